@@ -1,0 +1,271 @@
+"""Configuration as dataclasses: read YAML, build strictly, write back atomically."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import re
+import types
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+import yaml
+
+from .errors import ConfigError, PoiseError
+
+T = TypeVar("T")
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's safe loader, with ``1e-3`` read as a number and repeated keys refused."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
+        seen = set()
+        for key, _ in node.value:
+            if key.tag != "tag:yaml.org,2002:merge" and key.value in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key {key.value!r} occurs twice", key.start_mark
+                )
+            if isinstance(key.value, str):
+                seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+# YAML 1.1, which PyYAML follows, wants a dot and a signed exponent: 1e-3 would be a string.
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789")
+)
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?[0-9]*\.[0-9]+[eE][0-9]+$|^[-+]?[0-9]+\.[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
+)
+
+
+def read_yaml(path: str | Path) -> dict[str, Any]:
+    """The mapping in a YAML file.
+
+    Raises:
+        ConfigError: the file is missing, does not parse, or holds something else than a mapping.
+    """
+    try:
+        data = yaml.load(Path(path).read_bytes(), Loader=_Loader)
+    except OSError as error:
+        raise ConfigError(f"cannot be read ({error.strerror})", source=path) from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        raise ConfigError(f"not valid YAML: {place}{error.problem}", source=path) from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ConfigError(f"not valid YAML: {error}", source=path) from None
+    if not isinstance(data, dict):
+        found = "nothing" if data is None else type(data).__name__
+        raise ConfigError(f"must hold a mapping of fields, found {found}", source=path)
+    return data
+
+
+def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
+    """A dataclass instance from a mapping, strictly.
+
+    Fields may be bool, int, float, str, Path, Literal, Optional and other unions, tuple, list,
+    dict with string keys, Any, and dataclasses of these. An int is taken for a float; nothing else
+    is converted. A number must be finite. ``field(metadata={"min": 0, "max": 1, "above": 0})``
+    bounds a number (min and max inclusive, above exclusive), or each number of a tuple, list or
+    dict. A ValueError of ``__post_init__`` becomes a ConfigError.
+
+    Args:
+        cls: the dataclass.
+        data: field names and plain values, as YAML gives them.
+        source: the file, or another name of where data came from; errors begin with it.
+
+    Raises:
+        ConfigError: an unknown or missing field, a wrong type, a value out of range.
+    """
+    return _build(cls, data, str(source), "", {})
+
+
+def to_dict(obj: Any) -> Any:
+    """A dataclass as plain dicts, lists, strings and numbers; the inverse of :func:`build`."""
+    if dataclasses.is_dataclass(obj) and not isinstance(obj, type):
+        return {f.name: to_dict(getattr(obj, f.name)) for f in dataclasses.fields(obj) if f.init}
+    if isinstance(obj, dict):
+        return {key: to_dict(value) for key, value in obj.items()}
+    if isinstance(obj, (list, tuple)):
+        return [to_dict(value) for value in obj]
+    if isinstance(obj, (np.ndarray, np.generic)):
+        return obj.tolist()
+    return str(obj) if isinstance(obj, Path) else obj
+
+
+def to_yaml(obj: Any) -> str:
+    """YAML text of :func:`to_dict`, fields in their own order; :func:`read_yaml` reads it back."""
+    return yaml.safe_dump(to_dict(obj), sort_keys=False, allow_unicode=True, width=100)
+
+
+def packaged(kind: str) -> list[str]:
+    """Names of the packaged configurations of one kind: ``packaged("robots")``."""
+    folder = Path(str(files("poise.configs"))) / kind
+    return sorted(path.stem for path in folder.glob("*.yaml"))
+
+
+def resolve(kind: str, name: str | Path) -> Path:
+    """The YAML file of a packaged name (``humanoid``) or of a path to a ``.yaml`` file.
+
+    Args:
+        kind: folder of ``poise.configs``, such as ``robots`` or ``controllers``.
+        name: a packaged name, or a path with a folder or a suffix in it.
+
+    Raises:
+        ConfigError: there is no such name or file; its text lists the packaged names.
+    """
+    names = packaged(kind)
+    if str(name) in names:
+        return Path(str(files("poise.configs"))) / kind / f"{name}.yaml"
+    path = Path(name)
+    if path.suffix in (".yaml", ".yml") and path.is_file():
+        return path
+    problem = "no such file" if path.suffix or len(path.parts) > 1 else "no such name"
+    raise ConfigError(
+        f"{problem}: {str(name)!r}; give a path to a .yaml file or a packaged name",
+        field=kind,
+        choices=names,
+    )
+
+
+def write_atomic(path: str | Path, content: str | bytes) -> None:
+    """Write a file so that a reader, or a kill, sees the old content or the new, never a part.
+
+    Missing folders are made.
+
+    Raises:
+        PoiseError: the file cannot be written; the old content is then untouched.
+    """
+    path = Path(path)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(part, "wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except OSError as error:
+        raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:
+    """The value as the type hint wants it; `path` is the dotted field, `bounds` its metadata."""
+
+    def wrong(expected: str) -> ConfigError:
+        return ConfigError(f"must be {expected}, not {value!r}", source=source, field=path)
+
+    origin, args = get_origin(hint), get_args(hint)
+    if hint is Any:
+        return value
+    if dataclasses.is_dataclass(hint):
+        return _build_dataclass(hint, value, source, path)
+    if origin in (Union, types.UnionType):
+        return _build_union(args, value, source, path, bounds)
+    if origin is Literal:
+        if not any(value == arg and type(value) is type(arg) for arg in args):
+            raise ConfigError(f"unknown value {value!r}", source=source, field=path, choices=args)
+        return value
+    if origin in (tuple, list) or hint in (tuple, list):
+        if not isinstance(value, (list, tuple)):
+            raise wrong("a list")
+        kind = origin or hint
+        if kind is list or not args or args[-1] is Ellipsis:
+            hints = [args[0] if args else Any] * len(value)
+        elif len(args) != len(value):
+            raise wrong(f"a list of {len(args)}")
+        else:
+            hints = list(args)
+        pairs = zip(hints, value, strict=True)
+        return kind(_build(h, v, source, f"{path}[{i}]", bounds) for i, (h, v) in enumerate(pairs))
+    if origin is dict or hint is dict:
+        if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
+            raise wrong("a mapping with names as keys")
+        item = args[1] if args else Any
+        return {k: _build(item, v, source, f"{path}.{k}", bounds) for k, v in value.items()}
+    if hint in (int, float):
+        return _build_number(hint, value, source, path, bounds)
+    if hint is Path and isinstance(value, (str, Path)):
+        return Path(value)
+    if hint in (bool, str) and isinstance(value, hint):
+        return value
+    if hint in (type(None), None) and value is None:
+        return None
+    names = {bool: "true or false", str: "text", Path: "a path", type(None): "null"}
+    if hint not in names:
+        raise TypeError(f"{path}: config fields cannot have the type {hint}")
+    raise wrong(names[hint])
+
+
+def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
+    fields = {field.name: field for field in dataclasses.fields(cls) if field.init}
+    if not isinstance(data, dict):
+        raise ConfigError(
+            f"must be a mapping of fields, not {data!r}", source=source, field=path, choices=fields
+        )
+    prefix = f"{path}." if path else ""
+    for key in data:
+        if key not in fields:
+            raise ConfigError(
+                "unknown field", source=source, field=f"{prefix}{key}", choices=fields
+            )
+    hints = get_type_hints(cls)
+    values = {}
+    for name, field in fields.items():
+        if name in data:
+            values[name] = _build(hints[name], data[name], source, prefix + name, field.metadata)
+        elif field.default is field.default_factory is dataclasses.MISSING:
+            raise ConfigError("this field is missing", source=source, field=prefix + name)
+    try:
+        return cls(**values)
+    except ValueError as error:
+        raise ConfigError(str(error), source=source, field=path or None) from error
+
+
+def _build_union(args: tuple, value: Any, source: str, path: str, bounds: Any) -> Any:
+    if value is None and type(None) in args:
+        return None
+    options = [arg for arg in args if arg is not type(None)]
+    if isinstance(value, dict):  # then only the error of the dataclass helps
+        options = [arg for arg in options if dataclasses.is_dataclass(arg)] or options
+    errors = []
+    for option in options:
+        try:
+            return _build(option, value, source, path, bounds)
+        except ConfigError as error:
+            errors.append(error)
+    if len(errors) == 1:
+        raise errors[0]
+    message = ", or ".join(dict.fromkeys(error.message for error in errors))
+    raise ConfigError(message, source=source, field=path)
+
+
+def _build_number(kind: type, value: Any, source: str, path: str, bounds: Any) -> int | float:
+    def wrong(expected: str) -> ConfigError:
+        return ConfigError(f"must be {expected}, not {value!r}", source=source, field=path)
+
+    allowed = int if kind is int else (int, float)
+    if isinstance(value, bool) or not isinstance(value, allowed):
+        raise wrong("a whole number" if kind is int else "a number")
+    try:
+        number = kind(value)
+    except OverflowError:
+        raise wrong("a finite number") from None
+    if not math.isfinite(number):
+        raise wrong("a finite number")
+    if "min" in bounds and number < bounds["min"]:
+        raise wrong(f"at least {bounds['min']}")
+    if "max" in bounds and number > bounds["max"]:
+        raise wrong(f"at most {bounds['max']}")
+    if "above" in bounds and number <= bounds["above"]:
+        raise wrong(f"above {bounds['above']}")
+    return number

@@ -1,0 +1,15 @@
+"""Maps the top-level folders to the packages poise.*; everything else is in pyproject.toml."""
+
+from setuptools import find_packages, setup
+
+FOLDERS = ("envs", "baselines", "training", "configs")
+
+packages = ["poise"]
+for folder in FOLDERS:
+    packages.append(f"poise.{folder}")
+    packages += [f"poise.{folder}.{name}" for name in find_packages(folder)]
+
+setup(
+    packages=packages,
+    package_dir={"poise": "src/poise", **{f"poise.{folder}": folder for folder in FOLDERS}},
+)
