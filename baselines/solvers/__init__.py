@@ -1,0 +1,1 @@
+"""Dense QP solvers behind one interface."""
