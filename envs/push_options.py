@@ -1,0 +1,151 @@
+"""Pushes from what a caller wrote: dictionaries, lists, and magnitudes in several units."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from dataclasses import fields as dataclass_fields
+from typing import Any
+
+import numpy as np
+
+from .config import build
+from .errors import ConfigError
+from .pushes import Kick, Profile, Push, ankle_limit
+from .robot import Robot
+
+Margin = Callable[[float], float]  # direction [deg] → support margin δ(θ) [m]
+
+MAGNITUDES = ("impulse", "force", "specific_impulse", "ankle_fraction")
+PUSH_KEYS = (*(f.name for f in dataclass_fields(Push) if f.name != "impulse"), *MAGNITUDES)
+KICK_KEYS = tuple(f.name for f in dataclass_fields(Kick))
+DEFAULTS = {"start": 0.0, "duration": 0.1, "direction": 0.0}
+
+
+def body_names(robot: Robot) -> tuple[str, ...]:
+    """Bodies of the robot's own tree, the ones that can be pushed."""
+    model, root = robot.model, robot.root_body_id
+    return tuple(
+        model.body(i).name for i in range(root, model.nbody) if model.body_rootid[i] == root
+    )
+
+
+def pendulum_rate(robot: Robot) -> float:
+    """ω = √(g/z_c) of the standing robot [1/s]."""
+    return float(np.sqrt(np.linalg.norm(robot.model.opt.gravity) / robot.height_com))
+
+
+def to_impulse(
+    unit: str,
+    value: float,
+    robot: Robot,
+    direction: float,
+    duration: float,
+    profile: Profile,
+    margin: Margin | None = None,
+) -> float:
+    """Impulse J [N·s] of a push whose magnitude is given in `unit`.
+
+    impulse           J [N·s]
+    force             peak force F [N]: J = F T (square) or 2/π F T (half-sine)
+    specific_impulse  J/m [N·s/kg]
+    ankle_fraction    J/m over `ankle_limit` in that direction, for that duration and profile
+
+    Raises ConfigError for another unit, or when ankle_fraction has no `margin`.
+    """
+    if unit == "impulse":
+        return value
+    if unit == "force":
+        return value * duration * (1.0 if profile == "square" else 2.0 / np.pi)
+    if unit == "specific_impulse":
+        return value * robot.mass
+    if unit != "ankle_fraction":
+        raise ConfigError(f"unknown unit {unit!r}", field="unit", choices=MAGNITUDES)
+    if margin is None:
+        raise ConfigError("needs a support margin, which is not known here", field=unit)
+    limit = ankle_limit(pendulum_rate(robot), margin(direction), duration, profile)
+    return value * robot.mass * limit
+
+
+def parse_pushes(
+    value: Any, robot: Robot, margin: Margin | None = None, source: str = "push"
+) -> tuple[Push | Kick, ...]:
+    """Pushes from one dictionary, one Push or Kick, or a list of them; [] means none.
+
+    A push dictionary has the keys of `Push`, with exactly one magnitude among impulse [N·s],
+    force [N], specific_impulse [N·s/kg] and ankle_fraction; a dictionary with `delta_v` [m/s]
+    is a kick. Left out, body is the root body, start 0 s, duration 0.1 s, direction 0°.
+    `margin(direction)` gives δ(θ) [m] for ankle_fraction.
+
+    Raises ConfigError naming `source`, the field and the choices for an unknown key or body,
+    a wrong type, a value out of range or not finite, and no or several magnitudes.
+    """
+    if isinstance(value, (Mapping, Push, Kick)):
+        return (_parse_one(value, robot, margin, source),)
+    if isinstance(value, (list, tuple)):
+        return tuple(
+            _parse_one(item, robot, margin, f"{source}[{i}]") for i, item in enumerate(value)
+        )
+    raise ConfigError(
+        f"must be a mapping or a list of mappings, not {type(value).__name__}", source=source
+    )
+
+
+def _parse_one(item: Any, robot: Robot, margin: Margin | None, source: str) -> Push | Kick:
+    if isinstance(item, (Push, Kick)):
+        item = asdict(item)
+    if not isinstance(item, Mapping):
+        raise ConfigError(f"must be a mapping, not {type(item).__name__}", source=source)
+    data = {key: _plain(entry) for key, entry in item.items()}
+    if "delta_v" in data:
+        _check_keys(data, KICK_KEYS, source)
+        return build(Kick, {"start": 0.0, "direction": 0.0, **data}, source)
+
+    _check_keys(data, PUSH_KEYS, source)
+    units = [unit for unit in MAGNITUDES if unit in data]
+    if len(units) != 1:
+        problem = f"has {' and '.join(units)}" if units else "has no magnitude"
+        raise ConfigError(
+            f"{problem}; give exactly one",
+            source=source,
+            field="magnitude",
+            choices=(*MAGNITUDES, "delta_v"),
+        )
+    unit = units[0]
+    magnitude = data.pop(unit)
+    root = robot.model.body(robot.root_body_id).name
+    data = {"body": root, **DEFAULTS, **data, "impulse": 0.0}
+    push = build(Push, data, source)  # checks everything but the magnitude
+    _check_body(push.body, robot, source)
+    _check_magnitude(magnitude, source, unit)
+    impulse = to_impulse(
+        unit, float(magnitude), robot, push.direction, push.duration, push.profile, margin
+    )
+    return build(Push, {**data, "impulse": impulse}, source)
+
+
+def _plain(value: Any) -> Any:
+    """NumPy scalars and arrays as plain Python values."""
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
+
+
+def _check_keys(data: Mapping, known: tuple[str, ...], source: str) -> None:
+    for key in data:
+        if key not in known:
+            raise ConfigError("unknown key", source=source, field=str(key), choices=known)
+
+
+def _check_body(body: str, robot: Robot, source: str) -> None:
+    if body not in body_names(robot):
+        raise ConfigError(
+            f"no body {body!r} in robot {robot.name!r}",
+            source=source,
+            field="body",
+            choices=body_names(robot),
+        )
+
+
+def _check_magnitude(value: Any, source: str, unit: str) -> None:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not number or not np.isfinite(value) or value < 0.0:
+        raise ConfigError(
+            f"must be a finite number of at least 0, not {value!r}", source=source, field=unit
+        )
