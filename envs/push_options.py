@@ -1,8 +1,7 @@
 """Pushes from what a caller wrote: dictionaries, lists, and magnitudes in several units."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
-from dataclasses import fields as dataclass_fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -14,9 +13,20 @@ from .robot import Robot
 
 Margin = Callable[[float], float]  # direction [deg] → support margin δ(θ) [m]
 
-MAGNITUDES = ("impulse", "force", "specific_impulse", "ankle_fraction")
-PUSH_KEYS = (*(f.name for f in dataclass_fields(Push) if f.name != "impulse"), *MAGNITUDES)
-KICK_KEYS = tuple(f.name for f in dataclass_fields(Kick))
+
+@dataclass(frozen=True)
+class _Magnitude:
+    """The four ways to say how large a push is; one of them is given."""
+
+    impulse: float = field(default=0.0, metadata={"min": 0.0})
+    force: float = field(default=0.0, metadata={"min": 0.0})
+    specific_impulse: float = field(default=0.0, metadata={"min": 0.0})
+    ankle_fraction: float = field(default=0.0, metadata={"min": 0.0})
+
+
+MAGNITUDES = tuple(f.name for f in fields(_Magnitude))
+PUSH_KEYS = (*(f.name for f in fields(Push) if f.name != "impulse"), *MAGNITUDES)
+KICK_KEYS = tuple(f.name for f in fields(Kick))
 DEFAULTS = {"start": 0.0, "duration": 0.1, "direction": 0.0}
 
 
@@ -60,7 +70,7 @@ def to_impulse(
     if unit != "ankle_fraction":
         raise ConfigError(f"unknown unit {unit!r}", field="unit", choices=MAGNITUDES)
     if margin is None:
-        raise ConfigError("needs a support margin, which is not known here", field=unit)
+        raise ConfigError("needs a support margin, unknown here", field=unit)
     limit = ankle_limit(pendulum_rate(robot), margin(direction), duration, profile)
     return value * robot.mass * limit
 
@@ -114,11 +124,11 @@ def _parse_one(item: Any, robot: Robot, margin: Margin | None, source: str) -> P
     root = robot.model.body(robot.root_body_id).name
     data = {"body": root, **DEFAULTS, **data, "impulse": 0.0}
     push = build(Push, data, source)  # checks everything but the magnitude
-    _check_body(push.body, robot, source)
-    _check_magnitude(magnitude, source, unit)
-    impulse = to_impulse(
-        unit, float(magnitude), robot, push.direction, push.duration, push.profile, margin
-    )
+    check_body(push.body, robot, source)
+    value = getattr(build(_Magnitude, {unit: magnitude}, source), unit)
+    if unit == "ankle_fraction" and margin is None:
+        raise ConfigError("needs a support margin, unknown here", source=source, field=unit)
+    impulse = to_impulse(unit, value, robot, push.direction, push.duration, push.profile, margin)
     return build(Push, {**data, "impulse": impulse}, source)
 
 
@@ -133,19 +143,12 @@ def _check_keys(data: Mapping, known: tuple[str, ...], source: str) -> None:
             raise ConfigError("unknown key", source=source, field=str(key), choices=known)
 
 
-def _check_body(body: str, robot: Robot, source: str) -> None:
+def check_body(body: str, robot: Robot, source: str) -> None:
+    """Raise ConfigError, listing the robot's bodies, unless `body` is one of them."""
     if body not in body_names(robot):
         raise ConfigError(
             f"no body {body!r} in robot {robot.name!r}",
             source=source,
             field="body",
             choices=body_names(robot),
-        )
-
-
-def _check_magnitude(value: Any, source: str, unit: str) -> None:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not np.isfinite(value) or value < 0.0:
-        raise ConfigError(
-            f"must be a finite number of at least 0, not {value!r}", source=source, field=unit
         )
