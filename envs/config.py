@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-import re
 import types
 from importlib.resources import files
 from pathlib import Path
@@ -15,34 +14,9 @@ import numpy as np
 import yaml
 
 from .errors import ConfigError, PoiseError
+from .yaml_loader import Loader
 
 T = TypeVar("T")
-
-
-class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader, with ``1e-3`` read as a number and repeated keys refused."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
-        seen = set()
-        for key, _ in node.value:
-            if key.tag != "tag:yaml.org,2002:merge" and key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key.value!r} occurs twice", key.start_mark
-                )
-            if isinstance(key.value, str):
-                seen.add(key.value)
-        return super().construct_mapping(node, deep)
-
-
-# YAML 1.1, which PyYAML follows, wants a dot and a signed exponent: 1e-3 would be a string.
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789")
-)
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?[0-9]*\.[0-9]+[eE][0-9]+$|^[-+]?[0-9]+\.[eE][-+]?[0-9]+$"),
-    list("-+.0123456789"),
-)
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:
@@ -52,7 +26,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
         ConfigError: the file is missing, does not parse, or holds something else than a mapping.
     """
     try:
-        data = yaml.load(Path(path).read_bytes(), Loader=_Loader)
+        data = yaml.load(Path(path).read_bytes(), Loader=Loader)
     except OSError as error:
         raise ConfigError(f"cannot be read ({error.strerror})", source=path) from None
     except yaml.MarkedYAMLError as error:
@@ -234,19 +208,23 @@ def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
 def _build_union(args: tuple, value: Any, source: str, path: str, bounds: Any) -> Any:
     if value is None and type(None) in args:
         return None
-    options = [arg for arg in args if arg is not type(None)]
-    if isinstance(value, dict):  # then only the error of the dataclass helps
-        options = [arg for arg in options if dataclasses.is_dataclass(arg)] or options
     errors = []
-    for option in options:
-        try:
-            return _build(option, value, source, path, bounds)
-        except ConfigError as error:
-            errors.append(error)
-    if len(errors) == 1:
-        raise errors[0]
-    message = ", or ".join(dict.fromkeys(error.message for error in errors))
-    raise ConfigError(message, source=source, field=path)
+    for option in args:
+        if option is not type(None):
+            try:
+                return _build(option, value, source, path, bounds)
+            except ConfigError as error:
+                errors.append(error)
+    # An option that had the right shape failed inside: then only its error helps.
+    inside = [error for error in errors if error.field != path]
+    if inside or len(errors) == 1:
+        raise (inside or errors)[0]
+    raise ConfigError(
+        ", or ".join(dict.fromkeys(error.message for error in errors)),
+        source=source,
+        field=path,
+        choices=[choice for error in errors for choice in error.choices or ()] or None,
+    )
 
 
 def _build_number(kind: type, value: Any, source: str, path: str, bounds: Any) -> int | float:

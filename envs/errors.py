@@ -41,10 +41,3 @@ class ConfigError(PoiseError):
         if self.choices is not None:
             text += f" (choices: {', '.join(self.choices) or 'none'})"
         super().__init__(text)
-
-    def __reduce__(self):  # keyword-only arguments do not survive the default pickling
-        return _rebuild, (self.message, self.source, self.field, self.choices)
-
-
-def _rebuild(message, source, field, choices) -> ConfigError:
-    return ConfigError(message, source=source, field=field, choices=choices)

@@ -1,3 +1,32 @@
-"""Poise keeps a simulated humanoid on its feet while it is pushed."""
+"""Poise keeps a simulated humanoid on its feet while it is pushed.
+
+Importing it registers the environments ``poise/TorqueBalance-v0`` and ``poise/ResidualBalance-v0``
+with Gymnasium, and loads neither torch nor numba nor MuJoCo.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from gymnasium.envs.registration import register
+
+if TYPE_CHECKING:
+    from poise.training.policy import load_policy
 
 __version__ = "0.1.0"
+__all__ = ["__version__", "load_policy"]
+
+# No max_episode_steps: the environments end their episodes themselves, from their own config.
+register("poise/TorqueBalance-v0", entry_point="poise.envs.torque_balance:TorqueBalanceEnv")
+register(
+    "poise/ResidualBalance-v0",
+    entry_point="poise.baselines.residual_balance:ResidualBalanceEnv",
+)
+
+
+def __getattr__(name: str) -> Any:
+    if name == "load_policy":
+        from poise.training.policy import load_policy
+
+        return load_policy
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,40 @@
+"""Settings shared by all tests: one thread each, and an off-screen renderer."""
+
+from __future__ import annotations
+
+import ctypes.util
+import functools
+import os
+import sys
+
+import pytest
+
+# Set before any test imports NumPy, torch, MuJoCo or Matplotlib.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"  # small matrices lose time to threads, and sums may change their order
+os.environ.setdefault("MPLBACKEND", "Agg")
+if sys.platform == "linux":
+    off_screen = "osmesa" if ctypes.util.find_library("OSMesa") else "egl"
+    os.environ.setdefault("MUJOCO_GL", off_screen)
+
+
+@functools.cache
+def _rendering_problem() -> str | None:
+    """Why MuJoCo cannot draw off-screen here, or None if it can."""
+    import mujoco
+
+    try:
+        with mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 16, 16) as renderer:
+            renderer.render()
+    except Exception as error:  # every GL back end fails in its own way
+        back_end = os.environ.get("MUJOCO_GL", "default")
+        return f"MUJOCO_GL={back_end} cannot draw (Debian: install libosmesa6): {error!r}"
+    return None
+
+
+@pytest.fixture(scope="session")
+def can_render() -> None:
+    """Ask for this fixture in a test that draws: where no GL back end works, it is skipped."""
+    problem = _rendering_problem()
+    if problem:
+        pytest.skip(problem)
