@@ -1,0 +1,64 @@
+# make setup   .venv with everything in it (once; again when the requirements change)
+# make test    the tests                    make demo    the main job, with a table and plots
+# make check   format, lint and types       make format  put the format and imports right
+# make build   the wheel, tried alone       make bench   time the parts of a control tick
+# make clean   remove what was built (not .venv)
+#
+# PYTHON311 names another interpreter; PIP_ARGS and PYTEST_ARGS are passed on, as in
+# make test PYTEST_ARGS="-x tests/test_robot.py".
+
+PYTHON311 ?= $(shell command -v python3.11 || command -v python3)
+PIP_ARGS ?=
+PYTEST_ARGS ?=
+PYTHON := .venv/bin/python
+STAMP := .venv/.poise-setup
+
+.PHONY: setup test demo check format build bench clean types-tree
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml setup.py constraints.txt
+	$(PYTHON) -m pip --version >/dev/null 2>&1 || $(PYTHON311) -m venv .venv
+	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt setuptools
+	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt --no-build-isolation -e ".[dev]"
+	touch $@
+
+test: setup
+	$(PYTHON) -m pytest -q $(PYTEST_ARGS)
+
+demo: setup
+	.venv/bin/poise demo
+
+check: setup types-tree
+	.venv/bin/ruff format --check .
+	.venv/bin/ruff check .
+	$(PYTHON) -m mypy
+
+format: setup
+	.venv/bin/ruff check --fix .
+	.venv/bin/ruff format .
+
+# mypy cannot follow the map of folders to packages, so it gets the map as links.
+types-tree:
+	mkdir -p build/types/poise
+	for folder in envs baselines training configs; do \
+		ln -sfn ../../../$$folder build/types/poise/$$folder; done
+	ln -sf ../../../src/poise/__init__.py ../../../src/poise/py.typed build/types/poise/
+
+# The second environment holds the wheel alone; its dependencies are those of .venv, by a path
+# file, which does not bring the editable install with it.
+build: setup
+	rm -rf build/lib build/smoke dist
+	$(PYTHON) -m build -q --no-isolation
+	$(PYTHON) -m venv build/smoke
+	build/smoke/bin/python -m pip install -q --no-index --no-deps dist/poise-*.whl
+	$(PYTHON) -c "import sysconfig; print(sysconfig.get_path('purelib'))" \
+		> $$(build/smoke/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/main.pth
+	cd build/smoke && bin/python -P ../../tests/smoke.py && bin/poise --help >/dev/null
+	@ls dist
+
+bench: setup
+	$(PYTHON) -m tests.benchmarks
+
+clean:
+	rm -rf build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache
