@@ -29,6 +29,7 @@ class Settings:
     steps: int = field(default=1, metadata={"min": 1})
     fast: bool = False
     root: Literal["hard", "soft"] = "hard"
+    level: Literal[1, 2] = 1
     limit: float | None = None
     scale: tuple[float, float] = (0.2, 0.2)
     hidden: tuple[int, ...] = (128, 128)
@@ -39,6 +40,7 @@ class Settings:
     gain: float | dict[str, float] = 1.0
     file: Path = Path("model.xml")
     extra: Any = None
+    derived: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         if self.name == "nobody":
@@ -51,10 +53,11 @@ def make(**data: Any) -> Settings:
 
 FULL = {
     "name": "b",
-    "weights": {"com": 2.0, "posture": 3.0},
+    "weights": {"com": 2.0, "posture": 10.0},
     "steps": 4,
     "fast": True,
     "root": "soft",
+    "level": 2,
     "limit": 1.5,
     "scale": [0.1, 0.3],
     "hidden": [64],
@@ -73,10 +76,11 @@ def test_build_makes_every_kind_of_field() -> None:
     settings = build(Settings, FULL, "file.yaml")
     assert settings == Settings(
         name="b",
-        weights=Weights(2.0, 3.0),
+        weights=Weights(2.0, 10.0),
         steps=4,
         fast=True,
         root="soft",
+        level=2,
         limit=1.5,
         scale=(0.1, 0.3),
         hidden=(64,),
@@ -133,6 +137,8 @@ def test_an_int_is_taken_for_a_float_and_stays_exact() -> None:
         ({"name": 1}, "name: must be text, not 1"),
         ({"name": None}, "name: must be text, not None"),
         ({"root": "hrad"}, "root: unknown value 'hrad' (choices: hard, soft)"),
+        ({"level": True}, "level: unknown value True (choices: 1, 2)"),
+        ({"derived": 1}, "derived: unknown field"),
         ({"scale": [1, 2, 3]}, "scale: must be a list of 2"),
         ({"scale": 1}, "scale: must be a list, not 1"),
         ({"scale": [1, "x"]}, "scale[1]: must be a number, not 'x'"),
@@ -260,6 +266,15 @@ def test_write_atomic_makes_folders_and_replaces(tmp_path: Path) -> None:
     write_atomic(path, b"bytes")
     assert path.read_bytes() == b"bytes"
     assert os.listdir(path.parent) == ["file.txt"]
+
+
+def test_write_atomic_does_not_write_into_the_old_file(tmp_path: Path) -> None:
+    """The old file is replaced as a whole: another name for it keeps the old content."""
+    path, other = tmp_path / "file.txt", tmp_path / "other.txt"
+    write_atomic(path, "old")
+    os.link(path, other)
+    write_atomic(path, "new")
+    assert (path.read_text(), other.read_text()) == ("new", "old")
 
 
 def test_write_atomic_keeps_the_old_content_when_it_fails(tmp_path: Path, monkeypatch) -> None:
