@@ -15,11 +15,11 @@ from .factors import COMPILE, append, factorise, lift, padded, remove, solve_upp
 SOLVED, INFEASIBLE, ITERATION_LIMIT, INVALID = 0, 1, 2, 3
 
 FEASIBLE = 1e-11  # accepted violation of a scaled row, relative to ‖x‖
-ROUNDING = 1e-13  # the same, relative to ‖x‖ at the unconstrained minimum
+ROUNDING = 1e-13  # the same, relative to the unconstrained ‖x‖, before correction
 CONSISTENT = 1e-9  # the same as FEASIBLE, for a row that depends on the active rows
 DEPENDENT = 1e-20  # squared sine (in the metric of H⁻¹) below which a row depends on the active ones
 BLOCKS = 1e-13  # smallest multiplier direction that can block a step, relative to the largest
-CHECKS = 4  # times that a finished solution may be found wanting and taken up again
+CHECKS = 20  # times that a finished solution may be found wanting and taken up again
 
 
 @njit(**COMPILE)
@@ -97,11 +97,30 @@ def _most_violated(s, lower, upper, violation):
 
 
 @njit(**COMPILE)
-def _norm(x):
+def _size(x, start):
+    """‖x‖, and where x is all but zero a trace of ‖x‖ at the unconstrained minimum."""
     total = 0.0
     for j in range(x.shape[0]):
         total += x[j] * x[j]
-    return np.sqrt(total)
+    return np.sqrt(total) + 1e-9 * start
+
+
+@njit(**COMPILE)
+def _correct(Jt, Rt, Ct, q, active, sign, bound, x, start, e, z, s, product):
+    """Recomputes s from x and takes out of both what rounding has left on the active rows."""
+    for _ in range(3):
+        for i in range(s.shape[0]):
+            s[i] = 0.0
+        _advance(Ct, x, 1.0, s, product)
+        worst = 0.0
+        for k in range(q):
+            e[k] = bound[k] - sign[k] * s[active[k]]
+            worst = max(worst, abs(e[k]))
+        if worst <= 0.01 * FEASIBLE * _size(x, start):
+            break
+        lift(Jt, Rt, q, e, z)
+        for j in range(x.shape[0]):
+            x[j] += z[j]
 
 
 @njit(**COMPILE)
@@ -169,7 +188,7 @@ def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter):
     split(Jt, 0, normal, d, z)
     for j in range(n):
         x[j] = -z[j]
-    start = _norm(x)
+    start = _size(x, 0.0)
     if not start < np.inf:
         return INVALID
     for i in range(pm):
@@ -187,25 +206,14 @@ def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter):
         equality = row >= 0
         if not equality:
             row, violation = _most_violated(s, lower, upper, work)
-            tolerance = FEASIBLE * _norm(x) + ROUNDING * start
-            if violation <= tolerance:
-                # Finished, up to rounding. Correct x on the active rows and look again.
-                for i in range(pm):
-                    s[i] = 0.0
-                _advance(Ct, x, 1.0, s, work)
-                worst = 0.0
-                for k in range(q):
-                    r[k] = bound[k] - sign[k] * s[active[k]]
-                    worst = max(worst, abs(r[k]))
-                if worst > 0.1 * tolerance:
-                    lift(Jt, Rt, q, r, z)
-                    for j in range(n):
-                        x[j] += z[j]
-                    _advance(Ct, z, 1.0, s, work)
+            if violation <= FEASIBLE * _size(x, start) + ROUNDING * start:
+                # Finished, up to rounding. Correct x and look again, with the sharper tolerance.
+                _correct(Jt, Rt, Ct, q, active, sign, bound, x, start, r, z, s, work)
+                tolerance = FEASIBLE * _size(x, start)
                 if skipped:  # rows that followed from rows since dropped
                     for i in range(m):
                         low, high = l[i] * scale[i], u[i] * scale[i]
-                        if max(low - s[i], s[i] - high) > CONSISTENT * _norm(x):
+                        if max(low - s[i], s[i] - high) > CONSISTENT * _size(x, start):
                             lower[i], upper[i] = low, high
                 row, violation = _most_violated(s, lower, upper, work)
                 if violation <= tolerance:
@@ -230,7 +238,9 @@ def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter):
             violation = max(row_bound - side * s[row], 0.0)
             if dependent:
                 if blocking < 0:
-                    if violation > CONSISTENT * max(_norm(x), abs(row_bound)):
+                    _correct(Jt, Rt, Ct, q, active, sign, bound, x, start, r, z, s, work)
+                    violation = row_bound - side * s[row]
+                    if violation > CONSISTENT * max(_size(x, start), abs(row_bound)):
                         return INFEASIBLE
                     lower[row], upper[row] = -np.inf, np.inf
                     skipped = True
