@@ -1,0 +1,139 @@
+"""The ground plane of a robot's world, and the sensors that count contacts with it."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from .description import OptionDescription, RobotDescription
+from .errors import ConfigError
+
+GROUND = "ground"  # name of a plane that has none
+CONTACT_SENSOR = "contact_"  # prefix of the sensors' names
+ALL_BITS = 0x7FFFFFFF  # of contype and conaffinity: touches everything that collides
+INTEGRATORS = {
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
+}
+SOLVERS = {
+    "Newton": mujoco.mjtSolver.mjSOL_NEWTON,
+    "CG": mujoco.mjtSolver.mjSOL_CG,
+    "PGS": mujoco.mjtSolver.mjSOL_PGS,
+}
+
+
+def install_ground(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, name: str | None, source: str
+) -> str:
+    """The name of the ground plane, which is added where the model has no plane.
+
+    Args:
+        spec: changed in place.
+        model: the spec, compiled.
+        name: a plane of the model, or how to call a new one; None takes the model's first plane.
+        source: the description file, for errors.
+
+    Raises:
+        ConfigError: the model has planes but none with this name, or the plane is not z = 0.
+    """
+    planes = [
+        geom
+        for geom in spec.geoms
+        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE
+        and model.body_weldid[model.geom_bodyid[geom.id]] == 0
+        and (geom.contype or geom.conaffinity)
+    ]
+    if not planes:
+        _add_ground(spec, name or GROUND)
+        return name or GROUND
+    names = [geom.name for geom in planes]
+    if name is not None and name not in names:
+        raise ConfigError(
+            f"the model has no plane {name!r}", source=source, field="ground", choices=names
+        )
+    ground = planes[0 if name is None else names.index(name)]
+    ground.name = ground.name or GROUND
+    normal = np.zeros(3)
+    mujoco.mju_rotVecQuat(normal, np.array([0.0, 0.0, 1.0]), model.geom_quat[ground.id])
+    if model.geom_bodyid[ground.id] or model.geom_pos[ground.id, 2] or normal[2] < 1.0 - 1e-9:
+        raise ConfigError("the ground must be the plane z = 0", source=source, field="ground")
+    return ground.name
+
+
+def check_touches(
+    model: mujoco.MjModel, geom_ids: tuple[int, ...], ground: int, source: str, field: str
+) -> None:
+    """Raise ConfigError if a geom of a sole cannot touch the ground."""
+    pairs = {frozenset(p) for p in zip(model.pair_geom1, model.pair_geom2, strict=True)}
+    for geom in geom_ids:
+        masks = (
+            model.geom_contype[geom] & model.geom_conaffinity[ground]
+            or model.geom_contype[ground] & model.geom_conaffinity[geom]
+        )
+        if not masks and frozenset((geom, ground)) not in pairs:
+            raise ConfigError(
+                f"the geom {model.geom(geom).name or geom!r} does not collide with the ground "
+                f"{model.geom(ground).name!r} (contype, conaffinity)",
+                source=source,
+                field=field,
+            )
+
+
+def add_contact_sensors(spec: mujoco.MjSpec, description: RobotDescription, ground: str) -> None:
+    """Sensors of the number of contacts with the ground: of all bodies, and of each foot."""
+    found = [1, 0, 1]  # data: "found"; no reduction; one slot
+    spec.add_sensor(
+        name=f"{CONTACT_SENSOR}ground",
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_GEOM,
+        objname=ground,
+        intprm=found,
+    )
+    for foot in description.feet:
+        spec.add_sensor(
+            name=CONTACT_SENSOR + foot.name,
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_XBODY,  # the foot's whole subtree
+            objname=foot.body,
+            reftype=mujoco.mjtObj.mjOBJ_GEOM,
+            refname=ground,
+            intprm=found,
+        )
+
+
+def set_options(spec: mujoco.MjSpec, options: OptionDescription) -> None:
+    """Set time step, integrator, solver and friction; make room for rendered frames."""
+    spec.option.timestep = options.timestep
+    spec.option.integrator = INTEGRATORS[options.integrator]
+    spec.option.solver = SOLVERS[options.solver]
+    if options.friction is not None:
+        for geom in spec.geoms:
+            geom.friction[0] = options.friction
+        for pair in spec.pairs:
+            pair.friction[:2] = options.friction
+    picture = spec.visual.global_
+    picture.offwidth, picture.offheight = max(picture.offwidth, 1280), max(picture.offheight, 960)
+
+
+def _add_ground(spec: mujoco.MjSpec, name: str) -> None:
+    spec.add_texture(
+        name="poise_ground",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=[0.86, 0.86, 0.86],
+        rgb2=[0.76, 0.76, 0.76],
+        width=256,
+        height=256,
+    )
+    material = spec.add_material(name="poise_ground", texrepeat=[1, 1], texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "poise_ground"
+    spec.worldbody.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0, 0, 0.05],
+        contype=ALL_BITS,
+        conaffinity=ALL_BITS,
+        condim=3,
+        material="poise_ground",
+    )

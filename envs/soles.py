@@ -1,0 +1,225 @@
+"""Soles: the flat polygon on which a foot stands, found from its collision geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import mujoco
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from .errors import ConfigError
+
+FLATNESS = 0.005  # [m] a point of the foot this close to the sole plane belongs to the sole
+MAX_TILT = np.deg2rad(15.0)  # of a foot before levelling
+MIN_SPAN = 0.01  # [m] a sole that is narrower than this cannot bear a moment
+MAX_VERTICES = 8
+RIM_POINTS = 16  # by which the rim of a cylinder is sampled
+
+
+@dataclass(frozen=True)
+class Sole:
+    """A flat sole, fixed to a foot body.
+
+    Attributes:
+        name: the foot's name in the description.
+        body: name of the foot body; ``body_id`` is its index.
+        geom_ids: the collision geoms that make the sole.
+        position: (3,) reference point in the foot body's frame [m]: the polygon's centroid.
+        rotation: (3, 3) columns are the sole's axes in the foot body's frame. In the standing
+            posture x points to the robot's front, z up.
+        polygon: (k, 2) counter-clockwise vertices in the sole frame [m], 3 ≤ k ≤ 8.
+    """
+
+    name: str
+    body: str
+    body_id: int
+    geom_ids: tuple[int, ...]
+    position: np.ndarray
+    rotation: np.ndarray
+    polygon: np.ndarray
+
+    def __post_init__(self) -> None:
+        for array in (self.position, self.rotation, self.polygon):
+            array.setflags(write=False)
+
+
+@dataclass(frozen=True)
+class SolePlane:
+    """The plane a foot rests on, and the foot's points in it; all in the foot body's frame."""
+
+    normal: np.ndarray  # (3,) unit vector into the foot
+    points: np.ndarray  # (n, 3) [m], n ≥ 3
+
+
+def sole_geoms(
+    model: mujoco.MjModel, body_id: int, names: tuple[str, ...], source: str, field: str
+) -> tuple[int, ...]:
+    """The geoms of a sole: those named, or all collision geoms rigidly fixed to the foot body.
+
+    Raises:
+        ConfigError: a name is unknown, or there is no collision geometry.
+    """
+    rigid = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == body_id]
+    solid = [g for g in rigid if model.geom_contype[g] or model.geom_conaffinity[g]]
+    if names:
+        known = {model.geom(g).name: g for g in solid}
+        for name in names:
+            if name not in known:
+                raise ConfigError(
+                    f"{name!r} is no collision geom of the foot",
+                    source=source,
+                    field=field,
+                    choices=[key for key in known if key],
+                )
+        return tuple(known[name] for name in names)
+    if not solid:
+        raise ConfigError(
+            f"the foot {model.body(body_id).name!r} has no collision geometry",
+            source=source,
+            field=field,
+        )
+    return tuple(solid)
+
+
+def find_sole_plane(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    body_id: int,
+    geom_ids: tuple[int, ...],
+    source: str,
+    field: str,
+) -> SolePlane:
+    """The plane on which the foot would rest, near the horizontal in the present posture.
+
+    Raises:
+        ConfigError: the foot has no flat side, or is tilted by more than 15°.
+    """
+    rotation = data.xmat[body_id].reshape(3, 3)
+    down = -rotation[2]  # the world's down in the foot frame
+    tilt = 0.0
+    for _ in range(3):  # round geoms (spheres, capsules) move their lowest point with the direction
+        points = np.vstack([_lowest_points(model, data, g, body_id, down) for g in geom_ids])
+        facing = _mean_downward_normal(points, down)
+        if facing is None:
+            break
+        down = facing
+        tilt = float(np.arccos(np.clip(-rotation[2] @ down, -1.0, 1.0)))
+    points = np.vstack([_lowest_points(model, data, g, body_id, down) for g in geom_ids])
+    depth = points @ down
+    points = points[depth > depth.max() - FLATNESS]
+    spread = np.linalg.svd(points - points.mean(0), compute_uv=False) / np.sqrt(len(points))
+    if facing is None or len(points) < 3 or spread[1] < MIN_SPAN / 2 or tilt > MAX_TILT:
+        raise ConfigError(
+            f"the foot {model.body(body_id).name!r} does not stand flat in the standing posture "
+            f"(tilt {np.rad2deg(tilt):.1f}°, {len(points)} points on the ground)",
+            source=source,
+            field=field,
+        )
+    return SolePlane(normal=-down, points=points)
+
+
+def build_sole(
+    name: str,
+    body: str,
+    body_id: int,
+    geom_ids: tuple[int, ...],
+    plane: SolePlane,
+    xmat: np.ndarray,
+) -> Sole:
+    """The sole of a foot in the standing posture, the robot facing along the world's x axis.
+
+    Args:
+        name: the foot's name.
+        body: the foot body's name; ``body_id`` its index.
+        geom_ids: the sole's geoms.
+        plane: where the foot rests.
+        xmat: (9,) orientation of the foot body in the world, as MuJoCo keeps it.
+    """
+    rotation = xmat.reshape(3, 3).T.copy()  # the world's axes in the foot frame
+    points = plane.points @ rotation  # in the sole's axes, still about the foot body's origin
+    polygon = simplify(points[ConvexHull(points[:, :2]).vertices, :2], MAX_VERTICES)
+    centre = centroid(polygon)
+    position = rotation @ np.array([*centre, points[:, 2].min()])
+    return Sole(name, body, body_id, geom_ids, position, rotation, polygon - centre)
+
+
+def centroid(polygon: np.ndarray) -> np.ndarray:
+    """Centroid of the area of a polygon with vertices (k, 2)."""
+    shifted = polygon - polygon[0]
+    following = np.roll(shifted, -1, axis=0)
+    cross = shifted[:, 0] * following[:, 1] - shifted[:, 1] * following[:, 0]
+    return polygon[0] + cross @ (shifted + following) / (3.0 * cross.sum())
+
+
+def simplify(polygon: np.ndarray, count: int) -> np.ndarray:
+    """At most ``count`` of a convex polygon's vertices, dropping those that cost the least area.
+
+    What is left lies inside the given polygon.
+    """
+    polygon = polygon.copy()
+    while True:
+        back, ahead = polygon - np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0) - polygon
+        loss = back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0]  # twice the triangle's area
+        smallest = int(np.argmin(loss))
+        if len(polygon) <= count and loss[smallest] > 1e-9:  # [m²] less: on a straight edge
+            return polygon
+        polygon = np.delete(polygon, smallest, axis=0)
+
+
+def _lowest_points(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, body_id: int, down: np.ndarray
+) -> np.ndarray:
+    """(n, 3) points of the geom that can touch a plane whose downward normal is ``down``.
+
+    In the frame of the foot body, as ``down`` is.
+    """
+    to_foot = data.xmat[body_id].reshape(3, 3).T
+    axes = to_foot @ data.geom_xmat[geom].reshape(3, 3)
+    origin = to_foot @ (data.geom_xpos[geom] - data.xpos[body_id])
+    size, kind = model.geom_size[geom], mujoco.mjtGeom(int(model.geom_type[geom]))
+    below = axes.T @ down  # in the geom's frame, as all that follows
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        local = size[0] * below[None]
+    elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        ends = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]])
+        local = ends + size[0] * below
+    elif kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        local = (size**2 * below / np.linalg.norm(size * below))[None]
+    elif kind == mujoco.mjtGeom.mjGEOM_BOX:
+        local = np.array(list(product((-1, 1), repeat=3))) * size
+    elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        angles = np.arange(RIM_POINTS) * (2 * np.pi / RIM_POINTS)
+        rim = size[0] * np.column_stack([np.cos(angles), np.sin(angles)])
+        local = np.vstack(
+            [np.column_stack([rim, np.full(RIM_POINTS, z)]) for z in (-size[1], size[1])]
+        )
+    elif kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        first = model.mesh_vertadr[mesh]
+        local = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
+    else:
+        raise ConfigError(f"a sole cannot be made of the geom type {kind.name}")
+    return origin + local @ axes.T
+
+
+def _mean_downward_normal(points: np.ndarray, down: np.ndarray) -> np.ndarray | None:
+    """Area-weighted mean of the outward normals of the points' hull that are near ``down``.
+
+    None if the points lie on a line, or no side of the hull faces down.
+    """
+    above = points.mean(0) - np.ptp(points, axis=0).max() * down  # gives flat point sets a volume
+    try:
+        hull = ConvexHull(np.vstack([points, above]))
+    except QhullError:
+        return None
+    normals = hull.equations[:, :3]
+    facets = hull.points[hull.simplices]
+    cross = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
+    areas = np.linalg.norm(cross, axis=1)
+    near = normals @ down > np.cos(MAX_TILT)
+    if not near.any():
+        return None
+    mean = areas[near] @ normals[near]
+    return mean / np.linalg.norm(mean)
