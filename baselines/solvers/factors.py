@@ -9,26 +9,19 @@ with zeros to p, a multiple of 8: every inner loop has unit stride and no remain
 """
 
 import numpy as np
-from numba import njit
 
-# NaN and infinity keep their meaning: no "nnan", no "ninf".
-COMPILE = {
-    "nogil": True,
-    "cache": True,
-    "error_model": "numpy",
-    "fastmath": {"contract", "reassoc", "nsz", "arcp"},
-}
+from poise.envs.jit import compiled
 
 SMALLEST_PIVOT = 1e-14  # of H, relative to its diagonal entry
 
 
-@njit(**COMPILE)
+@compiled
 def padded(k):
     """The next multiple of 8."""
     return (k + 7) // 8 * 8
 
 
-@njit(**COMPILE)
+@compiled
 def factorise(H, Jt):
     """Jt ← L⁻¹ with H = LLᵀ; returns trace(H⁻¹) = ‖J‖², or −1 if H is not positive definite.
 
@@ -75,7 +68,7 @@ def factorise(H, Jt):
     return trace if trace < np.inf else -1.0
 
 
-@njit(**COMPILE)
+@compiled
 def _finish_row(Jt, k, scale):
     for j in range(k + 1):
         Jt[k, j] *= scale
@@ -83,7 +76,7 @@ def _finish_row(Jt, k, scale):
         Jt[k, j] = 0.0
 
 
-@njit(**COMPILE)
+@compiled
 def split(Jt, q, normal, d, z):
     """d = Jᵀn and z = J₂d₂; returns ‖d₂‖² (= nᵀz) and ‖d‖²."""
     n, p = Jt.shape
@@ -104,7 +97,7 @@ def split(Jt, q, normal, d, z):
     return free, free + active
 
 
-@njit(**COMPILE)
+@compiled
 def solve_upper(Rt, q, d, r):
     """r = R⁻¹d₁."""
     for j in range(q):
@@ -116,7 +109,7 @@ def solve_upper(Rt, q, d, r):
             r[i] -= value * Rt[j, i]
 
 
-@njit(**COMPILE)
+@compiled
 def lift(Jt, Rt, q, e, z):
     """z = J₁R⁻ᵀe, the smallest step (in the metric of H) with Nᵀz = e; e is overwritten."""
     p = Jt.shape[1]
@@ -131,7 +124,7 @@ def lift(Jt, Rt, q, e, z):
             z[j] += e[k] * Jt[k, j]
 
 
-@njit(**COMPILE)
+@compiled
 def append(Jt, Rt, q, d, z, free):
     """Adds the row that gave d, z and free = ‖d₂‖²; d and z are overwritten.
 
@@ -153,7 +146,7 @@ def append(Jt, Rt, q, d, z, free):
             Jt[i, j] -= factor * z[j]
 
 
-@njit(**COMPILE)
+@compiled
 def remove(Jt, Rt, q, k):
     """Deletes column k of R; rotations of neighbouring rows of Jᵀ make R triangular again."""
     p = Jt.shape[1]
