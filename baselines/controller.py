@@ -1,0 +1,65 @@
+"""What every controller is: state and targets in, joint torques out."""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from poise.envs.robot import Robot
+from poise.envs.state import RobotState
+
+from .reduced_qp import TargetArrays
+
+
+@dataclass
+class Targets:
+    """References of one tick, world axes; nj = nv−6 joints.
+
+    Writing into the arrays changes what the controller sees at its next tick.
+    """
+
+    q_ref: np.ndarray  #: (nj,) joint positions [rad]
+    v_ref: np.ndarray  #: (nj,) [rad/s]
+    a_ref: np.ndarray  #: (nj,) [rad/s²]
+    root_axes: np.ndarray  #: (3, 3) root orientation
+    com: np.ndarray  #: (3,) c_ref [m]
+    root_vel: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: [rad/s], body axes
+    root_acc: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: [rad/s²], body axes
+    com_vel: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: ċ_ref [m/s]
+    com_acc: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: c̈_ref [m/s²]
+    cop: np.ndarray = field(default_factory=lambda: np.zeros(2))  #: p_ref [m]
+
+    @classmethod
+    def standing(cls, robot: Robot, state: RobotState) -> "Targets":
+        """Standing posture, CoM and CoP over the middle of the soles, facing their heading."""
+        arrays = state.robot
+        cos, sin = state.heading
+        yaw = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        nj = len(robot.joint_names)
+        return cls(
+            q_ref=arrays.q_standing.copy(),
+            v_ref=np.zeros(nj),
+            a_ref=np.zeros(nj),
+            root_axes=yaw @ arrays.root_standing,
+            com=state.origin + np.array([0.0, 0.0, robot.height_com]),
+            cop=state.origin[:2].copy(),
+        )
+
+    def arrays(self) -> TargetArrays:
+        """The same arrays, not copies, for compiled code."""
+        return TargetArrays(
+            self.q_ref, self.v_ref, self.a_ref, self.root_axes, self.root_vel, self.root_acc,
+            self.com, self.com_vel, self.com_acc, self.cop,
+        )  # fmt: skip
+
+
+class Controller(Protocol):
+    """A balance controller. It knows no environment and never sees a push."""
+
+    period: float  #: seconds between two calls of `torques`
+
+    def reset(self, state: RobotState) -> None:
+        """Forget everything; a new trial starts at `state`."""
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] to hold for one `period`."""

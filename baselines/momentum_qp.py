@@ -1,0 +1,186 @@
+"""The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
+
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from poise.envs.arrays import RobotArrays, robot_arrays
+from poise.envs.jit import compiled
+from poise.envs.kinematics import StateArrays
+from poise.envs.robot import Robot
+from poise.envs.state import RobotState
+
+from .controller import Targets
+from .parameters import qp_parameters
+from .reduced_qp import (
+    QPParameters,
+    TargetArrays,
+    Workspace,
+    allocate_workspace,
+    assemble,
+    recover,
+)
+from .solvers import QP, make_solver
+from .solvers.dual_active_set import solve_dual
+from .tasks import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
+
+COMPILED_SOLVER = "active-set"
+MAX_ITERATIONS = 200
+
+
+@dataclass(frozen=True)
+class MomentumQPConfig:
+    """Tasks, contacts, limits and how they are solved [Macchietto09, Moskalev24 §2].
+
+    `root`: "hard" lets nothing but the ground push the root (physics); "soft" adds a penalised
+    wrench u_root on it (a game character that must not fail).
+    """
+
+    kind: Literal["momentum-qp"] = "momentum-qp"
+    period: float = field(default=0.004, metadata={"above": 0.0, "max": 0.05})  # [s]
+    solver: str = COMPILED_SOLVER
+    solver_options: dict[str, float] = field(default_factory=dict)
+    root: Literal["hard", "soft"] = "hard"
+    root_weight: float = field(default=1e3, metadata={"above": 0.0})
+    posture: PostureTask = field(default_factory=PostureTask)
+    com: CoMTask = field(default_factory=CoMTask)
+    cop: CoPTask = field(default_factory=CoPTask)
+    contact: SoleContact = field(default_factory=SoleContact)
+    torque: TorqueLimit = field(default_factory=TorqueLimit)
+    joint: JointLimit = field(default_factory=JointLimit)
+
+
+class Memory(NamedTuple):
+    """What outlives a tick: the torques to fall back on and the count of failures."""
+
+    torques: np.ndarray  # (nj,) of the last solved tick [N·m]
+    damping: np.ndarray  # (nj,) joint-space damping to fall back on [N·m·s/rad]
+    streak: np.ndarray  # (1,) int: failures since then
+    failures: np.ndarray  # (1,) int: failures since the reset
+
+
+FALLBACK_DECAY = 0.8  # per tick: share that the last good torques keep
+FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the whole torque limit
+
+
+@compiled
+def accept(s: StateArrays, p: QPParameters, status: int, ws: Workspace, memory: Memory):
+    """Torques from a solved QP; otherwise the last good ones, blended into damping."""
+    if status == 0:
+        recover(s, p, ws)
+        if np.all(np.isfinite(ws.tau)):
+            memory.torques[:] = ws.tau
+            memory.streak[0] = 0
+            return
+    memory.streak[0] += 1
+    memory.failures[0] += 1
+    keep = FALLBACK_DECAY ** memory.streak[0]
+    ws.root_wrench[:] = 0.0
+    for a in range(ws.tau.shape[0]):
+        torque = keep * memory.torques[a] - (1.0 - keep) * memory.damping[a] * s.qvel[6 + a]
+        ws.tau[a] = min(max(torque, -p.torque_limit[a]), p.torque_limit[a])
+
+
+@compiled
+def momentum_tick(
+    robot: RobotArrays,
+    s: StateArrays,
+    p: QPParameters,
+    t: TargetArrays,
+    period: float,
+    ws: Workspace,
+    memory: Memory,
+):
+    """One control tick with the compiled solver: `ws.tau` (nj,) holds the torques."""
+    assemble(robot, s, p, t, period, ws)
+    status = solve_dual(
+        ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS
+    )
+    accept(s, p, status, ws, memory)
+
+
+class MomentumQP:
+    """Tracks a posture, the CoM through linear and the CoP through angular momentum.
+
+    `torques` solves the reduced problem of `reduced_qp.py`, whose readable form is
+    `formulation.py`. After a call, `vdot`, `wrenches`, `root_wrench` and `failures` tell what was
+    found. Raises ConfigError for an unknown solver or solver option.
+    """
+
+    def __init__(self, robot: Robot, config: MomentumQPConfig | None = None):
+        self.robot = robot
+        self.config = config or MomentumQPConfig()
+        self.period = self.config.period
+        self.arrays = robot_arrays(robot)
+        self.parameters = qp_parameters(robot, self.arrays, self.config)
+        self.workspace = allocate_workspace(
+            robot.model.nv,
+            len(robot.soles),
+            self.parameters.cone.shape[1],
+            self.config.root == "soft",
+        )
+        limit = self.parameters.torque_limit
+        self.memory = Memory(
+            torques=np.zeros(len(limit)),
+            damping=limit / FALLBACK_SPEED,
+            streak=np.zeros(1, dtype=np.int64),
+            failures=np.zeros(1, dtype=np.int64),
+        )
+        self.com_offset = self.config.com.offset * robot.height_com
+        self.solver = None
+        if self.config.solver != COMPILED_SOLVER or self.config.solver_options:
+            self.solver = make_solver(self.config.solver, **self.config.solver_options)
+        self._motor_joints = self.arrays.motor_dofs - 6
+
+    @property
+    def failures(self) -> int:
+        """Ticks since the reset at which the QP was not solved."""
+        return int(self.memory.failures[0])
+
+    @property
+    def vdot(self) -> np.ndarray:
+        """(nv,) accelerations of the last solution."""
+        return self.workspace.vdot.copy()
+
+    @property
+    def wrenches(self) -> np.ndarray:
+        """(6 nc,) sole wrenches of the last solution, world axes, at the sole points."""
+        return self.workspace.wrenches.copy()
+
+    @property
+    def root_wrench(self) -> np.ndarray:
+        """(6,) u_root of the last solution: force and moment about the CoM; soft root only."""
+        return self.workspace.root_wrench.copy()
+
+    def reset(self, state: RobotState | None = None) -> None:
+        """Forget the last trial."""
+        self.memory.torques[:] = 0.0
+        self.memory.streak[0] = self.memory.failures[0] = 0
+        self.workspace.cop_prev[:] = np.nan
+        self.workspace.tau[:] = 0.0
+        self.workspace.root_wrench[:] = 0.0
+        if self.solver is not None:
+            self.solver.reset()
+
+    def problem(self, state: RobotState, targets: Targets) -> QP:
+        """The reduced QP of this state: pure, nothing is solved or remembered."""
+        ws = self.workspace
+        before = ws.cop_prev.copy()
+        assemble(self.arrays, state.arrays, self.parameters, targets.arrays(), self.period, ws)
+        ws.cop_prev[:] = before
+        return QP(ws.H.copy(), ws.g.copy(), ws.C.copy(), ws.l.copy(), ws.u.copy())
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] for the next `period`."""
+        arguments = (self.arrays, state.arrays, self.parameters, targets.arrays(), self.period)
+        ws = self.workspace
+        if self.solver is None:
+            momentum_tick(*arguments, ws, self.memory)
+        else:
+            assemble(*arguments, ws)
+            solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
+            if solution.solved:
+                ws.x[:] = solution.x
+            accept(state.arrays, self.parameters, 0 if solution.solved else 1, ws, self.memory)
+        return ws.tau[self._motor_joints].copy()

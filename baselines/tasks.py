@@ -1,0 +1,92 @@
+"""What the momentum QP is asked for and what it must respect; all costs and gains are numbers
+without units, so that one set serves every robot.
+
+Accelerations are measured in g (linear) and g/h (angular, h the CoM's standing height), forces
+in m g, moments in m g h; a stiffness of 1 is ω² = g/h and a damping of 1 is ω.
+"""
+
+from dataclasses import dataclass, field
+
+
+def _at_least(minimum: float, default: float):
+    return field(default=default, metadata={"min": minimum})
+
+
+def _above(bound: float, default: float):
+    return field(default=default, metadata={"above": bound})
+
+
+@dataclass(frozen=True)
+class PostureTask:
+    """h_t = ‖v̇ − (a_ref + k_t (q_ref ⊖ q) + d_t (v_ref − v))‖², weights per kind of joint.
+
+    Joints are told apart by what they carry: legs move one sole, the trunk moves several, the
+    rest (arms, head) none. Damping is d_t = 2 ζ √k_t.
+    """
+
+    leg_weight: float = _above(0.0, 1.0)
+    trunk_weight: float = _above(0.0, 1.0)
+    free_weight: float = _above(0.0, 1.0)
+    root_weight: float = _at_least(0.0, 1.0)  # orientation of the root
+    stiffness: float = _at_least(0.0, 2.5)
+    free_stiffness: float = _at_least(0.0, 2.5)
+    root_stiffness: float = _at_least(0.0, 2.5)
+    damping_ratio: float = _at_least(0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class CoMTask:
+    """h_c = ‖A_P v̇ + Ȧ_P v − Ṗ_des‖², Ṗ_des = m (c̈_ref + s_c (c_ref − c) + d_c (ċ_ref − ċ)).
+
+    `offset` moves the default c_ref and p_ref forward of the middle of the soles, in h.
+    """
+
+    weight: float = _at_least(0.0, 3600.0)
+    height_weight: float = _at_least(0.0, 3600.0)
+    stiffness: float = _at_least(0.0, 3.0)
+    height_stiffness: float = _at_least(0.0, 3.0)
+    damping_ratio: float = _at_least(0.0, 1.0)
+    offset: float = field(default=0.0, metadata={"min": -0.2, "max": 0.2})
+
+
+@dataclass(frozen=True)
+class CoPTask:
+    """h_p = ‖A_L v̇ + Ȧ_L v − L̇_des‖², L̇_des = (p_des − c) × (Ṗ_des − m g) − k_L L.
+
+    p_des integrates p̈_des = −s_p (p − p_ref) − d_p ṗ over `horizon` from the measured p.
+    """
+
+    weight: float = _at_least(0.0, 0.1)
+    yaw_weight: float = _at_least(0.0, 0.1)
+    stiffness: float = _at_least(0.0, 20.0)
+    damping: float = _at_least(0.0, 2.0)
+    horizon: float = _above(0.0, 0.05)  # in 1/ω
+    angular_damping: float = _at_least(0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class SoleContact:
+    """J v̇ + J̇ v = −k_v J v; wrenches inside a share of the real cone, and small."""
+
+    damping: float = _at_least(0.0, 5.0)
+    friction_share: float = field(default=0.9, metadata={"above": 0.0, "max": 1.0})
+    polygon_share: float = field(default=0.95, metadata={"above": 0.0, "max": 1.0})
+    force_weight: float = _above(0.0, 1e-3)
+    moment_weight: float = _above(0.0, 1e-3)
+
+
+@dataclass(frozen=True)
+class TorqueLimit:
+    """|τ| ≤ `share` · τ_max, and a cost on τ."""
+
+    share: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})
+    weight: float = _at_least(0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class JointLimit:
+    """v̇ may be what still lets a joint stop before its limit, braking with `brake`."""
+
+    brake: float = _above(0.0, 4.0)
+    horizon: float = _above(0.0, 0.1)  # in 1/ω
+    floor: float = _above(0.0, 20.0)

@@ -1,0 +1,134 @@
+"""The observation: what balance is about, in the heading frame, divided by known scales."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .arrays import RobotArrays
+from .jit import compiled
+from .kinematics import StateArrays
+
+
+class Scales(NamedTuple):
+    """What the observation and the reward are measured in."""
+
+    support_x: float  #: half length of the standing support polygon [m]
+    support_y: float  #: half width [m]
+    height: float  #: CoM height of the standing posture [m]
+    velocity: float  #: 0.2 ω h [m/s]
+    momentum: float  #: 0.1 m h² ω [N·m·s]
+    omega: float  #: ω = √(g/h) [1/s]
+    weight: float  #: m g [N]
+
+
+def scales(robot: RobotArrays, support: np.ndarray) -> Scales:
+    """Scales of a robot whose standing support polygon is `support` (k, 2), heading frame [m]."""
+    omega = float(np.sqrt(robot.gravity / robot.height_com))
+    half = 0.5 * (support.max(axis=0) - support.min(axis=0))
+    return Scales(
+        support_x=float(half[0]),
+        support_y=float(half[1]),
+        height=robot.height_com,
+        velocity=0.2 * omega * robot.height_com,
+        momentum=0.1 * robot.mass * robot.height_com**2 * omega,
+        omega=omega,
+        weight=robot.mass * robot.gravity,
+    )
+
+
+@dataclass(frozen=True)
+class Term:
+    """One named part of the observation vector."""
+
+    name: str
+    size: int
+    unit: str
+    meaning: str
+
+
+def observation_terms(joints: Sequence[str], soles: Sequence[str], actions: int) -> list[Term]:
+    """The parts of the observation, in order; `observe` fills them."""
+    nj, nc = len(joints), len(soles)
+    return [
+        Term("com", 2, "support half extents", "CoM minus the middle of the soles, x and y"),
+        Term("com_height", 1, "0.1 h", "CoM height minus its standing value"),
+        Term("capture_point", 2, "support half extents", "ξ minus the middle of the soles"),
+        Term("cop", 2, "support half extents", "centre of pressure minus the middle of the soles"),
+        Term("com_vel", 3, "0.2 ω h", "CoM velocity"),
+        Term("angular_momentum", 3, "0.1 m h² ω", "angular momentum about the CoM"),
+        Term("gravity", 3, "1", "direction of gravity in the root's frame"),
+        Term("root_rate", 3, "ω", "angular velocity of the root, body axes"),
+        Term("load", 1, "m g", "vertical force of the ground minus the weight"),
+        Term("joint_pos", nj, "rad", "joint positions minus the reference"),
+        Term("joint_vel", nj, "3 ω", "joint velocities minus the reference's"),
+        Term("contacts", nc, "1", "1 where a foot touches the ground, else 0"),
+        Term("last_action", actions, "1", "the action of the step before"),
+    ]
+
+
+def observation_table(terms: Sequence[Term]) -> str:
+    """The terms as a table of indices for a docstring."""
+    rows = ["| index | term | unit | meaning |", "| --- | --- | --- | --- |"]
+    start = 0
+    for term in terms:
+        last = start + term.size - 1
+        index = f"{start}" if term.size == 1 else f"{start}–{last}"
+        rows.append(f"| {index} | {term.name} | {term.unit} | {term.meaning} |")
+        start += term.size
+    return "\n".join(rows)
+
+
+@compiled
+def observe(
+    robot: RobotArrays,
+    s: StateArrays,
+    scale: Scales,
+    q_ref: np.ndarray,
+    v_ref: np.ndarray,
+    last_action: np.ndarray,
+    out: np.ndarray,
+):
+    """Fill `out` with the terms of `observation_terms`, in that order, clipped to ±10."""
+    cos, sin = s.heading[0], s.heading[1]
+    ox, oy = s.origin[0], s.origin[1]
+    k = 0
+    for which in range(4):
+        if which == 0:
+            x, y = s.com[0] - ox, s.com[1] - oy
+        elif which == 1:
+            out[k] = (s.com[2] - s.origin[2] - scale.height) / (0.1 * scale.height)
+            k += 1
+            continue
+        elif which == 2:
+            x, y = s.capture_point[0] - ox, s.capture_point[1] - oy
+        else:
+            x, y = s.cop[0] - ox, s.cop[1] - oy
+        out[k] = (cos * x + sin * y) / scale.support_x
+        out[k + 1] = (cos * y - sin * x) / scale.support_y
+        k += 2
+    out[k] = (cos * s.com_vel[0] + sin * s.com_vel[1]) / scale.velocity
+    out[k + 1] = (cos * s.com_vel[1] - sin * s.com_vel[0]) / scale.velocity
+    out[k + 2] = s.com_vel[2] / scale.velocity
+    out[k + 3] = (cos * s.momentum[3] + sin * s.momentum[4]) / scale.momentum
+    out[k + 4] = (cos * s.momentum[4] - sin * s.momentum[3]) / scale.momentum
+    out[k + 5] = s.momentum[5] / scale.momentum
+    k += 6
+    for a in range(3):
+        out[k + a] = -s.root_axes[2, a]
+        out[k + 3 + a] = s.qvel[3 + a] / scale.omega
+    out[k + 6] = s.contact_wrench[2] / scale.weight - 1.0
+    k += 7
+    nj = q_ref.shape[0]
+    for j in range(nj):
+        out[k + j] = s.qpos[7 + j] - q_ref[j]
+        out[k + nj + j] = (s.qvel[6 + j] - v_ref[j]) / (3.0 * scale.omega)
+    k += 2 * nj
+    for i in range(s.contacts.shape[0]):
+        out[k + i] = s.contacts[i]
+    k += s.contacts.shape[0]
+    for a in range(last_action.shape[0]):
+        out[k + a] = last_action[a]
+    for i in range(out.shape[0]):
+        out[i] = min(max(out[i], -10.0), 10.0)

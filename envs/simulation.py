@@ -1,0 +1,91 @@
+"""One simulated robot: MuJoCo data, its compiled views, its pushes and its clock."""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from .arrays import Plant, RobotArrays, plant_views, robot_arrays
+from .jit import compiled
+from .kinematics import allocate_state, update_state
+from .native import mj_step1, mj_step2
+from .pushes import TABLE_COLUMNS, Kick, Push, apply_kicks, apply_pushes, pack
+from .robot import Robot
+from .state import RobotState
+
+
+@compiled
+def advance(robot: RobotArrays, plant: Plant, pushes: np.ndarray, clock: np.ndarray):
+    """One physics step with the controls in `plant.ctrl`.
+
+    Enters and leaves with the position and velocity stages current, so whoever reads the state
+    needs no second pass. `clock` (1,) counts steps since the reset.
+    """
+    dt = robot.timestep
+    t = clock[0] * dt
+    plant.xfrc_applied[:, :] = 0.0
+    apply_pushes(pushes, t, dt, plant.xfrc_applied, plant.xmat)
+    mj_step2(plant.model_address, plant.data_address)
+    apply_kicks(pushes, t, dt, plant.qvel)
+    clock[0] += 1
+    mj_step1(plant.model_address, plant.data_address)
+
+
+class Simulation:
+    """A robot on flat ground. `state` is current after `reset` and after every `step`."""
+
+    def __init__(self, robot: Robot):
+        self.robot = robot
+        self.model = robot.model
+        self.data = mujoco.MjData(robot.model)
+        self.arrays = robot_arrays(robot)
+        self.plant = plant_views(robot.model, self.data)
+        self.state_arrays = allocate_state(robot.model.nv, len(robot.soles))
+        self.clock = np.zeros(1, dtype=np.int64)
+        self.pushes: tuple[Push | Kick, ...] = ()
+        self.push_table = np.zeros((0, TABLE_COLUMNS))
+        self.reset()
+
+    @property
+    def time(self) -> float:
+        """Seconds since the reset."""
+        return float(self.clock[0] * self.arrays.timestep)
+
+    @property
+    def state(self) -> RobotState:
+        """The current state; its arrays are overwritten by the next step."""
+        return RobotState(self.arrays, self.state_arrays, self.time)
+
+    def reset(
+        self,
+        qpos: np.ndarray | None = None,
+        qvel: np.ndarray | None = None,
+        pushes: Sequence[Push | Kick] = (),
+    ) -> RobotState:
+        """Start anew from `qpos` (nq,) and `qvel` (nv,): by default standing, at rest.
+
+        Push directions are relative to the heading at this moment.
+        """
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = self.robot.standing_qpos if qpos is None else qpos
+        if qvel is not None:
+            self.data.qvel[:] = qvel
+        mujoco.mj_normalizeQuat(self.model, self.data.qpos)
+        mujoco.mj_forward(self.model, self.data)
+        self.clock[0] = 0
+        update_state(self.arrays, self.plant, self.state_arrays)
+        self.set_pushes(pushes)
+        return self.state
+
+    def set_pushes(self, pushes: Sequence[Push | Kick]) -> None:
+        """Replace the schedule; starts are seconds since the reset."""
+        self.pushes = tuple(pushes)
+        self.push_table = pack(self.pushes, self.robot, self.state.heading_yaw)
+
+    def step(self, torques: np.ndarray, count: int = 1) -> RobotState:
+        """Apply joint torques (nu,) [N·m] for `count` physics steps."""
+        self.plant.ctrl[:] = torques
+        for _ in range(count):
+            advance(self.arrays, self.plant, self.push_table, self.clock)
+        update_state(self.arrays, self.plant, self.state_arrays)
+        return self.state
