@@ -87,6 +87,10 @@ class RobotDescription:
         feet: the two feet.
         posture: the standing posture.
         forward: the robot's forward direction in the root body's frame.
+        roles: what reference motions move: role, such as ``knees`` → joint name or pattern → scale,
+            so that +1 degree of the role turns the joint by ``scale`` degrees. Pitch is positive
+            about the robot's left axis, roll about its forward axis, of the segment that is
+            further from the pelvis: knees bend and the torso leans forward with positive pitch.
         torque_limits: joint name or pattern → largest torque [N·m]. Needed where the model's
             actuators do not bound it; wins over the model's own limits, and gives a motor to a
             joint that has none. An exact name wins over a pattern, an earlier pattern over a later.
@@ -101,6 +105,7 @@ class RobotDescription:
     feet: tuple[FootDescription, ...]
     posture: PostureDescription = field(default_factory=PostureDescription)
     forward: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    roles: dict[str, dict[str, float]] = field(default_factory=dict)
     torque_limits: dict[str, float] = field(default_factory=dict, metadata={"above": 0.0})
     ground: str | None = None
     options: OptionDescription = field(default_factory=OptionDescription)

@@ -97,7 +97,7 @@ def test_push_changes_the_momenta_of_a_free_robot(robot, floating):
     J = 3.0 * np.array(
         [np.cos(rise) * np.cos(azimuth), np.cos(rise) * np.sin(azimuth), np.sin(rise)]
     )
-    np.testing.assert_allclose(linear - linear_before, J, atol=1e-4)
+    np.testing.assert_allclose(linear - linear_before, J, atol=1e-3)  # halves with dt
     # the arm turns a little while the force acts, hence the looser tolerance
     expected = np.cross(arm, J)
     assert np.linalg.norm(expected) > 0.3
