@@ -93,11 +93,15 @@ def test_mean_over_directions_is_the_mean_of_the_fits():
 
 
 def test_the_mean_is_known_better_than_its_parts():
-    """Strata are resampled apart, so the mean of four directions has about half the width."""
-    direction, impulse, recovered, _ = envelope(np.random.default_rng(7), n=60)
-    result = mean_over_directions(direction, impulse, recovered)
-    parts = np.mean([np.ptp(f.j50_ci) for f in result.fits])
-    assert 0.35 * parts < np.ptp(result.j50_mean_ci) < 0.65 * parts
+    """Directions are resampled apart: four with the same trials have half the width of one."""
+    _, impulse, recovered, _ = envelope(np.random.default_rng(7), n=60)
+    trials = np.tile(impulse[:60], 4), np.tile(recovered[:60], 4)
+    result = mean_over_directions(np.repeat(ANGLES, 60), *trials)
+    gain = j50_gain(np.repeat(ANGLES, 60), *trials, np.tile(impulse[:60] < 13, 4))
+    one = np.mean([np.ptp(f.j50_ci) for f in result.fits])
+    assert np.ptp(result.j50_mean_ci) == pytest.approx(one / 2, rel=0.15)
+    one = np.mean([np.ptp(g.absolute_ci) for g in gain.gains])
+    assert np.ptp(gain.mean.absolute_ci) == pytest.approx(one / 2, rel=0.15)
 
 
 def test_bounds_are_counted():

@@ -76,9 +76,10 @@ def test_separated_trials_give_a_j50_in_the_gap():
 
 def test_separated_trials_that_are_lopsided_stay_in_the_gap():
     """One success and thirty failures do not drag J50 below the success."""
-    impulse = np.concatenate([[10.0], np.linspace(10.1, 11.0, 30)])
+    impulse = np.append(10.0, np.full(30, 10.1))
     fit = fit_logistic(impulse, impulse <= 10.0)
     assert 10.0 <= fit.j50 <= 10.1
+    assert fit.bound is None
 
 
 def test_all_recovered_is_a_lower_bound():
