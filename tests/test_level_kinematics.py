@@ -51,3 +51,15 @@ def test_root_pose_of_the_data_does_not_matter(robot):
 def test_support_extent_of_the_humanoid(robot):
     """Soles of 0.26 m × 0.08 m with centres 0.18 m apart."""
     np.testing.assert_allclose(LevelKinematics(robot).support_extent(), [0.13, 0.13], atol=1e-3)
+
+
+def test_root_rotation_is_relative_to_the_standing_root(robot):
+    """exp(φ) · standing root_axes = root_axes, also for a root frame that is not upright."""
+    kinematics = LevelKinematics(robot)
+    standing = Rotation.from_euler("zx", [0.7, 1.2])
+    phi = np.array([0.1, -0.3, 0.2])
+    posture = kinematics.standing._replace(
+        root_axes=(Rotation.from_rotvec(phi) * standing).as_matrix()
+    )
+    kinematics.standing = kinematics.standing._replace(root_axes=standing.as_matrix())
+    np.testing.assert_allclose(kinematics.root_rotation(posture), phi, atol=1e-12)
