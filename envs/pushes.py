@@ -124,8 +124,7 @@ def apply_pushes(table, t, dt, xfrc_applied, xmat):
 
     The force written is the mean over the step, so Σ F dt = J for any start and duration.
     Rows are [force; torque] in the world frame at the body's centre of mass, with
-    torque = (R point) × force; `xmat` (nbody, 9) holds R row by row. Steps must tile time:
-    pass `data.time`, and clear `xfrc_applied` before.
+    torque = (R point) × force; `xmat` (nbody, 9) holds R row by row. Clear `xfrc_applied` before.
     """
     for k in range(table.shape[0]):
         if table[k, 10] != 0.0:
@@ -158,12 +157,14 @@ def apply_pushes(table, t, dt, xfrc_applied, xmat):
 
 @compiled
 def apply_kicks(table, t, dt, qvel):
-    """Add each kick whose start lies in [t, t + dt) to the root's linear velocity `qvel[:3]`.
+    """Add each kick whose start lies in the step [t, t + dt) to the root's velocity `qvel[:3]`.
 
-    Call before the step; `qvel` (nv,) starts with the root's free joint (world frame).
+    Call once per step; `qvel` (nv,) starts with the root's free joint (world frame). Steps are
+    counted from t = 0, so that rounding at a step's end neither loses nor doubles a kick.
     """
+    step = np.rint(t / dt)
     for k in range(table.shape[0]):
-        if table[k, 10] == 1.0 and t <= table[k, 1] < t + dt:
+        if table[k, 10] == 1.0 and np.floor(table[k, 1] / dt + 1e-6) == step:
             qvel[0] += table[k, 3]
             qvel[1] += table[k, 4]
             qvel[2] += table[k, 5]

@@ -128,6 +128,20 @@ def test_kick_is_added_once_and_moves_the_whole_robot(robot, floating):
     np.testing.assert_allclose(linear, [-0.5 * robot.mass, 0.0, 0.0], atol=1e-9)
 
 
+@pytest.mark.parametrize("clock", ["count", "sum"])
+def test_a_kick_on_a_step_boundary_is_added_once(robot, clock):
+    """Whether time is k dt or a running sum, rounding neither loses nor doubles a kick."""
+    dt = 0.002
+    table = pack([Kick(0.0, 1.0, 0.0)], robot, 0.0)
+    times = [k * dt if clock == "count" else sum([dt] * k) for k in range(300)]
+    for k in range(0, 290):
+        table[0, 1] = k * 2 / 1000  # the decimal number that a user writes
+        steps = np.zeros((len(times), robot.model.nv))
+        for t, qvel in zip(times, steps, strict=True):
+            apply_kicks(table, t, dt, qvel)
+        assert np.flatnonzero(steps[:, 0]).tolist() == [k]
+
+
 @pytest.mark.parametrize("profile", ["square", "half-sine"])
 @pytest.mark.parametrize("duration", [0.02, 0.1, 0.4])
 def test_ankle_limit_brings_the_capture_point_to_the_edge(profile, duration):
