@@ -79,7 +79,7 @@ def _step_length(r, mult, equalities, q, dependent):
 
 
 @compiled
-def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter):
+def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter):  # noqa: E741
     """Minimises ½ xᵀHx + gᵀx subject to l ≤ Cx ≤ u; returns the status.
 
     H (n, n) symmetric positive definite, g (n,), C (m, n); l, u (m,) may be ∓inf, l == u means

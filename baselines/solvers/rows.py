@@ -12,7 +12,7 @@ SOLVED, INFEASIBLE, ITERATION_LIMIT, INVALID = 0, 1, 2, 3  # status of `solve_du
 
 
 @compiled
-def scale_rows(C, l, u, Ct, scale, lower, upper):
+def scale_rows(C, l, u, Ct, scale, lower, upper):  # noqa: E741
     """Ct (n, p) = (C / row norms)ᵀ and its bounds; returns SOLVED, INFEASIBLE or INVALID."""
     m, n = C.shape
     p = Ct.shape[1]

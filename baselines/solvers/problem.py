@@ -1,0 +1,112 @@
+"""A quadratic program, its solution, and how good a solution is."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class QP:
+    """min ½ xᵀHx + gᵀx  subject to  l ≤ Cx ≤ u.
+
+    H (n, n) symmetric positive definite, g (n,), C (m, n), l and u (m,). A side may be infinite;
+    l == u is an equality. The arrays are kept, not copied.
+
+    Raises:
+        ValueError: the shapes do not agree.
+    """
+
+    H: np.ndarray
+    g: np.ndarray
+    C: np.ndarray
+    l: np.ndarray  # noqa: E741
+    u: np.ndarray
+
+    def __post_init__(self) -> None:
+        n, m = len(self.g), len(self.l)
+        wanted = {"H": (n, n), "g": (n,), "C": (m, n), "l": (m,), "u": (m,)}
+        for name, shape in wanted.items():
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"{name} must be {shape}, not {getattr(self, name).shape}")
+
+
+class Status(StrEnum):
+    """How a solver ended."""
+
+    SOLVED = "solved"
+    INACCURATE = "inaccurate"  # near a solution, but not within the tolerances
+    INFEASIBLE = "infeasible"
+    ITERATION_LIMIT = "iteration limit"
+    INVALID = "invalid"  # H is not positive definite, or NaN or infinity among the numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """x (n,) and lam (m,) with Hx + g + Cᵀlam = 0, lam > 0 at an upper, < 0 at a lower bound.
+
+    Only when `solved` are they a solution. `solve_time` [s] is what the call took.
+    """
+
+    x: np.ndarray
+    lam: np.ndarray
+    status: Status
+    iterations: int
+    solve_time: float
+
+    @property
+    def solved(self) -> bool:
+        return self.status is Status.SOLVED
+
+
+class Residuals(NamedTuple):
+    """How far a solution is from the conditions of optimality; all are zero at the optimum."""
+
+    primal: float  # largest violation of a row
+    dual: float  # ‖Hx + g + Cᵀlam‖∞
+    gap: float  # |xᵀHx + gᵀx + Σ lam⁺u + Σ lam⁻l|, infinite if lam holds at an infinite bound
+
+
+def residuals(qp: QP, solution: Solution) -> Residuals:
+    """Residuals of the Karush–Kuhn–Tucker conditions, in the units of the problem."""
+    x, lam = solution.x, solution.lam
+    Cx = qp.C @ x
+    violation = np.concatenate([qp.l - Cx, Cx - qp.u, [0.0]])
+    Hx = qp.H @ x
+    bound = np.where(lam > 0.0, qp.u, np.where(lam < 0.0, qp.l, 0.0))
+    return Residuals(
+        primal=float(violation.max()),
+        dual=float(np.abs(Hx + qp.g + qp.C.T @ lam).max()),
+        gap=float(abs(x @ Hx + qp.g @ x + lam @ bound)),
+    )
+
+
+class Solver(Protocol):
+    """Solves one QP after another; may start from what the last one left until it is reset."""
+
+    def solve(self, qp: QP) -> Solution:
+        """The solution, or a status that says why there is none. Does not raise for bad numbers."""
+
+    def reset(self) -> None:
+        """Forget earlier problems: the next solution depends on its own problem only."""
+
+
+def failed(qp: QP, status: Status, start: float, iterations: int = 0) -> Solution:
+    """No solution: x and lam are NaN. `start` is the `time.perf_counter` of the beginning."""
+    x, lam = np.full(len(qp.g), np.nan), np.full(len(qp.l), np.nan)
+    return Solution(x, lam, status, iterations, time.perf_counter() - start)
+
+
+def refusal(qp: QP) -> Status | None:
+    """Why there is no need to ask a solver: numbers or bounds that cannot be; else None."""
+    if not all(np.isfinite(a).all() for a in (qp.H, qp.g, qp.C)):
+        return Status.INVALID
+    if np.isnan(qp.l).any() or np.isnan(qp.u).any():
+        return Status.INVALID
+    if (qp.l > qp.u).any() or (qp.l == np.inf).any() or (qp.u == -np.inf).any():
+        return Status.INFEASIBLE
+    return None
