@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -223,6 +224,12 @@ def test_unknown_solver():
         make_solver("cvx")
 
 
+def options_of(name: str, **options: Any) -> Any:
+    """The options that the solver works with."""
+    solver: Any = make_solver(name, **options)
+    return solver.options
+
+
 @every_solver
 def test_options(name):
     """Unknown options list the valid ones, values are checked, whole numbers may be floats."""
@@ -231,13 +238,13 @@ def test_options(name):
     for wrong in (0, -5, 2.5, "many", True, None, float("nan")):
         with pytest.raises(ConfigError, match="max_iter"):
             make_solver(name, max_iter=wrong)
-    assert make_solver(name, max_iter=50.0).options.max_iter == 50
+    assert options_of(name, max_iter=50.0).max_iter == 50
 
 
 def test_flags_may_be_numbers():
     """0 and 1 stand for false and true, as in a mapping of plain numbers."""
-    assert make_solver("osqp", polishing=0.0).options.polishing is False
-    assert make_solver("daqp", warm_start=1).options.warm_start is True
+    assert options_of("osqp", polishing=0.0).polishing is False
+    assert options_of("daqp", warm_start=1).warm_start is True
     with pytest.raises(ConfigError, match="polishing"):
         make_solver("osqp", polishing=0.5)
 

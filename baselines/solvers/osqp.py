@@ -81,11 +81,11 @@ class OSQPSolver:
         )
 
         try:
-            self._load(scaled)
+            solver = self._load(scaled)
             if self.options.warm_start and self._last is not None:
                 x, lam = self._last
-                self._solver.warm_start(x / (D * size), lam / (E * size))
-            result = self._solver.solve(raise_error=False)
+                solver.warm_start(x / (D * size), lam / (E * size))
+            result = solver.solve(raise_error=False)
         except (osqp.OSQPException, ValueError):  # both for data that it refuses
             self.reset()
             return failed(qp, Status.INVALID, start)
@@ -100,13 +100,13 @@ class OSQPSolver:
         x, lam = self._last
         return Solution(x.copy(), lam.copy(), status, result.info.iter, time.perf_counter() - start)
 
-    def _load(self, qp: QP) -> None:
+    def _load(self, qp: QP) -> osqp.OSQP:
         m, n = qp.C.shape
         H_values = qp.H[np.tril_indices(n)]  # rows of the lower are columns of the upper triangle
         C_values = qp.C.ravel(order="F")
         if self._solver is not None and (self._solver.m, self._solver.n) == (m, n):
             self._solver.update(Px=H_values, Ax=C_values, q=qp.g, l=qp.l, u=qp.u)
-            return
+            return self._solver
         self._last = None
         self._solver = osqp.OSQP()
         self._solver.setup(
@@ -118,6 +118,7 @@ class OSQPSolver:
             verbose=False,
             **self._settings(),
         )
+        return self._solver
 
     def _settings(self) -> dict[str, Any]:
         own = ("warm_start", "accept_inaccurate")
