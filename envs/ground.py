@@ -117,6 +117,16 @@ def set_options(spec: mujoco.MjSpec, options: OptionDescription) -> None:
 
 
 def _add_ground(spec: mujoco.MjSpec, name: str) -> None:
+    if not any(t.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for t in spec.textures):
+        spec.add_texture(
+            name="poise_sky",
+            type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+            builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+            rgb1=[0.8, 0.87, 0.95],
+            rgb2=[1.0, 1.0, 1.0],
+            width=64,
+            height=384,
+        )
     spec.add_texture(
         name="poise_ground",
         type=mujoco.mjtTexture.mjTEXTURE_2D,

@@ -26,6 +26,7 @@ from .soles import Sole, build_sole, find_sole_plane, sole_geoms
 from .standing import described_qpos, level_soles, turn_forward
 
 BUILDERS = {"humanoid": humanoid_spec}
+TOUCH = 1e-9  # [m] by which the soles stand below z = 0, so that rounding loses no contact
 DYNAMICS = (  # arrays of the model that its motion depends on
     *("body_parentid", "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos"),
     *("body_iquat", "jnt_type", "jnt_bodyid", "jnt_pos", "jnt_axis", "jnt_limited", "jnt_range"),
@@ -114,6 +115,7 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
     )
     points = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position for s in soles]
     data.qpos[:3] -= np.mean(points, axis=0)
+    data.qpos[2] -= TOUCH
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
 

@@ -141,6 +141,8 @@ def build_sole(
     points = plane.points @ rotation  # in the sole's axes, still about the foot body's origin
     polygon = simplify(points[ConvexHull(points[:, :2]).vertices, :2], MAX_VERTICES)
     centre = centroid(polygon)
+    angles = np.arctan2(*(polygon - centre).T[::-1]) % (2 * np.pi)
+    polygon = np.roll(polygon, -int(np.argmin(angles)), axis=0)  # starts at the front left
     position = rotation @ np.array([*centre, points[:, 2].min()])
     return Sole(name, body, body_id, geom_ids, position, rotation, polygon - centre)
 
