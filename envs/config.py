@@ -81,8 +81,12 @@ def to_yaml(obj: Any) -> str:
 
 def packaged(kind: str) -> list[str]:
     """Names of the packaged configurations of one kind: ``packaged("robots")``."""
-    folder = Path(str(files("poise.configs"))) / kind
-    return sorted(path.stem for path in folder.glob("*.yaml"))
+    return sorted(path.stem for path in packaged_folder(kind).glob("*.yaml"))
+
+
+def packaged_folder(kind: str) -> Path:
+    """Where the packaged configurations of one kind lie."""
+    return Path(str(files("poise.configs"))) / kind
 
 
 def resolve(kind: str, name: str | Path) -> Path:
@@ -97,7 +101,7 @@ def resolve(kind: str, name: str | Path) -> Path:
     """
     names = packaged(kind)
     if str(name) in names:
-        return Path(str(files("poise.configs"))) / kind / f"{name}.yaml"
+        return packaged_folder(kind) / f"{name}.yaml"
     path = Path(name)
     if path.suffix in (".yaml", ".yml") and path.is_file():
         return path

@@ -1,0 +1,302 @@
+"""What both environments share: a pushed robot, its observation, reward, fall and record."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from .arrays import RobotArrays
+from .config import build, read_yaml, resolve, to_dict
+from .episode import (
+    FALLEN,
+    QUIET_STEPS,
+    REWARD_TERMS,
+    SATURATED,
+    TICKS,
+    FallLimits,
+    RewardWeights,
+    allocate_episode,
+    begin_episode,
+    judge,
+)
+from .errors import ConfigError, PoiseError
+from .observation import observation_terms, observe, scales
+from .push_options import parse_pushes
+from .push_schedule import PushSampler
+from .pushes import Kick, Push
+from .robot import Robot, load_robot
+from .simulation import Simulation
+
+
+@dataclass(frozen=True)
+class StartNoise:
+    """How far a reset departs from the standing posture; uniform in ±."""
+
+    joints: float = field(default=0.02, metadata={"min": 0.0, "max": 0.5})  # [rad]
+    joint_speeds: float = field(default=0.05, metadata={"min": 0.0})  # [rad/s]
+    speed: float = field(default=0.02, metadata={"min": 0.0})  # root, horizontal [m/s]
+
+
+@dataclass(frozen=True)
+class EnvConfig:
+    """Everything about an environment that is not its robot or its controller."""
+
+    policy_period: float = field(default=0.02, metadata={"above": 0.0, "max": 1.0})  # [s]
+    duration: float = field(default=6.0, metadata={"above": 0.0})  # of an episode [s]
+    pushes: PushSampler | None = field(
+        default_factory=lambda: PushSampler(magnitude=(0.2, 0.5), unit="specific_impulse")
+    )
+    noise: StartNoise = field(default_factory=StartNoise)
+    fall: FallLimits = field(default_factory=FallLimits)
+    reward: RewardWeights = field(default_factory=RewardWeights)
+
+
+def env_config(config: "EnvConfig | str | Path | dict | None", **overrides: Any) -> EnvConfig:
+    """An EnvConfig from a packaged name, a path, a mapping or an object; `overrides` win.
+
+    Raises ConfigError naming the file, the field and the choices.
+    """
+    source = "environment"
+    if isinstance(config, (str, Path)):
+        path = resolve("envs", config)
+        config, source = read_yaml(path), str(path)
+    fields = to_dict(config) if config is not None else {}
+    return build(EnvConfig, {**fields, **{k: to_dict(v) for k, v in overrides.items()}}, source)
+
+
+class BalanceEnv(gymnasium.Env):
+    """Base of `ResidualBalanceEnv` and `TorqueBalanceEnv`: subclasses say what an action does."""
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
+
+    def __init__(
+        self,
+        robot: str | Path | Robot = "humanoid",
+        config: "EnvConfig | str | Path | dict | None" = None,
+        *,
+        render_mode: str | None = None,
+        **overrides: Any,
+    ):
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ConfigError(
+                f"unknown render mode {render_mode!r}",
+                field="render_mode",
+                choices=tuple(self.metadata["render_modes"]),
+            )
+        self.render_mode = render_mode
+        self.robot = robot if isinstance(robot, Robot) else load_robot(robot)
+        self.config = env_config(config, **overrides)
+        self.push_sampler = self.config.pushes  #: may be replaced between episodes
+        self.simulation = Simulation(self.robot)
+        self.arrays: RobotArrays = self.simulation.arrays
+        self.substeps = self._whole(self.config.policy_period, self.arrays.timestep, "policy_period")
+        self.max_steps = int(round(self.config.duration / self.config.policy_period))
+        state = self.simulation.state
+        self.scales = scales(self.arrays, state.support_polygon)
+        self.judge = judge(self.config.fall, self.config.reward, self.robot.height_com)
+        self.action_names = self._action_names()
+        soles = [sole.name for sole in self.robot.soles]
+        self.terms = observation_terms(self.robot.joint_names, soles, len(self.action_names))
+        size = sum(term.size for term in self.terms)
+        self.episode = allocate_episode(len(self.action_names), size, len(soles))
+        self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
+        self.steps = 0
+        self._renderer = None
+        self._needs_reset = True
+
+    @staticmethod
+    def _whole(period: float, step: float, name: str) -> int:
+        count = int(round(period / step))
+        if count < 1 or abs(count * step - period) > 1e-9:
+            raise ConfigError(
+                f"{period} s is not a whole number of steps of {step} s",
+                source="environment",
+                field=name,
+            )
+        return count
+
+    def _action_names(self) -> tuple[str, ...]:
+        """One name for each entry of the action."""
+        raise NotImplementedError
+
+    def _references(self) -> tuple[np.ndarray, np.ndarray]:
+        """Joint positions and velocities (nj,) that the observation is relative to."""
+        raise NotImplementedError
+
+    def _begin(self) -> None:
+        """Prepare the subclass for a new episode; the simulation has just been reset."""
+
+    def _advance(self) -> float:
+        """One policy step with `episode.action`; returns the reward."""
+        raise NotImplementedError
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start an episode.
+
+        `options`: "push" sets the pushes exactly (a mapping, a list of mappings, [] for none; see
+        `parse_pushes`), "noise" scales the start noise, "qpos" and "qvel" set the start.
+        """
+        super().reset(seed=seed)
+        options = dict(options or {})
+        push = options.pop("push", None)
+        noise = float(options.pop("noise", 1.0))
+        qpos, qvel = options.pop("qpos", None), options.pop("qvel", None)
+        if options:
+            raise ConfigError("unknown option", source="reset", field=next(iter(options)),
+                              choices=("push", "noise", "qpos", "qvel"))
+        start, speed = self._start(noise)
+        qpos = start if qpos is None else self._vector(qpos, len(start), "qpos")
+        qvel = speed if qvel is None else self._vector(qvel, len(speed), "qvel")
+        state = self.simulation.reset(qpos, qvel)
+        if push is not None:
+            pushes = parse_pushes(push, self.robot, state.support_margin)
+        elif self.push_sampler is None:
+            pushes = ()
+        else:
+            pushes = self.push_sampler.sample(self.np_random, self.robot, state.support_margin)
+        self.simulation.set_pushes(pushes)
+        begin_episode(self.simulation.state_arrays, self.episode)
+        self.steps = 0
+        self._needs_reset = False
+        self._begin()
+        self._observe()
+        if self.render_mode == "human":
+            self.render()
+        return self.episode.observation.astype(np.float32), self._info()
+
+    def _start(self, scale: float) -> tuple[np.ndarray, np.ndarray]:
+        """A disturbed standing posture with its lowest sole on the ground."""
+        noise, rng, robot = self.config.noise, self.np_random, self.robot
+        qpos, qvel = robot.standing_qpos.copy(), np.zeros(robot.model.nv)
+        nj = len(robot.joint_names)
+        qpos[7:] += scale * rng.uniform(-noise.joints, noise.joints, nj)
+        qpos[7:] = np.clip(qpos[7:], robot.joint_range[:, 0], robot.joint_range[:, 1])
+        qvel[6:] = scale * rng.uniform(-noise.joint_speeds, noise.joint_speeds, nj)
+        qvel[:2] = scale * rng.uniform(-noise.speed, noise.speed, 2)
+        state = self.simulation.reset(qpos)
+        lowest = min(
+            float((point + polygon @ axes[:, :2].T)[:, 2].min())
+            for point, axes, polygon in zip(
+                state.sole_points, state.sole_axes, (s.polygon for s in robot.soles), strict=True
+            )
+        )
+        qpos[2] -= lowest
+        return qpos, qvel
+
+    @staticmethod
+    def _vector(value: Any, size: int, name: str) -> np.ndarray:
+        vector = np.asarray(value, dtype=float)
+        if vector.shape != (size,) or not np.all(np.isfinite(vector)):
+            raise ConfigError(f"must be {size} finite numbers", source="reset", field=name)
+        return vector
+
+    def set_action(self, action: np.ndarray) -> None:
+        """Check `action` and remember it and the one before; raises ConfigError."""
+        vector = np.asarray(action, dtype=float)
+        if vector.shape != self.action_space.shape:
+            raise ConfigError(
+                f"has shape {vector.shape}, expected {self.action_space.shape} "
+                f"({', '.join(self.action_names[:8])}{', …' if len(self.action_names) > 8 else ''})",
+                field="action",
+            )
+        if not np.all(np.abs(vector) <= 1.0 + 1e-6):  # NaN fails too
+            raise ConfigError(f"must lie in [-1, 1], not {vector.tolist()}", field="action")
+        self.episode.last_action[:] = self.episode.action
+        self.episode.action[:] = np.clip(vector, -1.0, 1.0)
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """One policy step; a fall is `terminated`, the end of time is `truncated`."""
+        if self._needs_reset:
+            raise PoiseError("step() after the episode's end: call reset() first")
+        reward, terminated, truncated = self.step_in_place(action)
+        if self.render_mode == "human":
+            self.render()
+        observation = self.episode.observation.astype(np.float32)
+        return observation, reward, terminated, truncated, self._info()
+
+    def step_in_place(self, action: np.ndarray) -> tuple[float, bool, bool]:
+        """What `step` does, without `info`: the observation is in `episode.observation`."""
+        self.set_action(action)
+        reward = self._advance()
+        self._observe()
+        self.steps += 1
+        terminated = self.fallen
+        truncated = self.steps >= self.max_steps and not terminated
+        self._needs_reset = terminated or truncated
+        return reward, terminated, truncated
+
+    def _observe(self) -> None:
+        q_ref, v_ref = self._references()
+        observe(self.arrays, self.simulation.state_arrays, self.scales, q_ref, v_ref,
+                self.episode.action, self.episode.observation)
+
+    @property
+    def fallen(self) -> bool:
+        """Whether the robot has fallen."""
+        return bool(self.episode.metrics[FALLEN])
+
+    @property
+    def recovered(self) -> bool:
+        """Upright and quiet for the last `quiet_time` seconds."""
+        quiet = self.episode.metrics[QUIET_STEPS] * self.config.policy_period
+        return bool(quiet >= self.config.fall.quiet_time - 1e-9)
+
+    def _info(self) -> dict[str, Any]:
+        """Reward terms, push and record of the episode so far."""
+        metrics = self.episode.metrics
+        info: dict[str, Any] = {
+            "reward_terms": dict(zip(REWARD_TERMS, self.episode.reward_terms.tolist(), strict=True)),
+            "push": [self._push_info(push) for push in self.simulation.pushes],
+            "is_success": self.recovered,
+            "solver_failures": self._failures(),
+            "torque_saturation": float(metrics[SATURATED] / max(metrics[TICKS], 1.0)),
+            "root_wrench": self._root_wrench(),
+        }
+        return info
+
+    def _push_info(self, push: Push | Kick) -> dict[str, Any]:
+        if isinstance(push, Kick):
+            impulse = push.delta_v * self.robot.mass
+            force, duration, body = 0.0, 0.0, self.robot.model.body(self.robot.root_body_id).name
+        else:
+            impulse, force = push.impulse, push.peak_force
+            duration, body = push.duration, push.body
+        return {
+            "start": push.start,
+            "force": force,
+            "duration": duration,
+            "body": body,
+            "direction": push.direction,
+            "impulse": impulse,
+            "specific_impulse": impulse / self.robot.mass,
+        }
+
+    def _failures(self) -> int:
+        """Control ticks of this episode at which the controller's solver failed."""
+        return 0
+
+    def _root_wrench(self) -> np.ndarray:
+        """(6,) force and moment that a soft root has taken from nowhere in the last tick."""
+        return np.zeros(6)
+
+    def render(self) -> np.ndarray | None:
+        """A frame (h, w, 3) for "rgb_array"; shows it for "human"."""
+        if self.render_mode is None:
+            return None
+        if self._renderer is None:
+            from .rendering import SceneRenderer
+
+            self._renderer = SceneRenderer(self.simulation, human=self.render_mode == "human")
+        return self._renderer.render()
+
+    def close(self) -> None:
+        """Free what rendering holds."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None

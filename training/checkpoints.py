@@ -1,0 +1,83 @@
+"""A policy folder: policy.zip (SB3), vecnormalize.npz, config.yaml, state.json.
+
+The folder is replaced as a whole: a reader, or a kill, finds the old one or the new one.
+Nothing in it is unpickled on loading: weights by torch's weights-only reader, statistics as
+plain arrays, the rest as YAML and JSON.
+"""
+
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecNormalize
+
+from poise.envs.config import to_yaml
+from poise.envs.errors import ConfigError, PoiseError
+
+from .config import TrainConfig
+
+POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.yaml", "state.json"
+FILES = (POLICY, STATISTICS, CONFIG, STATE)
+_MOMENTS = ("mean", "var", "count")
+
+
+def save_checkpoint(
+    folder: Path, model: PPO, normalize: VecNormalize, config: TrainConfig, state: dict[str, Any]
+) -> None:
+    """Write the folder whole; raises PoiseError when the disk refuses."""
+    new, old = _beside(folder, "new"), _beside(folder, "old")
+    try:
+        shutil.rmtree(new, ignore_errors=True)
+        new.mkdir(parents=True)
+        model.save(new / POLICY, exclude=["ep_info_buffer", "ep_success_buffer"])
+        np.savez(new / STATISTICS, **statistics(normalize))
+        (new / CONFIG).write_text(to_yaml(config))
+        (new / STATE).write_text(json.dumps(state, indent=1) + "\n")
+        shutil.rmtree(old, ignore_errors=True)
+        if folder.exists():
+            os.replace(folder, old)
+        os.replace(new, folder)
+        shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        raise PoiseError(f"{folder}: cannot be written ({error.strerror})") from None
+
+
+def find_checkpoint(folder: Path) -> Path | None:
+    """The folder, or what a kill in the middle of a replacement left of it."""
+    for candidate in (folder, _beside(folder, "old")):
+        if all((candidate / name).is_file() for name in FILES):
+            return candidate
+    return None
+
+
+def restore(folder: Path, model: PPO, normalize: VecNormalize) -> dict[str, Any]:
+    """Load weights, optimizer and statistics into `model` and `normalize`; returns the state."""
+    try:
+        model.set_parameters(str(folder / POLICY), exact_match=True, device="cpu")
+        with np.load(folder / STATISTICS, allow_pickle=False) as data:
+            for prefix, moments in (("obs", normalize.obs_rms), ("ret", normalize.ret_rms)):
+                for name in _MOMENTS:
+                    setattr(moments, name, np.array(data[f"{prefix}_{name}"])[()])
+        return json.loads((folder / STATE).read_text())
+    except (OSError, ValueError, KeyError, RuntimeError, EOFError) as error:
+        raise ConfigError(f"cannot be resumed from ({error})", source=str(folder)) from None
+
+
+def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
+    """What normalises observations and returns, as arrays."""
+    arrays = {
+        f"{prefix}_{name}": np.asarray(getattr(moments, name), dtype=float)
+        for prefix, moments in (("obs", normalize.obs_rms), ("ret", normalize.ret_rms))
+        for name in _MOMENTS
+    }
+    arrays["clip_obs"] = np.asarray(normalize.clip_obs)
+    arrays["epsilon"] = np.asarray(normalize.epsilon)
+    return arrays
+
+
+def _beside(folder: Path, suffix: str) -> Path:
+    return folder.with_name(f".{folder.name}.{suffix}")

@@ -1,0 +1,88 @@
+"""Everything that decides a training run; written beside its results."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
+from poise.envs.balance import EnvConfig
+from poise.envs.config import build, read_yaml, resolve
+from poise.envs.push_schedule import PushSampler
+from poise.envs.robot import Robot
+
+
+@dataclass(frozen=True)
+class PPOConfig:
+    """Stable-Baselines3's PPO, its names."""
+
+    n_envs: int = field(default=32, metadata={"min": 1})
+    n_steps: int = field(default=128, metadata={"min": 1})  # per environment and rollout
+    batch_size: int = field(default=1024, metadata={"min": 2})
+    n_epochs: int = field(default=8, metadata={"min": 1})
+    learning_rate: float = field(default=3e-4, metadata={"above": 0.0})
+    final_learning_rate: float = field(default=5e-5, metadata={"min": 0.0})  # linear in time
+    gamma: float = field(default=0.99, metadata={"above": 0.0, "max": 1.0})
+    gae_lambda: float = field(default=0.95, metadata={"min": 0.0, "max": 1.0})
+    clip_range: float = field(default=0.2, metadata={"above": 0.0})
+    ent_coef: float = field(default=0.0, metadata={"min": 0.0})
+    vf_coef: float = field(default=0.5, metadata={"min": 0.0})
+    max_grad_norm: float = field(default=0.5, metadata={"above": 0.0})
+    net_arch: tuple[int, ...] = (128, 128)  # tanh
+    log_std_init: float = -1.5
+
+
+@dataclass(frozen=True)
+class Curriculum:
+    """The largest push grows from `start` times its final size over a share of the run."""
+
+    start: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})
+    share: float = field(default=0.3, metadata={"min": 0.0, "max": 1.0})
+
+
+@dataclass(frozen=True)
+class EvaluationConfig:
+    """Held-out pushes that the deterministic policy meets during training."""
+
+    every: int = field(default=200_000, metadata={"min": 1})  # [environment steps]
+    trials: int = field(default=128, metadata={"min": 1})
+    seed: int = 1_000_003  # never used for training
+    pushes: PushSampler | None = None  # None: those of training
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """A residual policy on a controller of a robot."""
+
+    robot: str = "humanoid"
+    controller: str = "momentum-qp"
+    motion: str = "standing"
+    seed: int = 0
+    steps: int = field(default=3_000_000, metadata={"min": 1})  # [environment steps]
+    threads: int = field(default=2, metadata={"min": 1})
+    env: EnvConfig = field(default_factory=EnvConfig)
+    residual: ResidualScales = field(default_factory=ResidualScales)
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    curriculum: Curriculum = field(default_factory=Curriculum)
+    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+
+    def make_env(self, robot: Robot | None = None, **overrides: Any) -> ResidualBalanceEnv:
+        """The environment of this run; `overrides` replace its arguments or fields of `env`.
+
+        A loaded `robot` spares loading it again.
+        """
+        arguments = {
+            "controller": self.controller,
+            "motion": self.motion,
+            "residual": self.residual,
+            **overrides,
+        }
+        return ResidualBalanceEnv(robot or self.robot, self.env, **arguments)
+
+
+def train_config(name_or_path: str | Path) -> TrainConfig:
+    """A packaged training configuration (`configs/training`) or a path to one.
+
+    Raises ConfigError naming the file, the field and the choices.
+    """
+    path = resolve("training", name_or_path)
+    return build(TrainConfig, read_yaml(path), str(path))

@@ -1,0 +1,141 @@
+"""Training a residual policy with Stable-Baselines3's PPO on the CPU."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.logger import configure
+from stable_baselines3.common.vec_env import VecNormalize
+
+from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.config import build, read_yaml, to_yaml, write_atomic
+from poise.envs.errors import ConfigError
+from poise.envs.robot import load_robot
+
+from .callbacks import Checkpoints, CurriculumCallback, Progress, Throughput
+from .checkpoints import CONFIG, find_checkpoint, restore
+from .config import TrainConfig
+from .vec_env import ThreadedVecEnv
+
+LAST, BEST = "last", "best"
+
+
+def train(
+    config: TrainConfig, out: str | Path, resume: bool = False, progress: bool = True
+) -> Path:
+    """Train into the folder `out`; returns the folder of the best checkpoint.
+
+    `out` gets config.yaml, evaluations.csv, tensorboard/, and the policy folders best/ and last/.
+    `resume` goes on from last/, which is written after every rollout; the configuration must be
+    the same but for `steps` and `threads`. The same configuration gives the same weights,
+    whatever the number of threads; a resumed run starts new episodes, and so differs.
+
+    Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
+    round, or when the configurations differ.
+    """
+    out = Path(out)
+    checkpoint = _check_folder(config, out, resume)
+    torch.set_num_threads(1)
+    normalize = _training_envs(config)
+    model = make_model(config, normalize)
+    state: dict[str, Any] = {}
+    if checkpoint is not None:
+        state = restore(checkpoint, model, normalize)
+        model.num_timesteps = state["timesteps"]
+        _reseed(model, normalize, config.seed + model.num_timesteps)
+    write_atomic(out / CONFIG, to_yaml(config))
+    model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
+    callbacks = [
+        Throughput(),
+        CurriculumCallback(config),
+        Checkpoints(config, out / LAST, out / BEST, out / "evaluations.csv", state),
+    ]
+    if progress:
+        callbacks.append(Progress(config.steps))
+    try:
+        remaining = config.steps - model.num_timesteps
+        if remaining > 0:
+            model.learn(remaining, callback=callbacks, reset_num_timesteps=checkpoint is None)
+    finally:
+        normalize.close()
+    return out / BEST
+
+
+def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
+    """PPO whose first policy is the controller alone: the mean's last layer is zero."""
+    ppo = config.ppo
+
+    def learning_rate(remaining: float) -> float:
+        return ppo.final_learning_rate + remaining * (ppo.learning_rate - ppo.final_learning_rate)
+
+    model = PPO(
+        "MlpPolicy",
+        env,
+        n_steps=ppo.n_steps,
+        batch_size=ppo.batch_size,
+        n_epochs=ppo.n_epochs,
+        learning_rate=learning_rate,
+        gamma=ppo.gamma,
+        gae_lambda=ppo.gae_lambda,
+        clip_range=ppo.clip_range,
+        ent_coef=ppo.ent_coef,
+        vf_coef=ppo.vf_coef,
+        max_grad_norm=ppo.max_grad_norm,
+        policy_kwargs={
+            "net_arch": list(ppo.net_arch),
+            "activation_fn": torch.nn.Tanh,
+            "log_std_init": ppo.log_std_init,
+        },
+        seed=config.seed,
+        device="cpu",
+        stats_window_size=500,
+    )
+    with torch.no_grad():
+        model.policy.action_net.weight.zero_()
+        model.policy.action_net.bias.zero_()
+    return model
+
+
+def _training_envs(config: TrainConfig) -> VecNormalize:
+    robot = load_robot(config.robot)
+    envs: list[ResidualBalanceEnv] = [
+        config.make_env(robot) for _ in range(config.ppo.n_envs)
+    ]
+    vec = ThreadedVecEnv(envs, config.threads)
+    return VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
+
+
+def _reseed(model: PPO, env: VecNormalize, seed: int) -> None:
+    model.set_random_seed(seed)
+    env.seed(seed)
+
+
+def _check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
+    """The checkpoint to go on from, or None for a new run."""
+    checkpoint = find_checkpoint(out / LAST)
+    if not resume:
+        if checkpoint is not None:
+            raise ConfigError(
+                "already holds a training run; go on with --resume or choose another folder",
+                source=str(out),
+                field="out",
+            )
+        return None
+    if checkpoint is None:
+        raise ConfigError("holds no run to resume", source=str(out), field="resume")
+    before = build(TrainConfig, read_yaml(checkpoint / CONFIG), str(checkpoint / CONFIG))
+    same = replace(before, steps=config.steps, threads=config.threads)
+    if same != config:
+        different = [
+            name for name in TrainConfig.__dataclass_fields__
+            if getattr(same, name) != getattr(config, name)
+        ]  # fmt: skip
+        raise ConfigError(
+            f"the run was started with another configuration ({', '.join(different)})",
+            source=str(checkpoint / CONFIG),
+            field=different[0],
+        )
+    return checkpoint
+
