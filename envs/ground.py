@@ -23,26 +23,24 @@ SOLVERS = {
 }
 
 
-def install_ground(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, name: str | None, source: str
-) -> str:
+def install_ground(spec: mujoco.MjSpec, name: str | None, source: str) -> str:
     """The name of the ground plane, which is added where the model has no plane.
 
     Args:
         spec: changed in place.
-        model: the spec, compiled.
-        name: a plane of the model, or how to call a new one; None takes the model's first plane.
+        name: a plane of the model, or how to call a new one; None takes the model's first plane
+            that collides with anything.
         source: the description file, for errors.
 
     Raises:
-        ConfigError: the model has planes but none with this name, or the plane is not z = 0.
+        ConfigError: the model has planes but none with this name.
     """
+    paired = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
     planes = [
         geom
-        for geom in spec.geoms
+        for geom in spec.worldbody.geoms
         if geom.type == mujoco.mjtGeom.mjGEOM_PLANE
-        and model.body_weldid[model.geom_bodyid[geom.id]] == 0
-        and (geom.contype or geom.conaffinity)
+        and (geom.contype or geom.conaffinity or geom.name in paired)
     ]
     if not planes:
         _add_ground(spec, name or GROUND)
@@ -54,30 +52,26 @@ def install_ground(
         )
     ground = planes[0 if name is None else names.index(name)]
     ground.name = ground.name or GROUND
-    normal = np.zeros(3)
-    mujoco.mju_rotVecQuat(normal, np.array([0.0, 0.0, 1.0]), model.geom_quat[ground.id])
-    if model.geom_bodyid[ground.id] or model.geom_pos[ground.id, 2] or normal[2] < 1.0 - 1e-9:
-        raise ConfigError("the ground must be the plane z = 0", source=source, field="ground")
     return ground.name
 
 
-def check_touches(
-    model: mujoco.MjModel, geom_ids: tuple[int, ...], ground: int, source: str, field: str
-) -> None:
-    """Raise ConfigError if a geom of a sole cannot touch the ground."""
-    pairs = {frozenset(p) for p in zip(model.pair_geom1, model.pair_geom2, strict=True)}
-    for geom in geom_ids:
-        masks = (
-            model.geom_contype[geom] & model.geom_conaffinity[ground]
-            or model.geom_contype[ground] & model.geom_conaffinity[geom]
+def check_ground(model: mujoco.MjModel, ground: int, source: str) -> None:
+    """Raise ConfigError unless the ground is the plane z = 0."""
+    normal = np.zeros(3)
+    mujoco.mju_rotVecQuat(normal, np.array([0.0, 0.0, 1.0]), model.geom_quat[ground])
+    if model.geom_pos[ground, 2] != 0 or normal[2] < 1.0 - 1e-9:
+        raise ConfigError(
+            f"the plane {model.geom(ground).name!r} must be z = 0", source=source, field="ground"
         )
-        if not masks and frozenset((geom, ground)) not in pairs:
-            raise ConfigError(
-                f"the geom {model.geom(geom).name or geom!r} does not collide with the ground "
-                f"{model.geom(ground).name!r} (contype, conaffinity)",
-                source=source,
-                field=field,
-            )
+
+
+def can_touch(model: mujoco.MjModel, geom: int, other: int) -> bool:
+    """Whether two geoms may collide: by their contype and conaffinity, or as an explicit pair."""
+    return bool(
+        model.geom_contype[geom] & model.geom_conaffinity[other]
+        or model.geom_contype[other] & model.geom_conaffinity[geom]
+        or {geom, other} in [set(p) for p in zip(model.pair_geom1, model.pair_geom2, strict=True)]
+    )
 
 
 def add_contact_sensors(spec: mujoco.MjSpec, description: RobotDescription, ground: str) -> None:

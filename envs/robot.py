@@ -16,7 +16,7 @@ from .errors import ConfigError
 from .ground import (
     CONTACT_SENSOR,
     add_contact_sensors,
-    check_touches,
+    check_ground,
     install_ground,
     set_options,
 )
@@ -101,10 +101,10 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
     data.qpos[:] = described_qpos(model, description, keyframes, source)
     mujoco.mj_kinematics(model, data)
     ground = model.geom(ground_name).id
+    check_ground(model, ground, source)
     geoms, planes = [], []
     for i, foot in enumerate(description.feet):
-        ids = sole_geoms(model, bodies[i], foot.geoms, source, f"feet[{i}]")
-        check_touches(model, ids, ground, source, f"feet[{i}]")
+        ids = sole_geoms(model, bodies[i], foot.geoms, ground, source, f"feet[{i}]")
         planes.append(find_sole_plane(model, data, bodies[i], ids, source, f"feet[{i}]"))
         geoms.append(ids)
     level_soles(model, data, bodies, planes, source)
@@ -172,13 +172,13 @@ def _prepare(
         spec = read_mjcf(path.parent / str(description.source.mjcf), feet, source)
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i}"
+    ground = install_ground(spec, description.ground, source)
     model = _compile(spec, source)
     _check_bodies(model, description, source)
     keyframes = {model.key(i).name: model.key_qpos[i].copy() for i in range(model.nkey)}
     for element in [*spec.keys, *spec.sensors]:  # they need not fit the new actuators
         spec.delete(element)
     install_motors(spec, model, description.torque_limits, source)
-    ground = install_ground(spec, model, description.ground, source)
     add_contact_sensors(spec, description, ground)
     set_options(spec, description.options)
     return spec, keyframes, ground

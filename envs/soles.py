@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from .errors import ConfigError
+from .ground import can_touch
 
 FLATNESS = 0.005  # [m] a point of the foot this close to the sole plane belongs to the sole
 MAX_TILT = np.deg2rad(15.0)  # of a foot before levelling
@@ -47,40 +48,48 @@ class Sole:
 
 @dataclass(frozen=True)
 class SolePlane:
-    """The plane a foot rests on, and the foot's points in it; all in the foot body's frame."""
+    """The plane a foot rests on, in the foot body's frame.
 
-    normal: np.ndarray  # (3,) unit vector into the foot
-    points: np.ndarray  # (n, 3) [m], n ≥ 3
+    Attributes:
+        normal: (3,) unit vector into the foot.
+        points: (n, 3) [m] points of the foot in the plane, or near and projected on it; n ≥ 3.
+    """
+
+    normal: np.ndarray
+    points: np.ndarray
 
 
 def sole_geoms(
-    model: mujoco.MjModel, body_id: int, names: tuple[str, ...], source: str, field: str
+    model: mujoco.MjModel,
+    body_id: int,
+    names: tuple[str, ...],
+    ground: int,
+    source: str,
+    field: str,
 ) -> tuple[int, ...]:
-    """The geoms of a sole: those named, or all collision geoms rigidly fixed to the foot body.
+    """The geoms of a sole: those named, or all that are fixed to the foot and touch the ground.
 
     Raises:
-        ConfigError: a name is unknown, or there is no collision geometry.
+        ConfigError: a name is none of these, or nothing of the foot can touch the ground.
     """
     rigid = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == body_id]
-    solid = [g for g in rigid if model.geom_contype[g] or model.geom_conaffinity[g]]
-    if names:
-        known = {model.geom(g).name: g for g in solid}
-        for name in names:
-            if name not in known:
-                raise ConfigError(
-                    f"{name!r} is no collision geom of the foot",
-                    source=source,
-                    field=field,
-                    choices=[key for key in known if key],
-                )
-        return tuple(known[name] for name in names)
+    solid = {model.geom(g).name or str(g): g for g in rigid if can_touch(model, g, ground)}
+    for name in names:
+        if name not in solid:
+            raise ConfigError(
+                f"{name!r} is no geom of the foot that collides with the ground",
+                source=source,
+                field=f"{field}.geoms",
+                choices=solid,
+            )
     if not solid:
         raise ConfigError(
-            f"the foot {model.body(body_id).name!r} has no collision geometry",
+            f"the foot {model.body(body_id).name!r} has no collision geometry: none of its "
+            f"{len(rigid)} geoms collides with the ground (contype, conaffinity, pairs)",
             source=source,
             field=field,
         )
-    return tuple(solid)
+    return tuple(solid[name] for name in names or solid)
 
 
 def find_sole_plane(
@@ -108,7 +117,7 @@ def find_sole_plane(
         tilt = float(np.arccos(np.clip(-rotation[2] @ down, -1.0, 1.0)))
     points = np.vstack([_lowest_points(model, data, g, body_id, down) for g in geom_ids])
     depth = points @ down
-    points = points[depth > depth.max() - FLATNESS]
+    points = (points + np.outer(depth.max() - depth, down))[depth > depth.max() - FLATNESS]
     spread = np.linalg.svd(points - points.mean(0), compute_uv=False) / np.sqrt(len(points))
     if facing is None or len(points) < 3 or spread[1] < MIN_SPAN / 2 or tilt > MAX_TILT:
         raise ConfigError(
@@ -143,7 +152,7 @@ def build_sole(
     centre = centroid(polygon)
     angles = np.arctan2(*(polygon - centre).T[::-1]) % (2 * np.pi)
     polygon = np.roll(polygon, -int(np.argmin(angles)), axis=0)  # starts at the front left
-    position = rotation @ np.array([*centre, points[:, 2].min()])
+    position = rotation @ np.array([*centre, points[0, 2]])
     return Sole(name, body, body_id, geom_ids, position, rotation, polygon - centre)
 
 

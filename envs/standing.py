@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -10,6 +12,7 @@ from .description import RobotDescription, match_names
 from .errors import ConfigError
 from .soles import SolePlane
 
+HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 MAX_CORRECTION = np.deg2rad(5.0)  # [rad] that levelling may change a joint
 TOLERANCE = 1e-10  # [rad] and [m]
 
@@ -21,6 +24,8 @@ def described_qpos(
     source: str,
 ) -> np.ndarray:
     """(nq,) the posture as described, not yet levelled.
+
+    Joints that the description leaves out stay within their range.
 
     Args:
         model: the robot.
@@ -42,28 +47,32 @@ def described_qpos(
                 choices=keyframes,
             )
         qpos = keyframes[posture.keyframe].copy()
-    names = [model.joint(i).name for i in range(model.njnt) if model.jnt_type[i] in SIMPLE_JOINTS]
-    for name, value in match_names(posture.joints, names, source, "posture.joints").items():
-        hinge = model.joint(name).type[0] == int(mujoco.mjtJoint.mjJNT_HINGE)
-        degrees = hinge and posture.unit == "degree"
-        qpos[model.joint(name).qposadr[0]] = np.deg2rad(value) if degrees else value
-    for i in range(model.njnt):
-        low, high = model.jnt_range[i]
+    simple = [i for i in range(model.njnt) if model.jnt_type[i] in SIMPLE_JOINTS]
+    names = [model.joint(i).name for i in simple]
+    given = match_names(posture.joints, names, source, "posture.joints")
+    for i, name in zip(simple, names, strict=True):
+        low, high = model.jnt_range[i] if model.jnt_limited[i] else (-np.inf, np.inf)
         value = qpos[model.jnt_qposadr[i]]
-        if model.jnt_limited[i] and model.jnt_type[i] in SIMPLE_JOINTS and not low <= value <= high:
-            raise ConfigError(
-                f"{value:.4f} is outside the joint's range [{low:.4f}, {high:.4f}] (rad or m)",
-                source=source,
-                field=f"posture.joints.{model.joint(i).name}",
-            )
+        if name in given:
+            degrees = posture.unit == "degree" and model.jnt_type[i] == HINGE
+            value = np.deg2rad(given[name]) if degrees else given[name]
+            if not low <= value <= high:
+                unit = 180.0 / np.pi if degrees else 1.0
+                raise ConfigError(
+                    f"{given[name]:g} is outside the range of the joint {name!r}, "
+                    f"{low * unit:g} to {high * unit:g}",
+                    source=source,
+                    field="posture.joints",
+                )
+        qpos[model.jnt_qposadr[i]] = np.clip(value, low, high)
     return qpos
 
 
 def level_soles(
     model: mujoco.MjModel,
     data: mujoco.MjData,
-    feet: tuple[int, int],
-    planes: tuple[SolePlane, SolePlane],
+    feet: Sequence[int],
+    planes: Sequence[SolePlane],
     source: str,
 ) -> None:
     """Turn the leg joints of ``data.qpos`` a little so that both soles are level and equally high.
@@ -102,8 +111,8 @@ def level_soles(
 def _levelness(
     model: mujoco.MjModel,
     data: mujoco.MjData,
-    feet: tuple[int, int],
-    planes: tuple[SolePlane, SolePlane],
+    feet: Sequence[int],
+    planes: Sequence[SolePlane],
 ) -> tuple[np.ndarray, np.ndarray]:
     """(5,) tilt of both sole normals and height difference, and its (5, nv) Jacobian."""
     tilts, heights, tilt_rows, height_rows = [], [], [], []
