@@ -51,13 +51,13 @@ def test_interval_of_the_mean_covers_the_true_mean():
 
 
 def test_interval_of_the_gain_covers_the_true_gain():
-    """Of 100 simulated pairs about 95 % have the true relative gain in the interval."""
+    """Of 60 simulated pairs about 95 % have the true relative gain in the interval."""
     rng = np.random.default_rng(2)
     held = 0
-    for k in range(100):
-        gain = j50_gain(*envelope(rng, gain=1.15), resamples=200, seed=k).mean
+    for k in range(60):
+        gain = j50_gain(*envelope(rng, gain=1.15), resamples=150, seed=k).mean
         held += gain.relative_ci.low <= 0.15 <= gain.relative_ci.high
-    assert 0.89 <= held / 100 <= 0.99
+    assert 0.88 <= held / 60 <= 0.99
 
 
 def test_direction_fit_brackets_its_estimate():
