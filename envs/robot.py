@@ -33,7 +33,7 @@ DYNAMICS = (  # arrays of the model that its motion depends on
     *("jnt_stiffness", "qpos_spring", "dof_damping", "dof_armature", "dof_frictionloss"),
     *("geom_type", "geom_bodyid", "geom_contype", "geom_conaffinity", "geom_condim", "geom_pos"),
     *("geom_quat", "geom_size", "geom_friction", "geom_margin", "geom_solref", "geom_solimp"),
-    *("actuator_trnid", "actuator_ctrlrange"),
+    *("geom_priority", "body_gravcomp", "actuator_trnid", "actuator_ctrlrange"),
 )
 
 

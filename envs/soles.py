@@ -14,6 +14,7 @@ from .ground import can_touch
 
 FLATNESS = 0.005  # [m] a point of the foot this close to the sole plane belongs to the sole
 MAX_TILT = np.deg2rad(15.0)  # of a foot before levelling
+SIDE_ANGLE = np.deg2rad(2.0)  # between facets that count as one side of a foot
 MIN_SPAN = 0.01  # [m] a sole that is narrower than this cannot bear a moment
 MAX_VERTICES = 8
 RIM_POINTS = 16  # by which the rim of a cylinder is sampled
@@ -110,7 +111,7 @@ def find_sole_plane(
     tilt = 0.0
     for _ in range(3):  # round geoms (spheres, capsules) move their lowest point with the direction
         points = np.vstack([_lowest_points(model, data, g, body_id, down) for g in geom_ids])
-        facing = _mean_downward_normal(points, down)
+        facing = _downward_normal(points, down)
         if facing is None:
             break
         down = facing
@@ -215,22 +216,26 @@ def _lowest_points(
     return origin + local @ axes.T
 
 
-def _mean_downward_normal(points: np.ndarray, down: np.ndarray) -> np.ndarray | None:
-    """Area-weighted mean of the outward normals of the points' hull that are near ``down``.
+def _downward_normal(points: np.ndarray, down: np.ndarray) -> np.ndarray | None:
+    """Outward normal of the side of the points' hull that faces ``down``, or None without one.
 
-    None if the points lie on a line, or no side of the hull faces down.
+    A side is a set of facets with the same normal, up to 2°. Of several (a flat sole, and the
+    slant from there to a raised toe) the larger wins, and the more level.
     """
     above = points.mean(0) - np.ptp(points, axis=0).max() * down  # gives flat point sets a volume
     try:
         hull = ConvexHull(np.vstack([points, above]))
-    except QhullError:
+    except QhullError:  # all points on one line
         return None
     normals = hull.equations[:, :3]
-    facets = hull.points[hull.simplices]
-    cross = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
-    areas = np.linalg.norm(cross, axis=1)
-    near = normals @ down > np.cos(MAX_TILT)
+    tilts = np.arccos(np.clip(normals @ down, -1.0, 1.0))
+    near = tilts < MAX_TILT
     if not near.any():
         return None
-    mean = areas[near] @ normals[near]
+    normals, tilts, facets = normals[near], tilts[near], hull.points[hull.simplices[near]]
+    cross = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
+    areas = np.linalg.norm(cross, axis=1)
+    same_side = normals @ normals.T > np.cos(SIDE_ANGLE)
+    best = np.argmax((same_side @ areas) * (1.0 - tilts / MAX_TILT))
+    mean = (same_side[best] * areas) @ normals
     return mean / np.linalg.norm(mean)
