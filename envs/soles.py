@@ -104,26 +104,23 @@ def find_sole_plane(
     """The plane on which the foot would rest, near the horizontal in the present posture.
 
     Raises:
-        ConfigError: the foot has no flat side, or is tilted by more than 15°.
+        ConfigError: the foot has no flat side, or it is tilted by more than 15°.
     """
-    rotation = data.xmat[body_id].reshape(3, 3)
-    down = -rotation[2]  # the world's down in the foot frame
-    tilt = 0.0
+    world_down = down = -data.xmat[body_id].reshape(3, 3)[2]  # in the foot frame
     for _ in range(3):  # round geoms (spheres, capsules) move their lowest point with the direction
         points = np.vstack([_lowest_points(model, data, g, body_id, down) for g in geom_ids])
-        facing = _downward_normal(points, down)
-        if facing is None:
+        side = _downward_normal(points, world_down)
+        if side is None:
             break
-        down = facing
-        tilt = float(np.arccos(np.clip(-rotation[2] @ down, -1.0, 1.0)))
+        down = side
     points = np.vstack([_lowest_points(model, data, g, body_id, down) for g in geom_ids])
     depth = points @ down
     points = (points + np.outer(depth.max() - depth, down))[depth > depth.max() - FLATNESS]
     spread = np.linalg.svd(points - points.mean(0), compute_uv=False) / np.sqrt(len(points))
-    if facing is None or len(points) < 3 or spread[1] < MIN_SPAN / 2 or tilt > MAX_TILT:
+    if side is None or len(points) < 3 or spread[1] < MIN_SPAN / 2:
         raise ConfigError(
-            f"the foot {model.body(body_id).name!r} does not stand flat in the standing posture "
-            f"(tilt {np.rad2deg(tilt):.1f}°, {len(points)} points on the ground)",
+            f"the foot {model.body(body_id).name!r} has no flat side of collision geometry within "
+            f"{np.rad2deg(MAX_TILT):.0f}° of the ground in the standing posture",
             source=source,
             field=field,
         )

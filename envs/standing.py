@@ -13,7 +13,7 @@ from .errors import ConfigError
 from .soles import SolePlane
 
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
-MAX_CORRECTION = np.deg2rad(5.0)  # [rad] that levelling may change a joint
+MAX_CORRECTION = np.deg2rad(3.0)  # [rad] that levelling may change a joint
 TOLERANCE = 1e-10  # [rad] and [m]
 
 
@@ -88,7 +88,7 @@ def level_soles(
         source: the description file, for errors.
 
     Raises:
-        ConfigError: the legs cannot do it within 5° per joint.
+        ConfigError: the legs cannot do it within 3° per joint.
     """
     start = data.qpos.copy()
     for _ in range(50):
