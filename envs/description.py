@@ -94,6 +94,8 @@ class RobotDescription:
         torque_limits: joint name or pattern → largest torque [N·m]. Needed where the model's
             actuators do not bound it; wins over the model's own limits, and gives a motor to a
             joint that has none. An exact name wins over a pattern, an earlier pattern over a later.
+        push_bodies: bodies that a benchmark pushes, the first where one is wanted; empty for the
+            root alone.
         ground: name of the ground plane; without it, the model's own plane. A model without a
             plane gets one.
         options: simulation options.
@@ -107,6 +109,7 @@ class RobotDescription:
     forward: tuple[float, float, float] = (1.0, 0.0, 0.0)
     roles: dict[str, dict[str, float]] = field(default_factory=dict)
     torque_limits: dict[str, float] = field(default_factory=dict, metadata={"above": 0.0})
+    push_bodies: tuple[str, ...] = ()
     ground: str | None = None
     options: OptionDescription = field(default_factory=OptionDescription)
 

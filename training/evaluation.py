@@ -1,0 +1,222 @@
+"""Evaluating controllers on the same trials."""
+
+import shlex
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from poise.envs.config import to_dict
+from poise.envs.errors import ConfigError
+from poise.envs.push_schedule import LimitTable
+from poise.envs.robot import Robot, load_robot
+
+from .evaluation_folder import EvaluationFolder, Settings
+from .limits import PushLimits, load_limits, write_limits
+from .players import Player, load_player
+from .provenance import commit, machine, usable_cores, versions
+from .report import draw_plots, print_summary
+from .suite import Suite
+from .suites import load_suite
+from .summary import plain, summarise
+from .trials import Outcome, Trial, row
+from .workers import Workers
+
+
+def evaluate(
+    controllers: Sequence[str],
+    suite: str | Path = "random",
+    *,
+    out: str | Path,
+    robot: str = "humanoid",
+    seed: int = 0,
+    workers: int | None = None,
+    trials: int | None = None,
+    limits: str | Path | None = None,
+    overwrite: bool = False,
+    console: Console | None = None,
+) -> dict[str, Any]:
+    """Play a suite with every controller and write what came of it; returns the summary.
+
+    `out` gets settings.yaml, trials.csv, summary.json and the plots. A run that was stopped goes
+    on when it is called again alike. The result is the same, bit for bit, for any `workers`.
+
+    Args:
+        controllers: names as `load_player` takes them, all different.
+        suite: a packaged suite or a path to a ``.yaml`` of one.
+        out: the folder to write to.
+        robot: a packaged robot or a path to its description.
+        seed: of the trials.
+        workers: number of processes; None for all cores.
+        trials: instead of the suite's own number; of pushes (random), of starts (quiet), of trials
+            per direction and controller in the second stage (envelope), of repeats (grid).
+        limits: what pushes are measured by, see `load_limits`.
+        overwrite: replace an evaluation that `out` holds.
+        console: where progress and tables are printed; None: nowhere.
+
+    Raises:
+        ConfigError: anything named does not exist or is not valid; nothing is written then.
+        PoiseError: a file cannot be written, or a worker has died.
+    """
+    console = console or Console(quiet=True)
+    started = time.perf_counter()
+    _check(controllers, seed, workers, trials)
+    chosen = load_suite(suite)
+    if trials is not None:
+        chosen = chosen.resized(trials)
+    loaded = load_robot(robot)
+    pushed = load_limits(loaded, limits)
+    overrides = {"duration": chosen.duration, "pushes": None, "noise": chosen.noise}
+    with _patience(console):
+        players = [load_player(name, loaded, **overrides) for name in controllers]
+        first = chosen.first(pushed, seed)
+        _warm_up(players)
+    settings = Settings(
+        suite_name=str(suite),
+        suite=to_dict(chosen),
+        robot=str(robot),
+        robot_fingerprint=loaded.fingerprint,
+        controllers={player.name: player.fingerprint for player in players},
+        seed=seed,
+        limits=pushed.table,
+        versions=versions(("mujoco", "numpy", "numba")),
+    )
+    folder = EvaluationFolder(Path(out), settings, overwrite)
+    if folder.finished:
+        console.print(f"going on after {len(folder.finished)} finished trials in {out}")
+    count = workers or usable_cores()
+    try:
+        with Workers(controllers, robot, overrides, count) as pool:
+            done = _play(pool, folder, chosen, pushed, first, controllers, console)
+    finally:
+        folder.close()
+    outcomes = {
+        name: [folder.finished[trial.number][i] for trial in done]
+        for i, name in enumerate(controllers)
+    }
+    summary = plain(
+        {
+            "suite": str(suite),
+            "seed": seed,
+            "robot": loaded.name,
+            **summarise(chosen, done, outcomes, pushed),
+            "command": shlex.join(sys.argv),
+            "versions": versions(),
+            "machine": machine(),
+            "workers": count,
+            "commit": commit(),
+            "seconds": round(time.perf_counter() - started, 1),
+        }
+    )
+    plots = draw_plots(Path(out), chosen, done, outcomes, pushed)
+    rows = [row(trial, name, outcomes[name][k])
+            for k, trial in enumerate(done) for name in controllers]  # fmt: skip
+    folder.finish(rows, summary)
+    print_summary(summary, console)
+    for path in [*plots, Path(out) / "trials.csv", Path(out) / "summary.json"]:
+        console.print(str(path), highlight=False, soft_wrap=True)
+    return summary
+
+
+def measured_limits(summary: dict[str, Any], path: Path, robot: str) -> None:
+    """Write the J50s of an evaluation's first controller as a file of limits.
+
+    Raises ConfigError when the suite does not measure J50 in each direction.
+    """
+    name, entry = next(iter(summary["controllers"].items()))
+    directions = entry.get("directions")
+    if not directions:
+        raise ConfigError(f"the suite {summary['suite']!r} does not measure J50", field="suite")
+    table = LimitTable(
+        tuple(d["direction"] for d in directions), tuple(round(d["j50"], 3) for d in directions)
+    )
+    write_limits(path, load_robot(robot), name, table)
+
+
+def _check(
+    controllers: Sequence[str], seed: int, workers: int | None, trials: int | None
+) -> None:
+    if not controllers:
+        raise ConfigError("give at least one", field="controller")
+    for name in controllers:
+        if list(controllers).count(name) > 1:
+            raise ConfigError(f"{name!r} is given twice", field="controller")
+    for value, name, least in ((seed, "seed", 0), (workers, "workers", 1), (trials, "trials", 1)):
+        if value is not None and value < least:
+            raise ConfigError(f"must be at least {least}, not {value}", field=name)
+
+
+def _play(
+    pool: Workers,
+    folder: EvaluationFolder,
+    suite: Suite,
+    limits: PushLimits,
+    first: list[Trial],
+    controllers: Sequence[str],
+    console: Console,
+) -> list[Trial]:
+    """Play all stages of the suite; returns the trials in order, `folder` has their outcomes."""
+    trials: list[Trial] = []
+    stage = first
+    with _progress(console) as bar:
+        task = bar.add_task("", total=suite.count(len(controllers)), rates="")
+
+        def show() -> None:
+            rates = np.mean([[o.recovered for o in os] for os in folder.finished.values()], axis=0)
+            text = "  ".join(f"{n} {r:.0%}" for n, r in zip(controllers, rates, strict=True))
+            bar.update(task, completed=len(folder.finished), rates=text)
+
+        while stage:
+            missing = [trial for trial in stage if trial.number not in folder.finished]
+            for trial, outcomes in pool.play(missing):
+                folder.append(trial.number, outcomes)
+                show()
+            trials += stage
+            recovered = {
+                name: [folder.finished[trial.number][i].recovered for trial in trials]
+                for i, name in enumerate(controllers)
+            }
+            stage = suite.more(limits, folder.settings.seed, trials, recovered)
+        if folder.finished:
+            show()
+    return trials
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
+        TextColumn("trials"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("recovered: {task.fields[rates]}"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=console.quiet,
+    )
+
+
+def _warm_up(players: Sequence[Player]) -> None:
+    """Compile what is not yet compiled, once, before many processes would do it each."""
+    for player in players:
+        observation, _ = player.env.reset(seed=0, options={"push": []})
+        player.env.step(player.act(observation))
+
+
+@contextmanager
+def _patience(console: Console) -> Iterator[None]:
+    """Say why nothing happens if the block takes long."""
+    message = "compiling (only once, about half a minute) …"
+    timer = threading.Timer(4.0, console.print, (message,))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()

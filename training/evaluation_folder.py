@@ -1,0 +1,147 @@
+"""The folder of an evaluation: its settings, its finished trials, and what is left of a stop.
+
+    settings.yaml         everything that decides the result
+    trials.partial.jsonl  a line for each finished trial, while the evaluation runs
+    trials.csv            a line for each trial and controller, at the end
+    summary.json          written last: with it, the evaluation is finished
+"""
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, TextIO
+
+from poise.envs.config import build, read_yaml, to_yaml, write_atomic
+from poise.envs.errors import ConfigError, PoiseError
+from poise.envs.push_schedule import LimitTable
+
+from .trials import COLUMNS, Outcome
+
+SETTINGS, PARTIAL, TRIALS, SUMMARY = (
+    "settings.yaml", "trials.partial.jsonl", "trials.csv", "summary.json",
+)  # fmt: skip
+PLOTS = ("polar_envelope.png", "fall_probability.png")
+FILES = (SUMMARY, SETTINGS, PARTIAL, TRIALS, *PLOTS)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Everything that decides an evaluation's result, but for the machine.
+
+    Attributes:
+        suite_name: as the user wrote it; `suite` holds its fields.
+        robot: name or path, as the user wrote it; `robot_fingerprint` of what was loaded.
+        controllers: name → fingerprint, in the user's order.
+        seed: of the trials.
+        limits: what the suite's pushes are measured by; None: the ankle limit.
+        versions: of what computes the result.
+    """
+
+    suite_name: str
+    suite: dict[str, Any]
+    robot: str
+    robot_fingerprint: str
+    controllers: dict[str, str]
+    seed: int = field(metadata={"min": 0})
+    limits: LimitTable | None
+    versions: dict[str, str]
+
+
+class EvaluationFolder:
+    """Opens a new or an interrupted evaluation.
+
+    `finished` holds the outcomes that an interrupted one has left, by trial number.
+
+    Args:
+        path: the folder; made if missing.
+        settings: of this evaluation.
+        overwrite: remove what an earlier evaluation has left there.
+
+    Raises:
+        ConfigError: the folder holds another or a finished evaluation, and `overwrite` is off.
+        PoiseError: the folder cannot be written.
+    """
+
+    def __init__(self, path: Path, settings: Settings, overwrite: bool = False):
+        self.path, self.settings = path, settings
+        self.finished: dict[int, list[Outcome]] = {}
+        self._partial: TextIO | None = None
+        if overwrite:
+            for name in FILES:
+                (path / name).unlink(missing_ok=True)
+        elif any((path / name).exists() for name in FILES):
+            self._check()
+            self._read_partial()
+        write_atomic(path / SETTINGS, to_yaml(settings))
+        write_atomic(path / PARTIAL, "".join(map(_line, self.finished.items())))
+        try:
+            self._partial = (path / PARTIAL).open("a")
+        except OSError as error:
+            raise PoiseError(f"{path / PARTIAL}: cannot be written ({error.strerror})") from None
+
+    def append(self, number: int, outcomes: list[Outcome]) -> None:
+        """Keep the outcome of a trial, in the order of the controllers."""
+        assert self._partial is not None
+        self.finished[number] = outcomes
+        self._partial.write(_line((number, outcomes)))
+        self._partial.flush()
+
+    def close(self) -> None:
+        """Stop; what is finished stays."""
+        if self._partial is not None:
+            self._partial.close()
+
+    def finish(self, rows: Sequence[dict[str, Any]], summary: dict[str, Any]) -> None:
+        """Write the trials and, last, the summary."""
+        self.close()
+        write_atomic(self.path / TRIALS, _csv(rows))
+        write_atomic(self.path / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
+        (self.path / PARTIAL).unlink(missing_ok=True)
+
+    def _check(self) -> None:
+        """Refuse to go on from anything but an interrupted evaluation with equal settings."""
+        advice = "choose another folder, or replace it by --overwrite"
+        if (self.path / SUMMARY).exists() or not (self.path / SETTINGS).exists():
+            raise ConfigError(f"already holds an evaluation: {advice}", source=self.path, field="out")
+        before = read_settings(self.path)
+        names = Settings.__dataclass_fields__
+        changed = [n for n in names if getattr(before, n) != getattr(self.settings, n)]
+        if changed:
+            raise ConfigError(
+                f"holds an interrupted evaluation with other settings ({', '.join(changed)}): "
+                f"{advice}",
+                source=self.path / SETTINGS,
+                field=changed[0],
+            )
+
+    def _read_partial(self) -> None:
+        """Outcomes up to the first line that a kill has cut off."""
+        path = self.path / PARTIAL
+        for line in path.read_text().splitlines() if path.exists() else []:
+            try:
+                number, outcomes = json.loads(line)
+                self.finished[number] = [build(Outcome, o, str(path)) for o in outcomes]
+            except (ValueError, TypeError, ConfigError):
+                break
+
+
+def read_settings(folder: Path) -> Settings:
+    """The settings of an evaluation; raises ConfigError where there are none."""
+    path = folder / SETTINGS
+    return build(Settings, read_yaml(path), str(path))
+
+
+def _line(item: tuple[int, Iterable[Outcome]]) -> str:
+    number, outcomes = item
+    return json.dumps([number, [asdict(outcome) for outcome in outcomes]]) + "\n"
+
+
+def _csv(rows: Sequence[dict[str, Any]]) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()

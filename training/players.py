@@ -1,0 +1,91 @@
+"""Who is evaluated: a controller by its name, ready to act in an environment of its own."""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.balance import BalanceEnv
+from poise.envs.config import packaged, to_yaml
+from poise.envs.errors import ConfigError
+from poise.envs.robot import Robot
+from poise.envs.torque_balance import TorqueBalanceEnv
+
+SHIPPED, NO_CONTROL = "residual", "zero"
+
+
+@dataclass(frozen=True, eq=False)
+class Player:
+    """A name, an environment, and what to do in it.
+
+    Attributes:
+        name: as the user wrote it.
+        env: the environment it acts in.
+        act: deterministic action (na,) for an observation (no,).
+        fingerprint: hash of the controller's configuration and the policy's weights.
+    """
+
+    name: str
+    env: BalanceEnv
+    act: Callable[[np.ndarray], np.ndarray]
+    fingerprint: str
+
+
+def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
+    """A player from the name of a controller.
+
+    Args:
+        name: a packaged controller or a path to a ``.yaml`` of one (played with action zero),
+            ``residual`` (the shipped policy), ``zero`` (no torque at all), or a folder written by
+            ``poise train``.
+        robot: who is controlled. A policy must have been trained on it.
+        overrides: arguments of the environment, or fields of its `EnvConfig`.
+
+    Raises:
+        ConfigError: no such controller, or one that is not valid or is for another robot.
+    """
+    if name == NO_CONTROL:
+        return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
+    if name == SHIPPED or Path(name).is_dir():
+        return _policy(name, robot, overrides)
+    names = packaged("controllers")
+    if name not in names and not (Path(name).is_file() and Path(name).suffix in (".yaml", ".yml")):
+        raise ConfigError(
+            f"no such controller: {name!r}; give a name, a .yaml file of a controller, "
+            "or a folder written by poise train",
+            field="controller",
+            choices=(*names, SHIPPED, NO_CONTROL),
+        )
+    env = ResidualBalanceEnv(robot, controller=name, **overrides)
+    return _idle(name, env, to_yaml(env.controller.config))
+
+
+def _idle(name: str, env: BalanceEnv, content: str) -> Player:
+    """A player whose action is always zero."""
+    action = np.zeros(env.action_space.shape)
+    return Player(name, env, lambda observation: action, _hash(content.encode()))
+
+
+def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
+    from .policy import load_policy  # loads torch, which the other players do without
+
+    policy = load_policy(None if name == SHIPPED else name, robot)
+    env = policy.make_env(robot=robot, **overrides)
+    sizes = (policy.layers[0][0].shape[0], policy.layers[-1][0].shape[1])
+    expected = (env.observation_space.shape[0], env.action_space.shape[0])
+    if sizes != expected:
+        raise ConfigError(
+            f"the policy has {sizes[0]} observations and {sizes[1]} actions, the environment of "
+            f"{robot.name!r} has {expected[0]} and {expected[1]}",
+            source=name,
+        )
+    weights = [array.tobytes() for layer in policy.layers for array in layer]
+    return Player(name, env, policy.act, _hash(to_yaml(policy.config).encode(), *weights))
+
+
+def _hash(*parts: bytes) -> str:
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()

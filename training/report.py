@@ -1,0 +1,136 @@
+"""An evaluation for people: plots, and tables in the terminal."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from .bootstrap import EnvelopeFit, mean_over_directions
+from .evaluation_folder import PLOTS
+from .fits import fit_logistic
+from .limits import PushLimits
+from .plots import fall_probability, polar_envelope
+from .suite import Suite
+from .summary import Outcomes, fractions, pushes, sectors, won
+from .trials import Trial
+
+
+def draw_plots(
+    folder: Path, suite: Suite, trials: Sequence[Trial], outcomes: Outcomes, limits: PushLimits
+) -> list[Path]:
+    """Write the plots of an evaluation; returns their paths, none without pushes."""
+    if trials[0].push is None:
+        return []
+    polar, fall = (folder / name for name in PLOTS)
+    direction, impulse, duration = pushes(trials)
+    ankle = np.array([limits.ankle(d, t) for d, t in zip(direction, duration, strict=True)])
+    if suite.by_direction:
+        fits = {
+            name: mean_over_directions(direction, impulse, won(results))
+            for name, results in outcomes.items()
+        }
+        fine = np.arange(0.0, 360.0, 2.0)
+        limit = [limits.ankle(d, float(duration[0])) for d in fine]
+        polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit))
+        share, label = impulse / ankle, None
+    else:
+        fits = {name: sectors(trials, results) for name, results in outcomes.items()}
+        unit = f"of the {limits.scale}"
+        title = f"Recovered share of the {limits.scale} by push direction"
+        polar_envelope(polar, _bands(fits), title=title, unit=unit)
+        share, label = fractions(trials), f"push impulse, as a fraction of the {limits.scale}"
+    fall_probability(
+        fall,
+        {name: (share, won(results)) for name, results in outcomes.items()},
+        {name: fit_logistic(share, won(results)) for name, results in outcomes.items()},
+        unit="fraction",
+        xlabel=label,
+    )
+    return [polar, fall]
+
+
+def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, tuple[list[float], ...]]:
+    """Direction, J50 and its interval, as `polar_envelope` takes them."""
+    return {
+        name: (
+            list(fit.directions),
+            [f.fit.j50 for f in fit.fits],
+            [f.j50_ci.low for f in fit.fits],
+            [f.j50_ci.high for f in fit.fits],
+        )
+        for name, fit in fits.items()
+    }
+
+
+def print_summary(summary: Mapping[str, Any], console: Console) -> None:
+    """Tables of the controllers and of the pairs."""
+    title = f"{summary['suite']} · {summary['robot']} · seed {summary['seed']}"
+    console.print(_controllers(summary, title))
+    if summary["pairs"]:
+        console.print(_pairs(summary))
+
+
+def _controllers(summary: Mapping[str, Any], title: str) -> Table:
+    entries = summary["controllers"]
+    first = next(iter(entries.values()))
+    table = Table(title=title, title_justify="left")
+    table.add_column("controller")
+    columns: list[tuple[str, Any]] = [
+        ("recovered", lambda e: f"{e['recovered']}/{e['trials']}"),
+        ("rate [95 %]", lambda e: f"{e['recovered_rate']:.1%} {_range(e['recovered_ci95'], '.1%')}"),
+    ]
+    if "j50_mean" in first:
+        columns += [
+            ("mean J50 [N·s]", lambda e: f"{e['j50_mean']:.1f} {_range(e['j50_mean_ci95'], '.1f')}"),
+            ("worst J50", lambda e: f"{e['j50_min']:.1f}"),
+            ("η mean, min", lambda e: f"{e['eta_mean']:.2f}, {e['eta_min']:.2f}"),
+        ]
+    if "fraction50" in first:
+        columns.append((f"half at, of {first['fraction_of']}", lambda e: f"{e['fraction50']:.2f}"))
+    if first["com_drift_max"] is not None:
+        columns += [
+            ("falls", lambda e: f"{e['fallen']}"),
+            ("CoM drift [mm]", lambda e: _milli(e["com_drift_max"])),
+        ]
+    columns += [
+        ("solver failures", lambda e: f"{e['solver_failures']}"),
+        ("mean |action|", lambda e: _number(e["mean_abs_action"], ".3f")),
+    ]
+    for name, _ in columns:
+        table.add_column(name, justify="right")
+    for name, entry in entries.items():
+        table.add_row(name, *(text(entry) for _, text in columns))
+    return table
+
+
+def _pairs(summary: Mapping[str, Any]) -> Table:
+    table = Table()
+    table.add_column("b against a")
+    names = ["both", "only a (lost)", "only b (won)", "neither", "McNemar p"]
+    gain = "j50_gain" in summary["pairs"][0]
+    for name in names + (["J50 gain [95 %]"] if gain else []):
+        table.add_column(name, justify="right")
+    for pair in summary["pairs"]:
+        cells = [str(pair[key]) for key in ("both", "only_a", "only_b", "neither")]
+        cells.append(f"{pair['p_mcnemar']:.2g}")
+        if gain:
+            cells.append(
+                f"{_number(pair['j50_gain'], '+.1%')} {_range(pair['j50_gain_ci95'], '+.1%')}"
+            )
+        table.add_row(f"{pair['b']} against {pair['a']}", *cells)
+    return table
+
+
+def _range(interval: Sequence[float], form: str) -> str:
+    return f"[{_number(interval[0], form)}, {_number(interval[1], form)}]"
+
+
+def _number(value: float | None, form: str) -> str:
+    return "–" if value is None else format(value, form)
+
+
+def _milli(value: float | None) -> str:
+    return "–" if value is None else f"{1000 * value:.1f}"
