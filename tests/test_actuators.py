@@ -64,6 +64,8 @@ def test_joint_force_range_bounds(tmp_path: Path) -> None:
     for extra in (section('<position joint="{}" kp="100"/>'), motors(ctrlrange="-99 99")):
         robot = load_robot(write_biped(tmp_path, leg=leg, extra=extra))
         assert set(limits(robot).values()) == {17}
+    robot = load_robot(write_biped(tmp_path, leg=leg, extra=motors(ctrlrange="-9 9")))
+    assert set(limits(robot).values()) == {9}
 
 
 def test_description_wins(tmp_path: Path) -> None:

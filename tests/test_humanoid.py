@@ -21,6 +21,7 @@ def test_is_the_humanoid_of_the_design() -> None:
         geoms = list(sole.geom_ids)
         assert np.all(robot.model.geom_condim[geoms] == 3)
         assert np.all(robot.model.geom_friction[geoms, 0] == 0.8)
+    assert not robot.model.geom_margin.any()
     assert robot.model.geom_friction[robot.ground_geom_id, 0] == 0.8
 
 

@@ -14,7 +14,7 @@ from poise.envs.config import packaged
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot, load_robot
 
-from .small_biped import LEG, write_biped
+from .small_biped import BOX_FOOT, LEG, write_biped
 
 ROBOTS = ("compact", "humanoid", "tall", "toddler")
 
@@ -158,6 +158,12 @@ def test_contact_sensors(robot: Robot) -> None:
     assert data.sensordata[ground] > data.sensordata[left] + data.sensordata[right]
 
 
+def test_contact_sensor_counts_the_foots_children(tmp_path: Path) -> None:
+    """Contacts of bodies that hang on the foot body count as the foot's."""
+    robot = load_robot(write_biped(tmp_path, foot=f"<body>{BOX_FOOT}</body>"))
+    assert standing(robot).sensordata[robot.sensor_adr["left"]] == 4
+
+
 def test_standing_posture_can_be_held(robot: Robot) -> None:
     """Some contact forces hold the standing posture with half of each motor's torque.
 
@@ -242,6 +248,7 @@ WRONG = [
     ({"root_joint": ""}, ["root", "free joint"]),
     ({"trunk": BALL}, ["ball joints"]),
     ({"extra": WELD}, ["closed kinematic loops"]),
+    ({"world": "<body><joint/><geom size='0.02'/></body>"}, ["root", "before all other"]),
     ({"world": BALL.replace("<joint type='ball'/>", "<freejoint/>")}, ["root"]),
     ({"leg": LEG.replace('axis="0 1 0"', 'axis="0 0 0"')}, ["does not compile"]),
     ({"feet": []}, ["feet", "two feet"]),

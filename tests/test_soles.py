@@ -63,6 +63,26 @@ def test_points_above_the_plane_do_not_count(tmp_path: Path) -> None:
         assert len(sole.geom_ids) == 2
 
 
+def test_points_near_the_plane_count(tmp_path: Path) -> None:
+    """What is up to 5 mm above the sole plane is part of the sole."""
+    spheres = "".join(sphere(x, y) for x in (-0.07, 0.13) for y in (-0.04, 0.04))
+    toe = '<geom size="0.01" pos="0.2 0 -0.037"/>'
+    for sole in soles(tmp_path, spheres + toe):
+        assert len(sole.polygon) == 5
+        assert np.ptp(sole.polygon[:, 0]) == pytest.approx(0.27)
+        assert sole.position[2] == pytest.approx(-0.05, abs=1e-9)
+
+
+def test_raised_toe_and_heel(tmp_path: Path) -> None:
+    """The flat of a sole is found between the slants to raised ends on all sides."""
+    ends = "".join(
+        f'<geom type="box" size="0.01 0.01 0.01" pos="{x} {y} -0.03"/>'
+        for x, y in ((0.22, 0), (-0.15, 0), (0.03, 0.12), (0.03, -0.12))
+    )
+    for sole in soles(tmp_path, BOX_FOOT + ends):
+        np.testing.assert_allclose(sole.polygon, RECTANGLE, atol=1e-9)
+
+
 def test_named_geoms_only(tmp_path: Path) -> None:
     """With geoms named in the description, the others of the foot do not count."""
     toe = '<geom name="{side}_toe" type="box" size="0.02 0.02 0.01" pos="0.2 0 -0.04"/>'
