@@ -1,0 +1,28 @@
+"""Choose MuJoCo's off-screen renderer. Does not import MuJoCo, which reads the choice only once."""
+
+from __future__ import annotations
+
+import ctypes.util
+import os
+import sys
+
+
+def choose_gl_backend() -> str | None:
+    """Set ``MUJOCO_GL`` on Linux without a display; returns its value, None if it is not set.
+
+    Call it before anything imports MuJoCo. A value set by the user stays. OSMesa comes first: it
+    draws in software the same pictures on every machine; EGL comes next. On a machine with a GPU
+    ``MUJOCO_GL=egl`` is faster. With a display, or on another system, MuJoCo's own choice is good.
+    """
+    chosen = os.environ.get("MUJOCO_GL")
+    if chosen or not sys.platform.startswith("linux") or "mujoco" in sys.modules or _has_display():
+        return chosen
+    for backend, library in (("osmesa", "OSMesa"), ("egl", "EGL")):
+        if ctypes.util.find_library(library):
+            os.environ["MUJOCO_GL"] = backend
+            return backend
+    return None
+
+
+def _has_display() -> bool:
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
