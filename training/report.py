@@ -77,7 +77,7 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
     entries = summary["controllers"]
     first = next(iter(entries.values()))
     table = Table(title=title, title_justify="left")
-    table.add_column("controller")
+    table.add_column("controller", overflow="fold", min_width=11)
     columns: list[tuple[str, Any]] = [
         ("recovered", lambda e: f"{e['recovered']}/{e['trials']}"),
         ("rate [95 %]", lambda e: f"{e['recovered_rate']:.1%} {_range(e['recovered_ci95'], '.1%')}"),
@@ -85,11 +85,11 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
     if "j50_mean" in first:
         columns += [
             ("mean J50 [N·s]", lambda e: f"{e['j50_mean']:.1f} {_range(e['j50_mean_ci95'], '.1f')}"),
-            ("worst J50", lambda e: f"{e['j50_min']:.1f}"),
+            ("worst J50", lambda e: f"{e['j50_min']:.1f}{_open(e)}"),
             ("η mean, min", lambda e: f"{e['eta_mean']:.2f}, {e['eta_min']:.2f}"),
         ]
     if "fraction50" in first:
-        columns.append((f"half at, of {first['fraction_of']}", lambda e: f"{e['fraction50']:.2f}"))
+        columns.append((f"half at, of {first['fraction_of']}", _half))
     if first["com_drift_max"] is not None:
         columns += [
             ("falls", lambda e: f"{e['fallen']}"),
@@ -100,7 +100,7 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
         ("mean |action|", lambda e: _number(e["mean_abs_action"], ".3f")),
     ]
     for name, _ in columns:
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", overflow="fold")
     for name, entry in entries.items():
         table.add_row(name, *(text(entry) for _, text in columns))
     return table
@@ -108,7 +108,7 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
 
 def _pairs(summary: Mapping[str, Any]) -> Table:
     table = Table()
-    table.add_column("b against a")
+    table.add_column("b against a", overflow="fold", min_width=11)
     names = ["both", "only a (lost)", "only b (won)", "neither", "McNemar p"]
     gain = "j50_gain" in summary["pairs"][0]
     for name in names + (["J50 gain [95 %]"] if gain else []):
@@ -122,6 +122,16 @@ def _pairs(summary: Mapping[str, Any]) -> Table:
             )
         table.add_row(f"{pair['b']} against {pair['a']}", *cells)
     return table
+
+
+def _half(entry: Mapping[str, Any]) -> str:
+    sign = {None: "", "lower": "≥ ", "upper": "≤ "}[entry["fraction50_bound"]]
+    return f"{sign}{entry['fraction50']:.2f}"
+
+
+def _open(entry: Mapping[str, Any]) -> str:
+    """A remark where the pushes did not reach from recovery to fall in every direction."""
+    return f" ({entry['j50_bounded']} only bounds)" if entry["j50_bounded"] else ""
 
 
 def _range(interval: Sequence[float], form: str) -> str:

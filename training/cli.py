@@ -1,0 +1,216 @@
+"""The command `poise`. What is heavy (MuJoCo, Numba, torch) is imported by the sub-commands."""
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+
+from poise.envs.errors import PoiseError
+
+Names = Annotated[
+    tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="CONTROLLER …", help_behavior_hint="")
+]
+Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
+Off = tyro.conf.FlagCreatePairsOff
+WIDTH = 120  # of tables that no terminal shows
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run a sub-command; returns 0, 2 after bad input, or 130 after Ctrl-C."""
+    args = list(sys.argv[1:] if args is None else args)
+    # Small matrices lose time to threads, and sums may change their order. Read at import.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    try:
+        if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass
+            from .train_command import run
+
+            run(args[1:])
+        else:
+            tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="poise",
+                description="Keep a simulated humanoid on its feet while it is pushed.",
+                args=args,
+            )
+    except PoiseError as error:
+        print(f"poise: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("poise: stopped", file=sys.stderr)
+        return 130
+    return 0
+
+
+def demo(out: Path = Path("out/demo"), workers: int | None = None, seed: int = 0) -> None:
+    """Push the baseline and the shipped residual policy, and compare them, in a few minutes.
+
+    Args:
+        out: folder to write to; an earlier demo there is replaced.
+        workers: number of processes; all cores if not given.
+        seed: of the pushes.
+    """
+    from .demo import demo
+
+    demo(out, workers=workers, seed=seed, console=_console())
+
+
+def train() -> None:
+    """Train a residual policy with PPO; `poise train --help` lists every field of its config."""
+    raise AssertionError("main() answers this sub-command")
+
+
+def evaluate(
+    controllers: Names,
+    /,
+    suite: str = "random",
+    *,
+    out: Path | None = None,
+    robot: str = "humanoid",
+    seed: int = 0,
+    workers: int | None = None,
+    trials: int | None = None,
+    limits: str | None = None,
+    write_limits: Path | None = None,
+    overwrite: Off[bool] = False,
+) -> None:
+    """Play a suite of pushes with several controllers, all on the same trials.
+
+    Writes settings.yaml, trials.csv, summary.json and plots. A run that was stopped goes on when
+    it is started again alike. The result is the same for any number of workers.
+
+    Args:
+        controllers: momentum-qp, residual (the shipped policy), zero (no torque), a .yaml file of
+            a controller, or a folder written by poise train.
+        suite: random, envelope, grid, quiet, or a .yaml file.
+        out: folder to write to; out/SUITE if not given.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        seed: of the trials.
+        workers: number of processes; all cores if not given.
+        trials: number of pushes (random), of starts (quiet), of trials per direction and controller
+            in the second stage (envelope), of repeats (grid).
+        limits: a .yaml file that pushes are measured by; if not given, the packaged file of the
+            robot, else its ankle limit.
+        write_limits: write the first controller's J50s to this file, for --limits.
+        overwrite: replace an evaluation that the folder holds.
+    """
+    from .evaluation import evaluate, measured_limits
+
+    folder = Path("out") / Path(suite).stem if out is None else out
+    try:
+        summary = evaluate(
+            controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, trials=trials,
+            limits=limits, overwrite=overwrite, console=_console(),
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        if (folder / "trials.partial.jsonl").exists():
+            print(
+                f"poise: the finished trials are kept in {folder}; the same command goes on",
+                file=sys.stderr,
+            )
+        raise
+    if write_limits is not None:
+        measured_limits(summary, write_limits, robot)
+        _console().print(str(write_limits), highlight=False, soft_wrap=True)
+
+
+def replay(
+    folder: Folder,
+    /,
+    *,
+    trial: int,
+    controller: str | None = None,
+    video: Path | None = None,
+    plot: Path | None = None,
+) -> None:
+    """Play one trial of an evaluation again, exactly, and say whether it ends as it was recorded.
+
+    Args:
+        folder: written by poise evaluate.
+        trial: its number in trials.csv.
+        controller: which of the evaluated ones; the last if not given.
+        video: an MP4 file to write.
+        plot: a PNG file to write: CoM, CoP, capture point and torque over time.
+    """
+    if video is not None:
+        from poise.envs.gl import choose_gl_backend
+
+        choose_gl_backend()
+    from .replay import replay
+
+    done, console = replay(folder, trial, controller, video=video, plot=plot), _console()
+    end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
+    console.print(f"trial {trial}, {done.controller}: {end}", highlight=False)
+    console.print(f"push: {done.trial.push}", highlight=False, soft_wrap=True)
+    for name, (recorded, now) in done.differences.items():
+        console.print(f"{name}: recorded {recorded or '–'}, now {now or '–'}", highlight=False)
+    console.print("differs from the record" if done.differences else "exactly as recorded")
+    for path in (video, plot):
+        if path is not None:
+            console.print(str(path), highlight=False, soft_wrap=True)
+
+
+def tune(
+    *,
+    out: Path,
+    controller: str = "momentum-qp",
+    robot: str = "humanoid",
+    generations: int = 60,
+    population: int = 14,
+    spread: float = 0.15,
+    seed: int = 0,
+    workers: int = 2,
+) -> None:
+    """Search a controller's gains by CMA-ES on seeded pushes.
+
+    Args:
+        out: folder to write gains.yaml and history.jsonl to.
+        controller: where the search starts: a packaged controller or a .yaml file.
+        robot: a packaged robot or a .yaml description.
+        generations: of the search.
+        population: candidates in a generation.
+        spread: initial standard deviation, as a share of each gain's range.
+        seed: of the search and its pushes.
+        workers: number of processes.
+    """
+    from poise.baselines.registry import controller_config
+
+    from .tuning import Tuning, tune
+
+    start = controller_config(controller)
+    tuning = Tuning(start, robot, generations=generations, population=population,
+                    spread=spread, seed=seed, workers=workers)  # fmt: skip
+    tune(tuning, out)
+
+
+def list_names() -> None:
+    """List what can be named: robots, controllers, suites, training configurations, motions."""
+    from poise.envs.config import packaged
+
+    console = _console()
+    for kind in ("robots", "controllers", "suites", "training", "motions", "limits"):
+        console.print(f"{kind}: {', '.join(packaged(kind)) or 'none'}", highlight=False)
+    console.print("also as controllers: residual, zero, a folder written by poise train")
+
+
+COMMANDS = {
+    "demo": demo,
+    "train": train,
+    "evaluate": evaluate,
+    "replay": replay,
+    "tune": tune,
+    "list": list_names,
+}
+
+
+def _console() -> Console:
+    console = Console()
+    return console if console.is_terminal else Console(width=WIDTH)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,43 @@
+"""The main job in a few minutes: the baseline against the shipped residual policy."""
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from .evaluation import evaluate
+from .evaluation_folder import PLOTS
+from .players import SHIPPED
+
+CONTROLLERS = ("momentum-qp", SHIPPED)
+SUITES = ("demo-envelope", "demo-random")
+
+
+def demo(
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    seed: int = 0,
+    controllers: tuple[str, ...] = CONTROLLERS,
+    console: Console | None = None,
+) -> list[dict[str, Any]]:
+    """Evaluate on both suites of the demo; returns their summaries.
+
+    An earlier demo in `out` is replaced.
+
+    Raises:
+        ConfigError, PoiseError: as `evaluate`.
+    """
+    console = console or Console(quiet=True)
+    summaries = []
+    for suite in SUITES:
+        summaries.append(
+            evaluate(
+                controllers, suite, out=Path(out) / suite, seed=seed, workers=workers,
+                overwrite=True, console=console,
+            )  # fmt: skip
+        )
+    console.print("\npolar recovery plot and fall probability:")
+    for suite, plot in zip(SUITES, PLOTS, strict=True):
+        console.print(str(Path(out) / suite / plot), highlight=False, soft_wrap=True)
+    return summaries

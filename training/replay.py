@@ -1,0 +1,172 @@
+"""Playing one trial of an evaluation again, exactly, from its folder."""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from poise.envs import episode
+from poise.envs.balance import BalanceEnv
+from poise.envs.config import build
+from poise.envs.errors import ConfigError
+from poise.envs.pushes import Push
+from poise.envs.robot import load_robot
+
+from .evaluation_folder import SUMMARY, TRIALS, Settings, read_settings
+from .players import Player, load_player
+from .suites import build_suite
+from .trials import COLUMNS, PUSH_COLUMNS, Outcome, Trial, run_trial
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A trial played again.
+
+    Attributes:
+        trial: the trial.
+        controller: who played it.
+        outcome: of now.
+        differences: outcome → (recorded, now), for those that differ.
+    """
+
+    trial: Trial
+    controller: str
+    outcome: Outcome
+    differences: dict[str, tuple[str, str]]
+
+
+def replay(
+    folder: str | Path,
+    trial: int,
+    controller: str | None = None,
+    *,
+    video: str | Path | None = None,
+    plot: str | Path | None = None,
+) -> Replay:
+    """Play a trial of the evaluation in `folder` again and compare it with what was recorded.
+
+    Args:
+        folder: written by `evaluate`.
+        trial: its number in trials.csv.
+        controller: one of the evaluation's; None: the last, which is the first if it is alone.
+        video: an MP4 file to write.
+        plot: a PNG file to write: CoM, CoP, capture point and torque over time.
+
+    Raises:
+        ConfigError: no evaluation there, no such trial or controller, or a controller or robot
+            that is no longer the one that was evaluated.
+        PoiseError: nothing can be drawn here, or a file cannot be written.
+    """
+    folder = Path(folder)
+    settings = read_settings(folder)
+    names = tuple(settings.controllers)
+    name = names[-1] if controller is None else controller
+    if name not in names:
+        raise ConfigError(f"{name!r} was not evaluated", source=folder, field="controller",
+                          choices=names)  # fmt: skip
+    line = _find(folder, trial, name)
+    again = _trial(line, folder / TRIALS)
+    player = _player(settings, name, folder)
+    watch = _Watch() if plot is not None else None
+    outcome = run_trial(player, again, watch)
+    differences = {
+        key: (line[key], text)
+        for key, value in asdict(outcome).items()
+        if line[key] != (text := "" if value is None else str(value))
+    }
+    if watch is not None:
+        watch.draw(Path(str(plot)), again, f"Trial {trial}, {name}")
+    if video is not None:
+        from .video import record
+
+        start = {"seed": again.seed, "options": {"push": [again.push] if again.push else []}}
+        record(player.env, player.act, video, start)
+    return Replay(again, name, outcome, differences)
+
+
+def _find(folder: Path, trial: int, controller: str) -> Mapping[str, str]:
+    """The line of trials.csv."""
+    path = folder / TRIALS
+    if not (folder / SUMMARY).exists() or not path.exists():
+        raise ConfigError("holds no finished evaluation", source=folder)
+    with path.open(newline="") as file:
+        reader = csv.DictReader(file)
+        if tuple(reader.fieldnames or ()) != COLUMNS:
+            raise ConfigError("has other columns than poise evaluate writes", source=path)
+        lines = list(reader)
+    for line in lines:
+        if line["trial"] == str(trial) and line["controller"] == controller:
+            return line
+    last = max((int(line["trial"]) for line in lines), default=-1)
+    raise ConfigError(f"no trial {trial}; they are numbered from 0 to {last}", source=path,
+                      field="trial")  # fmt: skip
+
+
+def _trial(line: Mapping[str, str], path: Path) -> Trial:
+    """The trial of a line; numbers read back exactly as they were."""
+    push = None
+    try:
+        if line["body"]:
+            data: dict[str, Any] = {
+                key: line[key] if key in ("body", "profile") else float(line[key])
+                for key in PUSH_COLUMNS
+            }
+            data["point"] = [data.pop(key) for key in ("point_x", "point_y", "point_z")]
+            push = build(Push, data, str(path))
+        fraction = float(line["limit_fraction"]) if line["limit_fraction"] else None
+        return Trial(int(line["trial"]), int(line["seed"]), push, fraction, int(line["stage"]))
+    except ValueError as error:
+        raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None
+
+
+def _player(settings: Settings, name: str, folder: Path) -> Player:
+    """The controller as it was evaluated."""
+    robot = load_robot(settings.robot)
+    if robot.fingerprint != settings.robot_fingerprint:
+        raise ConfigError(f"the robot {settings.robot!r} has changed since", source=folder,
+                          field="robot_fingerprint")  # fmt: skip
+    suite = build_suite(settings.suite, str(folder))
+    player = load_player(name, robot, duration=suite.duration, pushes=None, noise=suite.noise)
+    if player.fingerprint != settings.controllers[name]:
+        raise ConfigError(f"the controller {name!r} has changed since", source=folder,
+                          field="controllers")  # fmt: skip
+    return player
+
+
+class _Watch:
+    """Keeps what a time plot shows, in the heading frame of the start."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[Any, ...]] = []
+        self.origin, self.axes = np.zeros(2), np.eye(2)
+
+    def __call__(self, env: BalanceEnv) -> None:
+        state = env.simulation.state
+        if not self.rows:
+            cos, sin = state.heading
+            self.origin, self.axes = state.origin[:2].copy(), np.array([[cos, -sin], [sin, cos]])
+        support = self._local(state.support_polygon)
+        load = np.abs(env.simulation.plant.ctrl) / env.robot.torque_limit
+        self.rows.append((
+            env.simulation.time,
+            self._local(state.com[:2]),
+            self._local(state.cop),
+            self._local(state.capture_point),
+            np.stack([support.min(axis=0), support.max(axis=0)], axis=1),
+            float(load.max()),
+        ))  # fmt: skip
+
+    def _local(self, points: np.ndarray) -> np.ndarray:
+        return (points - self.origin) @ self.axes
+
+    def draw(self, path: Path, trial: Trial, title: str) -> None:
+        from .time_plots import trial_timeseries
+
+        names = ("com", "cop", "capture_point", "support", "torque")
+        t, *columns = (np.array(column) for column in zip(*self.rows, strict=True))
+        signals = dict(zip(names, columns, strict=True))
+        pushes = [(trial.push.start, trial.push.duration)] if trial.push else []
+        trial_timeseries(path, t, signals, pushes=pushes, title=title)
