@@ -1,26 +1,26 @@
 """`poise/ResidualBalance-v0`: the action moves the targets of a momentum QP."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from poise.envs.arrays import Plant, RobotArrays
 from poise.envs.balance import BalanceEnv, EnvConfig
-from poise.envs.episode import ROOT_FORCE, ROOT_MOMENT, EpisodeArrays, Judge, judge_step, record_tick
-from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays, update_state
-from poise.envs.observation import Scales
+from poise.envs.config import build, to_dict
+from poise.envs.episode import ROOT_FORCE, ROOT_MOMENT, judge_step, record_tick
+from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
-from poise.envs.simulation import advance
 
-from .controller import Targets
-from .momentum_qp import Memory, MomentumQP, momentum_tick
+from .controller import Controller, Targets
+from .momentum_qp import MomentumQP, MomentumQPConfig
 from .motions import ReferenceMotion, load_motion
-from .reduced_qp import QPParameters, TargetArrays, Workspace
 from .registry import load_controller
+from .residual_step import Motion, residual_step, soft_root_force
 from .targets import update_targets
+
+ACTION_NAMES = ("com_x", "com_y", "cop_x", "cop_y")
 
 
 @dataclass(frozen=True)
@@ -31,114 +31,189 @@ class ResidualScales:
     cop: float = field(default=0.15, metadata={"min": 0.0})  # Δp_ref [m]
 
 
-class Motion(NamedTuple):
-    """A reference motion as compiled code reads it."""
-
-    knots: np.ndarray
-    coeffs: np.ndarray
-    loop: bool
-    samples: np.ndarray  # scratch
-
-
-ACTION_NAMES = ("com_x", "com_y", "cop_x", "cop_y")
-
-
-@compiled
-def soft_root_force(s: StateArrays, wrench: np.ndarray, qfrc_applied: np.ndarray):
-    """Apply a wrench about the CoM (world axes) on the root's six generalised forces."""
-    rx = s.com[0] - s.qpos[0]
-    ry = s.com[1] - s.qpos[1]
-    rz = s.com[2] - s.qpos[2]
-    nx = wrench[3] + ry * wrench[2] - rz * wrench[1]
-    ny = wrench[4] + rz * wrench[0] - rx * wrench[2]
-    nz = wrench[5] + rx * wrench[1] - ry * wrench[0]
-    for a in range(3):
-        qfrc_applied[a] = wrench[a]
-        qfrc_applied[3 + a] = (
-            s.root_axes[0, a] * nx + s.root_axes[1, a] * ny + s.root_axes[2, a] * nz
-        )
-
-
-@compiled
-def residual_step(
-    robot: RobotArrays,
-    plant: Plant,
-    s: StateArrays,
-    pushes: np.ndarray,
-    clock: np.ndarray,
-    p: QPParameters,
-    t: TargetArrays,
-    ws: Workspace,
-    memory: Memory,
-    motion: Motion,
-    com_offset: float,
-    residual: np.ndarray,
-    scale: Scales,
-    j: Judge,
-    ticks: int,
-    substeps: int,
-    e: EpisodeArrays,
-) -> float:
-    """One policy step: `ticks` times the QP, each held for `substeps` physics steps."""
-    period = substeps * robot.timestep
-    for _ in range(ticks):
-        update_targets(
-            robot, s, motion.knots, motion.coeffs, motion.loop, clock[0] * robot.timestep,
-            com_offset, residual, motion.samples, t,
-        )  # fmt: skip
-        momentum_tick(robot, s, p, t, period, ws, memory)
-        for i in range(plant.ctrl.shape[0]):
-            plant.ctrl[i] = ws.tau[robot.motor_dofs[i] - 6]
-        if p.soft_root:
-            soft_root_force(s, ws.root_wrench, plant.qfrc_applied)
-            w, m = ws.root_wrench, e.metrics
-            m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
-            m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
-        record_tick(robot, s, plant.ctrl, period, e)
-        for _ in range(substeps):
-            advance(robot, plant, pushes, clock)
-        update_state(robot, plant, s)
-    return judge_step(robot, s, scale, j, t.q_ref, plant.ctrl, clock[0] * robot.timestep, e)
-
-
 class ResidualBalanceEnv(BalanceEnv):
     """Keep a pushed robot on its feet by moving the targets of the momentum QP.
 
-    Action: Box(−1, 1, (4,)): Δc_ref (x, y) and Δp_ref (x, y) over `residual.com` and
-    `residual.cop` [m], heading frame, held for one policy step while the QP runs at its own
-    period. Zero is the controller alone, bit for bit.
+    Tables are for the default robot; another one has its own joints and feet.
+
+    Action: Box(−1, 1, (4,)), in the heading frame (origin at the middle of the soles, x forward, y
+    left), held for one policy step (`policy_period`, 20 ms) while the QP runs at its own period.
+    Zero is the controller alone, bit for bit.
+
+    | index | name | 1 adds | to |
+    | --- | --- | --- | --- |
+    | 0 | com_x | `residual.com`, 0.2 m | CoM target, forward |
+    | 1 | com_y | `residual.com`, 0.2 m | CoM target, left |
+    | 2 | cop_x | `residual.cop`, 0.15 m | CoP target, forward |
+    | 3 | cop_y | `residual.cop`, 0.15 m | CoP target, left |
+
+    Observation: Box(−10, 10), in the heading frame; h is the standing height of the CoM and
+    ω = √(g/h). It does not know the push. The reference is that of `motion`.
+
+    | index | term | entry | unit | meaning |
+    | --- | --- | --- | --- | --- |
+    | 0 | com | x | half support | CoM from the middle of the soles |
+    | 1 | com | y | half support | CoM from the middle of the soles |
+    | 2 | com_height | z | 0.1 h | CoM height minus its standing value |
+    | 3 | capture_point | x | half support | ξ from the middle of the soles |
+    | 4 | capture_point | y | half support | ξ from the middle of the soles |
+    | 5 | cop | x | half support | CoP from the middle of the soles |
+    | 6 | cop | y | half support | CoP from the middle of the soles |
+    | 7 | com_vel | x | 0.2 ω h | CoM velocity |
+    | 8 | com_vel | y | 0.2 ω h | CoM velocity |
+    | 9 | com_vel | z | 0.2 ω h | CoM velocity |
+    | 10 | angular_momentum | x | 0.1 m h² ω | angular momentum about the CoM |
+    | 11 | angular_momentum | y | 0.1 m h² ω | angular momentum about the CoM |
+    | 12 | angular_momentum | z | 0.1 m h² ω | angular momentum about the CoM |
+    | 13 | gravity | x | 1 | direction of gravity, root axes |
+    | 14 | gravity | y | 1 | direction of gravity, root axes |
+    | 15 | gravity | z | 1 | direction of gravity, root axes |
+    | 16 | root_rate | x | ω | angular velocity of the root, root axes |
+    | 17 | root_rate | y | ω | angular velocity of the root, root axes |
+    | 18 | root_rate | z | ω | angular velocity of the root, root axes |
+    | 19 | load | z | m g | vertical force of the ground minus the weight |
+    | 20 | joint_pos | abdomen_z | rad | joint position minus the reference |
+    | 21 | joint_pos | abdomen_y | rad | joint position minus the reference |
+    | 22 | joint_pos | abdomen_x | rad | joint position minus the reference |
+    | 23 | joint_pos | right_hip_x | rad | joint position minus the reference |
+    | 24 | joint_pos | right_hip_z | rad | joint position minus the reference |
+    | 25 | joint_pos | right_hip_y | rad | joint position minus the reference |
+    | 26 | joint_pos | right_knee | rad | joint position minus the reference |
+    | 27 | joint_pos | right_ankle_y | rad | joint position minus the reference |
+    | 28 | joint_pos | right_ankle_x | rad | joint position minus the reference |
+    | 29 | joint_pos | left_hip_x | rad | joint position minus the reference |
+    | 30 | joint_pos | left_hip_z | rad | joint position minus the reference |
+    | 31 | joint_pos | left_hip_y | rad | joint position minus the reference |
+    | 32 | joint_pos | left_knee | rad | joint position minus the reference |
+    | 33 | joint_pos | left_ankle_y | rad | joint position minus the reference |
+    | 34 | joint_pos | left_ankle_x | rad | joint position minus the reference |
+    | 35 | joint_pos | right_shoulder1 | rad | joint position minus the reference |
+    | 36 | joint_pos | right_shoulder2 | rad | joint position minus the reference |
+    | 37 | joint_pos | right_elbow | rad | joint position minus the reference |
+    | 38 | joint_pos | left_shoulder1 | rad | joint position minus the reference |
+    | 39 | joint_pos | left_shoulder2 | rad | joint position minus the reference |
+    | 40 | joint_pos | left_elbow | rad | joint position minus the reference |
+    | 41 | joint_vel | abdomen_z | 3 ω | joint velocity minus the reference's |
+    | 42 | joint_vel | abdomen_y | 3 ω | joint velocity minus the reference's |
+    | 43 | joint_vel | abdomen_x | 3 ω | joint velocity minus the reference's |
+    | 44 | joint_vel | right_hip_x | 3 ω | joint velocity minus the reference's |
+    | 45 | joint_vel | right_hip_z | 3 ω | joint velocity minus the reference's |
+    | 46 | joint_vel | right_hip_y | 3 ω | joint velocity minus the reference's |
+    | 47 | joint_vel | right_knee | 3 ω | joint velocity minus the reference's |
+    | 48 | joint_vel | right_ankle_y | 3 ω | joint velocity minus the reference's |
+    | 49 | joint_vel | right_ankle_x | 3 ω | joint velocity minus the reference's |
+    | 50 | joint_vel | left_hip_x | 3 ω | joint velocity minus the reference's |
+    | 51 | joint_vel | left_hip_z | 3 ω | joint velocity minus the reference's |
+    | 52 | joint_vel | left_hip_y | 3 ω | joint velocity minus the reference's |
+    | 53 | joint_vel | left_knee | 3 ω | joint velocity minus the reference's |
+    | 54 | joint_vel | left_ankle_y | 3 ω | joint velocity minus the reference's |
+    | 55 | joint_vel | left_ankle_x | 3 ω | joint velocity minus the reference's |
+    | 56 | joint_vel | right_shoulder1 | 3 ω | joint velocity minus the reference's |
+    | 57 | joint_vel | right_shoulder2 | 3 ω | joint velocity minus the reference's |
+    | 58 | joint_vel | right_elbow | 3 ω | joint velocity minus the reference's |
+    | 59 | joint_vel | left_shoulder1 | 3 ω | joint velocity minus the reference's |
+    | 60 | joint_vel | left_shoulder2 | 3 ω | joint velocity minus the reference's |
+    | 61 | joint_vel | left_elbow | 3 ω | joint velocity minus the reference's |
+    | 62 | contacts | left | 1 | 1 where the foot touches the ground, else 0 |
+    | 63 | contacts | right | 1 | 1 where the foot touches the ground, else 0 |
+    | 64 | last_action | com_x | 1 | action of the step before |
+    | 65 | last_action | com_y | 1 | action of the step before |
+    | 66 | last_action | cop_x | 1 | action of the step before |
+    | 67 | last_action | cop_y | 1 | action of the step before |
+
+    Rewards: the sum of these terms, each times its weight (`reward`, see `RewardWeights`). The
+    first six are 0 in the step of a fall. "Half support" is half the size of the standing support
+    polygon.
+
+    | term | weight | value |
+    | --- | --- | --- |
+    | alive | 0.5 | 1 |
+    | com | 0.2 | exp(−4 e²), e the CoM's distance from the middle of the soles [half support] |
+    | capture | 0.2 | exp(−2 e²), e the capture point's [half support] |
+    | upright | 0.1 | max(cos φ, 0)⁴, φ the tilt of the root from standing |
+    | quiet | 0.1 | exp(−(|ċ| / quiet_speed)² / 4) |
+    | posture | 0.1 | exp(−Σ (q − q_ref)²) |
+    | effort | 0.02 | −mean (τ / τ_max)² |
+    | action | 0.1 | −mean a² |
+    | action_rate | 0.05 | −mean (a − a_before)² / 4 |
+    | fall | 5.0 | −1 in the step of a fall |
+
+    Start: the standing posture with uniform noise on joint positions, joint velocities and the
+    root's horizontal velocity (`noise`), the lowest sole on the ground; then pushes drawn from
+    `pushes` by the environment's generator. `reset(options=...)` takes
+
+    - "push": exactly these pushes: a mapping such as {"impulse": 12.0, "direction": 90.0,
+      "duration": 0.1, "start": 0.5, "body": "torso"} (N·s; degrees counter-clockwise from forward,
+      heading frame; seconds), a list of them, [] for none; other units: `parse_pushes`
+    - "noise": factor on the start noise, 0 for the exact standing posture
+    - "qpos" (nq,), "qvel" (nv,): the start itself, MuJoCo's conventions
+
+    End: `terminated` by a fall: CoM below `fall.height` of its standing height, root tilted by more
+    than `fall.tilt`, anything but the feet on the ground (`fall.ground_contact`), or a simulation
+    that diverged. `truncated` after `duration` seconds. `step` then needs a `reset`.
+
+    Info: "reward_terms" (name → weighted value; their sum is the reward), "push" (a list: start,
+    force [N], duration [s], body, direction [deg], impulse J [N·s], specific_impulse J/m [N·s/kg]),
+    "is_success" (upright and quiet, CoM over the soles, for the last `fall.quiet_time`),
+    "solver_failures" (ticks of the episode), "torque_saturation" (mean share of motors at their
+    limit), "root_wrench" (6,) (force [N] and moment [N·m] of a soft root in the last tick).
+
+    Arguments: `robot` (a name, a .yaml file or a `Robot`), `config` (an `EnvConfig`, a .yaml file
+    or a mapping), `controller` (a name, a .yaml file, a mapping or a `Controller`),
+    `motion` (a name, a .yaml file or a `ReferenceMotion`), `residual` (what an action of 1 adds, a
+    `ResidualScales`), `render_mode` (None,
+    "rgb_array" or "human"), and the fields of `EnvConfig` by name: policy_period, duration, pushes,
+    noise, fall, reward. Fields may be plain mappings. Raises ConfigError naming what is wrong.
+
+    Version history: v0, first release.
     """
 
     def __init__(
         self,
         robot: str | Path | Robot = "humanoid",
-        config: EnvConfig | str | Path | dict | None = None,
+        config: EnvConfig | str | Path | Mapping | None = None,
         *,
-        controller: Any = "momentum-qp",
+        controller: str | Path | Mapping | MomentumQPConfig | Controller = "momentum-qp",
         motion: str | Path | ReferenceMotion = "standing",
-        residual: ResidualScales | None = None,
+        residual: ResidualScales | Mapping | None = None,
+        render_mode: str | None = None,
         **overrides: Any,
     ):
-        super().__init__(robot, config, **overrides)
-        self.residual = residual or ResidualScales()
-        self.controller: MomentumQP = load_controller(controller, self.robot)
+        super().__init__(robot, config, render_mode=render_mode, **overrides)
+        scale = {} if residual is None else to_dict(residual)
+        self.residual = build(ResidualScales, scale, "residual")
+        self.controller: Any = load_controller(controller, self.robot)
         self.motion = (
             motion if isinstance(motion, ReferenceMotion) else load_motion(motion, self.robot)
         )
+        self._check_robots()
         self.control_substeps = self._whole(
             self.controller.period, self.arrays.timestep, "controller period"
         )
-        self.ticks = self._whole(
-            self.config.policy_period, self.controller.period, "policy_period"
-        )
+        self.ticks = self._whole(self.config.policy_period, self.controller.period, "policy_period")
+        # other solvers and controllers are called from Python, tick by tick
+        self._compiled = type(self.controller) is MomentumQP and self.controller.solver is None
+        self._com_offset = float(getattr(self.controller, "com_offset", 0.0))
         self.targets = Targets.standing(self.robot, self.simulation.state)
         self._targets = self.targets.arrays()
         columns = self.motion.coeffs.shape[2]
         self._motion = Motion(
             self.motion.knots, self.motion.coeffs, self.motion.loop, np.zeros((3, columns))
         )
-        scale = self.residual
-        self._scale = np.array([scale.com, scale.com, scale.cop, scale.cop])
+        com, cop = self.residual.com, self.residual.cop
+        self._scale = np.array([com, com, cop, cop])
+
+    def _check_robots(self) -> None:
+        """Compiled code trusts the sizes of its arrays."""
+        made_for = getattr(self.controller, "robot", self.robot)
+        if made_for.fingerprint != self.robot.fingerprint:
+            raise ConfigError(
+                f"is for the robot {made_for.name!r}, not {self.robot.name!r}", field="controller"
+            )
+        if self.motion.coeffs.shape[2] != len(self.robot.joint_names) + 6:
+            raise ConfigError(
+                f"{self.motion.name!r} is not a motion of {self.robot.name!r}", field="motion"
+            )
 
     def _action_names(self) -> tuple[str, ...]:
         return ACTION_NAMES
@@ -148,22 +223,45 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _begin(self) -> None:
         self.controller.reset(self.simulation.state)
+        self._update_targets(np.zeros(4))
+
+    def _update_targets(self, residual: np.ndarray) -> None:
         update_targets(
-            self.arrays, self.simulation.state_arrays, *self._motion[:3], 0.0,
-            self.controller.com_offset, np.zeros(4), self._motion.samples, self._targets,
+            self.arrays, self.simulation.state_arrays, *self._motion[:3], self.simulation.time,
+            self._com_offset, residual, self._motion.samples, self._targets,
         )  # fmt: skip
 
     def _advance(self) -> float:
         sim, controller = self.simulation, self.controller
+        residual = self._scale * self.episode.action
+        if not self._compiled:
+            return self._advance_in_python(residual)
         return residual_step(
             self.arrays, sim.plant, sim.state_arrays, sim.push_table, sim.clock,
             controller.parameters, self._targets, controller.workspace, controller.memory,
-            self._motion, controller.com_offset, self._scale * self.episode.action,
+            self._motion, self._com_offset, residual,
             self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
         )  # fmt: skip
 
+    def _advance_in_python(self, residual: np.ndarray) -> float:
+        """What `residual_step` does, for any controller."""
+        sim, e = self.simulation, self.episode
+        s, ctrl = sim.state_arrays, sim.plant.ctrl
+        for _ in range(self.ticks):
+            self._update_targets(residual)
+            ctrl[:] = self.controller.torques(sim.state, self.targets)
+            wrench = self._root_wrench()
+            soft_root_force(s, wrench, sim.plant.qfrc_applied)
+            for metric, part in ((ROOT_FORCE, wrench[:3]), (ROOT_MOMENT, wrench[3:])):
+                e.metrics[metric] = max(e.metrics[metric], float(np.linalg.norm(part)))
+            record_tick(self.arrays, s, ctrl, self.controller.period, e)
+            sim.step(ctrl, self.control_substeps)
+        return judge_step(
+            self.arrays, s, self.scales, self.judge, self.targets.q_ref, ctrl, sim.time, e
+        )
+
     def _failures(self) -> int:
-        return self.controller.failures
+        return int(getattr(self.controller, "failures", 0))
 
     def _root_wrench(self) -> np.ndarray:
-        return self.controller.root_wrench
+        return getattr(self.controller, "root_wrench", np.zeros(6))

@@ -1,6 +1,6 @@
 """What both environments share: a pushed robot, its observation, reward, fall and record."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -9,62 +9,26 @@ import numpy as np
 from gymnasium import spaces
 
 from .arrays import RobotArrays
-from .config import build, read_yaml, resolve, to_dict
+from .env_config import EnvConfig as EnvConfig
+from .env_config import env_config
 from .episode import (
     FALLEN,
     QUIET_STEPS,
     REWARD_TERMS,
     SATURATED,
     TICKS,
-    FallLimits,
-    RewardWeights,
     allocate_episode,
     begin_episode,
     judge,
 )
 from .errors import ConfigError, PoiseError
 from .observation import observation_terms, observe, scales
+from .push_info import push_info
 from .push_options import parse_pushes
-from .push_schedule import PushSampler
-from .pushes import Kick, Push
 from .robot import Robot, load_robot
 from .simulation import Simulation
 
-
-@dataclass(frozen=True)
-class StartNoise:
-    """How far a reset departs from the standing posture; uniform in ±."""
-
-    joints: float = field(default=0.02, metadata={"min": 0.0, "max": 0.5})  # [rad]
-    joint_speeds: float = field(default=0.05, metadata={"min": 0.0})  # [rad/s]
-    speed: float = field(default=0.02, metadata={"min": 0.0})  # root, horizontal [m/s]
-
-
-@dataclass(frozen=True)
-class EnvConfig:
-    """Everything about an environment that is not its robot or its controller."""
-
-    policy_period: float = field(default=0.02, metadata={"above": 0.0, "max": 1.0})  # [s]
-    duration: float = field(default=6.0, metadata={"above": 0.0})  # of an episode [s]
-    pushes: PushSampler | None = field(
-        default_factory=lambda: PushSampler(magnitude=(0.2, 0.5), unit="specific_impulse")
-    )
-    noise: StartNoise = field(default_factory=StartNoise)
-    fall: FallLimits = field(default_factory=FallLimits)
-    reward: RewardWeights = field(default_factory=RewardWeights)
-
-
-def env_config(config: "EnvConfig | str | Path | dict | None", **overrides: Any) -> EnvConfig:
-    """An EnvConfig from a packaged name, a path, a mapping or an object; `overrides` win.
-
-    Raises ConfigError naming the file, the field and the choices.
-    """
-    source = "environment"
-    if isinstance(config, (str, Path)):
-        path = resolve("envs", config)
-        config, source = read_yaml(path), str(path)
-    fields = to_dict(config) if config is not None else {}
-    return build(EnvConfig, {**fields, **{k: to_dict(v) for k, v in overrides.items()}}, source)
+RESET_OPTIONS = ("push", "noise", "qpos", "qvel")
 
 
 class BalanceEnv(gymnasium.Env):
@@ -75,7 +39,7 @@ class BalanceEnv(gymnasium.Env):
     def __init__(
         self,
         robot: str | Path | Robot = "humanoid",
-        config: "EnvConfig | str | Path | dict | None" = None,
+        config: EnvConfig | str | Path | Mapping | None = None,
         *,
         render_mode: str | None = None,
         **overrides: Any,
@@ -89,17 +53,19 @@ class BalanceEnv(gymnasium.Env):
         self.render_mode = render_mode
         self.robot = robot if isinstance(robot, Robot) else load_robot(robot)
         self.config = env_config(config, **overrides)
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.policy_period)}
         self.push_sampler = self.config.pushes  #: may be replaced between episodes
         self.simulation = Simulation(self.robot)
         self.arrays: RobotArrays = self.simulation.arrays
-        self.substeps = self._whole(self.config.policy_period, self.arrays.timestep, "policy_period")
-        self.max_steps = int(round(self.config.duration / self.config.policy_period))
+        period = self.config.policy_period
+        self.substeps = self._whole(period, self.arrays.timestep, "policy_period")
+        self.max_steps = round(self.config.duration / period)
         state = self.simulation.state
         self.scales = scales(self.arrays, state.support_polygon)
         self.judge = judge(self.config.fall, self.config.reward, self.robot.height_com)
         self.action_names = self._action_names()
         soles = [sole.name for sole in self.robot.soles]
-        self.terms = observation_terms(self.robot.joint_names, soles, len(self.action_names))
+        self.terms = observation_terms(self.robot.joint_names, soles, self.action_names)
         size = sum(term.size for term in self.terms)
         self.episode = allocate_episode(len(self.action_names), size, len(soles))
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
@@ -110,7 +76,7 @@ class BalanceEnv(gymnasium.Env):
 
     @staticmethod
     def _whole(period: float, step: float, name: str) -> int:
-        count = int(round(period / step))
+        count = round(period / step)
         if count < 1 or abs(count * step - period) > 1e-9:
             raise ConfigError(
                 f"{period} s is not a whole number of steps of {step} s",
@@ -140,19 +106,23 @@ class BalanceEnv(gymnasium.Env):
         """Start an episode.
 
         `options`: "push" sets the pushes exactly (a mapping, a list of mappings, [] for none; see
-        `parse_pushes`), "noise" scales the start noise, "qpos" and "qvel" set the start.
+        `parse_pushes`), "noise" scales the start noise, "qpos" (nq,) and "qvel" (nv,) are the
+        start itself.
+
+        Raises ConfigError naming the option that is unknown or wrong, and what it may be.
         """
         super().reset(seed=seed)
+        self._needs_reset = True  # until this one has succeeded
         options = dict(options or {})
-        push = options.pop("push", None)
-        noise = float(options.pop("noise", 1.0))
-        qpos, qvel = options.pop("qpos", None), options.pop("qvel", None)
-        if options:
-            raise ConfigError("unknown option", source="reset", field=next(iter(options)),
-                              choices=("push", "noise", "qpos", "qvel"))
-        start, speed = self._start(noise)
-        qpos = start if qpos is None else self._vector(qpos, len(start), "qpos")
-        qvel = speed if qvel is None else self._vector(qvel, len(speed), "qvel")
+        for name in options:
+            if name not in RESET_OPTIONS:
+                raise ConfigError(
+                    "unknown option", source="reset", field=str(name), choices=RESET_OPTIONS
+                )
+        push, qpos, qvel = (options.get(name) for name in ("push", "qpos", "qvel"))
+        start, speed = self._start(float(self._numbers(options.get("noise", 1.0), (), "noise")))
+        qpos = start if qpos is None else self._numbers(qpos, start.shape, "qpos")
+        qvel = speed if qvel is None else self._numbers(qvel, speed.shape, "qvel")
         state = self.simulation.reset(qpos, qvel)
         if push is not None:
             pushes = parse_pushes(push, self.robot, state.support_margin)
@@ -190,28 +160,43 @@ class BalanceEnv(gymnasium.Env):
         return qpos, qvel
 
     @staticmethod
-    def _vector(value: Any, size: int, name: str) -> np.ndarray:
-        vector = np.asarray(value, dtype=float)
-        if vector.shape != (size,) or not np.all(np.isfinite(vector)):
-            raise ConfigError(f"must be {size} finite numbers", source="reset", field=name)
-        return vector
+    def _numbers(value: Any, shape: tuple[int, ...], name: str) -> np.ndarray:
+        try:
+            numbers = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            numbers = np.array([np.nan])
+        if numbers.shape != shape or not np.all(np.isfinite(numbers)):
+            expected = f"{shape[0]} finite numbers" if shape else "a finite number"
+            raise ConfigError(f"must be {expected}", source="reset", field=name)
+        return numbers
 
     def set_action(self, action: np.ndarray) -> None:
-        """Check `action` and remember it and the one before; raises ConfigError."""
-        vector = np.asarray(action, dtype=float)
-        if vector.shape != self.action_space.shape:
+        """Check `action` and remember it and the one before.
+
+        Raises ConfigError naming the entries: all for a wrong shape, else those out of bounds.
+        """
+        try:
+            vector = np.asarray(action, dtype=float)
+        except (TypeError, ValueError):
+            raise ConfigError(f"must be numbers, not {action!r}", field="action") from None
+        names = self.action_names
+        if vector.shape != (len(names),):
             raise ConfigError(
-                f"has shape {vector.shape}, expected {self.action_space.shape} "
-                f"({', '.join(self.action_names[:8])}{', …' if len(self.action_names) > 8 else ''})",
+                f"has shape {vector.shape}, expected {(len(names),)}: {', '.join(names)}",
                 field="action",
             )
-        if not np.all(np.abs(vector) <= 1.0 + 1e-6):  # NaN fails too
-            raise ConfigError(f"must lie in [-1, 1], not {vector.tolist()}", field="action")
+        good = np.abs(vector) <= 1.0 + 1e-6  # NaN is not
+        if not good.all():
+            bad = [f"{names[i]} is {vector[i]:g}" for i in np.flatnonzero(~good)]
+            raise ConfigError(f"must lie in [-1, 1], but {', '.join(bad)}", field="action")
         self.episode.last_action[:] = self.episode.action
         self.episode.action[:] = np.clip(vector, -1.0, 1.0)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """One policy step; a fall is `terminated`, the end of time is `truncated`."""
+        """One policy step; a fall is `terminated`, the end of time is `truncated`.
+
+        Raises ConfigError for an action that is not valid, PoiseError after the episode's end.
+        """
         if self._needs_reset:
             raise PoiseError("step() after the episode's end: call reset() first")
         reward, terminated, truncated = self.step_in_place(action)
@@ -224,6 +209,8 @@ class BalanceEnv(gymnasium.Env):
         """What `step` does, without `info`: the observation is in `episode.observation`."""
         self.set_action(action)
         reward = self._advance()
+        if self.simulation.diverged:
+            reward = self._diverged()
         self._observe()
         self.steps += 1
         terminated = self.fallen
@@ -231,10 +218,25 @@ class BalanceEnv(gymnasium.Env):
         self._needs_reset = terminated or truncated
         return reward, terminated, truncated
 
+    def _diverged(self) -> float:
+        """A simulation that went to infinity, and that MuJoCo started anew, is a fall."""
+        terms, metrics = self.episode.reward_terms, self.episode.metrics
+        metrics[FALLEN], metrics[QUIET_STEPS] = 1.0, 0.0
+        terms[:] = 0.0
+        terms[REWARD_TERMS.index("fall")] = -self.config.reward.fall
+        return float(terms.sum())
+
     def _observe(self) -> None:
         q_ref, v_ref = self._references()
-        observe(self.arrays, self.simulation.state_arrays, self.scales, q_ref, v_ref,
-                self.episode.action, self.episode.observation)
+        observe(
+            self.arrays,
+            self.simulation.state_arrays,
+            self.scales,
+            q_ref,
+            v_ref,
+            self.episode.action,
+            self.episode.observation,
+        )
 
     @property
     def fallen(self) -> bool:
@@ -249,32 +251,14 @@ class BalanceEnv(gymnasium.Env):
 
     def _info(self) -> dict[str, Any]:
         """Reward terms, push and record of the episode so far."""
-        metrics = self.episode.metrics
-        info: dict[str, Any] = {
-            "reward_terms": dict(zip(REWARD_TERMS, self.episode.reward_terms.tolist(), strict=True)),
-            "push": [self._push_info(push) for push in self.simulation.pushes],
+        metrics, terms = self.episode.metrics, self.episode.reward_terms.tolist()
+        return {
+            "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
+            "push": [push_info(push, self.robot) for push in self.simulation.pushes],
             "is_success": self.recovered,
             "solver_failures": self._failures(),
             "torque_saturation": float(metrics[SATURATED] / max(metrics[TICKS], 1.0)),
             "root_wrench": self._root_wrench(),
-        }
-        return info
-
-    def _push_info(self, push: Push | Kick) -> dict[str, Any]:
-        if isinstance(push, Kick):
-            impulse = push.delta_v * self.robot.mass
-            force, duration, body = 0.0, 0.0, self.robot.model.body(self.robot.root_body_id).name
-        else:
-            impulse, force = push.impulse, push.peak_force
-            duration, body = push.duration, push.body
-        return {
-            "start": push.start,
-            "force": force,
-            "duration": duration,
-            "body": body,
-            "direction": push.direction,
-            "impulse": impulse,
-            "specific_impulse": impulse / self.robot.mass,
         }
 
     def _failures(self) -> int:

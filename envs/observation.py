@@ -43,40 +43,46 @@ class Term:
     """One named part of the observation vector."""
 
     name: str
-    size: int
+    entries: tuple[str, ...]
     unit: str
     meaning: str
 
+    @property
+    def size(self) -> int:
+        """How many numbers."""
+        return len(self.entries)
 
-def observation_terms(joints: Sequence[str], soles: Sequence[str], actions: int) -> list[Term]:
+
+def observation_terms(
+    joints: Sequence[str], soles: Sequence[str], actions: Sequence[str]
+) -> list[Term]:
     """The parts of the observation, in order; `observe` fills them."""
-    nj, nc = len(joints), len(soles)
+    ground, space = ("x", "y"), ("x", "y", "z")
+    joints, soles, actions = tuple(joints), tuple(soles), tuple(actions)
     return [
-        Term("com", 2, "support half extents", "CoM minus the middle of the soles, x and y"),
-        Term("com_height", 1, "0.1 h", "CoM height minus its standing value"),
-        Term("capture_point", 2, "support half extents", "ξ minus the middle of the soles"),
-        Term("cop", 2, "support half extents", "centre of pressure minus the middle of the soles"),
-        Term("com_vel", 3, "0.2 ω h", "CoM velocity"),
-        Term("angular_momentum", 3, "0.1 m h² ω", "angular momentum about the CoM"),
-        Term("gravity", 3, "1", "direction of gravity in the root's frame"),
-        Term("root_rate", 3, "ω", "angular velocity of the root, body axes"),
-        Term("load", 1, "m g", "vertical force of the ground minus the weight"),
-        Term("joint_pos", nj, "rad", "joint positions minus the reference"),
-        Term("joint_vel", nj, "3 ω", "joint velocities minus the reference's"),
-        Term("contacts", nc, "1", "1 where a foot touches the ground, else 0"),
-        Term("last_action", actions, "1", "the action of the step before"),
+        Term("com", ground, "half support", "CoM from the middle of the soles"),
+        Term("com_height", ("z",), "0.1 h", "CoM height minus its standing value"),
+        Term("capture_point", ground, "half support", "ξ from the middle of the soles"),
+        Term("cop", ground, "half support", "CoP from the middle of the soles"),
+        Term("com_vel", space, "0.2 ω h", "CoM velocity"),
+        Term("angular_momentum", space, "0.1 m h² ω", "angular momentum about the CoM"),
+        Term("gravity", space, "1", "direction of gravity, root axes"),
+        Term("root_rate", space, "ω", "angular velocity of the root, root axes"),
+        Term("load", ("z",), "m g", "vertical force of the ground minus the weight"),
+        Term("joint_pos", joints, "rad", "joint position minus the reference"),
+        Term("joint_vel", joints, "3 ω", "joint velocity minus the reference's"),
+        Term("contacts", soles, "1", "1 where the foot touches the ground, else 0"),
+        Term("last_action", actions, "1", "action of the step before"),
     ]
 
 
 def observation_table(terms: Sequence[Term]) -> str:
-    """The terms as a table of indices for a docstring."""
-    rows = ["| index | term | unit | meaning |", "| --- | --- | --- | --- |"]
-    start = 0
+    """The terms as a table for a docstring, one row per index."""
+    rows = ["| index | term | entry | unit | meaning |", "| --- | --- | --- | --- | --- |"]
     for term in terms:
-        last = start + term.size - 1
-        index = f"{start}" if term.size == 1 else f"{start}–{last}"
-        rows.append(f"| {index} | {term.name} | {term.unit} | {term.meaning} |")
-        start += term.size
+        for entry in term.entries:
+            index = len(rows) - 2
+            rows.append(f"| {index} | {term.name} | {entry} | {term.unit} | {term.meaning} |")
     return "\n".join(rows)
 
 

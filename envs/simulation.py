@@ -31,6 +31,11 @@ def advance(robot: RobotArrays, plant: Plant, pushes: np.ndarray, clock: np.ndar
     mj_step1(plant.model_address, plant.data_address)
 
 
+BAD_STATE = [
+    int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{name}")) for name in ("QPOS", "QVEL", "QACC")
+]
+
+
 class Simulation:
     """A robot on flat ground. `state` is current after `reset` and after every `step`."""
 
@@ -42,6 +47,7 @@ class Simulation:
         self.plant = plant_views(robot.model, self.data)
         self.state_arrays = allocate_state(robot.model.nv, len(robot.soles))
         self.clock = np.zeros(1, dtype=np.int64)
+        self._warnings = self.data.warning.number  # a view
         self.pushes: tuple[Push | Kick, ...] = ()
         self.push_table = np.zeros((0, TABLE_COLUMNS))
         self.reset()
@@ -50,6 +56,11 @@ class Simulation:
     def time(self) -> float:
         """Seconds since the reset."""
         return float(self.clock[0] * self.arrays.timestep)
+
+    @property
+    def diverged(self) -> bool:
+        """Whether numbers became too large since the reset; MuJoCo then starts anew by itself."""
+        return bool(self._warnings[BAD_STATE].any())
 
     @property
     def state(self) -> RobotState:

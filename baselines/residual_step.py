@@ -1,0 +1,90 @@
+"""One policy step of the momentum QP and the physics, compiled."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from poise.envs.arrays import Plant, RobotArrays
+from poise.envs.episode import (
+    ROOT_FORCE,
+    ROOT_MOMENT,
+    EpisodeArrays,
+    Judge,
+    judge_step,
+    record_tick,
+)
+from poise.envs.jit import compiled
+from poise.envs.kinematics import StateArrays, update_state
+from poise.envs.observation import Scales
+from poise.envs.simulation import advance
+
+from .momentum_qp import Memory, momentum_tick
+from .reduced_qp import QPParameters, TargetArrays, Workspace
+from .targets import update_targets
+
+
+class Motion(NamedTuple):
+    """A reference motion as compiled code reads it."""
+
+    knots: np.ndarray
+    coeffs: np.ndarray
+    loop: bool
+    samples: np.ndarray  # scratch
+
+
+@compiled
+def soft_root_force(s: StateArrays, wrench: np.ndarray, qfrc_applied: np.ndarray):
+    """Apply a wrench about the CoM (world axes) on the root's six generalised forces."""
+    rx = s.com[0] - s.qpos[0]
+    ry = s.com[1] - s.qpos[1]
+    rz = s.com[2] - s.qpos[2]
+    nx = wrench[3] + ry * wrench[2] - rz * wrench[1]
+    ny = wrench[4] + rz * wrench[0] - rx * wrench[2]
+    nz = wrench[5] + rx * wrench[1] - ry * wrench[0]
+    for a in range(3):
+        qfrc_applied[a] = wrench[a]
+        qfrc_applied[3 + a] = (
+            s.root_axes[0, a] * nx + s.root_axes[1, a] * ny + s.root_axes[2, a] * nz
+        )
+
+
+@compiled
+def residual_step(
+    robot: RobotArrays,
+    plant: Plant,
+    s: StateArrays,
+    pushes: np.ndarray,
+    clock: np.ndarray,
+    p: QPParameters,
+    t: TargetArrays,
+    ws: Workspace,
+    memory: Memory,
+    motion: Motion,
+    com_offset: float,
+    residual: np.ndarray,
+    scale: Scales,
+    j: Judge,
+    ticks: int,
+    substeps: int,
+    e: EpisodeArrays,
+) -> float:
+    """One policy step: `ticks` times the QP, each held for `substeps` physics steps."""
+    period = substeps * robot.timestep
+    for _ in range(ticks):
+        update_targets(
+            robot, s, motion.knots, motion.coeffs, motion.loop, clock[0] * robot.timestep,
+            com_offset, residual, motion.samples, t,
+        )  # fmt: skip
+        momentum_tick(robot, s, p, t, period, ws, memory)
+        for i in range(plant.ctrl.shape[0]):
+            plant.ctrl[i] = ws.tau[robot.motor_dofs[i] - 6]
+        if p.soft_root:
+            soft_root_force(s, ws.root_wrench, plant.qfrc_applied)
+            w, m = ws.root_wrench, e.metrics
+            m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
+            m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
+        record_tick(robot, s, plant.ctrl, period, e)
+        for _ in range(substeps):
+            advance(robot, plant, pushes, clock)
+        update_state(robot, plant, s)
+    return judge_step(robot, s, scale, j, t.q_ref, plant.ctrl, clock[0] * robot.timestep, e)
