@@ -16,7 +16,6 @@ from poise.baselines.solvers.dual_active_set import (
     iscratch_size,
     scratch_size,
     solve_dual,
-    solve_dual_warm,
 )
 
 from .qp_problems import KINDS, random_qp, solved_qp
@@ -28,7 +27,7 @@ def run(qp: QP, max_iter: int = 1000, offset: int = 0):
     scratch = np.full(scratch_size(n, m) + offset, np.nan)[offset:]
     iscratch = np.full(iscratch_size(n, m), -1, dtype=np.int64)
     x, lam = np.full(n, np.nan), np.full(m, np.nan)
-    status = solve_dual(qp.H, qp.g, qp.C, qp.l, qp.u, x, lam, scratch, iscratch, max_iter)
+    status = solve_dual(qp.H, qp.g, qp.C, qp.l, qp.u, x, lam, scratch, iscratch, max_iter, False)
     return status, x, lam, iscratch[0], iscratch[2 : 2 + iscratch[1]]
 
 
@@ -244,7 +243,7 @@ def test_scratch_is_large_enough(n, m):
         scratch = memory[40 + offset : 40 + offset + sizes[0]]
         iscratch = imemory[40 : 40 + sizes[1]]
         x, lam = np.zeros(n), np.zeros(m)
-        solve_dual(qp.H, qp.g, qp.C, qp.l, qp.u, x, lam, scratch, iscratch, 500)
+        solve_dual(qp.H, qp.g, qp.C, qp.l, qp.u, x, lam, scratch, iscratch, 500, False)
         assert (memory[: 40 + offset] == 7.25).all()
         assert (memory[40 + offset + sizes[0] :] == 7.25).all()
         assert (imemory[:40] == 725).all() and (imemory[40 + sizes[1] :] == 725).all()
@@ -266,11 +265,11 @@ def test_units_do_not_matter():
 
 
 def solve_warm(qp: QP, iscratch: np.ndarray):
-    """Status, x and lam of `solve_dual_warm` with this memory of the last call."""
+    """Status, x and lam of a warm start from this memory of the last call."""
     m, n = qp.C.shape
     x, lam, scratch = np.zeros(n), np.zeros(m), np.empty(scratch_size(n, m))
     arrays = (qp.H, qp.g, qp.C, qp.l, qp.u)
-    return solve_dual_warm(*arrays, x, lam, scratch, iscratch, 1000), x, lam
+    return solve_dual(*arrays, x, lam, scratch, iscratch, 1000, True), x, lam
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -309,7 +308,7 @@ def test_a_warm_start_saves_iterations():
 
 
 def test_forgetting_makes_a_warm_start_cold():
-    """With iscratch[1] = 0 the bits are those of `solve_dual`."""
+    """With iscratch[1] = 0 the bits are those of a cold start."""
     qp, _, _ = solved_qp(np.random.default_rng(0))
     iscratch = np.zeros(iscratch_size(21, 64), dtype=np.int64)
     solve_warm(qp, iscratch)

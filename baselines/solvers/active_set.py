@@ -37,7 +37,9 @@ class ActiveSetSolver:
             self._iscratch = np.empty(iscratch_size(n, m), dtype=np.int64)
         arrays = [np.ascontiguousarray(a, dtype=float) for a in (qp.H, qp.g, qp.C, qp.l, qp.u)]
         x, lam = np.zeros(n), np.zeros(m)
-        status = solve_dual(*arrays, x, lam, self._scratch, self._iscratch, self.options.max_iter)
+        status = solve_dual(
+            *arrays, x, lam, self._scratch, self._iscratch, self.options.max_iter, False
+        )
         iterations = int(self._iscratch[0])
         if status != 0:
             return failed(qp, STATUS[status], start, iterations)

@@ -17,9 +17,7 @@ from .rows import INFEASIBLE, INVALID, ITERATION_LIMIT, SOLVED, advance, most_vi
 FEASIBLE = 1e-11  # accepted violation of a scaled row, relative to ‖x‖
 ROUNDING = 1e-13  # the same, relative to the unconstrained ‖x‖, before correction
 CONSISTENT = 1e-9  # the same as FEASIBLE, for a row that depends on the active rows
-DEPENDENT = (
-    1e-20  # squared sine (in the metric of H⁻¹) below which a row depends on the active ones
-)
+DEPENDENT = 1e-20  # squared sine (metric of H⁻¹) below which a row depends on the active ones
 BLOCKS = 1e-13  # smallest multiplier direction that can block a step, relative to the largest
 ALIGNMENT = 8  # of the rows of the factors, in float64: unaligned ones cost a quarter more time
 CHECKS = 20  # times that a finished solution may be found wanting and taken up again
@@ -78,7 +76,7 @@ def _step_length(r, mult, equalities, q, dependent):
 
 
 @compiled
-def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter):  # noqa: E741
+def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter, warm=False):  # noqa: E741
     """Minimises ½ xᵀHx + gᵀx subject to l ≤ Cx ≤ u; returns the status.
 
     H (n, n) symmetric positive definite, g (n,), C (m, n); l, u (m,) may be ∓inf, l == u means
@@ -87,22 +85,13 @@ def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter):  # noqa: E74
     iscratch[0] iterations, iscratch[1] the number of active rows, iscratch[2:2 + active] their
     indices. x and lam are a solution only if the status is 0.
     scratch float64 (scratch_size(n, m),) and iscratch int64 (iscratch_size(n, m),) need no initial
-    value and carry nothing from call to call.
+    value and carry nothing from call to call, unless `warm`: then the rows that the last call has
+    left in iscratch[1:] are added before others (iscratch[1] = 0 forgets them). That changes the
+    order of the additions only, so x is the same up to rounding, and lam too where the active
+    rows are independent; for a problem like the last one it halves the iterations.
 
     Status: 0 solved; 1 infeasible; 2 iteration limit, or too ill-conditioned; 3 H not positive
     definite, or NaN or infinity where a finite number is needed.
-    """
-    iscratch[1] = 0
-    return solve_dual_warm(H, g, C, l, u, x, lam, scratch, iscratch, max_iter)
-
-
-@compiled
-def solve_dual_warm(H, g, C, l, u, x, lam, scratch, iscratch, max_iter):  # noqa: E741
-    """`solve_dual`, adding the rows that were active at the last call before others.
-
-    They are iscratch[2:2 + iscratch[1]], as the last call has left them; iscratch[1] = 0 forgets
-    them. Only the order of the additions changes: x is the same up to rounding, and so is lam
-    where the active rows are independent. For a problem like the last it halves the iterations.
     """
     m, n = C.shape
     p, pm = padded(n), padded(m)
@@ -125,7 +114,7 @@ def solve_dual_warm(H, g, C, l, u, x, lam, scratch, iscratch, max_iter):  # noqa
     work = scratch[vector + 4 * pm : vector + 5 * pm]
     active, sign = iscratch[2 : 2 + n], iscratch[2 + n : 2 + 2 * n]  # +1 at lower, −1 at upper
     first = iscratch[2 + 2 * n : 2 + 3 * n]  # the rows to add first
-    firsts = iscratch[1] if 0 <= iscratch[1] <= n else 0
+    firsts = iscratch[1] if warm and 0 <= iscratch[1] <= n else 0
     first[:firsts] = active[:firsts]
     iscratch[0], iscratch[1] = 0, 0
     lam[:] = 0.0

@@ -52,7 +52,7 @@ def time_compiled(sequences: list[list[QP]]) -> float:
     for sequence in sequences:
         for qp in sequence:
             start = time.perf_counter()
-            solve_dual(qp.H, qp.g, qp.C, qp.l, qp.u, x, lam, scratch, iscratch, 500)
+            solve_dual(qp.H, qp.g, qp.C, qp.l, qp.u, x, lam, scratch, iscratch, 500, False)
             times.append(time.perf_counter() - start)
     return float(np.median(times))
 
