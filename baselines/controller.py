@@ -45,11 +45,14 @@ class Targets:
             cop=state.origin[:2].copy(),
         )
 
+    # (3,) L_ref [N·m·s] that the posture is to carry besides
+    angular_momentum: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
     def arrays(self) -> TargetArrays:
         """The same arrays, not copies, for compiled code."""
         return TargetArrays(
             self.q_ref, self.v_ref, self.a_ref, self.root_axes, self.root_vel, self.root_acc,
-            self.com, self.com_vel, self.com_acc, self.cop,
+            self.com, self.com_vel, self.com_acc, self.cop, self.angular_momentum,
         )  # fmt: skip
 
 

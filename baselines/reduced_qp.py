@@ -64,6 +64,7 @@ class TargetArrays(NamedTuple):
     com_vel: np.ndarray  # (3,)
     com_acc: np.ndarray  # (3,)
     cop: np.ndarray  # (2,) p_ref
+    angular_momentum: np.ndarray  # (3,) L_ref that the posture is to carry; zero: none
 
 
 class Workspace(NamedTuple):
@@ -84,6 +85,7 @@ class Workspace(NamedTuple):
     momentum_rate: np.ndarray  # (6,) [Ṗ_des; L̇_des]
     B: np.ndarray  # (6, nz) A N
     W0: np.ndarray  # (6,) A v̇₀ + A_bias
+    BBt: np.ndarray  # (6, 6)
     E: np.ndarray  # (k, n)
     w0: np.ndarray  # (k,)
     T: np.ndarray  # (nj, n)
@@ -114,6 +116,7 @@ def allocate_workspace(nv: int, nc: int, cone_rows: int, soft_root: bool) -> Wor
         reflectors=z((k, nv)), diagonal=z(k), beta=z(k), pivot=z(k, dtype=np.int64),
         sole_rhs=z(k), y=z(nv), N=z((nz, nv)), weighted=z(nv), accel_des=z(nv), vdot0=z(nv),
         cop_prev=np.full(2, np.nan), cop_vel=z(2), momentum_rate=z(6), B=z((6, nz)), W0=z(6),
+        BBt=z((6, 6)),
         E=z((k, n)), w0=z(k), T=z((nj, n)), tau0=z(nj), H=z((n, n)), g=z(n), C=z((m, n)),
         l=z(m), u=z(m), x=z(n), lam=z(m), scratch=z(scratch_size(n, m)),
         iscratch=z(iscratch_size(n, m), dtype=np.int64), vdot=z(nv), wrenches=z(k), tau=z(nj),
@@ -135,6 +138,7 @@ def assemble(
     desired_momentum_rate(robot, s, p, t, tick, ws)
     _eliminate_soles(s, p, ws)
     _share_wrench(s, p, ws)
+    _carry_momentum(p, t, ws)
     _torques(s, ws)
     _objective(robot, s, p, ws)
     _constraints(robot, s, p, ws)
@@ -308,6 +312,47 @@ def _share_wrench(s, p, ws):
             ws.E[row + 3, j] -= ry * fz - rz * fy
             ws.E[row + 4, j] -= rz * fx - rx * fz
             ws.E[row + 5, j] -= rx * fy - ry * fx
+
+
+@compiled
+def _carry_momentum(p, t, ws):
+    """Posture velocities that carry L_ref: a_des += d_t v*, v* = N z, least z with B z = [0; L_ref].
+
+    The soles and the CoM stay where they are (A_P v* = 0), so this asks the trunk and arms to
+    turn, which is what the posture's own damping holds back.
+    """
+    L = t.angular_momentum
+    if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
+        return
+    nz, nv = ws.N.shape
+    G, y = ws.BBt, ws.y
+    trace = 0.0
+    for a in range(6):
+        for b in range(6):
+            total = 0.0
+            for i in range(nz):
+                total += ws.B[a, i] * ws.B[b, i]
+            G[a, b] = total
+        trace += G[a, a]
+        y[a] = L[a - 3] if a >= 3 else 0.0
+    for a in range(6):  # a robot of few joints may not reach every direction
+        G[a, a] += 1e-9 * trace
+    for k in range(6):  # Gauss: G is symmetric positive definite
+        for a in range(k + 1, 6):
+            factor = G[a, k] / G[k, k]
+            for b in range(k, 6):
+                G[a, b] -= factor * G[k, b]
+            y[a] -= factor * y[k]
+    for a in range(5, -1, -1):
+        for b in range(a + 1, 6):
+            y[a] -= G[a, b] * y[b]
+        y[a] /= G[a, a]
+    for i in range(nz):
+        z = 0.0
+        for a in range(6):
+            z += ws.B[a, i] * y[a]
+        for j in range(3, nv):
+            ws.accel_des[j] += p.damping[j] * ws.N[i, j] * z
 
 
 @compiled

@@ -20,15 +20,30 @@ from .registry import load_controller
 from .residual_step import Motion, residual_step, soft_root_force
 from .targets import update_targets
 
-ACTION_NAMES = ("com_x", "com_y", "cop_x", "cop_y")
-
 
 @dataclass(frozen=True)
 class ResidualScales:
-    """What an action of 1 adds to the targets, heading frame."""
+    """What an action of 1 adds to each target, heading frame; a scale of 0 takes it away."""
 
-    com: float = field(default=0.2, metadata={"min": 0.0})  # Δc_ref [m]
-    cop: float = field(default=0.15, metadata={"min": 0.0})  # Δp_ref [m]
+    com: float = field(default=0.2, metadata={"min": 0.0})  # Δc_ref x, y [m]
+    cop: float = field(default=0.15, metadata={"min": 0.0})  # Δp_ref x, y [m]
+    height: float = field(default=0.0, metadata={"min": 0.0})  # Δc_ref z [m]
+    lean: float = field(default=0.0, metadata={"min": 0.0})  # of the root, about x and y [rad]
+    momentum: float = field(default=0.0, metadata={"min": 0.0})  # L_ref x, y [m h² ω]
+
+    def entries(self) -> dict[str, float]:
+        """Scale of each target that can be moved, in the order of `update_targets`."""
+        return {
+            "com_x": self.com,
+            "com_y": self.com,
+            "cop_x": self.cop,
+            "cop_y": self.cop,
+            "com_z": self.height,
+            "lean_x": self.lean,
+            "lean_y": self.lean,
+            "momentum_x": self.momentum,
+            "momentum_y": self.momentum,
+        }
 
 
 class ResidualBalanceEnv(BalanceEnv):
@@ -46,6 +61,11 @@ class ResidualBalanceEnv(BalanceEnv):
     | 1 | com_y | `residual.com`, 0.2 m | CoM target, left |
     | 2 | cop_x | `residual.cop`, 0.15 m | CoP target, forward |
     | 3 | cop_y | `residual.cop`, 0.15 m | CoP target, left |
+
+    Scales above 0 for `residual.height` [m] and `residual.lean` [rad] append `com_z` (the CoM's
+    height) and `lean_x`, `lean_y` (a rotation of the root's target about the axes x and y); one for
+    `residual.momentum` [m h² ω] appends `momentum_x` and `momentum_y`, angular momentum that the
+    posture is to carry.
 
     Observation: Box(−10, 10), in the heading frame; h is the standing height of the CoM and
     ω = √(g/h). It does not know the push. The reference is that of `motion`.
@@ -179,9 +199,16 @@ class ResidualBalanceEnv(BalanceEnv):
         render_mode: str | None = None,
         **overrides: Any,
     ):
+        given = {} if residual is None else to_dict(residual)
+        self.residual = build(ResidualScales, given, "residual")
+        scale = np.array(list(self.residual.entries().values()))
+        self._moved = np.flatnonzero(scale)
+        self._offsets = np.zeros(len(scale))
+        if len(self._moved) == 0:
+            raise ConfigError("at least one scale must be above 0", field="residual")
         super().__init__(robot, config, render_mode=render_mode, **overrides)
-        scale = {} if residual is None else to_dict(residual)
-        self.residual = build(ResidualScales, scale, "residual")
+        scale[7:] *= 10.0 * self.scales.momentum
+        self._scale = scale[self._moved]
         self.controller: Any = load_controller(controller, self.robot)
         self.motion = (
             motion if isinstance(motion, ReferenceMotion) else load_motion(motion, self.robot)
@@ -200,8 +227,6 @@ class ResidualBalanceEnv(BalanceEnv):
         self._motion = Motion(
             self.motion.knots, self.motion.coeffs, self.motion.loop, np.zeros((3, columns))
         )
-        com, cop = self.residual.com, self.residual.cop
-        self._scale = np.array([com, com, cop, cop])
 
     def _check_robots(self) -> None:
         """Compiled code trusts the sizes of its arrays."""
@@ -216,14 +241,16 @@ class ResidualBalanceEnv(BalanceEnv):
             )
 
     def _action_names(self) -> tuple[str, ...]:
-        return ACTION_NAMES
+        names = list(self.residual.entries())
+        return tuple(names[i] for i in self._moved)
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self.targets.q_ref, self.targets.v_ref
 
     def _begin(self) -> None:
         self.controller.reset(self.simulation.state)
-        self._update_targets(np.zeros(4))
+        self._offsets[:] = 0.0
+        self._update_targets(self._offsets)
 
     def _update_targets(self, residual: np.ndarray) -> None:
         update_targets(
@@ -233,7 +260,8 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _advance(self) -> float:
         sim, controller = self.simulation, self.controller
-        residual = self._scale * self.episode.action
+        residual = self._offsets
+        residual[self._moved] = self._scale * self.episode.action
         if not self._compiled:
             return self._advance_in_python(residual)
         return residual_step(

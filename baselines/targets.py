@@ -26,7 +26,9 @@ def update_targets(
     """Fill `t` for `time`: the motion's joints and CoM, moved by the residual.
 
     Heading frame: the motion's CoM is relative to the mean of the sole points, `com_offset` [m]
-    forward of it; p_ref lies under it. `residual` (4,) adds Δc_ref (x, y) and Δp_ref (x, y) [m].
+    forward of it; p_ref lies under it. `residual` (9,) adds Δc_ref (x, y) and Δp_ref (x, y) [m],
+    the CoM's height [m], a lean of the root, a rotation about the axes x and y [rad],
+    and the angular momentum that the posture is to carry about x and y [N·m·s].
     `samples` (3, nj+6) is scratch. The root's
     reference is R = R_heading exp(φ) R_standing; its rate R_heading φ̇ is exact while φ keeps its
     axis, as it does in every motion that bows or leans.
@@ -37,18 +39,22 @@ def update_targets(
     t.v_ref[:] = samples[1, :nj]
     t.a_ref[:] = samples[2, :nj]
     cos, sin = s.heading[0], s.heading[1]
+    samples[0, nj + 3] += residual[5]
+    samples[0, nj + 4] += residual[6]
     _root_reference(robot, cos, sin, samples[:, nj + 3 : nj + 6], t)
     middle_x, middle_y = samples[0, nj] + com_offset, samples[0, nj + 1]
     x, y = middle_x + residual[0], middle_y + residual[1]
     t.com[0] = s.origin[0] + cos * x - sin * y
     t.com[1] = s.origin[1] + sin * x + cos * y
-    t.com[2] = s.origin[2] + samples[0, nj + 2]
+    t.com[2] = s.origin[2] + samples[0, nj + 2] + residual[4]
     for r in range(2):
         out = t.com_vel if r == 0 else t.com_acc
         x, y = samples[1 + r, nj], samples[1 + r, nj + 1]
         out[0] = cos * x - sin * y
         out[1] = sin * x + cos * y
         out[2] = samples[1 + r, nj + 2]
+    t.angular_momentum[0] = cos * residual[7] - sin * residual[8]
+    t.angular_momentum[1] = sin * residual[7] + cos * residual[8]
     x, y = middle_x + residual[2], middle_y + residual[3]
     t.cop[0] = s.origin[0] + cos * x - sin * y
     t.cop[1] = s.origin[1] + sin * x + cos * y
