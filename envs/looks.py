@@ -13,23 +13,27 @@ TILE = 0.5  # [m] edge of a ground tile
 TILES = ((226, 228, 230), (206, 209, 212))  # two pale greys
 BODY = (0.50, 0.56, 0.63, 1.0)
 SKY = (238, 242, 246)
-LAMP = np.array([1.5, 1.0, 4.0])  # from the robot's centre of mass [m]
-SHADOWED = 2.5  # half width of the region with shadows, over the CoM height
+LAMP = (-16.0, 66.0, 4.0)  # azimuth from the camera, elevation [deg]; distance to the robot [m]
+SHADOWED = 4.0  # half width of the region with shadows, over the CoM height
 FIELD_OF_VIEW = 30.0  # [deg], vertical
 
 
-def looks(robot: Robot, width: int, height: int) -> mujoco.MjModel:
-    """A private copy of the robot's model for pictures of `width` × `height` pixels."""
+def looks(robot: Robot, width: int, height: int, azimuth: float) -> mujoco.MjModel:
+    """A private copy of the robot's model for pictures of `width` × `height` pixels.
+
+    The lamp hangs on the camera's side, of which `azimuth` [deg] is the direction from the robot.
+    (On the other side the ground would have speckles where MuJoCo's shadow map ends.)
+    """
     model = copy.copy(robot.model)
     picture, quality = model.vis.global_, model.vis.quality
     picture.offwidth, picture.offheight = width, height
     picture.fovy = FIELD_OF_VIEW
-    quality.shadowsize, quality.offsamples = 1024, 4
+    quality.shadowsize, quality.offsamples = 2048, 4
     _show_bare_bodies(model)
     _paint(model)
     _ground(model, robot.ground_geom_id)
     _sky(model)
-    _light(model, robot.root_body_id)
+    _light(model, robot.root_body_id, azimuth + LAMP[0])
     model.vis.map.alpha = 0.5  # of the robot, where the viewer makes it transparent
     model.vis.map.shadowclip = SHADOWED * robot.height_com / model.stat.extent
     return model
@@ -88,8 +92,10 @@ def _pixels(model: mujoco.MjModel, texture: int) -> np.ndarray:
     return model.tex_data[start : start + int(np.prod(shape))].reshape(shape)
 
 
-def _light(model: mujoco.MjModel, body: int) -> None:
+def _light(model: mujoco.MjModel, body: int, azimuth: float) -> None:
     """One lamp that stays above the body and throws a shadow, and light from the camera."""
+    a, e = np.radians([azimuth, LAMP[1]])
+    to_lamp = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     head = model.vis.headlight
     head.ambient[:], head.diffuse[:], head.specular[:] = 0.45, 0.25, 0.05
     model.light_active[1:] = 0
@@ -98,7 +104,7 @@ def _light(model: mujoco.MjModel, body: int) -> None:
         model.light_castshadow[lamp] = 1
         model.light_mode[lamp] = int(mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM)
         model.light_bodyid[lamp] = body
-        model.light_poscom0[lamp] = LAMP
-        model.light_dir0[lamp] = -LAMP / np.linalg.norm(LAMP)
+        model.light_poscom0[lamp] = LAMP[2] * to_lamp
+        model.light_dir0[lamp] = -to_lamp
         model.light_ambient[lamp], model.light_diffuse[lamp] = 0.1, 0.4
         model.light_specular[lamp] = 0.1

@@ -57,7 +57,7 @@ class SceneRenderer:
     ):
         self.simulation = simulation
         self.camera = camera or Camera()
-        self.model = looks(simulation.robot, width, height)
+        self.model = looks(simulation.robot, width, height, self.camera.azimuth)
         self.data = mujoco.MjData(self.model)
         self.shown = np.inf  # simulation time of the last picture [s]
         self.due = 0.0  # wall clock at which the next one is shown [s]

@@ -47,6 +47,14 @@ def test_marks_are_where_the_state_says(simulation):
     assert np.array_equal([edge.end for edge in edges], np.roll([e.start for e in edges], -1, 0))
 
 
+def test_marks_only_read(simulation):
+    """No array of the state changes, not even one that is computed on demand."""
+    run(simulation, 0.1)
+    before = [array.tobytes() for array in simulation.state_arrays]
+    marks(simulation)
+    assert [array.tobytes() for array in simulation.state_arrays] == before
+
+
 def test_no_centre_of_pressure_in_the_air(simulation, robot):
     """A robot that flies has no CoP mark."""
     run(simulation, 0.02)
