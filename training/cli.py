@@ -12,7 +12,9 @@ from rich.console import Console
 from poise.envs.errors import PoiseError
 
 Names = Annotated[
-    tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="CONTROLLER …", help_behavior_hint="")
+    tuple[str, ...],
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="CONTROLLER …", help_behavior_hint=""),
 ]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 Off = tyro.conf.FlagCreatePairsOff
@@ -115,7 +117,7 @@ def evaluate(
         raise
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)
-        _console().print(str(write_limits), highlight=False, soft_wrap=True)
+        print(write_limits)
 
 
 def replay(
@@ -142,16 +144,16 @@ def replay(
         choose_gl_backend()
     from .replay import replay
 
-    done, console = replay(folder, trial, controller, video=video, plot=plot), _console()
+    done = replay(folder, trial, controller, video=video, plot=plot)
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
-    console.print(f"trial {trial}, {done.controller}: {end}", highlight=False)
-    console.print(f"push: {done.trial.push}", highlight=False, soft_wrap=True)
+    print(f"trial {trial}, {done.controller}: {end}")
+    print(done.trial.push or "no push")
     for name, (recorded, now) in done.differences.items():
-        console.print(f"{name}: recorded {recorded or '–'}, now {now or '–'}", highlight=False)
-    console.print("differs from the record" if done.differences else "exactly as recorded")
+        print(f"{name}: recorded {recorded or 'nothing'}, now {now or 'nothing'}")
+    print("differs from the record" if done.differences else "exactly as recorded")
     for path in (video, plot):
         if path is not None:
-            console.print(str(path), highlight=False, soft_wrap=True)
+            print(path)
 
 
 def tune(
@@ -191,10 +193,9 @@ def list_names() -> None:
     """List what can be named: robots, controllers, suites, training configurations, motions."""
     from poise.envs.config import packaged
 
-    console = _console()
     for kind in ("robots", "controllers", "suites", "training", "motions", "limits"):
-        console.print(f"{kind}: {', '.join(packaged(kind)) or 'none'}", highlight=False)
-    console.print("also as controllers: residual, zero, a folder written by poise train")
+        print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
+    print("also as controllers: residual, zero, a folder written by poise train")
 
 
 COMMANDS = {

@@ -8,6 +8,7 @@ from rich.console import Console
 from .evaluation import evaluate
 from .evaluation_folder import PLOTS
 from .players import SHIPPED
+from .report import print_paths
 
 CONTROLLERS = ("momentum-qp", SHIPPED)
 SUITES = ("demo-envelope", "demo-random")
@@ -31,13 +32,10 @@ def demo(
     console = console or Console(quiet=True)
     summaries = []
     for suite in SUITES:
-        summaries.append(
-            evaluate(
-                controllers, suite, out=Path(out) / suite, seed=seed, workers=workers,
-                overwrite=True, console=console,
-            )  # fmt: skip
-        )
+        settings = {"seed": seed, "workers": workers, "overwrite": True}
+        folder = Path(out) / Path(suite).stem
+        summaries.append(evaluate(controllers, suite, out=folder, console=console, **settings))
     console.print("\npolar recovery plot and fall probability:")
-    for suite, plot in zip(SUITES, PLOTS, strict=True):
-        console.print(str(Path(out) / suite / plot), highlight=False, soft_wrap=True)
+    folders = [Path(out) / Path(suite).stem for suite in SUITES]
+    print_paths([f / plot for f, plot in zip(folders, PLOTS, strict=True)], console)
     return summaries

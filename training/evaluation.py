@@ -2,32 +2,29 @@
 
 import shlex
 import sys
-import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
 from poise.envs.push_schedule import LimitTable
-from poise.envs.robot import Robot, load_robot
+from poise.envs.robot import load_robot
 
-from .evaluation_folder import EvaluationFolder, Settings
+from .evaluation_folder import SUMMARY, TRIALS, EvaluationFolder, Settings
 from .limits import PushLimits, load_limits, write_limits
 from .players import Player, load_player
+from .progress import patience, progress_bar
 from .provenance import commit, machine, usable_cores, versions
-from .report import draw_plots, print_summary
+from .report import draw_plots, print_paths, print_summary
 from .suite import Suite
 from .suites import load_suite
 from .summary import plain, summarise
-from .trials import Outcome, Trial, row
+from .trials import Trial, row
 from .workers import Workers
 
 
@@ -75,7 +72,7 @@ def evaluate(
     loaded = load_robot(robot)
     pushed = load_limits(loaded, limits)
     overrides = {"duration": chosen.duration, "pushes": None, "noise": chosen.noise}
-    with _patience(console):
+    with patience(console):
         players = [load_player(name, loaded, **overrides) for name in controllers]
         first = chosen.first(pushed, seed)
         _warm_up(players)
@@ -91,10 +88,10 @@ def evaluate(
     )
     folder = EvaluationFolder(Path(out), settings, overwrite)
     if folder.finished:
-        console.print(f"going on after {len(folder.finished)} finished trials in {out}")
+        console.print(f"going on after {len(folder.finished)} finished trials")
     count = workers or usable_cores()
     try:
-        with Workers(controllers, robot, overrides, count) as pool:
+        with Workers(controllers, str(robot), overrides, min(count, len(first))) as pool:
             done = _play(pool, folder, chosen, pushed, first, controllers, console)
     finally:
         folder.close()
@@ -121,8 +118,7 @@ def evaluate(
             for k, trial in enumerate(done) for name in controllers]  # fmt: skip
     folder.finish(rows, summary)
     print_summary(summary, console)
-    for path in [*plots, Path(out) / "trials.csv", Path(out) / "summary.json"]:
-        console.print(str(path), highlight=False, soft_wrap=True)
+    print_paths([*plots, Path(out) / TRIALS, Path(out) / SUMMARY], console)
     return summary
 
 
@@ -141,9 +137,7 @@ def measured_limits(summary: dict[str, Any], path: Path, robot: str) -> None:
     write_limits(path, load_robot(robot), name, table)
 
 
-def _check(
-    controllers: Sequence[str], seed: int, workers: int | None, trials: int | None
-) -> None:
+def _check(controllers: Sequence[str], seed: int, workers: int | None, trials: int | None) -> None:
     if not controllers:
         raise ConfigError("give at least one", field="controller")
     for name in controllers:
@@ -166,7 +160,7 @@ def _play(
     """Play all stages of the suite; returns the trials in order, `folder` has their outcomes."""
     trials: list[Trial] = []
     stage = first
-    with _progress(console) as bar:
+    with progress_bar(console) as bar:
         task = bar.add_task("", total=suite.count(len(controllers)), rates="")
 
         def show() -> None:
@@ -190,33 +184,8 @@ def _play(
     return trials
 
 
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("trials"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("recovered: {task.fields[rates]}"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=console.quiet,
-    )
-
-
 def _warm_up(players: Sequence[Player]) -> None:
     """Compile what is not yet compiled, once, before many processes would do it each."""
     for player in players:
         observation, _ = player.env.reset(seed=0, options={"push": []})
         player.env.step(player.act(observation))
-
-
-@contextmanager
-def _patience(console: Console) -> Iterator[None]:
-    """Say why nothing happens if the block takes long."""
-    message = "compiling (only once, about half a minute) …"
-    timer = threading.Timer(4.0, console.print, (message,))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()

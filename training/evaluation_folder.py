@@ -1,9 +1,9 @@
 """The folder of an evaluation: its settings, its finished trials, and what is left of a stop.
 
-    settings.yaml         everything that decides the result
-    trials.partial.jsonl  a line for each finished trial, while the evaluation runs
-    trials.csv            a line for each trial and controller, at the end
-    summary.json          written last: with it, the evaluation is finished
+- settings.yaml: everything that decides the result
+- trials.partial.jsonl: a line for each finished trial, while the evaluation runs
+- trials.csv: a line for each trial and controller, at the end
+- summary.json: written last; with it, the evaluation is finished
 """
 
 import csv
@@ -69,6 +69,8 @@ class EvaluationFolder:
         self.path, self.settings = path, settings
         self.finished: dict[int, list[Outcome]] = {}
         self._partial: TextIO | None = None
+        if path.exists() and not path.is_dir():
+            raise ConfigError("is not a folder", source=path, field="out")
         if overwrite:
             for name in FILES:
                 (path / name).unlink(missing_ok=True)
@@ -104,16 +106,17 @@ class EvaluationFolder:
     def _check(self) -> None:
         """Refuse to go on from anything but an interrupted evaluation with equal settings."""
         advice = "choose another folder, or replace it by --overwrite"
-        if (self.path / SUMMARY).exists() or not (self.path / SETTINGS).exists():
-            raise ConfigError(f"already holds an evaluation: {advice}", source=self.path, field="out")
-        before = read_settings(self.path)
+        path = self.path
+        if (path / SUMMARY).exists() or not (path / SETTINGS).exists():
+            raise ConfigError(f"already holds an evaluation: {advice}", source=path, field="out")
+        before = read_settings(path)
         names = Settings.__dataclass_fields__
         changed = [n for n in names if getattr(before, n) != getattr(self.settings, n)]
         if changed:
             raise ConfigError(
                 f"holds an interrupted evaluation with other settings ({', '.join(changed)}): "
                 f"{advice}",
-                source=self.path / SETTINGS,
+                source=path / SETTINGS,
                 field=changed[0],
             )
 

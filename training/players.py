@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import packaged, to_yaml
@@ -61,7 +62,7 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
             choices=(*names, SHIPPED, NO_CONTROL),
         )
     env = ResidualBalanceEnv(robot, controller=name, **overrides)
-    return _idle(name, env, to_yaml(env.controller.config))
+    return _idle(name, env, to_yaml(controller_config(name)))
 
 
 def _idle(name: str, env: BalanceEnv, content: str) -> Player:

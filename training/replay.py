@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from poise.envs import episode
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build
 from poise.envs.errors import ConfigError
@@ -82,8 +81,7 @@ def replay(
     if video is not None:
         from .video import record
 
-        start = {"seed": again.seed, "options": {"push": [again.push] if again.push else []}}
-        record(player.env, player.act, video, start)
+        record(player.env, player.act, video, {"seed": again.seed, "options": again.options})
     return Replay(again, name, outcome, differences)
 
 

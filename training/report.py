@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from .bootstrap import EnvelopeFit, mean_over_directions
@@ -67,7 +68,7 @@ def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, tuple[list[float], ...]
 
 def print_summary(summary: Mapping[str, Any], console: Console) -> None:
     """Tables of the controllers and of the pairs."""
-    title = f"{summary['suite']} · {summary['robot']} · seed {summary['seed']}"
+    title = escape(f"{summary['suite']} · {summary['robot']} · seed {summary['seed']}")
     console.print(_controllers(summary, title))
     if summary["pairs"]:
         console.print(_pairs(summary))
@@ -80,17 +81,17 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
     table.add_column("controller", overflow="fold", min_width=11)
     columns: list[tuple[str, Any]] = [
         ("recovered", lambda e: f"{e['recovered']}/{e['trials']}"),
-        ("rate [95 %]", lambda e: f"{e['recovered_rate']:.1%} {_range(e['recovered_ci95'], '.1%')}"),
+        ("rate [95 %]", lambda e: _with_range(e, "recovered_rate", "recovered_ci95", ".1%")),
     ]
     if "j50_mean" in first:
         columns += [
-            ("mean J50 [N·s]", lambda e: f"{e['j50_mean']:.1f} {_range(e['j50_mean_ci95'], '.1f')}"),
+            ("mean J50 [N·s]", lambda e: _with_range(e, "j50_mean", "j50_mean_ci95", ".1f")),
             ("worst J50", lambda e: f"{e['j50_min']:.1f}{_open(e)}"),
             ("η mean, min", lambda e: f"{e['eta_mean']:.2f}, {e['eta_min']:.2f}"),
         ]
     if "fraction50" in first:
         columns.append((f"half at, of {first['fraction_of']}", _half))
-    if first["com_drift_max"] is not None:
+    if any(entry["com_drift_max"] is not None for entry in entries.values()):
         columns += [
             ("falls", lambda e: f"{e['fallen']}"),
             ("CoM drift [mm]", lambda e: _milli(e["com_drift_max"])),
@@ -102,7 +103,7 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
     for name, _ in columns:
         table.add_column(name, justify="right", overflow="fold")
     for name, entry in entries.items():
-        table.add_row(name, *(text(entry) for _, text in columns))
+        table.add_row(escape(name), *(text(entry) for _, text in columns))
     return table
 
 
@@ -117,10 +118,8 @@ def _pairs(summary: Mapping[str, Any]) -> Table:
         cells = [str(pair[key]) for key in ("both", "only_a", "only_b", "neither")]
         cells.append(f"{pair['p_mcnemar']:.2g}")
         if gain:
-            cells.append(
-                f"{_number(pair['j50_gain'], '+.1%')} {_range(pair['j50_gain_ci95'], '+.1%')}"
-            )
-        table.add_row(f"{pair['b']} against {pair['a']}", *cells)
+            cells.append(_with_range(pair, "j50_gain", "j50_gain_ci95", "+.1%"))
+        table.add_row(escape(f"{pair['b']} against {pair['a']}"), *cells)
     return table
 
 
@@ -134,8 +133,9 @@ def _open(entry: Mapping[str, Any]) -> str:
     return f" ({entry['j50_bounded']} only bounds)" if entry["j50_bounded"] else ""
 
 
-def _range(interval: Sequence[float], form: str) -> str:
-    return f"[{_number(interval[0], form)}, {_number(interval[1], form)}]"
+def _with_range(entry: Mapping[str, Any], value: str, interval: str, form: str) -> str:
+    low, high = (_number(end, form) for end in entry[interval])
+    return f"{_number(entry[value], form)} [{low}, {high}]"
 
 
 def _number(value: float | None, form: str) -> str:
@@ -144,3 +144,9 @@ def _number(value: float | None, form: str) -> str:
 
 def _milli(value: float | None) -> str:
     return "–" if value is None else f"{1000 * value:.1f}"
+
+
+def print_paths(paths: Sequence[Path], console: Console) -> None:
+    """One path a line, whole, as it is to be copied."""
+    for path in paths:
+        console.print(str(path), markup=False, highlight=False, soft_wrap=True)

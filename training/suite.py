@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from poise.envs.balance import StartNoise
+from poise.envs.env_config import StartNoise
 from poise.envs.pushes import Push
 
 from .limits import PushLimits

@@ -11,7 +11,7 @@ import numpy as np
 from .bootstrap import EnvelopeFit, j50_gain, mean_over_directions
 from .fits import fit_logistic
 from .limits import PushLimits
-from .statistics import Interval, eta, mcnemar, wilson_interval
+from .statistics import eta, mcnemar, wilson_interval
 from .suite import Suite
 from .trials import Outcome, Trial
 

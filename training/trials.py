@@ -34,6 +34,11 @@ class Trial:
     limit_fraction: float | None = None
     stage: int = 1
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """For the environment's `reset`."""
+        return {"push": [] if self.push is None else [self.push]}
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -91,9 +96,9 @@ def run_trial(
 ) -> Outcome:
     """Play a trial to its end; `watch(env)` is called after the reset and after every step."""
     env = player.env
-    observation, _ = env.reset(seed=trial.seed, options={"push": [trial.push] if trial.push else []})
+    observation, _ = env.reset(seed=trial.seed, options=trial.options)
     state = env.simulation.state  # its arrays follow the simulation
-    settled = int(round(SETTLED / env.config.policy_period))
+    settled = round(SETTLED / env.config.policy_period)
     actions, steps, drift = 0.0, 0, 0.0
     start: np.ndarray | None = None
     done = False
@@ -138,7 +143,7 @@ def _record(env: BalanceEnv, trial: Trial) -> dict[str, Any]:
         "energy": _finite(m[episode.ENERGY]),
         "peak_torque": _finite(m[episode.PEAK_TORQUE]),
         "saturation": float(m[episode.SATURATED] / max(m[episode.TICKS], 1.0)),
-        "solver_failures": controller.failures if controller is not None else 0,
+        "solver_failures": int(getattr(controller, "failures", 0)),
         "final_speed": _finite(np.linalg.norm(env.simulation.state.com_vel)),
         "root_force": _finite(m[episode.ROOT_FORCE]),
     }

@@ -1,0 +1,185 @@
+"""training/cli.py and training/train_command.py."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from poise.envs.config import to_dict
+from poise.envs.errors import ConfigError
+from poise.training import cli, evaluation, train_command
+from poise.training.cli import main
+from poise.training.config import TrainConfig, train_config
+from poise.training.train_command import parse
+
+from .evaluations import RANDOM, InProcess, write_suite
+
+BAD_SUITE = "kind: random\ntrials: many\n"
+BAD_ROBOT = "name: a\nsource: {mjcf: nowhere.xml}\nroot: b\nfeet: []\n"
+
+
+def test_help_is_light() -> None:
+    """Neither the command nor its help loads MuJoCo, Numba, torch or SciPy."""
+    code = (
+        "import sys\nfrom poise.training.cli import main\n"
+        "try:\n    main(['--help'])\nexcept SystemExit as end:\n    assert end.code == 0\n"
+        "heavy = {'mujoco', 'numba', 'torch', 'scipy', 'matplotlib'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for name in ("train", "evaluate", "replay", "demo", "tune", "list"):
+        assert name in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["evaluate", "pid"], "no such controller: 'pid'"),
+        (["evaluate"], "controller: give at least one"),
+        (["evaluate", "zero", "--suite", "rndom"], "no such name: 'rndom'"),
+        (["evaluate", "zero", "--robot", "robby"], "no such name: 'robby'"),
+        (["evaluate", "zero", "--workers", "0"], "workers: must be at least 1"),
+        (["evaluate", "zero", "--suite", "bad.yaml"], "bad.yaml: trials: must be a whole number"),
+        (["evaluate", "zero", "--suite", "text.yaml"], "text.yaml: not valid YAML"),
+        (["evaluate", "zero", "--robot", "robot.yaml"], "robot.yaml: feet: a biped has two feet"),
+        (["evaluate", "run"], "run: no config.yaml"),
+        (["replay", "run", "--trial", "0"], "settings.yaml: cannot be read"),
+        (["train", "--out", "run", "--config", "nothing"], "no such name: 'nothing'"),
+        (["train", "--out", "run", "--seed", "1", "--ppo.gamma", "2"], "ppo.gamma"),
+        (["train", "--out", "run", "--config", "bad.yaml"], "bad.yaml: kind: unknown field"),
+        (["tune", "--out", "run", "--controller", "pid"], "controllers: no such name: 'pid'"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    args: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The line names the file, the field and what is wrong; nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.yaml").write_text(BAD_SUITE)
+    (tmp_path / "text.yaml").write_text("kind: [random\n")
+    (tmp_path / "robot.yaml").write_text(BAD_ROBOT)
+    (tmp_path / "run").mkdir()
+    assert main(args) == 2
+    output = capsys.readouterr()
+    assert message in output.err
+    assert output.err.startswith("poise: ") and output.err.count("\n") == 1
+    assert not list((tmp_path / "run").iterdir()) and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["evaluate", "zero", "--sede", "1"],
+        ["evaluate", "zero", "--seed", "one"],
+        ["train"],
+        ["train", "--out", "run", "--ppo.gama", "0.9"],
+        ["train", "--out", "run", "--resume", "--config"],
+        ["push"],
+        [],
+    ],
+)
+def test_a_wrong_flag_ends_with_code_2(
+    args: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unknown flags and sub-commands, and values that do not parse."""
+    monkeypatch.chdir(tmp_path)
+    try:
+        code: object = main(args)
+    except SystemExit as end:
+        code = end.code
+    assert code == 2 and not list(tmp_path.iterdir())
+
+
+def test_a_traceback_is_left_to_real_faults(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only Poise's own errors become a line."""
+    monkeypatch.setitem(cli.COMMANDS, "list", lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        main(["list"])
+
+
+def test_evaluate_and_replay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One command plays, the other plays one of its trials again and says that it is the same."""
+    monkeypatch.setattr(evaluation, "Workers", InProcess)
+    InProcess.played, InProcess.stop_after = 0, None
+    suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
+    args = ["evaluate", "zero", "--suite", suite, "--out", out, "--trials", "2", "--seed", "3"]
+    assert main(args) == 0
+    assert InProcess.played == 2 and f"{out}/summary.json" in capsys.readouterr().out
+    assert main(args) == 2
+    assert "already holds an evaluation" in capsys.readouterr().err
+    assert main([*args, "--overwrite"]) == 0
+    capsys.readouterr()
+    assert main(["replay", out, "--trial", "1"]) == 0
+    shown = capsys.readouterr().out
+    assert "trial 1, zero: fell" in shown and "exactly as recorded" in shown
+
+
+def test_ctrl_c_says_how_to_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 130, no traceback; the same command finishes the evaluation."""
+    monkeypatch.setattr(evaluation, "Workers", InProcess)
+    InProcess.played, InProcess.stop_after = 0, 1
+    suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
+    args = ["evaluate", "zero", "--suite", suite, "--out", out]
+    assert main(args) == 130
+    assert f"kept in {out}; the same command goes on" in capsys.readouterr().err
+    InProcess.stop_after = None
+    assert main(args) == 0 and InProcess.played == 4
+
+
+def test_list_names_what_is_packaged(capsys: pytest.CaptureFixture[str]) -> None:
+    """Robots, controllers and suites."""
+    assert main(["list"]) == 0
+    shown = capsys.readouterr().out
+    assert "humanoid" in shown and "momentum-qp" in shown and "envelope" in shown
+
+
+def test_flags_of_train_replace_fields_of_the_file(tmp_path: Path) -> None:
+    """Nested fields by dotted flags; the rest is the file's; ranges are checked."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("steps: 1000\nseed: 5\nppo: {n_envs: 4}\nenv: {duration: 3.0}\n")
+    args = ["--config", str(path), "--out", "run", "--seed", "7", "--ppo.net-arch", "8", "16"]
+    command = parse([*args, "--env.pushes.magnitude", "0.1", "0.3", "--resume"])
+    settings = command.settings
+    assert (settings.steps, settings.seed, settings.ppo.n_envs) == (1000, 7, 4)
+    assert settings.ppo.net_arch == (8, 16) and settings.env.duration == 3.0
+    assert settings.env.pushes is not None and settings.env.pushes.magnitude == (0.1, 0.3)
+    assert command.resume and command.out == Path("run")
+    with pytest.raises(ConfigError, match="command line: env.duration"):
+        parse([*args, "--env.duration", "-1"])
+
+
+def test_train_without_flags_is_the_packaged_configuration() -> None:
+    """No flag changes a field by itself."""
+    command = parse(["--out", "run"])
+    assert to_dict(command.settings) == to_dict(train_config(train_command.DEFAULT))
+    assert not command.resume
+
+
+def test_resume_takes_the_runs_own_configuration(tmp_path: Path) -> None:
+    """Without --config, a run goes on as it was started."""
+    (tmp_path / "config.yaml").write_text("steps: 77\n")
+    command = parse(["--out", str(tmp_path), "--resume"])
+    assert command.settings == TrainConfig(steps=77)
+    assert parse(["--out", str(tmp_path)]).settings.steps != 77
+
+
+def test_train_trains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sub-command hands configuration, folder and resume on."""
+    seen = []
+    monkeypatch.setattr(train_command, "train", lambda *args: seen.append(args) or tmp_path)
+    assert main(["train", "--out", str(tmp_path), "--steps", "9"]) == 0
+    ((config, out, resume),) = seen
+    assert config.steps == 9 and out == tmp_path and resume is False

@@ -1,0 +1,61 @@
+"""training/players.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.errors import ConfigError
+from poise.envs.robot import Robot, load_robot
+from poise.envs.torque_balance import TorqueBalanceEnv
+from poise.training.players import load_player
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot()
+
+
+def test_the_baseline_is_the_residual_environment_with_action_zero(robot: Robot) -> None:
+    """momentum-qp never moves its targets, whatever it observes."""
+    player = load_player("momentum-qp", robot, duration=2.0, pushes=None)
+    assert isinstance(player.env, ResidualBalanceEnv)
+    assert player.env.config.duration == 2.0 and player.env.config.pushes is None
+    assert np.array_equal(player.act(np.ones(player.env.observation_space.shape)), np.zeros(4))
+
+
+def test_zero_gives_no_torque(robot: Robot) -> None:
+    """zero acts on the joints themselves, by nothing."""
+    player = load_player("zero", robot)
+    assert isinstance(player.env, TorqueBalanceEnv)
+    player.env.reset(seed=0)
+    player.env.step(player.act(np.zeros(player.env.observation_space.shape)))
+    assert not player.env.simulation.plant.ctrl.any()
+
+
+def test_a_controllers_file_is_played_and_told_apart(robot: Robot, tmp_path: Path) -> None:
+    """A .yaml of a controller is a player of its own; other gains give another fingerprint."""
+    same, other = tmp_path / "same.yaml", tmp_path / "other.yaml"
+    default = load_player("momentum-qp", robot)
+    same.write_text("kind: momentum-qp\n")
+    other.write_text("kind: momentum-qp\ncom: {stiffness: 3.21}\n")
+    assert load_player(str(other), robot).env.controller.config.com.stiffness == 3.21
+    assert load_player(str(other), robot).fingerprint != default.fingerprint
+    assert load_player(str(same), robot).name == str(same)
+
+
+@pytest.mark.parametrize("name", ["momentum", "missing.yaml", "nowhere/run"])
+def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: str) -> None:
+    """The text names what was asked for and what there is."""
+    with pytest.raises(ConfigError, match="momentum-qp, residual, zero") as error:
+        load_player(name, robot)
+    assert name in str(error.value)
+
+
+def test_a_folder_without_a_policy_is_refused(robot: Robot, tmp_path: Path) -> None:
+    """An existing folder is taken for a policy; its missing file is named."""
+    with pytest.raises(ConfigError, match="config.yaml"):
+        load_player(str(tmp_path), robot)
