@@ -24,17 +24,26 @@ class Rows(NamedTuple):
 
 
 def posture_rows(state: RobotState, targets: Targets, p: QPParameters) -> Rows:
-    """h_t = ‖v̇ − (a_ref + k_t (q_ref ⊖ q) + d_t (v_ref − v))‖².
+    """h_t = ‖v̇ − (a_ref + k_t (q_ref ⊖ q) + d_t (v_ref + v* − v))‖².
 
     The root's q_ref ⊖ q is the rotation vector of RᵀR_ref, in body axes like its velocity; where
-    the root is, is the CoM's business: its three linear rows have no weight.
+    the root is, is the CoM's business: its three linear rows have no weight. v* carries the
+    angular momentum that is asked for.
     """
     turn = Rotation.from_matrix(state.root_axes.T @ targets.root_axes).as_rotvec()
     error = np.concatenate([np.zeros(3), turn, targets.q_ref - state.q])
     v_ref = np.concatenate([np.zeros(3), targets.root_vel, targets.v_ref])
     a_ref = np.concatenate([np.zeros(3), targets.root_acc, targets.a_ref])
+    v_ref = v_ref + carrying_velocity(state, targets.angular_momentum)
     desired = a_ref + p.stiffness * error + p.damping * (v_ref - state.qvel)
     return Rows(np.eye(len(desired)), desired, p.accel_weight)
+
+
+def carrying_velocity(state: RobotState, angular_momentum: np.ndarray) -> np.ndarray:
+    """(nv,) least v* with A_L v* = L_ref that moves neither soles, J v* = 0, nor CoM, A_P v* = 0."""
+    rows = np.vstack([state.J, state.A])
+    wanted = np.concatenate([np.zeros(len(rows) - 3), angular_momentum])
+    return np.linalg.lstsq(rows, wanted, rcond=None)[0]
 
 
 def desired_linear_rate(state: RobotState, targets: Targets, p: QPParameters) -> np.ndarray:

@@ -9,6 +9,7 @@ import pytest
 from poise.baselines.controller import Targets
 from poise.baselines.task_rows import (
     angular_momentum_rows,
+    carrying_velocity,
     desired_angular_rate,
     desired_cop,
     desired_linear_rate,
@@ -94,3 +95,22 @@ def test_momentum_rows_are_met_by_the_motion_they_ask_for(tick):
     np.testing.assert_allclose(rate[:3], desired_linear_rate(state, targets, p), atol=1e-8)
     expected = desired_angular_rate(state, targets, p, tick.cop_vel)
     np.testing.assert_allclose(rate[3:], expected, atol=1e-8)
+
+
+def test_carried_momentum(tick):
+    """v* has the angular momentum asked for and moves neither the soles nor the CoM."""
+    state, L_ref = tick.state, np.array([3.0, -2.0, 0.0])
+    velocity = carrying_velocity(state, L_ref)
+    np.testing.assert_allclose(state.A @ velocity, [0, 0, 0, *L_ref], atol=1e-9)
+    np.testing.assert_allclose(state.J @ velocity, 0.0, atol=1e-9)
+    targets = replace(tick.targets, angular_momentum=L_ref)
+    moved = posture_rows(state, targets, tick.parameters).b
+    still = posture_rows(state, tick.targets, tick.parameters).b
+    np.testing.assert_allclose(moved - still, tick.parameters.damping * velocity, atol=1e-9)
+    qp = controller(robot_named("humanoid"))
+    qp.problem(state, targets)
+    compiled = qp.workspace.accel_des[3:].copy()
+    qp.problem(state, tick.targets)
+    np.testing.assert_allclose(
+        compiled - qp.workspace.accel_des[3:], (moved - still)[3:], atol=1e-4
+    )
