@@ -137,16 +137,14 @@ def test_problem_and_solution_are_the_callers(name):
     assert (solution.x == x).all() and (solution.lam == lam).all()
 
 
-def test_warm_start_saves_iterations():
-    """Solving the same problem again costs DAQP and OSQP fewer iterations."""
+@pytest.mark.parametrize(("name", "fewest"), [("daqp", 1), ("osqp", 10)])
+def test_warm_start_saves_iterations(name, fewest):
+    """The same problem again costs the fewest iterations that there can be; without, more."""
     qp, _, _ = solved_qp(np.random.default_rng(0))
-    for name in ("daqp", "osqp"):
-        warm, cold = make_solver(name), make_solver(name, warm_start=False)
-        first = warm.solve(qp).iterations
-        assert warm.solve(qp).iterations < first
-        assert cold.solve(qp).iterations == first
-        again = cold.solve(qp)
-        assert again.solved and (again.iterations == first or name == "osqp")
+    warm, cold = make_solver(name), make_solver(name, warm_start=False)
+    first = warm.solve(qp).iterations
+    assert cold.solve(qp).iterations == first > fewest
+    assert warm.solve(qp).iterations == fewest < cold.solve(qp).iterations
 
 
 def test_osqp_is_accurate_on_problems_of_mixed_units():
