@@ -8,17 +8,16 @@ from poise.envs.robot import Robot, Sole
 def wrench_cone(polygon: np.ndarray, friction: float, yaw_radius: float) -> np.ndarray:
     """Rows R (r, 6) of R w ≤ 0 for a wrench w = [f; n] at the sole's reference point, sole axes.
 
-    Friction pyramid inside the cone, |f_x|, |f_y| ≤ (μ/√2) f_z; yaw moment |n_z| ≤ μ ρ f_z with
-    the radius ρ = `yaw_radius` [m]; centre of pressure (−n_y, n_x)/f_z inside `polygon` (k, 2),
+    Friction |f_x| + |f_y| ≤ μ f_z, MuJoCo's own pyramid, inside the round cone in any orientation;
+    yaw moment |n_z| ≤ μ ρ f_z with the radius ρ = `yaw_radius` [m]; centre of pressure (−n_y, n_x)/f_z inside `polygon` (k, 2),
     counter-clockwise [m]. Together they imply f_z ≥ 0. Rows are padded with zeros, so that soles
     of any polygon have the same count. [Macchietto09]
     """
-    mu = friction / np.sqrt(2.0)
     rows = [
-        [1, 0, -mu, 0, 0, 0],
-        [-1, 0, -mu, 0, 0, 0],
-        [0, 1, -mu, 0, 0, 0],
-        [0, -1, -mu, 0, 0, 0],
+        [1, 1, -friction, 0, 0, 0],
+        [1, -1, -friction, 0, 0, 0],
+        [-1, 1, -friction, 0, 0, 0],
+        [-1, -1, -friction, 0, 0, 0],
         [0, 0, -friction * yaw_radius, 0, 0, 1],
         [0, 0, -friction * yaw_radius, 0, 0, -1],
     ]

@@ -50,11 +50,12 @@ def test_pressure_outside_the_polygon_is_outside(polygon):
 
 
 def test_friction(polygon):
-    """Tangential forces up to μ/√2 along each axis are inside and never more than μ in all."""
+    """Tangential forces are inside while |f_x| + |f_y| is below μ f_z."""
     cone, middle = wrench_cone(polygon, MU, RADIUS), polygon.mean(axis=0)
     for angle in np.linspace(0.0, 2 * np.pi, 17):
         direction = np.array([np.cos(angle), np.sin(angle)])
-        for size, inside in ((0.999 * MU / np.sqrt(2), True), (1.001 * MU, False)):
+        reach = MU / np.abs(direction).sum()
+        for size, inside in ((0.999 * reach, True), (1.001 * reach, False)):
             # the force's moment about the origin must not need yaw: take it at the CoP (0, 0)
             force = np.array([*size * direction, 1.0])
             wrench = np.concatenate([force, at(middle, [0, 0, 1.0])[3:]])
