@@ -1,5 +1,6 @@
 """The cone of wrenches that a flat sole can transmit without sliding or tipping."""
 
+import mujoco
 import numpy as np
 
 from poise.envs.robot import Robot, Sole
@@ -30,9 +31,22 @@ def wrench_cone(polygon: np.ndarray, friction: float, yaw_radius: float) -> np.n
 
 
 def sole_friction(robot: Robot, sole: Sole) -> float:
-    """Sliding friction between a sole and the ground: the larger of the two, as MuJoCo takes it."""
-    friction = robot.model.geom_friction[:, 0]
-    return float(max(friction[robot.ground_geom_id], min(friction[g] for g in sole.geom_ids)))
+    """Sliding friction of a sole on the ground, as MuJoCo combines it; the least of its geoms.
+
+    An explicit contact pair has its own; else the geom of higher priority decides, or the larger
+    of the two.
+    """
+    return min(_pair_friction(robot.model, geom, robot.ground_geom_id) for geom in sole.geom_ids)
+
+
+def _pair_friction(model: mujoco.MjModel, geom: int, ground: int) -> float:
+    for i in range(model.npair):
+        if {int(model.pair_geom1[i]), int(model.pair_geom2[i])} == {geom, ground}:
+            return float(model.pair_friction[i, 0])
+    friction, priority = model.geom_friction[:, 0], model.geom_priority
+    if priority[geom] != priority[ground]:
+        return float(friction[geom if priority[geom] > priority[ground] else ground])
+    return float(max(friction[geom], friction[ground]))
 
 
 def robot_cones(robot: Robot, friction_share: float, polygon_share: float) -> np.ndarray:
