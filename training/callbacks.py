@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
@@ -37,6 +38,30 @@ class CurriculumCallback(BaseCallback):
         scaled = replace(pushes, magnitude=(min(low, factor * high), factor * high))
         self.training_env.set_attr("push_sampler", scaled)
         self.logger.record("curriculum/largest", scaled.magnitude[1])
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class ExplorationCallback(BaseCallback):
+    """Narrows the exploration on a schedule, where the configuration says so.
+
+    The deterministic policy is what counts in the end: with little noise left, what is learned
+    is what is judged.
+    """
+
+    def __init__(self, config: TrainConfig):
+        super().__init__()
+        self.config = config
+
+    def _on_rollout_start(self) -> None:
+        ppo = self.config.ppo
+        if ppo.log_std_final is None:
+            return
+        done = min(self.num_timesteps / self.config.steps, 1.0)
+        log_std = ppo.log_std_init + done * (ppo.log_std_final - ppo.log_std_init)
+        with torch.no_grad():
+            self.model.policy.log_std.fill_(log_std)
 
     def _on_step(self) -> bool:
         return True

@@ -29,6 +29,7 @@ class PPOConfig:
     max_grad_norm: float = field(default=0.5, metadata={"above": 0.0})
     net_arch: tuple[int, ...] = (128, 128)  # tanh
     log_std_init: float = -1.5
+    log_std_final: float | None = None  # linear in time from log_std_init; None: learned
     use_sde: bool = False  # exploration that is smooth in the state
     sde_sample_freq: int = field(default=16, metadata={"min": -1})  # [steps]
 

@@ -14,7 +14,13 @@ from poise.envs.config import build, read_yaml, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
 from poise.envs.robot import load_robot
 
-from .callbacks import Checkpoints, CurriculumCallback, Progress, Throughput
+from .callbacks import (
+    Checkpoints,
+    CurriculumCallback,
+    ExplorationCallback,
+    Progress,
+    Throughput,
+)
 from .checkpoints import CONFIG, find_checkpoint, restore
 from .config import TrainConfig
 from .vec_env import ThreadedVecEnv
@@ -50,6 +56,7 @@ def train(
     callbacks = [
         Throughput(),
         CurriculumCallback(config),
+        ExplorationCallback(config),
         Checkpoints(config, out / LAST, out / BEST, out / "evaluations.csv", state),
     ]
     if progress:
