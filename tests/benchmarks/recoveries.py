@@ -1,0 +1,48 @@
+"""Recorded ticks of real push recoveries, for the benchmarks of the controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.baselines.controller import Targets
+from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.baselines.solvers import QP
+from poise.envs.state import RobotState
+
+DIRECTIONS = (0.0, 45.0, 90.0, 135.0, 180.0, 270.0)
+IMPULSES = (9.0, 13.0, 16.0, 19.0)  # [N·s]
+
+
+@dataclass
+class Tick:
+    """What the controller met at one tick."""
+
+    state: RobotState
+    targets: Targets
+    problem: QP
+
+
+def record(seconds: float = 1.5, every: int = 2) -> tuple[ResidualBalanceEnv, list[list[Tick]]]:
+    """The environment, and the ticks after each push, `every`-th policy step, up to a fall."""
+    env = ResidualBalanceEnv(pushes=None, duration=0.5 + seconds)
+    action = np.zeros(env.action_space.shape)
+    recoveries = []
+    for direction in DIRECTIONS:
+        for impulse in IMPULSES:
+            push = {"impulse": impulse, "direction": direction, "start": 0.1}
+            env.reset(seed=len(recoveries), options={"push": push})
+            ticks: list[Tick] = []
+            ended = False
+            while not ended:
+                _, fallen, truncated = env.step_in_place(action)
+                ended = fallen or truncated
+                if env.simulation.time > 0.1 and env.steps % every == 0 and not fallen:
+                    state = env.simulation.state.copy()
+                    targets = Targets.standing(env.robot, state)
+                    targets.com[0] += env.controller.com_offset
+                    targets.cop[0] += env.controller.com_offset
+                    ticks.append(Tick(state, targets, env.controller.problem(state, targets)))
+            recoveries.append(ticks)
+    return env, recoveries
