@@ -6,6 +6,7 @@ and generator: results do not depend on the number of threads.
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +28,13 @@ class EnvBatch:
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
         self._chunks = np.array_split(np.arange(n), self.threads)
 
-    def reset(self, seeds: Sequence[int | None]) -> np.ndarray:
-        """Start all episodes; returns the observations (n, no)."""
-        for i, (env, seed) in enumerate(zip(self.envs, seeds, strict=True)):
-            self.observations[i] = env.reset(seed=seed)[0]
+    def reset(
+        self, seeds: Sequence[int | None], options: Sequence[dict[str, Any] | None] | None = None
+    ) -> np.ndarray:
+        """Start all episodes, each with its seed and options; returns the observations (n, no)."""
+        options = [None] * len(self.envs) if options is None else options
+        for i, (env, seed, option) in enumerate(zip(self.envs, seeds, options, strict=True)):
+            self.observations[i] = env.reset(seed=seed, options=option)[0]
         return self.observations
 
     def step(

@@ -115,7 +115,9 @@ def begin_episode(s: StateArrays, e: EpisodeArrays):
 
 
 @compiled
-def record_tick(robot: RobotArrays, s: StateArrays, tau: np.ndarray, period: float, e: EpisodeArrays):
+def record_tick(
+    robot: RobotArrays, s: StateArrays, tau: np.ndarray, period: float, e: EpisodeArrays
+):
     """Account for one control tick with motor torques `tau` (nu,)."""
     m = e.metrics
     power, saturated = 0.0, 0.0
@@ -137,7 +139,9 @@ def has_fallen(robot: RobotArrays, s: StateArrays, j: Judge) -> bool:
         upright += s.root_axes[2, a] * robot.root_standing[2, a]
     low = s.com[2] - s.origin[2] < j.height
     touching = j.ground_contact and s.other_contacts[0] > 0.5
-    return low or upright < j.cos_tilt or touching or not np.isfinite(s.com[2] + s.com_vel[2])
+    # not np.isfinite(x + y): x + y − (x + y), reordered, is 0 for NaN too
+    finite = abs(s.com[2]) < np.inf and abs(s.com_vel[2]) < np.inf
+    return low or upright < j.cos_tilt or touching or not finite
 
 
 @compiled
@@ -159,11 +163,7 @@ def judge_step(
     com_x, com_y = s.com[0] - s.origin[0], s.com[1] - s.origin[1]
     xi_x, xi_y = s.capture_point[0] - s.origin[0], s.capture_point[1] - s.origin[1]
     speed = np.sqrt(s.com_vel[0] ** 2 + s.com_vel[1] ** 2 + s.com_vel[2] ** 2)
-    quiet = (
-        not fallen
-        and speed < j.quiet_speed
-        and support_distance(s, s.com[0], s.com[1]) > 0.0
-    )
+    quiet = not fallen and speed < j.quiet_speed and support_distance(s, s.com[0], s.com[1]) > 0.0
     m[QUIET_STEPS] = m[QUIET_STEPS] + 1.0 if quiet else 0.0
     if not quiet:
         m[LAST_MOVING] = time

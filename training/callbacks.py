@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
@@ -115,14 +116,15 @@ class Checkpoints(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         # the update of the rollout before is done: its weights are new
+        self._save(self.last)  # first, so that a kill in the evaluation loses nothing
         if self.num_timesteps >= self._next:
             self._evaluate()
-        if self.num_timesteps > 0:
             self._save(self.last)
 
     def _on_training_end(self) -> None:
         self._evaluate()
         self._save(self.last)
+        self.close()
 
     def _on_step(self) -> bool:
         return True
@@ -197,9 +199,11 @@ class Checkpoints(BaseCallback):
         }
         save_checkpoint(folder, self.model, self._normalize(), self.config, state)
 
-    def _on_training_exit(self) -> None:
+    def close(self) -> None:
+        """Close the environments of the evaluation."""
         if self._batch is not None:
             self._batch.close()
+            self._batch = None
 
 
 class Progress(BaseCallback):
@@ -220,7 +224,7 @@ class Progress(BaseCallback):
             TimeRemainingColumn(),
         )
         self._bar.start()
-        self._task = self._bar.add_task("", total=self.total, rate="")
+        self._task = self._bar.add_task("", total=self.total, completed=self.num_timesteps, rate="")
         self._start, self._start_steps = time.perf_counter(), self.num_timesteps
 
     def _on_step(self) -> bool:
@@ -238,4 +242,9 @@ class Progress(BaseCallback):
         )
 
     def _on_training_end(self) -> None:
-        self._bar.stop()
+        self.close()
+
+    def close(self) -> None:
+        """Give the terminal back, after an error too."""
+        if self._bar is not None:
+            self._bar.stop()

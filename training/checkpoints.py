@@ -7,7 +7,10 @@ plain arrays, the rest as YAML and JSON.
 
 import json
 import os
+import pickle
 import shutil
+import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +27,12 @@ POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.ya
 FILES = (POLICY, STATISTICS, CONFIG, STATE)
 _MOMENTS = ("mean", "var", "count")
 
+#: What reading a file that is missing, truncated or something else may raise.
+UNREADABLE = (
+    *(OSError, ValueError, KeyError, IndexError, TypeError, AttributeError, RuntimeError, EOFError),
+    *(zipfile.BadZipFile, zlib.error, pickle.UnpicklingError),
+)
+
 
 def save_checkpoint(
     folder: Path, model: PPO, normalize: VecNormalize, config: TrainConfig, state: dict[str, Any]
@@ -37,8 +46,8 @@ def save_checkpoint(
         np.savez(new / STATISTICS, **statistics(normalize))
         (new / CONFIG).write_text(to_yaml(config))
         (new / STATE).write_text(json.dumps(state, indent=1) + "\n")
-        shutil.rmtree(old, ignore_errors=True)
         if folder.exists():
+            shutil.rmtree(old, ignore_errors=True)
             os.replace(folder, old)
         os.replace(new, folder)
         shutil.rmtree(old, ignore_errors=True)
@@ -54,17 +63,56 @@ def find_checkpoint(folder: Path) -> Path | None:
     return None
 
 
-def restore(folder: Path, model: PPO, normalize: VecNormalize) -> dict[str, Any]:
-    """Load weights, optimizer and statistics into `model` and `normalize`; returns the state."""
+def restore(folder: Path, model: PPO, normalize: VecNormalize, fingerprint: str) -> dict[str, Any]:
+    """Load weights, optimizer and statistics into `model` and `normalize`; returns the state.
+
+    Raises ConfigError naming the file that cannot be read or is for another robot than the one
+    with this `fingerprint`.
+    """
+    state = read_state(folder / STATE)
+    check_robot(state, fingerprint, folder / STATE)
+    path = folder / POLICY
     try:
-        model.set_parameters(str(folder / POLICY), exact_match=True, device="cpu")
-        with np.load(folder / STATISTICS, allow_pickle=False) as data:
+        model.set_parameters(str(path), exact_match=True, device="cpu")
+        path = folder / STATISTICS
+        with np.load(path, allow_pickle=False) as data:
             for prefix, moments in (("obs", normalize.obs_rms), ("ret", normalize.ret_rms)):
                 for name in _MOMENTS:
-                    setattr(moments, name, np.array(data[f"{prefix}_{name}"])[()])
-        return json.loads((folder / STATE).read_text())
-    except (OSError, ValueError, KeyError, RuntimeError, EOFError) as error:
-        raise ConfigError(f"cannot be resumed from ({error})", source=str(folder)) from None
+                    value = np.asarray(data[f"{prefix}_{name}"], dtype=float)
+                    if value.shape != np.shape(getattr(moments, name)):
+                        raise ValueError(f"{prefix}_{name} has shape {value.shape}")
+                    setattr(moments, name, value[()])
+    except UNREADABLE as error:
+        raise unreadable(path, error) from None
+    return state
+
+
+def read_state(path: Path) -> dict[str, Any]:
+    """The mapping in a state.json; raises ConfigError naming the file."""
+    try:
+        state = json.loads(path.read_text())
+        if not isinstance(state, dict):
+            raise ValueError("not a mapping")
+        if type(state["timesteps"]) is not int:
+            raise ValueError("timesteps is not a whole number")
+    except UNREADABLE as error:
+        raise unreadable(path, error) from None
+    return state
+
+
+def check_robot(state: dict[str, Any], fingerprint: str, path: Path) -> None:
+    """Raise ConfigError unless the policy was trained for the robot with this fingerprint."""
+    if state.get("fingerprint") != fingerprint:
+        raise ConfigError(
+            f"trained for another robot, {state.get('robot')!r}, or another version of it",
+            source=path,
+            field="fingerprint",
+        )
+
+
+def unreadable(path: Path, error: BaseException) -> ConfigError:
+    """The ConfigError for a file whose reading raised `error`."""
+    return ConfigError(f"cannot be read ({type(error).__name__}: {error})", source=path)
 
 
 def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:

@@ -33,6 +33,12 @@ class PPOConfig:
     use_sde: bool = False  # exploration that is smooth in the state
     sde_sample_freq: int = field(default=16, metadata={"min": -1})  # [steps]
 
+    def __post_init__(self):
+        if self.n_envs * self.n_steps < 2:
+            raise ValueError("n_envs × n_steps must be at least 2")
+        if any(width < 1 for width in self.net_arch):
+            raise ValueError("net_arch: widths must be at least 1")
+
 
 @dataclass(frozen=True)
 class Curriculum:

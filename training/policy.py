@@ -1,9 +1,8 @@
 """A trained residual policy, ready to use: observation in, action out, plain NumPy."""
 
 import io
-import json
-import pickle
 import zipfile
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +14,30 @@ from poise.envs.config import build, packaged_folder, read_yaml
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot, load_robot
 
-from .checkpoints import CONFIG, POLICY, STATE, STATISTICS
+from .checkpoints import (
+    CONFIG,
+    FILES,
+    POLICY,
+    STATE,
+    STATISTICS,
+    UNREADABLE,
+    check_robot,
+    find_checkpoint,
+    read_state,
+    unreadable,
+)
 from .config import TrainConfig
 
 SHIPPED = "residual"
+ACTOR = "mlp_extractor.policy_net."  # SB3's name of the actor's hidden layers
 
 
 class Policy:
-    """The mean of a Gaussian actor: a = clip(W₃ tanh(W₂ tanh(W₁ ô)) , −1, 1), ô normalised."""
+    """The mean of a Gaussian actor: a = clip(W₃ tanh(W₂ tanh(W₁ ô + b₁) + b₂) + b₃, −1, 1).
+
+    ô = clip((o − mean)/√(var + ε), ±clip) is the normalised observation. `config` is the run's
+    configuration, `state` what its state.json says (steps, robot, evaluations).
+    """
 
     def __init__(
         self,
@@ -40,12 +55,16 @@ class Policy:
         self._clip = clip
 
     def act(self, observation: np.ndarray) -> np.ndarray:
-        """Deterministic action (..., na) for raw observations (..., no)."""
+        """Deterministic action (..., na) for raw observations (..., no).
+
+        An observation gives the same bits alone as in a batch: each is a product of its own.
+        """
         x = np.clip((observation - self._mean) * self._scale, -self._clip, self._clip)
+        x = x[..., None, :]
         for weight, bias in self.layers[:-1]:
             x = np.tanh(x @ weight + bias)
         weight, bias = self.layers[-1]
-        return np.clip(x @ weight + bias, -1.0, 1.0)
+        return np.clip(x @ weight + bias, -1.0, 1.0)[..., 0, :]
 
     def make_env(self, **overrides: Any) -> ResidualBalanceEnv:
         """The environment that the policy was trained in; `overrides` as in `EnvConfig`."""
@@ -61,24 +80,22 @@ def load_policy(folder: str | Path | None = None, robot: Robot | None = None) ->
     """
     path = _locate(folder)
     config = build(TrainConfig, read_yaml(path / CONFIG), str(path / CONFIG))
-    state = _read_state(path / STATE)
+    state = read_state(path / STATE)
     mean, var, clip, epsilon = _read_statistics(path / STATISTICS)
     layers = _read_weights(path / POLICY)
     robot = robot or load_robot(config.robot)
-    if state.get("fingerprint") != robot.fingerprint:
-        raise ConfigError(
-            f"was trained for another robot than {robot.name!r} (fingerprints differ)",
-            source=str(path / STATE),
-            field="fingerprint",
-        )
-    sizes = (len(mean), layers[-1][0].shape[1])
-    expected = (state.get("observations"), state.get("actions"))
-    if layers[0][0].shape[0] != sizes[0] or sizes != expected:
-        raise ConfigError(
-            f"observations and actions are {layers[0][0].shape[0]} and {sizes[1]} in {POLICY}, "
-            f"{sizes[0]} in {STATISTICS}, {expected[0]} and {expected[1]} in {STATE}",
-            source=str(path),
-        )
+    check_robot(state, robot.fingerprint, path / STATE)
+    env = config.make_env(robot)
+    inputs, outputs = env.observation_space.shape[0], env.action_space.shape[0]
+    for name, what, size, expected in (
+        (STATISTICS, "observations", len(mean), inputs),
+        (POLICY, "observations", layers[0][0].shape[0], inputs),
+        (POLICY, "actions", layers[-1][0].shape[1], outputs),
+    ):
+        if size != expected:
+            raise ConfigError(
+                f"is for {size} {what}, the environment has {expected}", source=path / name
+            )
     return Policy(config, layers, mean, var, clip, epsilon, state)
 
 
@@ -87,25 +104,13 @@ def _locate(folder: str | Path | None) -> Path:
         path = packaged_folder("policies") / SHIPPED
     else:
         path = Path(folder)
-        if (path / "best" / CONFIG).is_file():
-            path = path / "best"
-    for name in (CONFIG, POLICY, STATISTICS, STATE):
+        path = find_checkpoint(path / "best") or find_checkpoint(path) or path
+    for name in FILES:
         if not (path / name).is_file():
             raise ConfigError(
-                f"no {name}: a policy folder holds {CONFIG}, {POLICY}, {STATISTICS} and {STATE}",
-                source=str(path),
+                f"no {name}: a policy folder holds {', '.join(FILES)}", source=path, field=name
             )
     return path
-
-
-def _read_state(path: Path) -> dict[str, Any]:
-    try:
-        state = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"cannot be read ({error})", source=str(path)) from None
-    if not isinstance(state, dict):
-        raise ConfigError("must hold a mapping", source=str(path))
-    return state
 
 
 def _read_statistics(path: Path) -> tuple[np.ndarray, np.ndarray, float, float]:
@@ -113,11 +118,14 @@ def _read_statistics(path: Path) -> tuple[np.ndarray, np.ndarray, float, float]:
         with np.load(path, allow_pickle=False) as data:
             values = [np.asarray(data[k], dtype=float) for k in ("obs_mean", "obs_var")]
             clip, epsilon = float(data["clip_obs"]), float(data["epsilon"])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise ConfigError(f"cannot be read ({error})", source=str(path)) from None
-    if not all(np.all(np.isfinite(v)) for v in values) or values[0].shape != values[1].shape:
-        raise ConfigError("holds numbers that are not statistics", source=str(path))
-    return values[0], values[1], clip, epsilon
+    except UNREADABLE as error:
+        raise unreadable(path, error) from None
+    mean, var = values
+    numbers = np.concatenate([mean.ravel(), var.ravel(), [clip, epsilon]])
+    good = mean.ndim == 1 and mean.shape == var.shape and np.isfinite(numbers).all()
+    if not good or var.min() < 0.0 or clip <= 0.0 or epsilon <= 0.0:
+        raise ConfigError("holds numbers that are not statistics", source=path)
+    return mean, var, clip, epsilon
 
 
 def _read_weights(path: Path) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -126,20 +134,19 @@ def _read_weights(path: Path) -> list[tuple[np.ndarray, np.ndarray]]:
         with zipfile.ZipFile(path) as archive:
             blob = io.BytesIO(archive.read("policy.pth"))
         weights = torch.load(blob, map_location="cpu", weights_only=True)
-        names = sorted(
-            {key.rsplit(".", 1)[0] for key in weights if key.startswith("mlp_extractor.policy_net")},
-            key=lambda name: int(name.rsplit(".", 1)[1]),
-        )
+        actor = [key.rsplit(".", 1)[0] for key in weights if key.startswith(ACTOR)]
+        names = sorted(set(actor), key=lambda name: int(name.rsplit(".", 1)[1]))
         layers = [
             (weights[f"{name}.weight"].double().numpy().T.copy(),
              weights[f"{name}.bias"].double().numpy().copy())
             for name in [*names, "action_net"]
         ]  # fmt: skip
-    except (
-        OSError, KeyError, ValueError, RuntimeError, EOFError, zipfile.BadZipFile,
-        pickle.UnpicklingError,
-    ) as error:  # fmt: skip
-        raise ConfigError(f"cannot be read ({error})", source=str(path)) from None
+        if any(a[0].shape[1] != b[0].shape[0] for a, b in pairwise(layers)):
+            raise ValueError("layers do not fit each other")
+        if any(bias.shape != (weight.shape[1],) for weight, bias in layers):
+            raise ValueError("a bias does not fit its layer")
+    except UNREADABLE as error:
+        raise unreadable(path, error) from None
     if not all(np.all(np.isfinite(array)) for layer in layers for array in layer):
-        raise ConfigError("holds weights that are not finite", source=str(path))
+        raise ConfigError("holds weights that are not finite", source=path)
     return layers

@@ -39,7 +39,7 @@ def train(
     whatever the number of threads; a resumed run starts new episodes, and so differs.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
-    round, or when the configurations differ.
+    round; when the configurations or robots differ; when a file of last/ cannot be read.
     """
     out = Path(out)
     checkpoint = _check_folder(config, out, resume)
@@ -48,24 +48,25 @@ def train(
     model = make_model(config, normalize)
     state: dict[str, Any] = {}
     if checkpoint is not None:
-        state = restore(checkpoint, model, normalize)
+        robot = normalize.get_attr("robot")[0]
+        state = restore(checkpoint, model, normalize, robot.fingerprint)
         model.num_timesteps = state["timesteps"]
         _reseed(model, normalize, config.seed + model.num_timesteps)
     write_atomic(out / CONFIG, to_yaml(config))
     model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
-    callbacks = [
-        Throughput(),
-        CurriculumCallback(config),
-        ExplorationCallback(config),
-        Checkpoints(config, out / LAST, out / BEST, out / "evaluations.csv", state),
-    ]
+    checkpoints = Checkpoints(config, out / LAST, out / BEST, out / "evaluations.csv", state)
+    schedules = [CurriculumCallback(config), ExplorationCallback(config)]
+    callbacks = [Throughput(), *schedules, checkpoints]
+    bar = Progress(config.steps)
     if progress:
-        callbacks.append(Progress(config.steps))
+        callbacks.append(bar)
     try:
         remaining = config.steps - model.num_timesteps
         if remaining > 0:
             model.learn(remaining, callback=callbacks, reset_num_timesteps=checkpoint is None)
     finally:
+        bar.close()
+        checkpoints.close()
         normalize.close()
     return out / BEST
 
@@ -109,9 +110,7 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
 
 def _training_envs(config: TrainConfig) -> VecNormalize:
     robot = load_robot(config.robot)
-    envs: list[ResidualBalanceEnv] = [
-        config.make_env(robot) for _ in range(config.ppo.n_envs)
-    ]
+    envs: list[ResidualBalanceEnv] = [config.make_env(robot) for _ in range(config.ppo.n_envs)]
     vec = ThreadedVecEnv(envs, config.threads)
     return VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
 
@@ -147,4 +146,3 @@ def _check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
             field=different[0],
         )
     return checkpoint
-

@@ -27,11 +27,12 @@ class ThreadedVecEnv(VecEnv):
         self._actions: np.ndarray | None = None
 
     def reset(self) -> np.ndarray:
-        """Start all episodes, with the seeds given to `seed` if they are new."""
+        """Start all episodes, with what was last given to `seed` and `set_options`."""
         self._returns[:] = 0.0
         self._lengths[:] = 0
-        observations = self.batch.reset(self._seeds)
+        observations = self.batch.reset(self._seeds, self._options)
         self._reset_seeds()
+        self._reset_options()
         return observations.copy()
 
     def step_async(self, actions: np.ndarray) -> None:
