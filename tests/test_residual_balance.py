@@ -1,0 +1,264 @@
+"""The residual environment: what the action moves, and what it leaves alone."""
+
+import inspect
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from poise.baselines.controller import Targets
+from poise.baselines.momentum_qp import MomentumQP
+from poise.baselines.motions import load_motion
+from poise.baselines.registry import controller_config, load_controller
+from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
+from poise.baselines.targets import update_targets
+from poise.envs.balance import EnvConfig
+from poise.envs.episode import RewardWeights
+from poise.envs.errors import ConfigError
+from poise.envs.observation import observation_table
+from poise.envs.simulation import Simulation
+from poise.envs.torque_balance import TorqueBalanceEnv
+
+from .shared import robot
+
+PUSH = {"impulse": 9.0, "direction": 30.0, "start": 0.1, "body": "torso"}
+
+
+@pytest.fixture(scope="module")
+def env():
+    return ResidualBalanceEnv(robot())
+
+
+def zero(env):
+    return np.zeros(env.action_space.shape)
+
+
+@pytest.mark.parametrize("motion", ["standing", "squat"])
+def test_action_zero_is_the_controller_alone(motion):
+    """An episode equals a plain Python loop over targets, controller and simulation, bitwise."""
+    env = ResidualBalanceEnv(robot(), motion=motion)
+    env.reset(seed=3, options={"push": PUSH})
+    data = env.simulation.data
+    simulation = Simulation(robot())
+    state = simulation.reset(data.qpos.copy(), data.qvel.copy(), env.simulation.pushes)
+    controller = load_controller("momentum-qp", robot())
+    controller.reset(state)
+    reference = load_motion(motion, robot())
+    targets = Targets.standing(robot(), state)
+    scratch, none = np.zeros((3, reference.coeffs.shape[2])), np.zeros(len(env._offsets))
+    count = round(controller.period / robot().model.opt.timestep)
+    for _ in range(40):
+        env.step(zero(env))
+        while simulation.time < env.simulation.time - 1e-9:
+            update_targets(
+                simulation.arrays, state.arrays, reference.knots, reference.coeffs,
+                reference.loop, simulation.time, controller.com_offset, none, scratch,
+                targets.arrays(),
+            )  # fmt: skip
+            state = simulation.step(controller.torques(state, targets), count)
+        assert np.array_equal(simulation.data.qpos, data.qpos)
+        assert np.array_equal(simulation.data.qvel, data.qvel)
+        assert np.array_equal(simulation.data.ctrl, data.ctrl)
+
+
+@pytest.mark.parametrize("entry", range(4))
+def test_the_action_moves_its_target(env, entry):
+    """Each entry of ±1 moves CoM or CoP target by its scale, in the heading frame."""
+    qpos = robot().standing_qpos.copy()
+    q = qpos[3:7].copy()
+    qpos[3:7] = np.cos(0.5) * q + np.sin(0.5) * np.array([-q[3], -q[2], q[1], q[0]])  # yaw 1 rad
+    start = {"push": [], "qpos": qpos, "qvel": np.zeros(robot().model.nv)}
+    targets = []
+    for value in (0.0, -1.0):
+        env.reset(seed=0, options=start)
+        assert env.simulation.state.heading_yaw == pytest.approx(1.0, abs=1e-6)
+        env.ticks = 1  # the targets of the first tick, before the robot moves
+        try:
+            action = zero(env)
+            action[entry] = value
+            env.step(action)
+        finally:
+            env.ticks = 5
+        targets.append((env.targets.com.copy(), env.targets.cop.copy()))
+    moved = [b - a for a, b in zip(*targets, strict=True)]
+    axis = [np.array([np.cos(1.0), np.sin(1.0)]), np.array([-np.sin(1.0), np.cos(1.0)])][entry % 2]
+    scale, which = (0.2, 0) if entry < 2 else (0.15, 1)
+    np.testing.assert_allclose(moved[which][:2], -scale * axis, atol=1e-6)
+    assert np.abs(moved[1 - which]).max() < 1e-12
+
+
+def test_more_targets_can_be_moved():
+    """Scales above 0 append the CoM's height, a lean of the root and carried momentum."""
+    scales = {"height": 0.05, "lean": 0.3, "momentum": 0.1}
+    env = ResidualBalanceEnv(robot(), residual=scales)
+    names = ("com_z", "lean_x", "lean_y", "momentum_x", "momentum_y")
+    assert env.action_names[4:] == names
+    found = {}
+    for entry in (None, *names):
+        env.reset(seed=0, options={"push": [], "noise": 0.0})
+        env.ticks = 1
+        env.step(np.array([float(name == entry) for name in env.action_names]))
+        t = env.targets
+        found[entry] = (t.com[2], t.root_axes.copy(), t.angular_momentum.copy())
+    height, axes, momentum = found[None]
+    assert found["com_z"][0] - height == pytest.approx(0.05)
+    for k, name in enumerate(("lean_x", "lean_y")):
+        turn = found[name][1] @ axes.T
+        angle = np.arccos((np.trace(turn) - 1.0) / 2.0)
+        assert angle == pytest.approx(0.3) and turn[k, k] == pytest.approx(1.0)
+    unit = robot().mass * robot().height_com ** 2 * env.scales.omega
+    for k, name in enumerate(("momentum_x", "momentum_y")):
+        moved = (found[name][2] - momentum) / unit
+        np.testing.assert_allclose(moved, 0.1 * np.eye(3)[k], atol=1e-9)
+
+
+def test_scales_come_from_the_arguments():
+    """A mapping and an object mean the same; wrong ones are refused."""
+    for residual in ({"com": 0.1, "cop": 0.3}, ResidualScales(com=0.1, cop=0.3)):
+        env = ResidualBalanceEnv(robot(), residual=residual)
+        assert env.residual.com == 0.1 and env.residual.cop == 0.3
+        assert list(env._scale[:4]) == [0.1, 0.1, 0.3, 0.3]
+    for wrong, named in (({"com": -0.1}, "com"), ({"zmp": 0.1}, "zmp"), (0.1, "residual")):
+        with pytest.raises(ConfigError, match=named):
+            ResidualBalanceEnv(robot(), residual=wrong)
+
+
+def test_the_observation_is_relative_to_the_motion():
+    """Halfway down a squat the joints are observed near the squat, not near standing."""
+    env = ResidualBalanceEnv(robot(), motion="squat", noise={"joints": 0.0})
+    env.reset(seed=0, options={"push": [], "noise": 0.0})
+    for _ in range(30):
+        observation = env.step(zero(env))[0]
+    sizes = np.cumsum([term.size for term in env.terms])
+    names = [term.name for term in env.terms]
+    joints = slice(sizes[names.index("joint_pos") - 1], sizes[names.index("joint_pos")])
+    bent = np.abs(env.simulation.state.q - robot().standing_qpos[7:]).max()
+    assert bent > 0.05 and np.abs(observation[joints]).max() < 0.5 * bent
+
+
+@pytest.mark.parametrize("solver", ["daqp", "active-set"])
+def test_another_solver_is_really_used(solver):
+    """A controller that names a solver is solved by it, and agrees with the default."""
+    default = ResidualBalanceEnv(robot())
+    config = replace(controller_config("momentum-qp"), solver=solver)
+    other = ResidualBalanceEnv(robot(), controller=MomentumQP(robot(), config))
+    solved = []
+    if other.controller.solver is not None:
+        inner = other.controller.solver.solve
+        other.controller.solver.solve = lambda qp: solved.append(1) or inner(qp)
+    for env in (default, other):
+        env.reset(seed=1, options={"push": {**PUSH, "impulse": 4.0}})
+        for _ in range(10):
+            env.step(np.full(env.action_space.shape, 0.02))
+    assert len(solved) == (50 if solver == "daqp" else 0)
+    np.testing.assert_allclose(other.simulation.data.qpos, default.simulation.data.qpos, atol=1e-6)
+
+
+class Crouch:
+    """A controller from outside: joint-space springs, no solver, no record."""
+
+    period = 0.01
+
+    def __init__(self):
+        self.resets, self.targets = 0, []
+
+    def reset(self, state):
+        self.resets += 1
+
+    def torques(self, state, targets):
+        self.targets.append(targets.com.copy())
+        q = targets.q_ref - state.q
+        return np.clip(100.0 * q - 5.0 * state.qvel[6:], -20.0, 20.0)
+
+
+def test_a_controller_from_outside():
+    """Whatever has period, reset and torques may be the base; it sees the moved targets."""
+    controller = Crouch()
+    env = ResidualBalanceEnv(robot(), controller=controller)
+    env.reset(seed=0, options={"push": [], "noise": 0.0})
+    action = zero(env)
+    action[0] = 1.0
+    *_, info = env.step(action)
+    assert controller.resets == 1 and len(controller.targets) == 2
+    assert controller.targets[0][0] == pytest.approx(0.2, abs=1e-6)
+    assert info["solver_failures"] == 0 and not info["root_wrench"].any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ({"controller": "nobody"}, ("nobody", "momentum-qp")),
+        ({"controller": 3}, ("controller", "3", "momentum-qp")),
+        ({"controller": {"root": "loose"}}, ("root", "loose", "hard")),
+        ({"controller": {"solver": "guess"}}, ("solver", "guess", "osqp")),
+        ({"motion": "dance"}, ("dance", "squat")),
+        ({"policy_period": 0.006}, ("policy_period", "0.004")),
+        ({"controller": {"period": 0.003}}, ("period", "0.002")),
+    ],
+)
+def test_bad_arguments_are_refused(arguments, named):
+    """One error names the field, the value and the choices."""
+    with pytest.raises(ConfigError) as error:
+        ResidualBalanceEnv(robot(), **arguments)
+    for word in named:
+        assert word in str(error.value)
+
+
+def test_parts_of_another_robot_are_refused():
+    """A controller or motion of another robot would read past its arrays."""
+    with pytest.raises(ConfigError, match="controller.*tall"):
+        ResidualBalanceEnv(robot(), controller=load_controller("momentum-qp", robot("tall")))
+    with pytest.raises(ConfigError, match="motion"):
+        ResidualBalanceEnv(robot(), motion=load_motion("standing", robot("toddler")))
+
+
+def test_a_soft_root_is_reported():
+    """Its wrench holds a robot that would fall, and is in info and in the record."""
+    env = ResidualBalanceEnv(robot(), controller={"root": "soft"})
+    env.reset(seed=0, options={"push": {**PUSH, "impulse": 25.0, "start": 0.0}})
+    largest = 0.0
+    for _ in range(10):
+        *_, info = env.step(zero(env))
+        largest = max(largest, np.abs(info["root_wrench"]).max())
+    assert largest > 1.0
+    compiled = env.episode.metrics.copy()
+    env._compiled = False  # the same in Python
+    env.reset(seed=0, options={"push": {**PUSH, "impulse": 25.0, "start": 0.0}})
+    for _ in range(10):
+        env.step(zero(env))
+    np.testing.assert_allclose(env.episode.metrics, compiled, rtol=1e-9)
+
+
+def test_failures_of_the_solver_are_counted_per_episode(env):
+    """info says how often the QP was not solved since the reset."""
+    env.reset(seed=0)
+    env.controller.memory.failures[0] = 3
+    assert env.step(zero(env))[4]["solver_failures"] >= 3
+    assert env.reset(seed=0)[1]["solver_failures"] == 0
+
+
+def test_the_class_docstring_is_the_specification(env):
+    """Its tables are those that the code builds for the default robot."""
+    text = inspect.getdoc(ResidualBalanceEnv)
+    assert observation_table(env.terms) in text, observation_table(env.terms)
+    for i, (name, scale) in enumerate(zip(env.action_names, env._scale, strict=True)):
+        field = name.split("_")[0]
+        assert f"| {i} | {name} | `residual.{field}`, {scale:g} m |" in text
+
+
+def test_both_docstrings_tell_the_same_of_rewards_start_end_and_info():
+    """The shared part is the same text, and names every weight, field and key."""
+    parts = []
+    for cls in (ResidualBalanceEnv, TorqueBalanceEnv):
+        text = inspect.getdoc(cls)
+        parts.append(text[text.index("Rewards:") : text.index("Arguments:")])
+        for field in fields(EnvConfig):
+            assert field.name in text[text.index("Arguments:") :]
+        assert "Version history: v0" in text
+    assert parts[0] == parts[1]
+    for name, weight in vars(RewardWeights()).items():
+        assert f"| {name} | {weight} |" in parts[0]
+    env = TorqueBalanceEnv(robot())
+    _, info = env.reset(seed=0)
+    for key in [*info, *info["push"][0]]:
+        assert key.split("_")[0] in parts[0]
