@@ -40,7 +40,7 @@ def posture_rows(state: RobotState, targets: Targets, p: QPParameters) -> Rows:
 
 
 def carrying_velocity(state: RobotState, angular_momentum: np.ndarray) -> np.ndarray:
-    """(nv,) least v* with A_L v* = L_ref that moves neither soles, J v* = 0, nor CoM, A_P v* = 0."""
+    """(nv,) least v* that has A_L v* = L_ref and moves neither the soles nor the CoM."""
     rows = np.vstack([state.J, state.A])
     wanted = np.concatenate([np.zeros(len(rows) - 3), angular_momentum])
     return np.linalg.lstsq(rows, wanted, rcond=None)[0]

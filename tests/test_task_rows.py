@@ -18,12 +18,7 @@ from poise.baselines.task_rows import (
 )
 from poise.envs.simulation import Simulation
 
-from .physics import (
-    controller,
-    recovery,
-    robot_named,
-    wrench_about,
-)
+from .physics import controller, recovery, robot_named, wrench_about
 
 
 @pytest.fixture(scope="module")
