@@ -48,7 +48,7 @@ def test_motions_are_followed(motion):
 @pytest.mark.parametrize("direction", [0.0, 90.0, 180.0, 225.0])
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_motions_are_followed_through_a_push(motion, direction):
-    """A push of 4 N·s is no reason to fall: CoM to 3 cm, root to 10°; and it goes on as before.
+    """A push of 4 N·s is no reason to fall: CoM to 3 cm, root to 15°; and it goes on as before.
 
     Joints stay within 30°: feet that have turned a little hold the legs in another posture.
     """
@@ -56,5 +56,5 @@ def test_motions_are_followed_through_a_push(motion, direction):
     assert np.degrees(errors[:, 0].max()) < 30.0
     assert errors[:, 1].max() < 0.03 and errors[-25:, 1].max() < 0.01
     assert errors[:, 2].max() < 0.02
-    assert np.degrees(errors[:, 3].max()) < 10.0
+    assert np.degrees(errors[:, 3].max()) < 15.0
     assert env.controller.failures <= 5
