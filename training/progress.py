@@ -24,7 +24,7 @@ def progress_bar(console: Console) -> Progress:
 @contextmanager
 def patience(console: Console) -> Iterator[None]:
     """Say why nothing happens if the block takes long."""
-    message = "compiling (only once, about half a minute) …"
+    message = "getting ready: the first run compiles for about half a minute …"
     timer = threading.Timer(4.0, console.print, (message,))
     timer.daemon = True
     timer.start()
