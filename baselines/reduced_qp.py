@@ -93,7 +93,7 @@ class Workspace(NamedTuple):
     H: np.ndarray  # (n, n)
     g: np.ndarray  # (n,)
     C: np.ndarray  # (m, n)
-    l: np.ndarray  # (m,)
+    l: np.ndarray  # noqa: E741  (m,)
     u: np.ndarray  # (m,)
     x: np.ndarray  # (n,)
     lam: np.ndarray  # (m,)
@@ -316,9 +316,9 @@ def _share_wrench(s, p, ws):
 
 @compiled
 def _carry_momentum(p, t, ws):
-    """Posture velocities that carry L_ref: a_des += d_t v*, v* = N z, least z with B z = [0; L_ref].
+    """Posture velocities that carry L_ref: a_des += d_t N z, the least z with B z = [0; L_ref].
 
-    The soles and the CoM stay where they are (A_P v* = 0), so this asks the trunk and arms to
+    The soles and the CoM stay where they are (A_P N z = 0), so this asks the trunk and arms to
     turn, which is what the posture's own damping holds back.
     """
     L = t.angular_momentum

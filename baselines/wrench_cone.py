@@ -10,9 +10,9 @@ def wrench_cone(polygon: np.ndarray, friction: float, yaw_radius: float) -> np.n
     """Rows R (r, 6) of R w ≤ 0 for a wrench w = [f; n] at the sole's reference point, sole axes.
 
     Friction |f_x| + |f_y| ≤ μ f_z, MuJoCo's own pyramid, inside the round cone in any orientation;
-    yaw moment |n_z| ≤ μ ρ f_z with the radius ρ = `yaw_radius` [m]; centre of pressure (−n_y, n_x)/f_z inside `polygon` (k, 2),
-    counter-clockwise [m]. Together they imply f_z ≥ 0. Rows are padded with zeros, so that soles
-    of any polygon have the same count. [Macchietto09]
+    yaw moment |n_z| ≤ μ ρ f_z with the radius ρ = `yaw_radius` [m]; centre of pressure
+    (−n_y, n_x)/f_z inside `polygon` (k, 2), counter-clockwise [m]. Together they imply f_z ≥ 0.
+    [Macchietto09]
     """
     rows = [
         [1, 1, -friction, 0, 0, 0],
@@ -58,4 +58,3 @@ def robot_cones(robot: Robot, friction_share: float, polygon_share: float) -> np
         cones.append(wrench_cone(polygon, friction_share * sole_friction(robot, sole), radius))
     rows = max(len(cone) for cone in cones)
     return np.array([np.pad(cone, ((0, rows - len(cone)), (0, 0))) for cone in cones])
-

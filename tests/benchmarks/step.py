@@ -66,11 +66,10 @@ def main() -> None:
     print("| path | median | p99 | over physics |")
     print("| --- | --- | --- | --- |")
     floor = float(np.median(physics))
-    for name, times in (("10 × mj_step", physics), ("ResidualBalance-v0.step", steps)):
-        print(f"| {name} | {1e6 * np.median(times):.0f} µs | {1e6 * np.percentile(times, 99):.0f} µs "
-              f"| {np.median(times) / floor:.2f} |")  # fmt: skip
-    print(f"| control tick | {1e6 * np.median(ticks):.0f} µs | "
-          f"{1e6 * np.percentile(ticks, 99):.0f} µs | {np.median(ticks) / floor:.2f} |")  # fmt: skip
+    rows = {"10 × mj_step": physics, "ResidualBalance-v0.step": steps, "control tick": ticks}
+    for name, times in rows.items():
+        median, slow = np.median(times), np.percentile(times, 99)
+        print(f"| {name} | {1e6 * median:.0f} µs | {1e6 * slow:.0f} µs | {median / floor:.2f} |")
 
 
 if __name__ == "__main__":
