@@ -47,7 +47,7 @@ def test_help_is_light() -> None:
         (["evaluate", "zero", "--suite", "bad.yaml"], "bad.yaml: trials: must be a whole number"),
         (["evaluate", "zero", "--suite", "text.yaml"], "text.yaml: not valid YAML"),
         (["evaluate", "zero", "--robot", "robot.yaml"], "robot.yaml: feet: a biped has two feet"),
-        (["evaluate", "run"], "run: no config.yaml"),
+        (["evaluate", "run"], "a policy folder holds"),
         (["replay", "run", "--trial", "0"], "settings.yaml: cannot be read"),
         (["train", "--out", "run", "--config", "nothing"], "no such name: 'nothing'"),
         (["train", "--out", "run", "--seed", "1", "--ppo.gamma", "2"], "ppo.gamma"),

@@ -33,17 +33,20 @@ def test_a_small_push_is_recovered_and_a_huge_one_not(player: Player) -> None:
 
     small = run_trial(player, Trial(0, 1, push(11.0)), watch)
     assert small.recovered and not small.fallen and small.fall_time is None
-    assert small.recovery_time == pytest.approx(moving[-1] - 0.2) and small.final_speed < 0.1
+    assert small.recovery_time == pytest.approx(moving[-1] - 0.2)
+    assert small.final_speed is not None and small.final_speed < 0.1
     assert small.mean_abs_action == 0.0 and small.com_drift is None and not small.stepped
     huge = run_trial(player, Trial(1, 1, push(60.0)))
     assert huge.fallen and not huge.recovered and huge.recovery_time is None
-    assert 0.2 < huge.fall_time < 3.0 and huge.max_com > small.max_com
+    assert huge.fall_time is not None and 0.2 < huge.fall_time < 3.0
+    assert huge.max_com is not None and small.max_com is not None
+    assert huge.max_com > small.max_com
 
 
 def test_drift_counts_without_a_push(player: Player) -> None:
     """An unpushed robot stays; its drift is measured from the first second on."""
     quiet = run_trial(player, Trial(0, 3))
-    assert quiet.recovered and 0.0 < quiet.com_drift < 0.02
+    assert quiet.recovered and quiet.com_drift is not None and 0.0 < quiet.com_drift < 0.02
 
 
 def test_an_outcome_depends_on_the_trial_alone(player: Player) -> None:

@@ -2,9 +2,9 @@
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
@@ -17,7 +17,7 @@ Names = Annotated[
     tyro.conf.arg(metavar="CONTROLLER …", help_behavior_hint=""),
 ]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
-Off = tyro.conf.FlagCreatePairsOff
+Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
 WIDTH = 120  # of tables that no terminal shows
 
 
@@ -78,7 +78,7 @@ def evaluate(
     trials: int | None = None,
     limits: str | None = None,
     write_limits: Path | None = None,
-    overwrite: Off[bool] = False,
+    overwrite: Switch = False,
 ) -> None:
     """Play a suite of pushes with several controllers, all on the same trials.
 
@@ -198,7 +198,7 @@ def list_names() -> None:
     print("also as controllers: residual, zero, a folder written by poise train")
 
 
-COMMANDS = {
+COMMANDS: dict[str, Callable[..., Any]] = {
     "demo": demo,
     "train": train,
     "evaluate": evaluate,

@@ -32,9 +32,16 @@ def demo(
     console = console or Console(quiet=True)
     summaries = []
     for suite in SUITES:
-        settings = {"seed": seed, "workers": workers, "overwrite": True}
-        folder = Path(out) / Path(suite).stem
-        summaries.append(evaluate(controllers, suite, out=folder, console=console, **settings))
+        summary = evaluate(
+            controllers,
+            suite,
+            out=Path(out) / Path(suite).stem,
+            seed=seed,
+            workers=workers,
+            overwrite=True,
+            console=console,
+        )
+        summaries.append(summary)
     console.print("\npolar recovery plot and fall probability:")
     folders = [Path(out) / Path(suite).stem for suite in SUITES]
     print_paths([f / plot for f, plot in zip(folders, PLOTS, strict=True)], console)

@@ -67,7 +67,7 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
 
 def _idle(name: str, env: BalanceEnv, content: str) -> Player:
     """A player whose action is always zero."""
-    action = np.zeros(env.action_space.shape)
+    action = np.zeros(len(env.action_names))
     return Player(name, env, lambda observation: action, _hash(content.encode()))
 
 
@@ -77,7 +77,7 @@ def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
     policy = load_policy(None if name == SHIPPED else name, robot)
     env = policy.make_env(robot=robot, **overrides)
     sizes = (policy.layers[0][0].shape[0], policy.layers[-1][0].shape[1])
-    expected = (env.observation_space.shape[0], env.action_space.shape[0])
+    expected = (env.episode.observation.size, len(env.action_names))
     if sizes != expected:
         raise ConfigError(
             f"the policy has {sizes[0]} observations and {sizes[1]} actions, the environment of "

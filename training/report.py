@@ -53,7 +53,7 @@ def draw_plots(
     return [polar, fall]
 
 
-def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, tuple[list[float], ...]]:
+def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, Any]:
     """Direction, J50 and its interval, as `polar_envelope` takes them."""
     return {
         name: (

@@ -144,7 +144,7 @@ def _record(env: BalanceEnv, trial: Trial) -> dict[str, Any]:
         "peak_torque": _finite(m[episode.PEAK_TORQUE]),
         "saturation": float(m[episode.SATURATED] / max(m[episode.TICKS], 1.0)),
         "solver_failures": int(getattr(controller, "failures", 0)),
-        "final_speed": _finite(np.linalg.norm(env.simulation.state.com_vel)),
+        "final_speed": _finite(float(np.linalg.norm(env.simulation.state.com_vel))),
         "root_force": _finite(m[episode.ROOT_FORCE]),
     }
 
