@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -28,13 +28,18 @@ from .push_options import parse_pushes
 from .robot import Robot, load_robot
 from .simulation import Simulation
 
+if TYPE_CHECKING:
+    from .rendering import SceneRenderer
+
 RESET_OPTIONS = ("push", "noise", "qpos", "qvel")
 
 
 class BalanceEnv(gymnasium.Env):
     """Base of `ResidualBalanceEnv` and `TorqueBalanceEnv`: subclasses say what an action does."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
+    metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
+    observation_space: spaces.Box
+    action_space: spaces.Box
 
     def __init__(
         self,
@@ -71,7 +76,7 @@ class BalanceEnv(gymnasium.Env):
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
         self.steps = 0
-        self._renderer = None
+        self._renderer: SceneRenderer | None = None
         self._needs_reset = True
 
     @staticmethod

@@ -7,6 +7,7 @@ them can be cached on disk.
 
 import ctypes
 from pathlib import Path
+from typing import Any
 
 import llvmlite.binding
 import mujoco
@@ -29,5 +30,5 @@ def _register(names: tuple[str, ...]) -> None:
 _register(("mj_step1", "mj_step2"))
 
 _signature = types.void(types.intp, types.intp)
-mj_step1 = types.ExternalFunction("mj_step1", _signature)
-mj_step2 = types.ExternalFunction("mj_step2", _signature)
+mj_step1: Any = types.ExternalFunction("mj_step1", _signature)
+mj_step2: Any = types.ExternalFunction("mj_step2", _signature)

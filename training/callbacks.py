@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
+from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
@@ -51,6 +52,8 @@ class ExplorationCallback(BaseCallback):
     is what is judged.
     """
 
+    model: PPO
+
     def __init__(self, config: TrainConfig):
         super().__init__()
         self.config = config
@@ -70,6 +73,8 @@ class ExplorationCallback(BaseCallback):
 
 class Throughput(BaseCallback):
     """Logs steps per second and the update's share of the time."""
+
+    model: PPO
 
     def __init__(self) -> None:
         super().__init__()
@@ -93,6 +98,8 @@ class Throughput(BaseCallback):
 
 class Checkpoints(BaseCallback):
     """Writes last/ after every rollout, and best/ after the best evaluation so far."""
+
+    model: PPO
 
     def __init__(
         self, config: TrainConfig, last: Path, best: Path, table: Path, state: dict[str, Any]
@@ -150,8 +157,11 @@ class Checkpoints(BaseCallback):
     def _play(self) -> dict[str, float]:
         """The deterministic policy on the held-out pushes, the same at every evaluation."""
         evaluation, batch = self.config.evaluation, self._batch
+        assert batch is not None  # made at the start of the training
         normalize = self._normalize()
-        recovered, fallen, actions = [], [], []
+        recovered: list[bool] = []
+        fallen: list[bool] = []
+        actions: list[float] = []
         seeds = np.random.SeedSequence(evaluation.seed).generate_state(evaluation.trials)
         size = len(batch.envs)
         for start in range(0, evaluation.trials, size):
@@ -173,11 +183,11 @@ class Checkpoints(BaseCallback):
                 batch.step(action, at_end)
             recovered.extend(result[i][0] for i in range(counted))
             fallen.extend(result[i][1] for i in range(counted))
-        rate, action = float(np.mean(recovered)), float(np.mean(actions))
+        rate = float(np.mean(recovered))
         return {
             "recovered": rate,
             "fallen": float(np.mean(fallen)),
-            "mean_abs_action": action,
+            "mean_abs_action": float(np.mean(actions)),
             "score": rate,
         }
 
@@ -188,12 +198,14 @@ class Checkpoints(BaseCallback):
 
     def _save(self, folder: Path) -> None:
         robot = self.training_env.get_attr("robot")[0]
+        inputs, outputs = self.model.observation_space.shape, self.model.action_space.shape
+        assert inputs and outputs  # both spaces are boxes
         state = {
             "timesteps": self.num_timesteps,
             "fingerprint": robot.fingerprint,
             "robot": robot.name,
-            "observations": int(self.model.observation_space.shape[0]),
-            "actions": int(self.model.action_space.shape[0]),
+            "observations": int(inputs[0]),
+            "actions": int(outputs[0]),
             "next_evaluation": self._next,
             "evaluations": self.rows,
         }
@@ -237,6 +249,7 @@ class Progress(BaseCallback):
         seconds = time.perf_counter() - self._start
         speed = (self.num_timesteps - self._start_steps) / max(seconds, 1e-9)
         rate = f"recovered {np.mean(self._episodes):.0%}" if self._episodes else ""
+        assert self._bar is not None  # made at the start of the training
         self._bar.update(
             self._task, completed=self.num_timesteps, rate=f"{rate}  {speed:,.0f} steps/s"
         )

@@ -43,7 +43,8 @@ def save_checkpoint(
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir(parents=True)
         model.save(new / POLICY, exclude=["ep_info_buffer", "ep_success_buffer"])
-        np.savez(new / STATISTICS, **statistics(normalize))
+        arrays: dict[str, Any] = statistics(normalize)
+        np.savez(new / STATISTICS, **arrays)
         (new / CONFIG).write_text(to_yaml(config))
         (new / STATE).write_text(json.dumps(state, indent=1) + "\n")
         if folder.exists():

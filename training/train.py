@@ -102,9 +102,11 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         device="cpu",
         stats_window_size=500,
     )
+    head = model.policy.action_net
+    assert isinstance(head, torch.nn.Linear)
     with torch.no_grad():
-        model.policy.action_net.weight.zero_()
-        model.policy.action_net.bias.zero_()
+        head.weight.zero_()
+        head.bias.zero_()
     return model
 
 

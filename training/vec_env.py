@@ -56,6 +56,7 @@ class ThreadedVecEnv(VecEnv):
             }
 
         batch = self.batch
+        assert self._actions is not None  # step_async came first
         batch.step(self._actions, at_end)
         dones = batch.terminated | batch.truncated
         self._returns += batch.rewards
