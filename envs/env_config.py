@@ -11,6 +11,13 @@ from .errors import ConfigError
 from .push_schedule import PushSampler
 
 
+class UnknownArgument(ConfigError, TypeError):
+    """An argument that the environment does not have. A TypeError too, as of any function.
+
+    TorchRL gives every environment arguments of its own, and takes back what raises a TypeError.
+    """
+
+
 @dataclass(frozen=True)
 class StartNoise:
     """How far a reset departs from the standing posture; uniform in ±."""
@@ -37,8 +44,16 @@ class EnvConfig:
 def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: Any) -> EnvConfig:
     """An EnvConfig from a packaged name, a path, a mapping or an object; `overrides` win.
 
-    Raises ConfigError naming the file, the field and the choices.
+    Raises ConfigError naming the file, the field and the choices, UnknownArgument for an override
+    that is no field.
     """
+    for name in overrides:
+        if name not in EnvConfig.__dataclass_fields__:
+            raise UnknownArgument(
+                f"unexpected keyword argument {name!r}",
+                source="environment",
+                choices=EnvConfig.__dataclass_fields__,
+            )
     source = "environment"
     if isinstance(config, (str, Path)):
         path = resolve("envs", config)

@@ -289,7 +289,7 @@ def test_bad_options_are_refused(make, options, named):
     [
         ({"robot": "nobody"}, ("nobody", "robots", "humanoid")),
         ({"render_mode": "ascii"}, ("render_mode", "ascii", "rgb_array")),
-        ({"duraton": 3.0}, ("duraton", "duration")),
+        ({"duraton": 3.0}, ("unexpected keyword argument 'duraton'", "duration")),
         ({"duration": -1.0}, ("duration", "-1.0")),
         ({"reward": {"alive": "much"}}, ("reward.alive", "much")),
         ({"fall": {"tilt": 100.0}}, ("fall.tilt", "100.0")),
@@ -336,6 +336,12 @@ def test_the_configuration_is_read_from_anything(tmp_path):
     file.write_text("duration: [2.0]\n")
     with pytest.raises(ConfigError, match="short.yaml: duration"):
         env_config(file)
+
+
+def test_an_unknown_argument_is_a_type_error_too():
+    """TorchRL offers `frameskip`, and goes on without it after this TypeError."""
+    with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'"):
+        TorqueBalanceEnv(robot(), frameskip=1)
 
 
 def test_frames_per_second_follow_the_policy_period():

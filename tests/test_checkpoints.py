@@ -55,6 +55,9 @@ def test_what_is_saved_is_restored(folder, trained):
     assert state["timesteps"] == 64
     for a, b in zip(model.policy.parameters(), fresh.policy.parameters(), strict=True):
         assert np.array_equal(a.detach(), b.detach())
+    with np.load(finished_run() / "last" / STATISTICS) as data:
+        assert np.array_equal(env.obs_rms.mean, data["obs_mean"]) and env.obs_rms.mean.any()
+        assert env.ret_rms.count == data["ret_count"]
     moments = [list(m.policy.optimizer.state.values()) for m in (model, fresh)]
     assert len(moments[0]) > 0
     for a, b in zip(*moments, strict=True):

@@ -114,10 +114,12 @@ def test_torchrl_collects(name):
     """TorchRL's GymEnv rolls the environment out."""
     pytest.importorskip("torchrl")
     from torchrl.envs import GymEnv
+    from torchrl.envs.utils import check_env_specs
 
     env = GymEnv(name, **SMALL)
+    check_env_specs(env)
     rollout = env.rollout(5)
-    assert rollout["observation"].shape[-1] == env.observation_spec["observation"].shape[-1]
+    assert rollout["observation"].shape == (5, *env.observation_spec["observation"].shape)
 
 
 @EACH

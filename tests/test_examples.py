@@ -11,6 +11,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 ARGUMENTS = {
     "own_controller.py": [],
     "ppo_single_file.py": ["--steps", "128", "--envs", "2", "--rollout", "32"],
+    "push_strip.py": ["strip.png"],
     "sb3_train.py": ["100"],
 }
 
@@ -45,6 +46,12 @@ def test_stable_baselines3_in_ten_lines(tmp_path):
     """It learns and saves."""
     assert "fps" in run("sb3_train.py", tmp_path)
     assert (tmp_path / "sb3_residual.zip").is_file()
+
+
+def test_the_picture_of_the_readme(tmp_path, can_render):
+    """Frames of a push are drawn into one picture."""
+    run("push_strip.py", tmp_path)
+    assert (tmp_path / "strip.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("mode", ["sync", "async"])

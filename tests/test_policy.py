@@ -64,6 +64,17 @@ def test_it_acts_as_sb3_does(model):
     np.testing.assert_allclose(actions, expected, atol=1e-5)
 
 
+def test_an_entry_that_never_changed_is_no_division_by_zero(folder):
+    """A variance of zero, as of feet that never left the ground, gives finite actions."""
+    with np.load(folder / STATISTICS) as data:
+        arrays = dict(data)
+    arrays["obs_var"][3] = 0.0
+    np.savez(folder / STATISTICS, **arrays)
+    policy = load_policy(folder)
+    assert np.isfinite(policy.act(arrays["obs_mean"])).all()
+    assert np.isfinite(policy.act(arrays["obs_mean"] + 1e-3)).all()
+
+
 def test_one_observation_gives_the_same_bits_as_a_batch():
     """What an observation makes of it does not depend on its company."""
     policy = load_policy(finished_run())

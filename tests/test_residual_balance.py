@@ -139,9 +139,9 @@ def test_the_observation_is_relative_to_the_motion():
 @pytest.mark.parametrize("solver", ["daqp", "active-set"])
 def test_another_solver_is_really_used(solver):
     """A controller that names a solver is solved by it, and agrees with the default."""
-    default = ResidualBalanceEnv(robot())
+    default = ResidualBalanceEnv(robot(), motion="squat")
     config = replace(controller_config("momentum-qp"), solver=solver)
-    other = ResidualBalanceEnv(robot(), controller=MomentumQP(robot(), config))
+    other = ResidualBalanceEnv(robot(), controller=MomentumQP(robot(), config), motion="squat")
     solved = []
     if other.controller.solver is not None:
         inner = other.controller.solver.solve

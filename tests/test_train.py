@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from poise.envs.batch import EnvBatch
 from poise.envs.config import build, read_yaml
 from poise.envs.errors import ConfigError
-from poise.training import callbacks
+from poise.training import callbacks, schedules
 from poise.training.checkpoints import FILES, POLICY, STATE
 from poise.training.config import Curriculum, PPOConfig, TrainConfig
 from poise.training.policy import load_policy
@@ -94,6 +95,22 @@ def test_another_seed_gives_other_weights(tmp_path):
     train(tiny_config(seed=1, steps=64), tmp_path, progress=False)
     assert not np.array_equal(weights(tmp_path)[0], weights(finished_run())[0])
     assert evaluations(tmp_path)[0] == evaluations(finished_run())[0]  # held-out pushes are fixed
+
+
+def test_every_evaluation_meets_the_same_pushes(tmp_path, monkeypatch):
+    """The held-out seeds do not change as the run goes on, and are not those of training."""
+    seeds, reset = [], EnvBatch.reset
+
+    def spy(self, given, *rest):
+        seeds.append(list(given))
+        return reset(self, given, *rest)
+
+    monkeypatch.setattr(EnvBatch, "reset", spy)
+    train(tiny_config(steps=128), tmp_path, progress=False)
+    held_out = [given for given in seeds if len(given) == 5]
+    trained = [seed for given in seeds if len(given) == 4 for seed in given]
+    assert len(held_out) == 2 and held_out[0] == held_out[1] and len(set(held_out[0])) == 5
+    assert set(trained) == {0, 1, 2, 3}
 
 
 def test_last_is_written_after_every_rollout(tmp_path, monkeypatch):
@@ -202,13 +219,13 @@ def test_a_damaged_run_is_not_resumed(run, spoil):
 def test_the_curriculum_grows_the_pushes(tmp_path, monkeypatch):
     """The largest push starts small and reaches its size after its share of the run."""
     largest = []
-    start = callbacks.CurriculumCallback._on_rollout_start
+    start = schedules.CurriculumCallback._on_rollout_start
 
     def spy(self):
         start(self)
         largest.append(self.training_env.get_attr("push_sampler")[0].magnitude)
 
-    monkeypatch.setattr(callbacks.CurriculumCallback, "_on_rollout_start", spy)
+    monkeypatch.setattr(schedules.CurriculumCallback, "_on_rollout_start", spy)
     config = tiny_config(steps=256, curriculum=Curriculum(start=0.1, share=0.5))
     config = replace(config, evaluation=replace(config.evaluation, trials=1))
     train(config, tmp_path, progress=False)
@@ -244,13 +261,13 @@ def test_bad_configurations_are_refused(section, named):
 def test_exploration_narrows_on_a_schedule(tmp_path, monkeypatch):
     """With log_std_final, the noise of each rollout lies on a line in time."""
     seen = []
-    start = callbacks.ExplorationCallback._on_rollout_start
+    start = schedules.ExplorationCallback._on_rollout_start
 
     def spy(self):
         start(self)
         seen.append(self.model.policy.log_std.detach().numpy().copy())
 
-    monkeypatch.setattr(callbacks.ExplorationCallback, "_on_rollout_start", spy)
+    monkeypatch.setattr(schedules.ExplorationCallback, "_on_rollout_start", spy)
     ppo = replace(tiny_config().ppo, log_std_init=-1.0, log_std_final=-3.0)
     config = tiny_config(steps=128, ppo=ppo)
     train(replace(config, evaluation=replace(config.evaluation, trials=1)), tmp_path, False, False)

@@ -30,7 +30,6 @@ def test_an_episode_ends_as_sb3_expects():
     env.reset()
     total, last = np.zeros(2), None
     for _ in range(10):
-        before = env.batch.envs[0].episode.observation
         observations, rewards, dones, infos = env.step(zeros(env))
         total += rewards
         if not dones.any():
@@ -42,7 +41,10 @@ def test_an_episode_ends_as_sb3_expects():
         assert info["episode"]["r"] == pytest.approx(total[i], rel=1e-5)
         last = info["terminal_observation"]
         assert last.shape == observations[i].shape and not np.array_equal(last, observations[i])
-    assert before is env.batch.envs[0].episode.observation
+    for _ in range(10):
+        _, _, _, infos = env.step(zeros(env))
+    assert [info["episode"]["l"] for info in infos] == [10, 10]  # counted anew
+    assert all(0.0 < info["episode"]["r"] < 1.2 * total[0] for info in infos)
 
 
 def test_a_fall_is_no_time_limit():
@@ -113,5 +115,8 @@ def test_it_can_be_normalised():
     raw.seed(0)
     first = raw.reset()
     kept = first.copy()
-    raw.step(zeros(raw))
+    second = raw.step(zeros(raw))[0]
     assert np.array_equal(first, kept)
+    kept = second.copy()
+    raw.step(zeros(raw))
+    assert np.array_equal(second, kept)

@@ -14,15 +14,10 @@ from poise.envs.config import build, read_yaml, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
 from poise.envs.robot import load_robot
 
-from .callbacks import (
-    Checkpoints,
-    CurriculumCallback,
-    ExplorationCallback,
-    Progress,
-    Throughput,
-)
+from .callbacks import Checkpoints, Progress, Throughput
 from .checkpoints import CONFIG, find_checkpoint, restore
 from .config import TrainConfig
+from .schedules import CurriculumCallback, ExplorationCallback
 from .vec_env import ThreadedVecEnv
 
 LAST, BEST = "last", "best"
