@@ -51,6 +51,13 @@ def test_make_gives_the_documented_class(name):
     assert env.action_space.low.min() == -1.0 and env.action_space.high.max() == 1.0
 
 
+def test_processes_without_poise_can_make_it():
+    """With the module's name before the id, Gymnasium imports poise itself (spawned workers)."""
+    code = "import gymnasium; print(gymnasium.make('poise:poise/TorqueBalance-v0').spec.id)"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == "poise/TorqueBalance-v0"
+
+
 @EACH
 def test_the_spec_can_be_written_and_read(name):
     """Arguments as plain mappings survive JSON; the environment made of it is the same."""
