@@ -16,6 +16,11 @@ compiled = numba.njit(
 )
 
 
+_ROOM = Path(__file__).resolve().parent
+#: Holds the digest of the sources that the cached kernels were compiled from.
+CACHE_STAMP = _ROOM / "__pycache__" / "kernels.sha256"
+
+
 def drop_stale_kernels(packages: list[Path]) -> bool:
     """Delete compiled kernels that sources of `packages` have outdated; True if any were.
 
@@ -26,7 +31,7 @@ def drop_stale_kernels(packages: list[Path]) -> bool:
     for package in packages:
         for path in sorted(package.rglob("*.py")):
             digest.update(path.read_bytes())
-    stamp = packages[0] / "__pycache__" / "kernels.sha256"
+    stamp = packages[0] / "__pycache__" / CACHE_STAMP.name
     with contextlib.suppress(OSError):
         if stamp.is_file() and stamp.read_text() == digest.hexdigest():
             return False
@@ -39,5 +44,4 @@ def drop_stale_kernels(packages: list[Path]) -> bool:
     return True
 
 
-_ROOM = Path(__file__).resolve().parent
 drop_stale_kernels([_ROOM, _ROOM.parent / "baselines"])

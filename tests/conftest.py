@@ -38,3 +38,10 @@ def can_render() -> None:
     problem = _rendering_problem()
     if problem:
         pytest.skip(problem)
+
+
+def pytest_sessionstart(session):
+    """Compile the kernels in a process of their own, so that this one and its children agree."""
+    from poise.training.warmup import prepare
+
+    prepare()

@@ -25,6 +25,7 @@ from .suite import Suite
 from .suites import load_suite
 from .summary import plain, summarise
 from .trials import Trial, row
+from .warmup import prepare
 from .workers import Workers
 
 
@@ -73,6 +74,7 @@ def evaluate(
     pushed = load_limits(loaded, limits)
     overrides = {"duration": chosen.duration, "pushes": None, "noise": chosen.noise}
     with patience(console):
+        prepare()
         players = [load_player(name, loaded, **overrides) for name in controllers]
         first = chosen.first(pushed, seed)
         _warm_up(players)

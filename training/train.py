@@ -19,6 +19,7 @@ from .checkpoints import CONFIG, find_checkpoint, restore
 from .config import TrainConfig
 from .schedules import CurriculumCallback, ExplorationCallback
 from .vec_env import ThreadedVecEnv
+from .warmup import prepare
 
 LAST, BEST = "last", "best"
 
@@ -39,6 +40,7 @@ def train(
     out = Path(out)
     checkpoint = _check_folder(config, out, resume)
     torch.set_num_threads(1)
+    prepare()
     normalize = _training_envs(config)
     model = make_model(config, normalize)
     state: dict[str, Any] = {}
