@@ -1,6 +1,6 @@
 """The picture of the README: the baseline under a push of 16 N·s from behind.
 
-    python examples/push_strip.py docs/images/push_strip.png
+python examples/push_strip.py docs/images/push_strip.png
 """
 
 import sys
