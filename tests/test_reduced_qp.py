@@ -144,14 +144,14 @@ def test_posture_error_is_a_rotation_at_any_angle():
 
 def test_problem_is_pure(robot):
     """Looking at the problem changes neither the next problem nor the next torques."""
-    tick = solved()[20]
+    tick, later = solved()[20:22]
     qp, other = controller(robot), controller(robot)
     first = qp.problem(tick.state, tick.targets)
     second = qp.problem(tick.state, tick.targets)
     for name in "HgClu":
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
     np.testing.assert_array_equal(
-        qp.torques(tick.state, tick.targets), other.torques(tick.state, tick.targets)
+        qp.torques(later.state, later.targets), other.torques(later.state, later.targets)
     )
 
 
