@@ -54,16 +54,24 @@ def torque_limits(state: RobotState, p: QPParameters) -> Bounds:
 def joint_limits(state: RobotState, p: QPParameters) -> Bounds:
     """Accelerations that let every joint stop before its limit.
 
-    From the distance d to a limit, braking with a stops a joint that is no faster than √(2 a d);
-    the bound brings its speed there within a horizon, and demands no more than a floor.
+    From the distance d to a limit, a joint that is no faster than v stops if it brakes with a
+    after a reaction time r: r v + v²/(2 a) = d. The bound brings its speed there within a horizon
+    T, and demands no more than a floor; r = 4 T makes the approach critically damped. Beyond the
+    limit, v = d/r leads back.
     """
     q, v, robot = state.q, state.qvel[6:], state.robot
-    up = np.sqrt(2.0 * p.brake_accel * np.maximum(robot.q_max - q, 0.0))
-    down = np.sqrt(2.0 * p.brake_accel * np.maximum(q - robot.q_min, 0.0))
+    up, down = (_stopping_speed(d, p) for d in (robot.q_max - q, q - robot.q_min))
     low = np.minimum((-down - v) / p.brake_horizon, p.brake_floor)
     high = np.maximum((up - v) / p.brake_horizon, -p.brake_floor)
     C = np.eye(len(q), len(q) + 6, 6)
     return Bounds(C, low, np.maximum(low, high))
+
+
+def _stopping_speed(distance: np.ndarray, p: QPParameters) -> np.ndarray:
+    reaction = 4.0 * p.brake_horizon
+    ahead, lag = np.maximum(distance, 0.0), reaction * p.brake_accel
+    speed = np.sqrt(lag**2 + 2.0 * p.brake_accel * ahead) - lag
+    return np.where(distance < 0.0, distance / reaction, speed)
 
 
 def torque_matrix(state: RobotState) -> np.ndarray:

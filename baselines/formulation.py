@@ -35,6 +35,7 @@ from .reduced_qp import QPParameters
 from .solvers import QP
 from .task_rows import (
     Rows,
+    accel_rows,
     angular_momentum_rows,
     linear_momentum_rows,
     posture_rows,
@@ -87,6 +88,7 @@ def build(
         angular_momentum_rows(state, targets, p, cop_vel),
         wrench_rows(state, p),
         torque_rows(state, p),
+        accel_rows(state, p),
         *tasks,
     ]
     bounds = [

@@ -21,8 +21,9 @@ from .reduced_qp import (
     assemble,
     recover,
 )
-from .solvers import QP, make_solver
+from .solvers import QP, Status, make_solver
 from .solvers.dual_active_set import solve_dual
+from .solvers.rows import INFEASIBLE
 from .tasks import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
 
 COMPILED_SOLVER = "active-set"
@@ -78,8 +79,17 @@ def accept(s: StateArrays, p: QPParameters, status: int, ws: Workspace, memory: 
     keep = FALLBACK_DECAY ** memory.streak[0]
     ws.root_wrench[:] = 0.0
     for a in range(ws.tau.shape[0]):
-        torque = keep * memory.torques[a] - (1.0 - keep) * memory.damping[a] * s.qvel[6 + a]
+        speed = s.qvel[6 + a] if np.isfinite(s.qvel[6 + a]) else 0.0
+        torque = keep * memory.torques[a] - (1.0 - keep) * memory.damping[a] * speed
         ws.tau[a] = min(max(torque, -p.torque_limit[a]), p.torque_limit[a])
+
+
+@compiled
+def release_joints(ws: Workspace):
+    """Take away the joint limits, the last rows of the problem."""
+    first = ws.l.shape[0] - ws.tau.shape[0]
+    ws.l[first:] = -np.inf
+    ws.u[first:] = np.inf
 
 
 @compiled
@@ -97,6 +107,11 @@ def momentum_tick(
     status = solve_dual(
         ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS
     )
+    if status == INFEASIBLE:  # always because of joint limits, which the joints hold by themselves
+        release_joints(ws)
+        status = solve_dual(
+            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS
+        )
     accept(s, p, status, ws, memory)
 
 
@@ -180,6 +195,9 @@ class MomentumQP:
         else:
             assemble(*arguments, ws)
             solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
+            if solution.status is Status.INFEASIBLE:
+                release_joints(ws)
+                solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
             if solution.solved:
                 ws.x[:] = solution.x
             accept(state.arrays, self.parameters, 0 if solution.solved else 1, ws, self.memory)

@@ -68,5 +68,5 @@ def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig")
         brake_horizon=config.joint.horizon / omega,
         brake_floor=config.joint.floor * omega**2,
         soft_root=config.root == "soft",
-        root_weight=config.root_weight / force**2,
+        root_weight=config.root_weight / np.repeat([force, moment], 3) ** 2,
     )

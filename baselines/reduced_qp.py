@@ -48,7 +48,7 @@ class QPParameters(NamedTuple):
     brake_horizon: float  # [s]
     brake_floor: float  # [rad/s²] braking is never asked to exceed
     soft_root: bool
-    root_weight: float  # ω_root per N² and (N·m)²
+    root_weight: np.ndarray  # (6,) ω_root per N² and per (N·m)²
 
 
 class TargetArrays(NamedTuple):
@@ -423,10 +423,11 @@ def _objective(robot, s, p, ws):
         if p.torque_weight[a] > 0.0:
             _add_square(H, g, ws.T[a], ws.tau0[a], p.torque_weight[a])
     if p.soft_root:
-        for i in range(n - 6, n):
-            H[i, i] += p.root_weight
+        for i in range(6):
+            H[n - 6 + i, n - 6 + i] += p.root_weight[i]
     for i in range(n):
-        H[i, i] += p.accel_floor
+        if i < nz:
+            H[i, i] += p.accel_floor
         for j in range(i):
             H[i, j] = H[j, i]
 
@@ -475,17 +476,29 @@ def _constraints(robot, s, p, ws):
 def braking_bounds(q, v, q_min, q_max, accel, horizon, floor):
     """Bounds on q̈ that let a joint stop before its limit.
 
-    The fastest velocity from which `accel` still stops in the distance left is √(2·accel·d);
-    the bound brings v there within `horizon`, asking for no more than `floor`.
+    The bound brings v within `horizon` to the fastest velocity from which `accel` still stops in
+    the distance left (see `stopping_speed`), asking for no more than `floor`.
     """
     low, high = -np.inf, np.inf
     if q_max < np.inf:
-        fastest = np.sqrt(2.0 * accel * max(q_max - q, 0.0))
-        high = max((fastest - v) / horizon, -floor)
+        high = max((stopping_speed(q_max - q, accel, horizon) - v) / horizon, -floor)
     if q_min > -np.inf:
-        fastest = np.sqrt(2.0 * accel * max(q - q_min, 0.0))
-        low = min((-fastest - v) / horizon, floor)
+        low = min((-stopping_speed(q - q_min, accel, horizon) - v) / horizon, floor)
     return low, max(low, high)
+
+
+@compiled
+def stopping_speed(distance, accel, horizon):
+    """Speed v that stops within a distance after a reaction time r: r v + v²/(2 accel) = distance.
+
+    r = 4·horizon makes the way to the limit critically damped: no overshoot. Beyond the limit the
+    speed leads back to it.
+    """
+    reaction = 4.0 * horizon
+    if distance < 0.0:
+        return distance / reaction
+    lag = reaction * accel
+    return np.sqrt(lag * lag + 2.0 * accel * distance) - lag
 
 
 @compiled

@@ -65,7 +65,9 @@ class ResidualBalanceEnv(BalanceEnv):
     Scales above 0 for `residual.height` [m] and `residual.lean` [rad] append `com_z` (the CoM's
     height) and `lean_x`, `lean_y` (a rotation of the root's target about the axes x and y); one for
     `residual.momentum` [m h² ω] appends `momentum_x` and `momentum_y`, angular momentum that the
-    posture is to carry.
+    posture is to carry. With `smoothing` τ > 0 [s] the targets follow the action as a first-order
+    lag, a ← a + (1 − e^(−T/τ)) (action − a) per policy step T; a then is what the observation and
+    the rewards call the action.
 
     Observation: Box(−10, 10), in the heading frame; h is the standing height of the CoM and
     ω = √(g/h). It does not know the push. The reference is that of `motion`.
@@ -174,14 +176,15 @@ class ResidualBalanceEnv(BalanceEnv):
 
     Info: "reward_terms" (name → weighted value; their sum is the reward), "push" (a list: start,
     force [N], duration [s], body, direction [deg], impulse J [N·s], specific_impulse J/m [N·s/kg]),
-    "is_success" (upright and quiet, CoM over the soles, for the last `fall.quiet_time`),
+    "is_success" (tilt below `fall.quiet_tilt`, CoM slower than `fall.quiet_speed`
+    and over the soles for the last `fall.quiet_time`),
     "solver_failures" (ticks of the episode), "torque_saturation" (mean share of motors at their
     limit), "root_wrench" (6,) (force [N] and moment [N·m] of a soft root in the last tick).
 
     Arguments: `robot` (a name, a .yaml file or a `Robot`), `config` (an `EnvConfig`, a .yaml file
     or a mapping), `controller` (a name, a .yaml file, a mapping or a `Controller`),
     `motion` (a name, a .yaml file or a `ReferenceMotion`), `residual` (what an action of 1 adds, a
-    `ResidualScales`), `render_mode` (None,
+    `ResidualScales`), `smoothing` (time constant of the action [s]), `render_mode` (None,
     "rgb_array" or "human"), and the fields of `EnvConfig` by name: policy_period, duration, pushes,
     noise, fall, reward. Fields may be plain mappings. Raises ConfigError naming what is wrong.
 
@@ -196,6 +199,7 @@ class ResidualBalanceEnv(BalanceEnv):
         controller: str | Path | Mapping | MomentumQPConfig | Controller = "momentum-qp",
         motion: str | Path | ReferenceMotion = "standing",
         residual: ResidualScales | Mapping | None = None,
+        smoothing: float = 0.0,
         render_mode: str | None = None,
         **overrides: Any,
     ):
@@ -207,6 +211,12 @@ class ResidualBalanceEnv(BalanceEnv):
         if len(self._moved) == 0:
             raise ConfigError("at least one scale must be above 0", field="residual")
         super().__init__(robot, config, render_mode=render_mode, **overrides)
+        if not 0.0 <= smoothing < np.inf:
+            raise ConfigError(f"must be a time of at least 0 s, not {smoothing}", field="smoothing")
+        self.smoothing = float(smoothing)
+        # share of the way that the residual goes to the action in one policy step
+        share = 1.0 if smoothing == 0.0 else -np.expm1(-self.config.policy_period / smoothing)
+        self._share = float(share)
         scale[7:] *= 10.0 * self.scales.momentum
         self._scale = scale[self._moved]
         self.controller: Any = load_controller(controller, self.robot)
@@ -260,8 +270,10 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _advance(self) -> float:
         sim, controller = self.simulation, self.controller
-        residual = self._offsets
-        residual[self._moved] = self._scale * self.episode.action
+        residual, e = self._offsets, self.episode
+        if self._share < 1.0:
+            e.action[:] = e.last_action + self._share * (e.action - e.last_action)
+        residual[self._moved] = self._scale * e.action
         if not self._compiled:
             return self._advance_in_python(residual)
         return residual_step(

@@ -95,6 +95,12 @@ def wrench_rows(state: RobotState, p: QPParameters) -> Rows:
     return Rows(np.eye(k, nv + k, nv), np.zeros(k), weights)
 
 
+def accel_rows(state: RobotState, p: QPParameters) -> Rows:
+    """Small accelerations: ‖v̇‖², a trace that keeps the compiled problem well posed."""
+    nv = len(state.qvel)
+    return Rows(np.eye(nv), np.zeros(nv), np.full(nv, p.accel_floor))
+
+
 def torque_rows(state: RobotState, p: QPParameters) -> Rows:
     """Small torques: ‖τ‖²."""
     return Rows(torque_matrix(state), -state.h[6:], p.torque_weight)
@@ -103,4 +109,4 @@ def torque_rows(state: RobotState, p: QPParameters) -> Rows:
 def root_rows(state: RobotState, p: QPParameters) -> Rows:
     """ω_root ‖u_root‖²: what a soft root must not lean on."""
     start = len(state.qvel) + len(state.J)
-    return Rows(np.eye(6, start + 6, start), np.zeros(6), np.full(6, p.root_weight))
+    return Rows(np.eye(6, start + 6, start), np.zeros(6), p.root_weight)

@@ -2,32 +2,32 @@
 
 import mujoco
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from poise.envs.robot import Robot, Sole
 
 
-def wrench_cone(polygon: np.ndarray, friction: float, yaw_radius: float) -> np.ndarray:
+def wrench_cone(polygon: np.ndarray, friction: float) -> np.ndarray:
     """Rows R (r, 6) of R w ≤ 0 for a wrench w = [f; n] at the sole's reference point, sole axes.
 
-    Friction |f_x| + |f_y| ≤ μ f_z, MuJoCo's own pyramid, inside the round cone in any orientation;
-    yaw moment |n_z| ≤ μ ρ f_z with the radius ρ = `yaw_radius` [m]; centre of pressure
-    (−n_y, n_x)/f_z inside `polygon` (k, 2), counter-clockwise [m]. Together they imply f_z ≥ 0.
-    [Macchietto09]
+    Exactly the sums of forces at the vertices of `polygon` (k, 2) [m], each with
+    |f_x| + |f_y| ≤ μ f_z, MuJoCo's own pyramid [Caron15]. So the nearer the centre of pressure
+    (−n_y, n_x)/f_z is to the edge, the less yaw moment is left; at a corner there is none.
+    The rows are the facets of the hull of the vertices' extreme wrenches with f_z = 1.
     """
-    rows = [
-        [1, 1, -friction, 0, 0, 0],
-        [1, -1, -friction, 0, 0, 0],
-        [-1, 1, -friction, 0, 0, 0],
-        [-1, -1, -friction, 0, 0, 0],
-        [0, 0, -friction * yaw_radius, 0, 0, 1],
-        [0, 0, -friction * yaw_radius, 0, 0, -1],
-    ]
-    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        edge = (b - a) / np.linalg.norm(b - a)
-        outward = np.array([edge[1], -edge[0]])
-        # outward · (p − a) ≤ 0 with p f_z = (−n_y, n_x)
-        rows.append([0, 0, -outward @ a, outward[1], -outward[0], 0])
-    return np.array(rows, dtype=float)
+    extremes = np.array(
+        [
+            [f_x, f_y, y, -x, x * f_y - y * f_x]
+            for x, y in polygon
+            for f_x, f_y in friction * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        ]
+    )
+    scale = np.abs(extremes).max(axis=0)
+    facets = ConvexHull(extremes / scale).equations  # normal · point + offset ≤ 0
+    facets[:, :5] /= scale
+    facets /= np.linalg.norm(facets, axis=1, keepdims=True)
+    facets = facets[np.unique(facets.round(7), axis=0, return_index=True)[1]]  # Qhull triangulates
+    return facets[:, [0, 1, 5, 2, 3, 4]]
 
 
 def sole_friction(robot: Robot, sole: Sole) -> float:
@@ -50,11 +50,13 @@ def _pair_friction(model: mujoco.MjModel, geom: int, ground: int) -> float:
 
 
 def robot_cones(robot: Robot, friction_share: float, polygon_share: float) -> np.ndarray:
-    """Cones (nc, r, 6) of all soles, with a share of the real friction and of the real polygon."""
-    cones = []
-    for sole in robot.soles:
-        polygon = polygon_share * sole.polygon
-        radius = 0.5 * float(np.mean(np.linalg.norm(polygon, axis=1)))
-        cones.append(wrench_cone(polygon, friction_share * sole_friction(robot, sole), radius))
+    """Cones (nc, r, 6) of all soles, with a share of the real friction and of the real polygon.
+
+    Rows are padded with zeros, so that soles of any polygon have the same count.
+    """
+    cones = [
+        wrench_cone(polygon_share * sole.polygon, friction_share * sole_friction(robot, sole))
+        for sole in robot.soles
+    ]
     rows = max(len(cone) for cone in cones)
     return np.array([np.pad(cone, ((0, rows - len(cone)), (0, 0))) for cone in cones])

@@ -16,9 +16,11 @@ class FallLimits:
     """When a robot has fallen, and when it is upright and quiet again."""
 
     height: float = field(default=0.6, metadata={"above": 0.0, "max": 1.0})  # of the standing h
-    tilt: float = field(default=60.0, metadata={"above": 0.0, "max": 90.0})  # root [deg]
+    # root [deg]: a deep bow, the hip strategy at its end, is not yet a fall
+    tilt: float = field(default=90.0, metadata={"above": 0.0, "max": 180.0})
     ground_contact: bool = True  # anything but the feet on the ground is a fall
     quiet_speed: float = field(default=0.1, metadata={"above": 0.0})  # CoM [m/s]
+    quiet_tilt: float = field(default=30.0, metadata={"above": 0.0, "max": 90.0})  # root [deg]
     quiet_time: float = field(default=1.0, metadata={"above": 0.0})  # [s]
 
 
@@ -76,6 +78,7 @@ class Judge(NamedTuple):
     cos_tilt: float
     ground_contact: bool
     quiet_speed: float
+    quiet_cos_tilt: float
     weights: np.ndarray  # (terms,)
 
 
@@ -86,6 +89,7 @@ def judge(limits: FallLimits, weights: RewardWeights, height_com: float) -> Judg
         cos_tilt=float(np.cos(np.radians(limits.tilt))),
         ground_contact=limits.ground_contact,
         quiet_speed=limits.quiet_speed,
+        quiet_cos_tilt=float(np.cos(np.radians(limits.quiet_tilt))),
         weights=np.array([getattr(weights, name) for name in REWARD_TERMS], dtype=float),
     )
 
@@ -132,16 +136,22 @@ def record_tick(
 
 
 @compiled
-def has_fallen(robot: RobotArrays, s: StateArrays, j: Judge) -> bool:
-    """CoM too low, root tilted too far, or more than the feet on the ground."""
-    upright = 0.0  # cosine between the root's axes now and standing: its vertical one
+def uprightness(robot: RobotArrays, s: StateArrays) -> float:
+    """Cosine of the root's tilt from standing: between its vertical axes, whatever the yaw."""
+    upright = 0.0
     for a in range(3):
         upright += s.root_axes[2, a] * robot.root_standing[2, a]
+    return upright
+
+
+@compiled
+def has_fallen(robot: RobotArrays, s: StateArrays, j: Judge) -> bool:
+    """CoM too low, root tilted too far, or more than the feet on the ground."""
     low = s.com[2] - s.origin[2] < j.height
     touching = j.ground_contact and s.other_contacts[0] > 0.5
     # not np.isfinite(x + y): x + y − (x + y), reordered, is 0 for NaN too
     finite = abs(s.com[2]) < np.inf and abs(s.com_vel[2]) < np.inf
-    return low or upright < j.cos_tilt or touching or not finite
+    return low or uprightness(robot, s) < j.cos_tilt or touching or not finite
 
 
 @compiled
@@ -163,7 +173,9 @@ def judge_step(
     com_x, com_y = s.com[0] - s.origin[0], s.com[1] - s.origin[1]
     xi_x, xi_y = s.capture_point[0] - s.origin[0], s.capture_point[1] - s.origin[1]
     speed = np.sqrt(s.com_vel[0] ** 2 + s.com_vel[1] ** 2 + s.com_vel[2] ** 2)
-    quiet = not fallen and speed < j.quiet_speed and support_distance(s, s.com[0], s.com[1]) > 0.0
+    upright = uprightness(robot, s)
+    quiet = not fallen and speed < j.quiet_speed and upright > j.quiet_cos_tilt
+    quiet = quiet and support_distance(s, s.com[0], s.com[1]) > 0.0
     m[QUIET_STEPS] = m[QUIET_STEPS] + 1.0 if quiet else 0.0
     if not quiet:
         m[LAST_MOVING] = time
@@ -176,9 +188,7 @@ def judge_step(
         m[MAX_SLIDE] = max(m[MAX_SLIDE], np.sqrt(dx * dx + dy * dy))
 
     cos, sin = s.heading[0], s.heading[1]
-    upright, posture = 0.0, 0.0
-    for a in range(3):
-        upright += s.root_axes[2, a] * robot.root_standing[2, a]
+    posture = 0.0
     for a in range(q_ref.shape[0]):
         posture += (s.qpos[7 + a] - q_ref[a]) ** 2
     effort, action, action_rate = 0.0, 0.0, 0.0

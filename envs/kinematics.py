@@ -217,15 +217,21 @@ def _contact(robot, plant, s):
     """Total ground wrench, CoP and capture point; which feet touch the ground.
 
     The ground is the only thing outside the body, and joint limits and friction do not act on
-    the root: so the root rows of the constraint force are the ground's wrench.
+    the root: so the root rows of the constraint force are the ground's wrench. They belong to the
+    root's pose before the last step, from which v has led to the present one.
     """
     R = s.root_axes
-    f = plant.qfrc_constraint
+    dt, f, v = robot.timestep, plant.qfrc_constraint, plant.qvel
     fx, fy, fz = f[0], f[1], f[2]
-    nx = R[0, 0] * f[3] + R[0, 1] * f[4] + R[0, 2] * f[5]
-    ny = R[1, 0] * f[3] + R[1, 1] * f[4] + R[1, 2] * f[5]
-    nz = R[2, 0] * f[3] + R[2, 1] * f[4] + R[2, 2] * f[5]
-    x, y, z = plant.qpos[0], plant.qpos[1], plant.qpos[2]
+    mx = f[3] - dt * (v[4] * f[5] - v[5] * f[4])
+    my = f[4] - dt * (v[5] * f[3] - v[3] * f[5])
+    mz = f[5] - dt * (v[3] * f[4] - v[4] * f[3])
+    nx = R[0, 0] * mx + R[0, 1] * my + R[0, 2] * mz
+    ny = R[1, 0] * mx + R[1, 1] * my + R[1, 2] * mz
+    nz = R[2, 0] * mx + R[2, 1] * my + R[2, 2] * mz
+    x = plant.qpos[0] - dt * v[0]
+    y = plant.qpos[1] - dt * v[1]
+    z = plant.qpos[2] - dt * v[2]
     s.contact_wrench[0], s.contact_wrench[1], s.contact_wrench[2] = fx, fy, fz
     s.contact_wrench[3] = nx + y * fz - z * fy
     s.contact_wrench[4] = ny + z * fx - x * fz

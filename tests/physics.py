@@ -95,13 +95,9 @@ def controller(robot: Robot, **config) -> MomentumQP:
 def recovery(
     name: str = "humanoid", root: str = "hard", specific: float = 0.28, every: int = 6
 ) -> tuple[Tick, ...]:
-    """Ticks along push recoveries in four directions, 0.4 s each, from contact lost to at rest.
-
-    Without `accel_floor`, a regularisation that only the eliminated problem has.
-    """
+    """Ticks along push recoveries in four directions, 0.4 s each, from contact lost to at rest."""
     robot = robot_named(name)
     qp = controller(robot, root=root)
-    qp.parameters = qp.parameters._replace(accel_floor=0.0)
     simulation = Simulation(robot)
     ticks = []
     for direction in (0.0, 90.0, 180.0, 250.0):

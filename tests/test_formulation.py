@@ -21,7 +21,6 @@ from poise.baselines.task_rows import (
 )
 
 from .physics import (
-    controller,
     recovery,
     robot_named,
 )
@@ -81,17 +80,6 @@ def test_the_active_set_solver_agrees_on_the_readable_problem():
         qp = build(tick.state, tick.targets, tick.parameters, tick.cop_vel)
         ours = torques_of(tick.state, solve(qp, "active-set").x)
         np.testing.assert_allclose(motors(tick.state, ours), tick.torques, atol=1e-7)
-
-
-def test_the_accel_floor_of_the_compiled_problem_changes_little(robot):
-    """What only the compiled problem is regularised with changes torques by less than 1 %."""
-    qp = controller(robot)
-    for tick in [tick for tick in recovery() if tick.solved][::8]:
-        qp.reset(tick.state)
-        with_floor = qp.torques(tick.state, tick.targets)
-        x = solve(build(tick.state, tick.targets, qp.parameters)).x
-        change = with_floor - motors(tick.state, torques_of(tick.state, x))
-        assert np.abs(change / robot.torque_limit).max() < 1e-2
 
 
 def test_constraints_hold_at_the_solution(tick):

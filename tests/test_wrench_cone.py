@@ -9,7 +9,7 @@ from poise.envs.simulation import Simulation
 
 from .physics import robot_named
 
-MU, RADIUS = 0.8, 0.05
+MU = 0.8
 POLYGONS = {
     "box": np.array([[0.13, -0.04], [0.13, 0.04], [-0.13, 0.04], [-0.13, -0.04]]),
     "skewed": np.array([[0.1, -0.05], [0.14, 0.02], [0.0, 0.05], [-0.1, 0.02], [-0.09, -0.03]]),
@@ -32,7 +32,7 @@ def random_points(rng, polygon, count):
 
 def test_pressure_anywhere_in_the_polygon_is_inside(polygon):
     """Vertical forces at points of the sole are in the cone, and their sums too."""
-    cone = wrench_cone(polygon, MU, RADIUS)
+    cone = wrench_cone(polygon, MU)
     rng = np.random.default_rng(0)
     wrenches = [at(point, [0, 0, 300.0]) for point in random_points(rng, polygon, 50)]
     assert max((cone @ w).max() for w in wrenches) < 1e-9
@@ -41,7 +41,7 @@ def test_pressure_anywhere_in_the_polygon_is_inside(polygon):
 
 def test_pressure_outside_the_polygon_is_outside(polygon):
     """A CoP 1 mm beyond any vertex or edge is refused, one 1 mm inside of it is not."""
-    cone, middle = wrench_cone(polygon, MU, RADIUS), polygon.mean(axis=0)
+    cone, middle = wrench_cone(polygon, MU), polygon.mean(axis=0)
     border = np.concatenate([polygon, 0.5 * (polygon + np.roll(polygon, -1, axis=0))])
     for point in border:
         outward = (point - middle) / np.linalg.norm(point - middle)
@@ -50,26 +50,19 @@ def test_pressure_outside_the_polygon_is_outside(polygon):
 
 
 def test_friction(polygon):
-    """Tangential forces are inside while |f_x| + |f_y| is below μ f_z."""
-    cone, middle = wrench_cone(polygon, MU, RADIUS), polygon.mean(axis=0)
+    """Tangential forces through the middle are inside while |f_x| + |f_y| is below μ f_z."""
+    cone, middle = wrench_cone(polygon, MU), polygon.mean(axis=0)
     for angle in np.linspace(0.0, 2 * np.pi, 17):
         direction = np.array([np.cos(angle), np.sin(angle)])
         reach = MU / np.abs(direction).sum()
         for size, inside in ((0.999 * reach, True), (1.001 * reach, False)):
-            # the force's moment about the origin must not need yaw: take it at the CoP (0, 0)
-            force = np.array([*size * direction, 1.0])
-            wrench = np.concatenate([force, at(middle, [0, 0, 1.0])[3:]])
+            wrench = at(middle, [*size * direction, 1.0])
             assert bool((cone @ wrench).max() <= 0.0) is inside
 
 
-def test_yaw_moment_and_pulling(polygon):
-    """|n_z| ≤ μ ρ f_z, and nothing with f_z < 0."""
-    cone, middle = wrench_cone(polygon, MU, RADIUS), polygon.mean(axis=0)
-    for sign in (-1.0, 1.0):
-        inside = at(middle, [0, 0, 10.0], yaw=sign * 0.999 * MU * RADIUS * 10.0)
-        outside = at(middle, [0, 0, 10.0], yaw=sign * 1.001 * MU * RADIUS * 10.0)
-        assert (cone @ inside).max() < 0.0 < (cone @ outside).max()
-    rng = np.random.default_rng(1)
+def test_nothing_pulls(polygon):
+    """No wrench with f_z < 0 is inside, and no wrench at all is."""
+    cone, rng = wrench_cone(polygon, MU), np.random.default_rng(1)
     for _ in range(200):
         wrench = rng.normal(size=6)
         wrench[2] = -abs(wrench[2])
@@ -77,27 +70,29 @@ def test_yaw_moment_and_pulling(polygon):
     assert (cone @ np.zeros(6)).max() == 0.0
 
 
-def test_a_sole_can_transmit_what_the_cone_allows_in_its_middle(polygon):
-    """With the CoP in the middle, any wrench of the robots' cones is a sum of forces at vertices
-    that do not slide, as long as friction and yaw moment do not both use more than half."""
-    radius = 0.5 * float(np.mean(np.linalg.norm(polygon, axis=1)))
-    cone = wrench_cone(polygon, 0.9 * MU, radius)
-    middle, rng = polygon.mean(axis=0), np.random.default_rng(2)
-    # unknowns: components along 16 edges of each vertex's friction cone
-    angles = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
-    edges = np.stack([MU * np.cos(angles), MU * np.sin(angles), np.ones(16)], axis=1)
+def test_the_cone_is_what_forces_at_the_vertices_can_give(polygon):
+    """A wrench is inside if and only if forces at the vertices that do not slide add up to it."""
+    cone, rng = wrench_cone(polygon, MU), np.random.default_rng(2)
+    edges = [[MU, 0, 1], [-MU, 0, 1], [0, MU, 1], [0, -MU, 1]]
     columns = np.stack([at(vertex, edge) for vertex in polygon for edge in edges], axis=1)
-    for _ in range(20):
-        friction, yaw = rng.uniform(-1, 1, 2), rng.uniform(-1, 1)
-        share = rng.uniform(0.0, 1.0)
-        force = np.array([*share * 0.5 * 0.9 * MU / np.sqrt(2) * friction, 1.0])
-        moment = at(middle, [0, 0, 1.0])[3:]
-        moment[2] = middle[0] * force[1] - middle[1] * force[0]
-        moment[2] += 0.5 * 0.9 * MU * radius * yaw
-        wrench = np.concatenate([force, moment])
-        assert (cone @ wrench).max() <= 0.0
-        result = linprog(np.zeros(columns.shape[1]), A_eq=columns, b_eq=wrench)
-        assert result.success
+    inside = 0
+    for point in random_points(rng, polygon, 60):
+        force = np.array([*rng.uniform(-0.6, 0.6, 2) * MU, 1.0])
+        wrench = at(point, force, yaw=rng.normal() * 0.08)
+        violation = (cone @ wrench).max()
+        possible = linprog(np.zeros(columns.shape[1]), A_eq=columns, b_eq=wrench).success
+        assert abs(violation) < 1e-9 or (violation < 0.0) == possible
+        inside += possible
+    assert 10 < inside < 50
+
+
+def test_a_corner_transmits_no_yaw_moment(polygon):
+    """Pressure in the middle leaves room for a yaw moment, pressure at a corner leaves none."""
+    cone = wrench_cone(polygon, MU)
+    for sign in (-1.0, 1.0):
+        assert (cone @ at(polygon.mean(axis=0), [0, 0, 1.0], yaw=sign * 0.02)).max() < 0.0
+        for vertex in polygon:
+            assert (cone @ at(0.999 * vertex, [0, 0, 1.0], yaw=sign * 0.002)).max() > 0.0
 
 
 @pytest.mark.parametrize("name", ["humanoid", "tall", "compact", "toddler"])
@@ -105,7 +100,7 @@ def test_cones_of_a_robot(name):
     """Shares shrink friction and polygon; all soles have as many rows; padding never binds."""
     robot = robot_named(name)
     cones = robot_cones(robot, 0.5, 0.9)
-    assert cones.shape == (2, 6 + max(len(sole.polygon) for sole in robot.soles), 6)
+    assert cones.shape[0] == 2 and cones.shape[1] >= 32
     for cone, sole in zip(cones, robot.soles, strict=True):
         mu = 0.5 * sole_friction(robot, sole)
         assert (cone @ [0.99 * mu, 0, 1, 0, 0, 0]).max() <= 0.0

@@ -70,6 +70,7 @@ class TrainConfig:
     threads: int = field(default=2, metadata={"min": 1})
     env: EnvConfig = field(default_factory=EnvConfig)
     residual: ResidualScales = field(default_factory=ResidualScales)
+    smoothing: float = field(default=0.0, metadata={"min": 0.0})  # of the action [s]
     ppo: PPOConfig = field(default_factory=PPOConfig)
     curriculum: Curriculum = field(default_factory=Curriculum)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
@@ -83,6 +84,7 @@ class TrainConfig:
             "controller": self.controller,
             "motion": self.motion,
             "residual": self.residual,
+            "smoothing": self.smoothing,
             **overrides,
         }
         return ResidualBalanceEnv(robot or self.robot, self.env, **arguments)
