@@ -19,6 +19,14 @@ Unit = Literal[
 LIMIT_DURATION = 0.1  # [s] of the pushes that a limit table was measured with
 
 
+def push_bodies(robot: Robot) -> tuple[str, ...]:
+    """The bodies to push, by the robot's description (else its root); raises ConfigError."""
+    bodies = robot.description.push_bodies
+    for body in bodies:
+        check_body(body, robot, f"push_bodies of {robot.name}")
+    return bodies or (robot.model.body(robot.root_body_id).name,)
+
+
 @dataclass(frozen=True)
 class LimitTable:
     """Impulse that a controller recovers from in half of the trials, J50, per direction.
@@ -54,7 +62,7 @@ class PushSampler:
 
     magnitude: Range = field(metadata={"min": 0.0})
     unit: Unit
-    bodies: tuple[str, ...] = ()  # one is drawn for each push; none: the root body
+    bodies: tuple[str, ...] = ()  # one is drawn for each push; none: `push_bodies`
     duration: Range = field(default=(LIMIT_DURATION, LIMIT_DURATION), metadata={"above": 0.0})
     direction: Range = field(default=(0.0, 360.0), metadata={"min": -360.0, "max": 360.0})  # [deg]
     elevation: Range = field(default=(0.0, 0.0), metadata={"min": -90.0, "max": 90.0})  # [deg]
@@ -110,7 +118,7 @@ class PushSampler:
         margin: Margin | None,
         limits: Limits | None,
     ) -> Push | Kick:
-        bodies = self.bodies or (robot.model.body(robot.root_body_id).name,)
+        bodies = self.bodies or push_bodies(robot)
         body = bodies[int(rng.integers(len(bodies)))]
         duration = rng.uniform(*self.duration)
         direction = rng.uniform(*self.direction)

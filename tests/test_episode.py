@@ -118,18 +118,37 @@ def test_what_a_fall_is():
     assert fallen(simulation)
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-def test_the_tilt_limit_is_an_angle(axis):
-    """50° about a horizontal axis falls with a limit of 49°, not with one of 51°."""
+def tilted(degrees, axis):
+    """A simulation whose root is turned about a horizontal axis, nothing but feet touching."""
     simulation = Simulation(robot())
     qpos = robot().standing_qpos.copy()
-    q, c, s = qpos[3:7].copy(), np.cos(np.radians(25)), np.sin(np.radians(25))
+    half = np.radians(degrees) / 2
+    q, c, s = qpos[3:7].copy(), np.cos(half), np.sin(half)
     other = [-q[1], q[0], -q[3], q[2]] if axis == 0 else [-q[2], q[3], q[0], -q[1]]
     qpos[3:7] = c * q + s * np.array(other)
     simulation.reset(qpos)
     simulation.state_arrays.other_contacts[0] = 0.0
+    return simulation
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_tilt_limit_is_an_angle(axis):
+    """50° about a horizontal axis falls with a limit of 49°, not with one of 51°."""
+    simulation = tilted(50.0, axis)
     assert fallen(simulation, tilt=49.0, height=0.01)
     assert not fallen(simulation, tilt=51.0, height=0.01)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_only_who_stands_upright_is_quiet(axis):
+    """Tilted by 20° and at rest over the soles counts as quiet below a limit of 21°, not of 19°."""
+    simulation = tilted(20.0, axis)
+    s = simulation.state_arrays
+    s.com[:2] = s.origin[:2]
+    for limit, steps in ((21.0, 1.0), (19.0, 0.0)):
+        _, e = play(simulation, time=0.02, limits=FallLimits(quiet_tilt=limit))
+        assert e.metrics[episode.FALLEN] == 0.0
+        assert e.metrics[episode.QUIET_STEPS] == steps
 
 
 def test_quiet_steps_count_and_start_again():

@@ -9,10 +9,10 @@ import pytest
 
 from poise.envs.errors import ConfigError
 from poise.envs.push_options import pendulum_rate
-from poise.envs.push_schedule import LimitTable
+from poise.envs.push_schedule import LimitTable, push_bodies
 from poise.envs.pushes import Push, ankle_limit
 from poise.envs.robot import Robot, load_robot
-from poise.training.limits import PushLimits, load_limits, push_bodies, write_limits
+from poise.training.limits import PushLimits, load_limits, write_limits
 
 
 @pytest.fixture(scope="module")

@@ -20,6 +20,7 @@ from poise.training.checkpoints import (
     POLICY,
     STATE,
     STATISTICS,
+    controller_fingerprint,
     restore,
     save_checkpoint,
 )
@@ -92,8 +93,13 @@ def test_the_first_policy_is_the_controller_alone(tmp_path):
     model = make_model(tiny_config(), normalize)
     seen = observations(model, 20)
     assert not model.predict(seen, deterministic=True)[0].any()
-    state = {"timesteps": 0, "fingerprint": robot().fingerprint}
-    save_checkpoint(tmp_path / "first", model, normalize, tiny_config(), state)
+    config = tiny_config()
+    state = {
+        "timesteps": 0,
+        "fingerprint": robot().fingerprint,
+        "controller_fingerprint": controller_fingerprint(config),
+    }
+    save_checkpoint(tmp_path / "first", model, normalize, config, state)
     assert not load_policy(tmp_path / "first").act(seen).any()
     normalize.close()
 
@@ -155,6 +161,14 @@ def test_another_robot_is_refused(folder):
     with pytest.raises(ConfigError, match=f"{STATE}: fingerprint.*humanoid"):
         load_policy(folder, robot("tall"))
     assert load_policy(folder, robot()).state["robot"] == "humanoid"
+
+
+def test_another_version_of_the_controller_is_refused(folder):
+    """A policy moves the targets of the gains that it learned on."""
+    state = json.loads((folder / STATE).read_text())
+    (folder / STATE).write_text(json.dumps({**state, "controller_fingerprint": "0" * 64}))
+    with pytest.raises(ConfigError, match=f"{STATE}: controller_fingerprint.*momentum-qp"):
+        load_policy(folder)
 
 
 def test_another_action_size_is_refused(folder):

@@ -202,14 +202,14 @@ def test_nothing_to_resume(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("spoil", ["truncate", "robot"])
+@pytest.mark.parametrize("spoil", ["truncate", "fingerprint", "controller_fingerprint"])
 def test_a_damaged_run_is_not_resumed(run, spoil):
     """One error names the file; nothing is written over."""
     path = run / "last" / (POLICY if spoil == "truncate" else STATE)
     if spoil == "truncate":
         path.write_bytes(path.read_bytes()[:5000])
     else:
-        path.write_text(json.dumps({**state(run), "fingerprint": "0" * 64}))
+        path.write_text(json.dumps({**state(run), spoil: "0" * 64}))
     before = snapshot(run)
     with pytest.raises(ConfigError, match=path.name):
         train(tiny_config(steps=256), run, resume=True, progress=False)

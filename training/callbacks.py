@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from poise.envs.batch import EnvBatch
 from poise.envs.config import write_atomic
 
-from .checkpoints import save_checkpoint
+from .checkpoints import controller_fingerprint, save_checkpoint
 from .config import TrainConfig
 
 
@@ -154,6 +154,7 @@ class Checkpoints(BaseCallback):
             "timesteps": self.num_timesteps,
             "fingerprint": robot.fingerprint,
             "robot": robot.name,
+            "controller_fingerprint": controller_fingerprint(self.config),
             "observations": int(inputs[0]),
             "actions": int(outputs[0]),
             "next_evaluation": self._next,

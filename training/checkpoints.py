@@ -5,6 +5,7 @@ Nothing in it is unpickled on loading: weights by torch's weights-only reader, s
 plain arrays, the rest as YAML and JSON.
 """
 
+import hashlib
 import json
 import os
 import pickle
@@ -18,6 +19,7 @@ import numpy as np
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
+from poise.baselines.registry import controller_config
 from poise.envs.config import to_yaml
 from poise.envs.errors import ConfigError, PoiseError
 
@@ -109,6 +111,21 @@ def check_robot(state: dict[str, Any], fingerprint: str, path: Path) -> None:
             source=path,
             field="fingerprint",
         )
+
+
+def check_controller(state: dict[str, Any], config: TrainConfig, path: Path) -> None:
+    """Raise ConfigError unless the controller still has the gains that the policy learned on."""
+    if state.get("controller_fingerprint") != controller_fingerprint(config):
+        raise ConfigError(
+            f"trained on another version of the controller {config.controller!r}",
+            source=path,
+            field="controller_fingerprint",
+        )
+
+
+def controller_fingerprint(config: TrainConfig) -> str:
+    """Hash of the configuration of the controller below the policy."""
+    return hashlib.sha256(to_yaml(controller_config(config.controller)).encode()).hexdigest()
 
 
 def unreadable(path: Path, error: BaseException) -> ConfigError:

@@ -7,11 +7,11 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from poise.envs.push_options import check_body, to_impulse
-from poise.envs.push_schedule import Range
+from poise.envs.push_schedule import Range, push_bodies
 from poise.envs.pushes import Push
 
 from .fits import fit_logistic
-from .limits import PushLimits, push_bodies
+from .limits import PushLimits
 from .suite import Recovered, Suite, generator, make_trial
 from .trials import Trial
 

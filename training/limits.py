@@ -5,7 +5,7 @@ from pathlib import Path
 
 from poise.envs.config import build, packaged, read_yaml, resolve, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
-from poise.envs.push_options import check_body, pendulum_rate
+from poise.envs.push_options import pendulum_rate
 from poise.envs.push_schedule import LIMIT_DURATION, LimitTable
 from poise.envs.pushes import Push, ankle_limit, duration_factor
 from poise.envs.robot import Robot
@@ -81,11 +81,3 @@ def write_limits(path: Path, robot: Robot, controller: str, table: LimitTable) -
     """Write a file that `load_limits` reads; raises PoiseError when the disk refuses."""
     measured = MeasuredLimits(robot.name, robot.fingerprint, controller, table)
     write_atomic(path, to_yaml(measured))
-
-
-def push_bodies(robot: Robot) -> tuple[str, ...]:
-    """The bodies that a benchmark pushes, by the robot's description; raises ConfigError."""
-    bodies = robot.description.push_bodies
-    for body in bodies:
-        check_body(body, robot, f"push_bodies of {robot.name}")
-    return bodies or (robot.model.body(robot.root_body_id).name,)

@@ -154,7 +154,7 @@ def fall_probability(
                 )
         ax.set_ylim(-0.03, 1.03)
         ax.yaxis.set_major_formatter(PercentFormatter(1.0))
-        ax.set_ylabel("trials that fell (bars: 95 % interval)")
+        ax.set_ylabel("trials not recovered (bars: 95 % interval)")
         ax.set_xlabel(xlabel or IMPULSE_LABEL[unit])
         ax.set_title(title)
         legend_below(figure, columns=2)

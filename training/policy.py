@@ -21,6 +21,7 @@ from .checkpoints import (
     STATE,
     STATISTICS,
     UNREADABLE,
+    check_controller,
     check_robot,
     find_checkpoint,
     read_state,
@@ -85,6 +86,7 @@ def load_policy(folder: str | Path | None = None, robot: Robot | None = None) ->
     layers = _read_weights(path / POLICY)
     robot = robot or load_robot(config.robot)
     check_robot(state, robot.fingerprint, path / STATE)
+    check_controller(state, config, path / STATE)
     env = config.make_env(robot)
     inputs, outputs = env.observation_space.shape[0], env.action_space.shape[0]
     for name, what, size, expected in (

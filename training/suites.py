@@ -10,11 +10,11 @@ from typing import Any, Literal
 
 from poise.envs.config import build, read_yaml, resolve
 from poise.envs.errors import ConfigError
-from poise.envs.push_schedule import PushSampler
+from poise.envs.push_schedule import PushSampler, push_bodies
 from poise.envs.pushes import Push
 
 from .direction_suites import EnvelopeSuite, GridSuite
-from .limits import PushLimits, push_bodies
+from .limits import PushLimits
 from .suite import Suite, generator, make_trial, start_seed
 from .trials import Trial
 

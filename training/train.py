@@ -15,7 +15,7 @@ from poise.envs.errors import ConfigError
 from poise.envs.robot import load_robot
 
 from .callbacks import Checkpoints, Progress, Throughput
-from .checkpoints import CONFIG, find_checkpoint, restore
+from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
 from .schedules import CurriculumCallback, ExplorationCallback
 from .vec_env import ThreadedVecEnv
@@ -47,6 +47,7 @@ def train(
     if checkpoint is not None:
         robot = normalize.get_attr("robot")[0]
         state = restore(checkpoint, model, normalize, robot.fingerprint)
+        check_controller(state, config, checkpoint / STATE)
         model.num_timesteps = state["timesteps"]
         _reseed(model, normalize, config.seed + model.num_timesteps)
     write_atomic(out / CONFIG, to_yaml(config))
