@@ -67,7 +67,9 @@ class ResidualBalanceEnv(BalanceEnv):
     `residual.momentum` [m h² ω] appends `momentum_x` and `momentum_y`, angular momentum that the
     posture is to carry. With `smoothing` τ > 0 [s] the targets follow the action as a first-order
     lag, a ← a + (1 − e^(−T/τ)) (action − a) per policy step T; a then is what the observation and
-    the rewards call the action.
+    the rewards call the action. With `gate` d₀ > 0 [m] the residual is scaled by
+    1 − exp(−(d/d₀)²), d the distance of the capture point from the reference's: at rest the
+    controller is alone.
 
     Observation: Box(−10, 10), in the heading frame; h is the standing height of the CoM and
     ω = √(g/h). It does not know the push. The reference is that of `motion`.
@@ -184,7 +186,8 @@ class ResidualBalanceEnv(BalanceEnv):
     Arguments: `robot` (a name, a .yaml file or a `Robot`), `config` (an `EnvConfig`, a .yaml file
     or a mapping), `controller` (a name, a .yaml file, a mapping or a `Controller`),
     `motion` (a name, a .yaml file or a `ReferenceMotion`), `residual` (what an action of 1 adds, a
-    `ResidualScales`), `smoothing` (time constant of the action [s]), `render_mode` (None,
+    `ResidualScales`), `smoothing` (time constant of the action [s]), `gate` (distance from rest at which
+    the residual opens [m]), `render_mode` (None,
     "rgb_array" or "human"), and the fields of `EnvConfig` by name: policy_period, duration, pushes,
     noise, fall, reward. Fields may be plain mappings. Raises ConfigError naming what is wrong.
 
@@ -200,6 +203,7 @@ class ResidualBalanceEnv(BalanceEnv):
         motion: str | Path | ReferenceMotion = "standing",
         residual: ResidualScales | Mapping | None = None,
         smoothing: float = 0.0,
+        gate: float = 0.0,
         render_mode: str | None = None,
         **overrides: Any,
     ):
@@ -213,7 +217,9 @@ class ResidualBalanceEnv(BalanceEnv):
         super().__init__(robot, config, render_mode=render_mode, **overrides)
         if not 0.0 <= smoothing < np.inf:
             raise ConfigError(f"must be a time of at least 0 s, not {smoothing}", field="smoothing")
-        self.smoothing = float(smoothing)
+        if not 0.0 <= gate < np.inf:
+            raise ConfigError(f"must be a distance of at least 0 m, not {gate}", field="gate")
+        self.smoothing, self.gate = float(smoothing), float(gate)
         # share of the way that the residual goes to the action in one policy step
         share = 1.0 if smoothing == 0.0 else -np.expm1(-self.config.policy_period / smoothing)
         self._share = float(share)
@@ -273,7 +279,7 @@ class ResidualBalanceEnv(BalanceEnv):
         residual, e = self._offsets, self.episode
         if self._share < 1.0:
             e.action[:] = e.last_action + self._share * (e.action - e.last_action)
-        residual[self._moved] = self._scale * e.action
+        residual[self._moved] = self._openness() * self._scale * e.action
         if not self._compiled:
             return self._advance_in_python(residual)
         return residual_step(
@@ -282,6 +288,19 @@ class ResidualBalanceEnv(BalanceEnv):
             self._motion, self._com_offset, residual,
             self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
         )  # fmt: skip
+
+    def _openness(self) -> float:
+        """1 − exp(−(d/gate)²), d the capture point's distance from that of the reference [m]."""
+        if self.gate == 0.0:
+            return 1.0
+        s, samples, nj = self.simulation.state_arrays, self._motion.samples, self.targets.q_ref.size
+        omega = float(s.omega[0])
+        x = samples[0, nj] + self._com_offset + samples[1, nj] / omega
+        y = samples[0, nj + 1] + samples[1, nj + 1] / omega
+        cos, sin = s.heading
+        dx = s.capture_point[0] - s.origin[0] - (cos * x - sin * y)
+        dy = s.capture_point[1] - s.origin[1] - (sin * x + cos * y)
+        return float(-np.expm1(-(dx * dx + dy * dy) / self.gate**2))
 
     def _advance_in_python(self, residual: np.ndarray) -> float:
         """What `residual_step` does, for any controller."""

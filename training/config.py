@@ -71,6 +71,7 @@ class TrainConfig:
     env: EnvConfig = field(default_factory=EnvConfig)
     residual: ResidualScales = field(default_factory=ResidualScales)
     smoothing: float = field(default=0.0, metadata={"min": 0.0})  # of the action [s]
+    gate: float = field(default=0.0, metadata={"min": 0.0})  # of the residual [m]
     ppo: PPOConfig = field(default_factory=PPOConfig)
     curriculum: Curriculum = field(default_factory=Curriculum)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
@@ -85,6 +86,7 @@ class TrainConfig:
             "motion": self.motion,
             "residual": self.residual,
             "smoothing": self.smoothing,
+            "gate": self.gate,
             **overrides,
         }
         return ResidualBalanceEnv(robot or self.robot, self.env, **arguments)
