@@ -8,30 +8,52 @@ from poise.envs.config import build, packaged, read_yaml, resolve
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 
+from .abe07 import Abe07, Abe07Config
+from .capture_point import CapturePoint, CapturePointConfig
+from .jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
+from .kudoh02 import Kudoh02, Kudoh02Config
+from .lip_mpc import LIPMPC, LIPMPCConfig
+from .lqr_lip import LQRLIP, LQRLIPConfig
 from .momentum_qp import MomentumQP, MomentumQPConfig
+from .pd import PD, PDConfig
+from .stable_pd import StablePD, StablePDConfig
+
+#: `kind` → its configuration and its controller, which takes (robot, configuration).
+KINDS: dict[str, tuple[type, type]] = {
+    "momentum-qp": (MomentumQPConfig, MomentumQP),
+    "pd": (PDConfig, PD),
+    "stable-pd": (StablePDConfig, StablePD),
+    "jacobian-transpose": (JacobianTransposeConfig, JacobianTranspose),
+    "kudoh02": (Kudoh02Config, Kudoh02),
+    "abe07": (Abe07Config, Abe07),
+    "capture-point": (CapturePointConfig, CapturePoint),
+    "lqr-lip": (LQRLIPConfig, LQRLIP),
+    "lip-mpc": (LIPMPCConfig, LIPMPC),
+}
 
 
-def controller_config(name_or_path: str | Path) -> MomentumQPConfig:
-    """The configuration in a packaged file or a path.
+def controller_config(name_or_path: str | Path) -> Any:
+    """The configuration in a packaged file or a path, of the class that its `kind` names.
 
     Raises ConfigError naming the file, the field and the choices.
     """
     path = resolve("controllers", name_or_path)
-    return build(MomentumQPConfig, read_yaml(path), str(path))
+    return _build(read_yaml(path), str(path))
 
 
 def load_controller(controller: Any, robot: Robot) -> Any:
-    """A controller for `robot`: from a name, a path, a mapping or a MomentumQPConfig.
+    """A controller for `robot`: from a name, a path, a mapping or a configuration.
 
     Whatever has `period`, `reset` and `torques` (see `Controller`) is returned as it is.
     Raises ConfigError naming the file, the field and the choices.
     """
-    if isinstance(controller, MomentumQPConfig):
-        return MomentumQP(robot, controller)
     if isinstance(controller, (str, Path)):
-        return MomentumQP(robot, controller_config(controller))
+        controller = controller_config(controller)
     if isinstance(controller, Mapping):
-        return MomentumQP(robot, build(MomentumQPConfig, dict(controller), "controller"))
+        controller = _build(dict(controller), "controller")
+    for config_class, controller_class in KINDS.values():
+        if type(controller) is config_class:
+            return controller_class(robot, controller)
     if all(hasattr(controller, name) for name in ("period", "reset", "torques")):
         return controller
     raise ConfigError(
@@ -39,3 +61,16 @@ def load_controller(controller: Any, robot: Robot) -> Any:
         field="controller",
         choices=packaged("controllers"),
     )
+
+
+def _build(data: dict[str, Any], source: str) -> Any:
+    """A configuration; `qp` may be the name of one of the momentum QP, or its mapping."""
+    kind = data.get("kind", "momentum-qp")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise ConfigError(
+            f"no such kind of controller: {kind!r}", source=source, field="kind", choices=KINDS
+        )
+    if isinstance(data.get("qp"), str):
+        inner = resolve("controllers", data["qp"])
+        data = {**data, "qp": read_yaml(inner)}
+    return build(KINDS[kind][0], data, source)

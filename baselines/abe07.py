@@ -1,0 +1,63 @@
+"""CoM and motion tracking in one QP, without CoP control [Abe07, Moskalev24 §1.1.2]."""
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from poise.envs.robot import Robot
+from poise.envs.state import RobotState
+
+from .controller import Targets
+from .momentum_qp import MomentumQP, MomentumQPConfig
+
+
+@dataclass(frozen=True)
+class Abe07Config:
+    """The tracking weight falls to `floor` of itself as the CoM leaves: over `distance` [share of
+    the CoM height] of the CoM from c_ref. The QP's CoP weight is not used: it is 0 here."""
+
+    kind: Literal["abe07"] = "abe07"
+    distance: float = field(default=0.05, metadata={"above": 0.0})
+    floor: float = field(default=0.1, metadata={"above": 0.0, "max": 1.0})
+    qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+
+
+class Abe07:
+    """min β h_t + h_c: no angular momentum, β = floor + (1 − floor) exp(−(|c − c_ref| / d)²).
+
+    A CoM far from its goal counts more than the motion; near it, the motion is followed again.
+    """
+
+    def __init__(self, robot: Robot, config: Abe07Config | None = None):
+        self.robot = robot
+        self.config = config or Abe07Config()
+        cop = replace(self.config.qp.cop, weight=0.0, yaw_weight=0.0)
+        self.qp = MomentumQP(robot, replace(self.config.qp, cop=cop))
+        self.period, self.com_offset = self.qp.period, self.qp.com_offset
+        self._tracking = self.qp.parameters.accel_weight.copy()
+
+    @property
+    def failures(self) -> int:
+        """Ticks since the reset at which the QP was not solved."""
+        return self.qp.failures
+
+    @property
+    def root_wrench(self) -> np.ndarray:
+        """(6,) u_root of the last tick, soft root only."""
+        return self.qp.root_wrench
+
+    def reset(self, state: RobotState | None = None) -> None:
+        """Forget the last trial."""
+        self.qp.reset(state)
+
+    def tracking(self, state: RobotState, targets: Targets) -> float:
+        """β of this state."""
+        away = np.linalg.norm(state.com[:2] - targets.com[:2])
+        share = np.exp(-((away / (self.config.distance * self.robot.height_com)) ** 2))
+        return float(self.config.floor + (1.0 - self.config.floor) * share)
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] for the next `period`."""
+        self.qp.parameters.accel_weight[:] = self.tracking(state, targets) * self._tracking
+        return self.qp.torques(state, targets)

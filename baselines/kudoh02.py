@@ -1,0 +1,83 @@
+"""A QP for large deviations of the CoM, PD for small ones [Kudoh02, Moskalev24 §1.1.1]."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from poise.envs.robot import Robot
+from poise.envs.state import RobotState
+
+from .controller import Targets
+from .momentum_qp import MomentumQP, MomentumQPConfig
+from .pd import PDGains
+from .stable_pd import StablePD, StablePDConfig
+
+
+@dataclass(frozen=True)
+class Kudoh02Config:
+    """The QP takes over where the capture point is farther than `far` from c_ref, and hands back
+    below `near` [shares of the CoM height]; torques pass from one to the other in `blend` [s].
+
+    `qp` brings the CoM back with the CoP in the soles; it tracks no motion but for what makes
+    its solution unique.
+    """
+
+    kind: Literal["kudoh02"] = "kudoh02"
+    near: float = field(default=0.02, metadata={"min": 0.0})
+    far: float = field(default=0.05, metadata={"min": 0.0})
+    blend: float = field(default=0.1, metadata={"above": 0.0})
+    pd: PDGains = field(default_factory=PDGains)
+    qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+
+    def __post_init__(self):
+        if self.near > self.far:
+            raise ValueError("near must not be larger than far")
+
+
+class Kudoh02:
+    """Switches by the distance of the CoM from its goal, with hysteresis.
+
+    The paper switches by the CoM's position; the capture point is taken here, because at the
+    moment of a push the CoM has not moved yet.
+    """
+
+    def __init__(self, robot: Robot, config: Kudoh02Config | None = None):
+        self.robot = robot
+        self.config = config or Kudoh02Config()
+        self.qp = MomentumQP(robot, self.config.qp)
+        period = self.config.qp.period
+        self.pd = StablePD(robot, StablePDConfig(period=period, gains=self.config.pd))
+        self.period, self.com_offset = period, self.qp.com_offset
+        self.reset()
+
+    @property
+    def failures(self) -> int:
+        """Ticks since the reset at which the QP was not solved."""
+        return self.qp.failures
+
+    @property
+    def root_wrench(self) -> np.ndarray:
+        """(6,) u_root of the QP's last tick, soft root only."""
+        return self.qp.root_wrench
+
+    def reset(self, state: RobotState | None = None) -> None:
+        """Forget the last trial: start with PD."""
+        self.qp.reset(state)
+        self.large = False  # whether the deviation is large
+        self._share = 0.0  # of the QP in the torques
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] for the next `period`."""
+        away = np.linalg.norm(state.capture_point - targets.com[:2])
+        limit = self.config.near if self.large else self.config.far
+        self.large = bool(away > limit * self.robot.height_com)
+        step = self.period / self.config.blend
+        # to the QP at once, a push does not wait; back to PD in `blend`
+        self._share = 1.0 if self.large else max(self._share - step, 0.0)
+        tau = np.zeros(len(self.robot.motor_dofs))
+        if self._share > 0.0:
+            tau += self._share * self.qp.torques(state, targets)
+        if self._share < 1.0:
+            tau += (1.0 - self._share) * self.pd.torques(state, targets)
+        return tau
