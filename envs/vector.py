@@ -178,9 +178,10 @@ def stack_infos(infos: Sequence[dict[str, Any]], mask: np.ndarray) -> dict[str, 
             parts = [infos[i][key] if mask[i] else {} for i in range(len(mask))]
             column = stack_infos(parts, mask)
         elif key != "final_obs" and isinstance(example, (int, float, np.number, np.ndarray)):
-            filled = np.array(values)
-            column = np.zeros((len(mask), *filled.shape[1:]), dtype=filled.dtype)
-            column[rows] = filled
+            column = np.array(values)
+            if len(rows) < len(mask):
+                column, filled = np.zeros((len(mask), *column.shape[1:]), column.dtype), column
+                column[rows] = filled
         else:
             column = np.full(len(mask), None, dtype=object)
             for i, value in zip(rows, values, strict=True):
