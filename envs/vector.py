@@ -40,6 +40,9 @@ class BalanceVectorEnv(VectorEnv):
     Raises ConfigError for an unknown mode, fewer threads than one, or environments that differ.
     """
 
+    batch: EnvBatch
+    envs: list[BalanceEnv]
+
     def __init__(
         self,
         envs: Sequence[BalanceEnv],
@@ -57,7 +60,8 @@ class BalanceVectorEnv(VectorEnv):
         if not isinstance(threads, Integral) or threads < 1:
             raise ConfigError(f"must be at least 1, not {threads!r}", field="threads")
         self.batch = EnvBatch(envs, int(threads), infos=True)
-        self.envs, first = self.batch.envs, self.batch.envs[0]
+        self.envs = self.batch.envs
+        first = self.envs[0]
         self.num_envs = len(self.envs)
         self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = first.render_mode
@@ -78,8 +82,10 @@ class BalanceVectorEnv(VectorEnv):
         resets only some. Raises ConfigError for a wrong number of seeds, mask or option.
         """
         n, options = self.num_envs, dict(options or {})
-        if seed is None or isinstance(seed, Integral):
-            seed = [None if seed is None else int(seed) + i for i in range(n)]
+        if isinstance(seed, (int, np.integer)):
+            seeds: Sequence[int | None] = [int(seed) + i for i in range(n)]
+        else:
+            seeds = [None] * n if seed is None else seed
         mask = options.pop("reset_mask", None)
         if mask is None:
             mask = np.ones(n, dtype=bool)
@@ -87,7 +93,7 @@ class BalanceVectorEnv(VectorEnv):
             raise ConfigError(f"must be a bool array ({n},)", source="reset", field="reset_mask")
         elif not mask.any():
             raise ConfigError("needs at least one True", source="reset", field="reset_mask")
-        observations = self.batch.reset(seed, [options] * n, mask)
+        observations = self.batch.reset(seeds, [options] * n, mask)
         return observations.copy(), stack_infos(self.batch.infos, mask)
 
     def step(
@@ -125,17 +131,17 @@ class BalanceVectorEnv(VectorEnv):
             {**stack_infos(batch.infos, every), **infos},
         )
 
-    def render(self) -> tuple[np.ndarray | None, ...]:
+    def render(self) -> tuple[Any, ...]:
         """A frame of each environment, see `BalanceEnv.render`."""
         return tuple(env.render() for env in self.envs)
 
-    @property
-    def np_random(self) -> tuple[np.random.Generator, ...]:
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """Each environment's generator."""
         return tuple(env.np_random for env in self.envs)
 
     @property
-    def np_random_seed(self) -> tuple[int, ...]:
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """The seed of each environment's generator."""
         return tuple(env.np_random_seed for env in self.envs)
 
@@ -169,7 +175,7 @@ def stack_infos(infos: Sequence[dict[str, Any]], mask: np.ndarray) -> dict[str, 
     all else becomes an array of objects. "_key" (n,) tells whose `key` was reported: `mask`, of
     which the rows outside hold nothing.
     """
-    rows = np.flatnonzero(mask)
+    rows = np.flatnonzero(mask).tolist()
     stacked: dict[str, Any] = {}
     for key, example in infos[rows[0]].items():
         values = [infos[i][key] for i in rows]

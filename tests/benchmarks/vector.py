@@ -26,7 +26,7 @@ THREADS = min(2, CORES)
 ROUNDS, SECONDS = 9, 1.0  # of each contestant per round
 SPREAD = 0.2  # of the actions
 
-Stepper = Callable[[], None]
+Stepper = Callable[[], object]
 
 
 def single() -> tuple[int, Stepper]:
@@ -55,7 +55,7 @@ def processes(count: int) -> tuple[int, Stepper]:
     """Stable-Baselines3's processes, as its users make them."""
     env = make_vec_env(f"poise:{NAME}", n_envs=count, seed=0, vec_env_cls=SubprocVecEnv)
     env.reset()
-    draw = actions((count, *env.action_space.shape))
+    draw = actions((count, *(env.action_space.shape or ())))
     return count, lambda: env.step(draw())
 
 
