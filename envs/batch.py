@@ -38,10 +38,11 @@ class EnvBatch:
         self.envs = list(envs)
         first, n = self.envs[0], len(self.envs)
         for env in self.envs:
-            if env.observation_space != first.observation_space or (
-                env.action_space != first.action_space
-            ):
+            spaces = env.observation_space, env.action_space
+            if spaces != (first.observation_space, first.action_space):
                 raise ConfigError("environments must have the same spaces", field="envs")
+        if len({id(env) for env in envs}) < n:
+            raise ConfigError("holds an environment twice", field="envs")
         # a window is drawn to from one thread only
         self.threads = 1 if first.render_mode == "human" else max(1, min(threads, n))
         # the environments' own records become rows of these, so that nothing is gathered by hand
