@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from poise.envs.config import build, to_dict
 from poise.envs.episode import ROOT_FORCE, ROOT_MOMENT, judge_step, record_tick
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
+from poise.envs.vector import make_vector_env
 
 from .controller import Controller, Targets
 from .momentum_qp import MomentumQP, MomentumQPConfig
@@ -244,6 +246,24 @@ class ResidualBalanceEnv(BalanceEnv):
             self.motion.knots, self.motion.coeffs, self.motion.loop, np.zeros((3, columns))
         )
 
+    def arguments(self) -> dict[str, Any]:
+        """What makes another environment like this one; robot and motion are shared.
+
+        Raises ConfigError for a controller from outside: its memory cannot be shared.
+        """
+        if type(self.controller) is not MomentumQP:
+            raise ConfigError(
+                "one object cannot control several environments: give each its own",
+                field="controller",
+            )
+        return {
+            **super().arguments(),
+            "controller": self.controller.config,
+            "motion": self.motion,
+            "residual": self.residual,
+            "smoothing": self.smoothing,
+        }
+
     def _check_robots(self) -> None:
         """Compiled code trusts the sizes of its arrays."""
         made_for = getattr(self.controller, "robot", self.robot)
@@ -324,3 +344,6 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _root_wrench(self) -> np.ndarray:
         return getattr(self.controller, "root_wrench", np.zeros(6))
+
+
+vector_env = partial(make_vector_env, ResidualBalanceEnv)  # for gymnasium.make_vec

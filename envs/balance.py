@@ -79,6 +79,10 @@ class BalanceEnv(gymnasium.Env):
         self._renderer: SceneRenderer | None = None
         self._needs_reset = True
 
+    def arguments(self) -> dict[str, Any]:
+        """What makes another environment like this one; the robot is shared."""
+        return {"robot": self.robot, "config": self.config, "render_mode": self.render_mode}
+
     @staticmethod
     def _whole(period: float, step: float, name: str) -> int:
         count = round(period / step)
@@ -143,7 +147,7 @@ class BalanceEnv(gymnasium.Env):
         self._observe()
         if self.render_mode == "human":
             self.render()
-        return self.episode.observation.astype(np.float32), self._info()
+        return self.episode.observation.astype(np.float32), self.info()
 
     def _start(self, scale: float) -> tuple[np.ndarray, np.ndarray]:
         """A disturbed standing posture with its lowest sole on the ground."""
@@ -202,17 +206,21 @@ class BalanceEnv(gymnasium.Env):
 
         Raises ConfigError for an action that is not valid, PoiseError after the episode's end.
         """
-        if self._needs_reset:
-            raise PoiseError("step() after the episode's end: call reset() first")
         reward, terminated, truncated = self.step_in_place(action)
         if self.render_mode == "human":
             self.render()
         observation = self.episode.observation.astype(np.float32)
-        return observation, reward, terminated, truncated, self._info()
+        return observation, reward, terminated, truncated, self.info()
 
     def step_in_place(self, action: np.ndarray) -> tuple[float, bool, bool]:
         """What `step` does, without `info`: the observation is in `episode.observation`."""
         self.set_action(action)
+        return self.apply_action()
+
+    def apply_action(self) -> tuple[float, bool, bool]:
+        """What `step_in_place` does with an action that has been set."""
+        if self._needs_reset:
+            raise PoiseError("step() after the episode's end: call reset() first")
         reward = self._advance()
         if self.simulation.diverged:
             reward = self._diverged()
@@ -254,7 +262,7 @@ class BalanceEnv(gymnasium.Env):
         quiet = self.episode.metrics[QUIET_STEPS] * self.config.policy_period
         return bool(quiet >= self.config.fall.quiet_time - 1e-9)
 
-    def _info(self) -> dict[str, Any]:
+    def info(self) -> dict[str, Any]:
         """Reward terms, push and record of the episode so far."""
         metrics, terms = self.episode.metrics, self.episode.reward_terms.tolist()
         return {

@@ -4,65 +4,175 @@ Compiled steps release the GIL, so threads run in parallel. Every environment ha
 and generator: results do not depend on the number of threads.
 """
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
 
 from .balance import BalanceEnv
+from .episode import EpisodeArrays
+from .errors import ConfigError
+
+
+def replicate(env: BalanceEnv, count: int) -> list[BalanceEnv]:
+    """`env` and `count` − 1 more like it, which share what is only read (robot, motion).
+
+    Raises ConfigError if `count` is below 1, or the environment's controller cannot be shared.
+    """
+    if count < 1:
+        raise ConfigError(f"must be at least 1, not {count}", field="num_envs")
+    return [env, *(type(env)(**env.arguments()) for _ in range(count - 1))]
 
 
 class EnvBatch:
-    """`len(envs)` environments of one kind, with automatic reset after an episode's end."""
+    """`len(envs)` environments of one kind; what they report lies in arrays, one row for each.
 
-    def __init__(self, envs: Sequence[BalanceEnv], threads: int = 1):
+    With `infos`, `infos[i]` is at every step what a single environment would return; without, only
+    after a reset.
+    """
+
+    def __init__(self, envs: Sequence[BalanceEnv], threads: int = 1, infos: bool = False):
+        if not envs:
+            raise ConfigError("needs at least one environment", field="envs")
         self.envs = list(envs)
-        self.threads = max(1, min(threads, len(self.envs)))
         first, n = self.envs[0], len(self.envs)
+        for env in self.envs:
+            spaces = env.observation_space, env.action_space
+            if spaces != (first.observation_space, first.action_space):
+                raise ConfigError("environments must have the same spaces", field="envs")
+        if len({id(env) for env in envs}) < n:
+            raise ConfigError("holds an environment twice", field="envs")
+        # a window is drawn to from one thread only
+        self.threads = 1 if first.render_mode == "human" else max(1, min(threads, n))
+        # the environments' own records become rows of these, so that nothing is gathered by hand
+        self.episodes = EpisodeArrays(
+            *(np.stack(arrays) for arrays in zip(*(env.episode for env in envs), strict=True))
+        )
+        for env, rows in zip(self.envs, zip(*self.episodes, strict=True), strict=True):
+            env.episode = EpisodeArrays(*rows)
         self.observations = np.zeros((n, *first.observation_space.shape), dtype=np.float32)
         self.final_observations = np.zeros_like(self.observations)
         self.rewards = np.zeros(n)
         self.terminated = np.zeros(n, dtype=bool)
         self.truncated = np.zeros(n, dtype=bool)
-        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
-        self._chunks = np.array_split(np.arange(n), self.threads)
+        self.infos: list[dict[str, Any]] = [{} for _ in range(n)]
+        self._wants_infos = infos
+        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+
+    @property
+    def ended(self) -> np.ndarray:
+        """(n,) whether the episode ended with the last step."""
+        return self.terminated | self.truncated
 
     def reset(
-        self, seeds: Sequence[int | None], options: Sequence[dict[str, Any] | None] | None = None
+        self,
+        seeds: Sequence[int | None],
+        options: Sequence[dict[str, Any] | None] | None = None,
+        mask: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Start all episodes, each with its seed and options; returns the observations (n, no)."""
-        options = [None] * len(self.envs) if options is None else options
-        for i, (env, seed, option) in enumerate(zip(self.envs, seeds, options, strict=True)):
-            self.observations[i] = env.reset(seed=seed, options=option)[0]
+        """Start episodes, each with its seed and options; returns the observations (n, no).
+
+        Only those of `mask` (n,) if it is given; the others go on.
+        """
+        n = len(self.envs)
+        options = [None] * n if options is None else options
+        if len(seeds) != n or len(options) != n:
+            raise ConfigError(
+                f"{len(seeds)} seeds and {len(options)} options for {n} environments",
+                source="reset",
+            )
+        indices = np.arange(n) if mask is None else np.flatnonzero(mask)
+        self._forget(indices)
+        self._share(lambda i: self._restart(i, seeds[i], options[i]), indices)
+        self.observations[:] = self.episodes.observation
         return self.observations
 
     def step(
         self, actions: np.ndarray, at_end: Callable[[int, BalanceEnv], None] | None = None
     ) -> None:
-        """One policy step of all; `at_end(i, env)` sees a finished episode before its reset.
+        """One policy step of all; an episode that ends is followed by the next at once.
 
         Fills `observations`, `rewards`, `terminated`, `truncated`, and `final_observations` of
-        the environments whose episode ended.
+        the environments whose episode ended. `at_end(i, env)` sees a finished episode before its
+        reset. Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
         """
-        if self._pool is None:
-            self._step_chunk(self._chunks[0], actions)
-        else:
-            jobs = [self._pool.submit(self._step_chunk, c, actions) for c in self._chunks]
-            for job in jobs:
-                job.result()
-        for i in np.flatnonzero(self.terminated | self.truncated):
-            env = self.envs[i]
-            self.final_observations[i] = self.observations[i]
-            if at_end is not None:
-                at_end(int(i), env)
-            self.observations[i] = env.reset()[0]
+        self.advance(actions)
+        ended = np.flatnonzero(self.ended)
+        if len(ended) == 0:
+            return
+        self.final_observations[ended] = self.observations[ended]
+        if at_end is not None:
+            for i in ended:
+                at_end(int(i), self.envs[i])
+        self._share(self._restart, ended)
+        self.observations[ended] = self.episodes.observation[ended]
 
-    def _step_chunk(self, indices: np.ndarray, actions: np.ndarray) -> None:
-        for i in indices:
-            env = self.envs[i]
-            self.rewards[i], self.terminated[i], self.truncated[i] = env.step_in_place(actions[i])
-            self.observations[i] = env.episode.observation
+    def advance(self, actions: np.ndarray, restart: np.ndarray | None = None) -> None:
+        """One policy step of all but those of `restart` (n,), which start an episode instead.
+
+        The action of a restarted environment is not looked at; its reward is 0. Nothing else is
+        reset. Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
+        """
+        live = np.ones(len(self.envs), dtype=bool) if restart is None else ~restart
+        self._set_actions(actions, live)
+        self._forget(~live)
+        self._share(lambda i: self._play(i) if live[i] else self._restart(i), range(len(live)))
+        self.observations[:] = self.episodes.observation
+
+    def _set_actions(self, actions: np.ndarray, live: np.ndarray) -> None:
+        """What `BalanceEnv.set_action` does, for all rows at once."""
+        record = self.episodes
+        try:
+            vectors = np.asarray(actions, dtype=float)
+        except (TypeError, ValueError):
+            raise ConfigError(f"must be numbers, not {actions!r}", field="action") from None
+        if vectors.shape != record.action.shape:
+            raise ConfigError(
+                f"has shape {vectors.shape}, expected {record.action.shape}", field="action"
+            )
+        good = (np.abs(vectors) <= 1.0 + 1e-6).all(axis=1) | ~live
+        for i in np.flatnonzero(~good):
+            self.envs[i].set_action(vectors[i])  # raises, and names the entries
+        record.last_action[live] = record.action[live]
+        record.action[live] = np.clip(vectors[live], -1.0, 1.0)
+
+    def _play(self, i: int) -> None:
+        env = self.envs[i]
+        self.rewards[i], self.terminated[i], self.truncated[i] = env.apply_action()
+        if self._wants_infos:
+            self.infos[i] = env.info()
+
+    def _restart(
+        self, i: int, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> None:
+        self.infos[i] = self.envs[i].reset(seed=seed, options=options)[1]
+
+    def _forget(self, rows: np.ndarray) -> None:
+        """Rows that start anew have earned nothing and ended nothing."""
+        self.rewards[rows] = 0.0
+        self.terminated[rows] = self.truncated[rows] = False
+
+    def _share(self, work: Callable[[int], None], indices: Iterable[int]) -> None:
+        """Call `work` with every index, in all threads: whoever is free takes the next."""
+        todo = list(indices)
+        if self._pool is None or len(todo) < 2:
+            for i in todo:
+                work(i)
+            return
+        following = iter(todo)  # its `next` holds the GIL: no index is taken twice
+
+        def run() -> None:
+            for i in following:
+                work(i)
+
+        jobs = [self._pool.submit(run) for _ in range(min(self.threads, len(todo)) - 1)]
+        try:
+            run()
+        finally:
+            wait(jobs)
+        for job in jobs:
+            job.result()
 
     def close(self) -> None:
         """Close the environments and stop the threads."""

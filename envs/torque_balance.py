@@ -1,6 +1,7 @@
 """`poise/TorqueBalance-v0`: the action is the joints' torques."""
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from .kinematics import StateArrays, update_state
 from .observation import Scales
 from .robot import Robot
 from .simulation import advance
+from .vector import make_vector_env
 
 
 @compiled
@@ -232,3 +234,6 @@ class TorqueBalanceEnv(BalanceEnv):
             self.arrays, sim.plant, sim.state_arrays, sim.push_table, sim.clock,
             self.scales, self.judge, self.substeps, self.episode,
         )  # fmt: skip
+
+
+vector_env = partial(make_vector_env, TorqueBalanceEnv)  # for gymnasium.make_vec

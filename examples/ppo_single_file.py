@@ -26,7 +26,8 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--env", default="poise/ResidualBalance-v0")
     parser.add_argument("--steps", type=int, default=300_000, help="environment steps in all")
     parser.add_argument("--envs", type=int, default=8)
-    parser.add_argument("--mode", default="sync", choices=("sync", "async"))
+    modes = ("vector_entry_point", "sync", "async")  # threads, one after the other, processes
+    parser.add_argument("--mode", default=modes[0], choices=modes)
     parser.add_argument("--rollout", type=int, default=128, help="steps per environment")
     parser.add_argument("--epochs", type=int, default=5)
     parser.add_argument("--minibatches", type=int, default=4)

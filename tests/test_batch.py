@@ -79,3 +79,15 @@ def test_an_error_in_a_thread_reaches_the_caller():
     with pytest.raises(ConfigError, match="com_x is nan"):
         batch.step(bad)
     batch.close()
+
+
+def test_environments_that_do_not_fit_together_are_refused():
+    """None, two kinds, or one twice."""
+    env = make()
+    for envs, problem in (
+        ([], "at least one"),
+        ([env, make(residual={"lean": 0.1})], "same spaces"),
+        ([env, env], "twice"),
+    ):
+        with pytest.raises(ConfigError, match=problem):
+            EnvBatch(envs)

@@ -58,6 +58,22 @@ def test_processes_without_poise_can_make_it():
     assert out.stdout.strip() == "poise/TorqueBalance-v0"
 
 
+def test_processes_of_stable_baselines3():
+    """Its spawned workers make the environment by the id with the module's name."""
+    code = (
+        "from stable_baselines3.common.env_util import make_vec_env\n"
+        "from stable_baselines3.common.vec_env import SubprocVecEnv\n"
+        "if __name__ == '__main__':\n"
+        "    settings = {'start_method': 'spawn'}\n"
+        "    env = make_vec_env('poise:poise/TorqueBalance-v0', 2, vec_env_cls=SubprocVecEnv,"
+        " vec_env_kwargs=settings)\n"
+        "    print(env.reset().shape)\n"
+        "    env.close()\n"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert out.stdout.strip() == "(2, 85)", out.stderr
+
+
 @EACH
 def test_the_spec_can_be_written_and_read(name):
     """Arguments as plain mappings survive JSON; the environment made of it is the same."""
@@ -70,7 +86,7 @@ def test_the_spec_can_be_written_and_read(name):
 
 
 @EACH
-@pytest.mark.parametrize("mode", ["sync", "async"])
+@pytest.mark.parametrize("mode", ["vector_entry_point", "sync", "async"])
 def test_vector_environments_are_single_ones(name, mode):
     """Rows of make_vec equal single environments with the seeds of the rows."""
     vector = gymnasium.make_vec(name, num_envs=2, vectorization_mode=mode, **SMALL)

@@ -54,7 +54,7 @@ def test_the_picture_of_the_readme(tmp_path, can_render):
     assert (tmp_path / "strip.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("mode", ["sync", "async"])
+@pytest.mark.parametrize("mode", ["vector_entry_point", "sync", "async"])
 def test_the_single_file_masks_the_steps_that_only_reset(mode, monkeypatch):
     """Advantages stop at an episode's end; the step after it is no experience."""
     monkeypatch.syspath_prepend(str(EXAMPLES))

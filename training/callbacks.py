@@ -14,7 +14,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
-from poise.envs.batch import EnvBatch
+from poise.envs.batch import EnvBatch, replicate
 from poise.envs.config import write_atomic
 
 from .checkpoints import controller_fingerprint, save_checkpoint
@@ -66,8 +66,8 @@ class Checkpoints(BaseCallback):
         pushes = evaluation.pushes or self.config.env.pushes
         robot = self.training_env.get_attr("robot")[0]
         count = min(evaluation.trials, 32)
-        envs = [self.config.make_env(robot, pushes=pushes) for _ in range(count)]
-        self._batch = EnvBatch(envs, self.config.threads)
+        first = self.config.make_env(robot, pushes=pushes)
+        self._batch = EnvBatch(replicate(first, count), self.config.threads)
         if self.num_timesteps == 0:
             self._evaluate()  # the controller alone: what the policy must beat
 

@@ -9,10 +9,9 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecNormalize
 
-from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.batch import replicate
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
-from poise.envs.robot import load_robot
 
 from .callbacks import Checkpoints, Progress, Throughput
 from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
@@ -109,8 +108,7 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
 
 
 def _training_envs(config: TrainConfig) -> VecNormalize:
-    robot = load_robot(config.robot)
-    envs: list[ResidualBalanceEnv] = [config.make_env(robot) for _ in range(config.ppo.n_envs)]
+    envs = replicate(config.make_env(), config.ppo.n_envs)
     vec = ThreadedVecEnv(envs, config.threads)
     return VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
 

@@ -11,7 +11,7 @@ from poise.envs.batch import EnvBatch
 
 
 class ThreadedVecEnv(VecEnv):
-    """Environments of one kind stepped together; the same bits for any number of threads.
+    """An `EnvBatch` as SB3 sees it; the same bits for any number of threads.
 
     At an episode's end `infos[i]` holds "episode" (return r, length l), "is_success",
     "terminal_observation" and "TimeLimit.truncated", as SB3 expects; else it is empty.
@@ -23,13 +23,11 @@ class ThreadedVecEnv(VecEnv):
         self.render_mode = first.render_mode
         super().__init__(len(envs), first.observation_space, first.action_space)
         self._returns = np.zeros(len(envs))
-        self._lengths = np.zeros(len(envs), dtype=int)
         self._actions: np.ndarray | None = None
 
     def reset(self) -> np.ndarray:
         """Start all episodes, with what was last given to `seed` and `set_options`."""
         self._returns[:] = 0.0
-        self._lengths[:] = 0
         observations = self.batch.reset(self._seeds, self._options)
         self._reset_seeds()
         self._reset_options()
@@ -47,7 +45,7 @@ class ThreadedVecEnv(VecEnv):
             infos[i] = {
                 "episode": {
                     "r": float(self._returns[i] + batch.rewards[i]),
-                    "l": int(self._lengths[i] + 1),
+                    "l": env.steps,
                     "t": 0.0,
                 },
                 "is_success": env.recovered and not env.fallen,
@@ -58,11 +56,9 @@ class ThreadedVecEnv(VecEnv):
         batch = self.batch
         assert self._actions is not None  # step_async came first
         batch.step(self._actions, at_end)
-        dones = batch.terminated | batch.truncated
+        dones = batch.ended
         self._returns += batch.rewards
-        self._lengths += 1
         self._returns[dones] = 0.0
-        self._lengths[dones] = 0
         return batch.observations.copy(), batch.rewards.astype(np.float32), dones, infos
 
     def close(self) -> None:

@@ -17,10 +17,15 @@ __version__ = "0.1.0"
 __all__ = ["__version__", "load_policy"]
 
 # No max_episode_steps: the environments end their episodes themselves, from their own config.
-register("poise/TorqueBalance-v0", entry_point="poise.envs.torque_balance:TorqueBalanceEnv")
+register(
+    "poise/TorqueBalance-v0",
+    entry_point="poise.envs.torque_balance:TorqueBalanceEnv",
+    vector_entry_point="poise.envs.torque_balance:vector_env",
+)
 register(
     "poise/ResidualBalance-v0",
     entry_point="poise.baselines.residual_balance:ResidualBalanceEnv",
+    vector_entry_point="poise.baselines.residual_balance:vector_env",
 )
 
 

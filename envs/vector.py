@@ -1,0 +1,214 @@
+"""Gymnasium's vector environment over a batch: threads, no processes, no pickling."""
+
+import os
+from collections.abc import Sequence
+from enum import Enum
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from .balance import BalanceEnv
+from .batch import EnvBatch, replicate
+from .errors import ConfigError
+
+try:
+    from gymnasium.vector import AutoresetMode
+except ImportError:  # Gymnasium 1.0, which knows the first mode only
+
+    class AutoresetMode(Enum):  # type: ignore[no-redef]
+        """When an ended episode is followed by the next."""
+
+        NEXT_STEP = "NextStep"
+        SAME_STEP = "SameStep"
+        DISABLED = "Disabled"
+
+
+class BalanceVectorEnv(VectorEnv):
+    """`len(envs)` environments of one kind, stepped by `threads` threads.
+
+    Row i of every array, and every `info`, is what `gymnasium.vector.SyncVectorEnv` would give of
+    the same environments, bit for bit, for any number of threads. `autoreset_mode`, a
+    `gymnasium.vector.AutoresetMode` or its value, says what follows an episode's end:
+
+    - "NextStep": the next `step` resets it, whatever its action; reward 0
+    - "SameStep": it is reset at once; the end is in `info` as "final_obs" and "final_info"
+    - "Disabled": nothing; use `reset(options={"reset_mask": ended})`
+
+    Raises ConfigError for an unknown mode, fewer threads than one, or environments that differ.
+    """
+
+    batch: EnvBatch
+    envs: list[BalanceEnv]
+
+    def __init__(
+        self,
+        envs: Sequence[BalanceEnv],
+        threads: int = 1,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    ):
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError:
+            raise ConfigError(
+                f"unknown mode {autoreset_mode!r}",
+                field="autoreset_mode",
+                choices=[mode.value for mode in AutoresetMode],
+            ) from None
+        if not isinstance(threads, Integral) or threads < 1:
+            raise ConfigError(f"must be at least 1, not {threads!r}", field="threads")
+        self.batch = EnvBatch(envs, int(threads), infos=True)
+        self.envs = self.batch.envs
+        first = self.envs[0]
+        self.num_envs = len(self.envs)
+        self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = first.render_mode
+        self.single_observation_space = first.observation_space
+        self.single_action_space = first.action_space
+        self.observation_space = batch_space(first.observation_space, self.num_envs)
+        self.action_space = batch_space(first.action_space, self.num_envs)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start episodes: environment i with `seed` + i, or with entry i of a list.
+
+        `options` are those of a single environment, for each; "reset_mask" (n,) bool besides them
+        resets only some. Raises ConfigError for a wrong number of seeds, mask or option.
+        """
+        n, options = self.num_envs, dict(options or {})
+        if isinstance(seed, (int, np.integer)):
+            seeds: Sequence[int | None] = [int(seed) + i for i in range(n)]
+        else:
+            seeds = [None] * n if seed is None else seed
+        mask = options.pop("reset_mask", None)
+        if mask is None:
+            mask = np.ones(n, dtype=bool)
+        elif not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (n,)):
+            raise ConfigError(f"must be a bool array ({n},)", source="reset", field="reset_mask")
+        elif not mask.any():
+            raise ConfigError("needs at least one True", source="reset", field="reset_mask")
+        observations = self.batch.reset(seeds, [options] * n, mask)
+        return observations.copy(), stack_infos(self.batch.infos, mask)
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """One policy step of all with `actions` (n, na).
+
+        Raises ConfigError for actions that are not valid (nothing has moved then), PoiseError
+        before the first reset.
+        """
+        batch, every = self.batch, np.ones(self.num_envs, dtype=bool)
+        infos: dict[str, Any] = {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            final: list[dict[str, Any]] = [{} for _ in self.envs]
+
+            def at_end(i: int, env: BalanceEnv) -> None:
+                final[i] = batch.infos[i]
+
+            batch.step(actions, at_end)
+            ended = batch.ended
+            if ended.any():
+                last = zip(batch.final_observations.copy(), final, strict=True)
+                ends = [{"final_obs": row, "final_info": info} for row, info in last]
+                infos = stack_infos(ends, ended)
+        else:
+            resets = self.autoreset_mode is AutoresetMode.NEXT_STEP
+            batch.advance(actions, batch.ended if resets else None)
+        if self.render_mode == "human":
+            self.render()
+        return (
+            batch.observations.copy(),
+            batch.rewards.copy(),
+            batch.terminated.copy(),
+            batch.truncated.copy(),
+            {**stack_infos(batch.infos, every), **infos},
+        )
+
+    def render(self) -> tuple[Any, ...]:
+        """A frame of each environment, see `BalanceEnv.render`."""
+        return tuple(env.render() for env in self.envs)
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """Each environment's generator."""
+        return tuple(env.np_random for env in self.envs)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seed of each environment's generator."""
+        return tuple(env.np_random_seed for env in self.envs)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """What the method `name` of each environment returns, or its attribute `name`."""
+        found = [getattr(env, name) for env in self.envs]
+        return tuple(each(*args, **kwargs) if callable(each) else each for each in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of each environment."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute: a list or tuple has a value for each environment, else all get it."""
+        if not isinstance(values, (list, tuple)):
+            values = [values] * self.num_envs
+        if len(values) != self.num_envs:
+            raise ConfigError(f"needs {self.num_envs} values, not {len(values)}", field=name)
+        for env, value in zip(self.envs, values, strict=True):
+            setattr(env, name, value)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the environments and stop the threads."""
+        self.batch.close()
+
+
+def stack_infos(infos: Sequence[dict[str, Any]], mask: np.ndarray) -> dict[str, Any]:
+    """Infos with the same keys as one, in the form of Gymnasium's vector environments.
+
+    Numbers and arrays become arrays with a row for each environment, dictionaries are gone into,
+    all else becomes an array of objects. "_key" (n,) tells whose `key` was reported: `mask`, of
+    which the rows outside hold nothing.
+    """
+    rows = np.flatnonzero(mask).tolist()
+    stacked: dict[str, Any] = {}
+    for key, example in infos[rows[0]].items():
+        values = [infos[i][key] for i in rows]
+        column: Any
+        if isinstance(example, dict):
+            parts = [infos[i][key] if mask[i] else {} for i in range(len(mask))]
+            column = stack_infos(parts, mask)
+        elif key != "final_obs" and isinstance(example, (int, float, np.number, np.ndarray)):
+            column = np.array(values)
+            if len(rows) < len(mask):
+                column, filled = np.zeros((len(mask), *column.shape[1:]), column.dtype), column
+                column[rows] = filled
+        else:
+            column = np.full(len(mask), None, dtype=object)
+            for i, value in zip(rows, values, strict=True):
+                column[i] = value
+        stacked[key], stacked[f"_{key}"] = column, mask.copy()
+    return stacked
+
+
+def make_vector_env(
+    env_class: type[BalanceEnv],
+    num_envs: int = 1,
+    threads: int | None = None,
+    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    **arguments: Any,
+) -> BalanceVectorEnv:
+    """What `gymnasium.make_vec` calls: `num_envs` environments that share one robot.
+
+    `threads` defaults to the processor's cores that this process may use; `arguments` are those
+    of a single environment. Raises ConfigError naming what is wrong.
+    """
+    if threads is None:
+        usable = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))
+        threads = len(usable(0))
+    return BalanceVectorEnv(replicate(env_class(**arguments), num_envs), threads, autoreset_mode)
