@@ -6,6 +6,7 @@ import importlib.util
 from functools import partial
 from typing import Any, NamedTuple
 
+import daqp
 import numpy as np
 from scipy import sparse
 
@@ -46,6 +47,19 @@ class Compiled:
 
     def solve(self, data: tuple) -> Answer | None:
         return Answer(data[5], data[6]) if solve_dual(*data, 500, False) == 0 else None
+
+
+class DAQP:
+    """Its own function, without a workspace that is kept."""
+
+    def prepare(self, qp: QP) -> tuple:
+        arrays = (qp.H, qp.g, qp.C, qp.u, qp.l)
+        sense = np.where(qp.l == qp.u, 5, 0).astype(np.int32)  # 5: equality
+        return *(np.array(a, dtype=float, order="C") for a in arrays), sense
+
+    def solve(self, data: tuple) -> Answer | None:
+        x, _, flag, info = daqp.solve(*data, primal_tol=1e-9, dual_tol=1e-12)
+        return Answer(np.array(x), np.array(info["lam"])) if flag == 1 else None
 
 
 class Parts(NamedTuple):
@@ -187,6 +201,7 @@ def _osqp(eps: float, polishing: bool = False) -> Own:
 SOLVERS = {
     "active-set, compiled call": Compiled,
     "active-set": partial(Own, "active-set"),
+    "daqp, direct call": DAQP,
     "daqp": partial(Own, "daqp"),
     "osqp 1e-3": partial(_osqp, 1e-3),
     "osqp 1e-4": partial(_osqp, 1e-4),
