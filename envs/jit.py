@@ -2,9 +2,12 @@
 
 import contextlib
 import hashlib
+import sys
+import time
 from pathlib import Path
 
 import numba
+from numba.core import event
 
 #: Compiled without the GIL, cached on disk, NumPy's rules for division by zero. Sums may be
 #: reordered (SIMD), but NaN and infinity keep their meaning: checks rely on them.
@@ -14,6 +17,34 @@ compiled = numba.njit(
     error_model="numpy",
     fastmath={"contract", "reassoc", "nsz", "arcp"},
 )
+
+PATIENCE = 1.0  # [s] of compilation before the user is told
+MESSAGE = "poise: compiling for the first use; this takes about half a minute, once"
+
+
+class Patience(event.Listener):
+    """Says on the standard error, once in a process, that compilation takes a while.
+
+    Kernels read from the cache raise no event, nor do a user's own functions count.
+    """
+
+    def __init__(self) -> None:
+        self.depth, self.begun, self.told = 0, 0.0, False
+
+    def on_start(self, event: event.Event) -> None:
+        if self.depth == 0:
+            self.begun = time.perf_counter()
+        self.depth += 1
+        ours = event.data["dispatcher"].py_func.__module__.startswith("poise.")
+        if ours and not self.told and time.perf_counter() - self.begun > PATIENCE:
+            self.told = True
+            print(MESSAGE, file=sys.stderr, flush=True)
+
+    def on_end(self, event: event.Event) -> None:
+        self.depth -= 1
+
+
+event.register("numba:compile", Patience())
 
 
 _ROOM = Path(__file__).resolve().parent

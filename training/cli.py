@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 from rich.console import Console
@@ -189,6 +189,35 @@ def tune(
     tune(tuning, out)
 
 
+def qp_set(
+    *,
+    out: Path,
+    count: int = 1000,
+    seed: int = 0,
+    form: Literal["reduced", "full"] = "reduced",
+    robot: str = "humanoid",
+    controller: str = "momentum-qp",
+) -> None:
+    """Export whole-body QPs of real push recoveries, for qpsolvers and qpbenchmark.
+
+    Args:
+        out: folder to write to: new, or empty.
+        count: number of problems; 25 of each trial.
+        seed: of the pushes and starts.
+        form: reduced (dense, inequalities only) or full (accelerations and wrenches, equalities).
+        robot: a packaged robot or a .yaml description.
+        controller: a packaged controller or a .yaml file.
+    """
+    from .qp_set import write_qp_set
+
+    manifest = write_qp_set(
+        out, count=count, seed=seed, form=form, robot=robot, controller=controller
+    )
+    ends = [trial["end"] for trial in manifest["trials"]]
+    counts = ", ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
+    print(f"{out}: {count} problems of {len(ends)} trials ({counts})")
+
+
 def list_names() -> None:
     """List what can be named: robots, controllers, suites, training configurations, motions."""
     from poise.envs.config import packaged
@@ -204,6 +233,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "evaluate": evaluate,
     "replay": replay,
     "tune": tune,
+    "qp-set": qp_set,
     "list": list_names,
 }
 

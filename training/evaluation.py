@@ -18,7 +18,7 @@ from poise.envs.robot import load_robot
 from .evaluation_folder import SUMMARY, TRIALS, EvaluationFolder, Settings
 from .limits import PushLimits, load_limits, write_limits
 from .players import Player, load_player
-from .progress import patience, progress_bar
+from .progress import progress_bar
 from .provenance import commit, machine, usable_cores, versions
 from .report import draw_plots, print_paths, print_summary
 from .suite import Suite
@@ -73,11 +73,10 @@ def evaluate(
     loaded = load_robot(robot)
     pushed = load_limits(loaded, limits)
     overrides = {"duration": chosen.duration, "pushes": None, "noise": chosen.noise}
-    with patience(console):
-        prepare()
-        players = [load_player(name, loaded, **overrides) for name in controllers]
-        first = chosen.first(pushed, seed)
-        _warm_up(players)
+    prepare()
+    players = [load_player(name, loaded, **overrides) for name in controllers]
+    first = chosen.first(pushed, seed)
+    _warm_up(players)
     settings = Settings(
         suite_name=str(suite),
         suite=to_dict(chosen),

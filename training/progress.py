@@ -1,9 +1,5 @@
 """What the terminal shows while an evaluation runs."""
 
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -19,16 +15,3 @@ def progress_bar(console: Console) -> Progress:
         console=console,
         disable=console.quiet,
     )
-
-
-@contextmanager
-def patience(console: Console) -> Iterator[None]:
-    """Say why nothing happens if the block takes long."""
-    message = "getting ready: the first run compiles for about half a minute …"
-    timer = threading.Timer(4.0, console.print, (message,))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
