@@ -121,7 +121,7 @@ class LIPMPC(Guided):
         return self._planned
 
     def plan(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """(steps, 2) the CoPs of the horizon [m]; the saturated capture point where none is found."""
+        """(steps, 2) the CoPs of the horizon [m]; where none is found the saturated ξ."""
         n, reference = self.config.steps, targets.com[:2]
         normals, offsets = half_planes(shrunk(state.support_polygon, self.config.share))
         normals, offsets = (

@@ -41,6 +41,22 @@ def controller_config(name_or_path: str | Path) -> Any:
     return _build(read_yaml(path), str(path))
 
 
+def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
+    """`controller_config` where only a momentum QP will do; raises ConfigError for others."""
+    config = controller_config(name_or_path)
+    if not isinstance(config, MomentumQPConfig):
+        raise ConfigError(
+            f"{str(name_or_path)!r} is of kind {config.kind!r}, not a momentum QP",
+            field="controller",
+            choices=[
+                name
+                for name in packaged("controllers")
+                if isinstance(controller_config(name), MomentumQPConfig)
+            ],
+        )
+    return config
+
+
 def load_controller(controller: Any, robot: Robot) -> Any:
     """A controller for `robot`: from a name, a path, a mapping or a configuration.
 

@@ -188,8 +188,8 @@ class ResidualBalanceEnv(BalanceEnv):
     Arguments: `robot` (a name, a .yaml file or a `Robot`), `config` (an `EnvConfig`, a .yaml file
     or a mapping), `controller` (a name, a .yaml file, a mapping or a `Controller`),
     `motion` (a name, a .yaml file or a `ReferenceMotion`), `residual` (what an action of 1 adds, a
-    `ResidualScales`), `smoothing` (time constant of the action [s]), `gate` (distance from rest at which
-    the residual opens [m]), `render_mode` (None,
+    `ResidualScales`), `smoothing` (time constant of the action [s]), `gate` (distance from rest at
+    which the residual opens [m]), `render_mode` (None,
     "rgb_array" or "human"), and the fields of `EnvConfig` by name: policy_period, duration, pushes,
     noise, fall, reward. Fields may be plain mappings. Raises ConfigError naming what is wrong.
 

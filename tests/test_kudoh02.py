@@ -9,7 +9,12 @@ from poise.baselines.abe07 import Abe07, Abe07Config
 from poise.baselines.controller import Targets
 from poise.baselines.kudoh02 import Kudoh02, Kudoh02Config
 from poise.baselines.momentum_qp import MomentumQP
-from poise.baselines.registry import KINDS, controller_config, load_controller
+from poise.baselines.registry import (
+    KINDS,
+    controller_config,
+    load_controller,
+    momentum_qp_config,
+)
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.config import packaged
 from poise.envs.errors import ConfigError
@@ -112,6 +117,13 @@ def test_kinds_are_named_in_the_error():
         load_controller({"kind": "lqr-lip", "qp": "nothing"}, robot())
     with pytest.raises(ConfigError, match="gian"):
         load_controller({"kind": "capture-point", "gian": 1.0}, robot())
+
+
+def test_some_commands_need_a_momentum_qp():
+    """Others are refused by name, with those that will do."""
+    assert momentum_qp_config("moskalev24").root == "soft"
+    with pytest.raises(ConfigError, match="lip-mpc.*choices: momentum-qp, moskalev24, root-assist"):
+        momentum_qp_config("lip-mpc")
 
 
 def test_every_kind_is_packaged():

@@ -79,9 +79,13 @@ def test_probability_of_no_push(robot, sampler):
     assert np.mean(quiet) == pytest.approx(0.3, abs=0.05)
 
 
-def test_no_body_named_means_the_root_body(robot):
-    """Without bodies the sampler serves any robot."""
-    (push,) = PushSampler((1.0, 2.0), "impulse").sample(np.random.default_rng(0), robot)
+def test_no_body_named_means_those_of_the_robot(robot):
+    """Without bodies the sampler serves any robot: all its push bodies, or the root."""
+    sampler, rng = PushSampler((1.0, 2.0), "impulse"), np.random.default_rng(0)
+    drawn = {sampler.sample(rng, robot)[0].body for _ in range(60)}
+    assert drawn == set(robot.description.push_bodies)
+    plain = replace(robot, description=replace(robot.description, push_bodies=()))
+    (push,) = sampler.sample(rng, plain)
     assert push.body == robot.model.body(robot.root_body_id).name
 
 

@@ -179,11 +179,11 @@ def tune(
         seed: of the search and its pushes.
         workers: number of processes.
     """
-    from poise.baselines.registry import controller_config
+    from poise.baselines.registry import momentum_qp_config
 
     from .tuning import Tuning, tune
 
-    start = controller_config(controller)
+    start = momentum_qp_config(controller)
     tuning = Tuning(start, robot, generations=generations, population=population,
                     spread=spread, seed=seed, workers=workers)  # fmt: skip
     tune(tuning, out)

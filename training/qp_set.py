@@ -19,13 +19,14 @@ import numpy as np
 from poise.baselines import formulation
 from poise.baselines.constraint_rows import torque_matrix
 from poise.baselines.momentum_qp import MomentumQP
-from poise.baselines.registry import controller_config
+from poise.baselines.registry import momentum_qp_config
 from poise.baselines.solvers import QP
 from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError, PoiseError
+from poise.envs.push_schedule import push_bodies
 from poise.envs.robot import load_robot
 
-from .limits import load_limits, push_bodies
+from .limits import load_limits
 from .provenance import commit, versions
 from .qp_trials import PUSH_DURATION, Recovery, Tick, recoveries
 
@@ -105,7 +106,7 @@ def write_qp_set(
         raise ConfigError("is not empty: choose another folder", source=out, field="out")
     body = load_robot(robot)
     limits = load_limits(body)
-    config = controller_config(controller)
+    config = momentum_qp_config(controller)
     writer = MomentumQP(body, config)
     manifest: dict[str, Any] = {
         "form": form, "count": count, "seed": seed,

@@ -11,14 +11,15 @@ import numpy as np
 
 from poise.baselines.controller import Targets
 from poise.baselines.momentum_qp import MomentumQP, MomentumQPConfig
-from poise.baselines.registry import controller_config
+from poise.baselines.registry import momentum_qp_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.baselines.solvers import QP, make_solver
+from poise.envs.push_schedule import push_bodies
 from poise.envs.pushes import Push
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
-from .limits import PushLimits, push_bodies
+from .limits import PushLimits
 from .suite import generator, start_seed
 
 DIRECTIONS = 8
@@ -85,7 +86,7 @@ class Recovery:
 
 def recoveries(robot: Robot, controller: str, limits: PushLimits, seed: int) -> Iterator[Recovery]:
     """Trials without end: each of 8 directions with each of 5 impulses, then anew."""
-    recorder = Recorder(robot, controller_config(controller))
+    recorder = Recorder(robot, momentum_qp_config(controller))
     env = ResidualBalanceEnv(robot, controller=recorder, pushes=None, duration=TRIAL_DURATION)
     action = np.zeros(len(env.action_names))
     body, number = push_bodies(robot)[0], 0
