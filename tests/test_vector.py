@@ -123,7 +123,10 @@ def test_seeds_options_and_masks():
     ]
     records = []
     for env in (native(), sync()):
-        env.reset(seed=0)  # SyncVectorEnv masks nothing before the first reset
+        env.reset(seed=0)
+        for _ in range(8):  # to the end of time: the next step would reset, but a reset comes first
+            ended = env.step(np.zeros(env.action_space.shape))[3]
+        assert ended.all()
         record = []
         for call in calls:
             options = dict(call["options"]) if "options" in call else None
