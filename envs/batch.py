@@ -4,6 +4,7 @@ Compiled steps release the GIL, so threads run in parallel. Every environment ha
 and generator: results do not depend on the number of threads.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
@@ -154,21 +155,18 @@ class EnvBatch:
         self.terminated[rows] = self.truncated[rows] = False
 
     def _share(self, work: Callable[[int], None], indices: Iterable[int]) -> None:
-        """Call `work` with every index, in all threads: whoever is free takes the next."""
-        todo = list(indices)
-        if self._pool is None or len(todo) < 2:
-            for i in todo:
-                work(i)
-            return
-        following = iter(todo)  # its `next` holds the GIL: no index is taken twice
+        """Call `work` with every index, in all threads: whoever is free takes the next.
 
-        def run() -> None:
-            for i in following:
-                work(i)
-
-        jobs = [self._pool.submit(run) for _ in range(min(self.threads, len(todo)) - 1)]
+        They take from both ends, so that most environments stay with a thread and in its cache.
+        """
+        todo = deque(indices)
+        jobs = []
+        if self._pool is not None:
+            ends = todo.pop, todo.popleft
+            others = min(self.threads, len(todo)) - 1
+            jobs = [self._pool.submit(_work_off, work, ends[k % 2]) for k in range(others)]
         try:
-            run()
+            _work_off(work, todo.popleft)
         finally:
             wait(jobs)
         for job in jobs:
@@ -180,3 +178,13 @@ class EnvBatch:
             env.close()
         if self._pool is not None:
             self._pool.shutdown()
+
+
+def _work_off(work: Callable[[int], None], take: Callable[[], int]) -> None:
+    """Call `work` with what `take` gives, until it raises IndexError for want of more."""
+    while True:
+        try:
+            i = take()
+        except IndexError:
+            return
+        work(i)

@@ -176,13 +176,16 @@ def stack_infos(infos: Sequence[dict[str, Any]], mask: np.ndarray) -> dict[str, 
     which the rows outside hold nothing.
     """
     rows = np.flatnonzero(mask).tolist()
+    return _stack([infos[i] for i in rows], rows, mask.copy())
+
+
+def _stack(infos: list[dict[str, Any]], rows: list[int], mask: np.ndarray) -> dict[str, Any]:
     stacked: dict[str, Any] = {}
-    for key, example in infos[rows[0]].items():
-        values = [infos[i][key] for i in rows]
+    for key, example in infos[0].items():
+        values = [info[key] for info in infos]
         column: Any
         if isinstance(example, dict):
-            parts = [infos[i][key] if mask[i] else {} for i in range(len(mask))]
-            column = stack_infos(parts, mask)
+            column = _stack(values, rows, mask)
         elif key != "final_obs" and isinstance(example, (int, float, np.number, np.ndarray)):
             column = np.array(values)
             if len(rows) < len(mask):
@@ -192,7 +195,8 @@ def stack_infos(infos: Sequence[dict[str, Any]], mask: np.ndarray) -> dict[str, 
             column = np.full(len(mask), None, dtype=object)
             for i, value in zip(rows, values, strict=True):
                 column[i] = value
-        stacked[key], stacked[f"_{key}"] = column, mask.copy()
+        stacked[key] = column
+        stacked[f"_{key}"] = mask
     return stacked
 
 

@@ -80,11 +80,19 @@ def test_it_is_gymnasiums_own_bit_for_bit(name, mode):
 def test_a_fall_is_the_same_too(name):
     """Episodes that end by falls, at different times."""
     hard = {"pushes": {**PUSHES, "magnitude": [0.2, 4.0]}, "duration": 0.8}
-    if name == RESIDUAL:
-        hard["smoothing"] = 0.05
     expected = play(sync(name, **hard), 60)
     assert sum(step[2].sum() for step in expected[1:]) >= 2
     same(play(native(name, **hard), 60), expected)
+
+
+def test_a_smoothed_action():
+    """The action that the next step finds as the last one is the smoothed one."""
+    expected = play(sync(smoothing=0.05), 7)
+    for (observations, rewards, *_), (others, other_rewards, *_) in zip(
+        play(native(smoothing=0.05), 7)[1:], expected[1:], strict=True
+    ):
+        assert np.array_equal(observations, others)
+        np.testing.assert_allclose(rewards, other_rewards, rtol=1e-12)
 
 
 def test_the_attributes_of_a_vector_environment():
@@ -123,7 +131,10 @@ def test_seeds_options_and_masks():
     ]
     records = []
     for env in (native(), sync()):
-        env.reset(seed=0)  # SyncVectorEnv masks nothing before the first reset
+        env.reset(seed=0)
+        for _ in range(8):  # to the end of time: the next step would reset, but a reset comes first
+            ended = env.step(np.zeros(env.action_space.shape))[3]
+        assert ended.all()
         record = []
         for call in calls:
             options = dict(call["options"]) if "options" in call else None
