@@ -1,10 +1,11 @@
 """What every controller is: state and targets in, joint torques out."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Protocol
 
 import numpy as np
 
+from poise.envs.arrays import apart
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
@@ -47,6 +48,13 @@ class Targets:
 
     # (3,) L_ref [N·m·s] that the posture is to carry besides
     angular_momentum: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self):
+        for item in fields(self):
+            given = np.asarray(getattr(self, item.name), dtype=float)
+            array = apart(given.shape)
+            array[...] = given
+            setattr(self, item.name, array)
 
     def arrays(self) -> TargetArrays:
         """The same arrays, not copies, for compiled code."""

@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from poise.envs.arrays import RobotArrays, robot_arrays
+from poise.envs.arrays import RobotArrays, apart, robot_arrays
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
 from poise.envs.robot import Robot
@@ -137,10 +137,10 @@ class MomentumQP:
         )
         limit = self.parameters.torque_limit
         self.memory = Memory(
-            torques=np.zeros(len(limit)),
+            torques=apart(len(limit)),
             damping=limit / FALLBACK_SPEED,
-            streak=np.zeros(1, dtype=np.int64),
-            failures=np.zeros(1, dtype=np.int64),
+            streak=apart(1, dtype=np.int64),
+            failures=apart(1, dtype=np.int64),
         )
         self.com_offset = self.config.com.offset * robot.height_com
         self.solver = None

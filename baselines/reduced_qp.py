@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from poise.envs.arrays import RobotArrays
+from poise.envs.arrays import RobotArrays, apart
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, cross
 
@@ -111,17 +111,19 @@ def allocate_workspace(nv: int, nc: int, cone_rows: int, soft_root: bool) -> Wor
     nz = nv - k
     n = nz + 6 * (nc - 1) + (6 if soft_root else 0)
     m = nc * cone_rows + 2 * nj
-    z = np.zeros
-    return Workspace(
+    z = apart
+    ws = Workspace(
         reflectors=z((k, nv)), diagonal=z(k), beta=z(k), pivot=z(k, dtype=np.int64),
         sole_rhs=z(k), y=z(nv), N=z((nz, nv)), weighted=z(nv), accel_des=z(nv), vdot0=z(nv),
-        cop_prev=np.full(2, np.nan), cop_vel=z(2), momentum_rate=z(6), B=z((6, nz)), W0=z(6),
+        cop_prev=z(2), cop_vel=z(2), momentum_rate=z(6), B=z((6, nz)), W0=z(6),
         BBt=z((6, 6)),
         E=z((k, n)), w0=z(k), T=z((nj, n)), tau0=z(nj), H=z((n, n)), g=z(n), C=z((m, n)),
         l=z(m), u=z(m), x=z(n), lam=z(m), scratch=z(scratch_size(n, m)),
         iscratch=z(iscratch_size(n, m), dtype=np.int64), vdot=z(nv), wrenches=z(k), tau=z(nj),
         root_wrench=z(6),
     )  # fmt: skip
+    ws.cop_prev[:] = np.nan
+    return ws
 
 
 @compiled

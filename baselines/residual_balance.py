@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from poise.envs.arrays import apart
 from poise.envs.balance import BalanceEnv, EnvConfig
 from poise.envs.config import build, to_dict
 from poise.envs.episode import ROOT_FORCE, ROOT_MOMENT, judge_step, record_tick
@@ -213,7 +214,7 @@ class ResidualBalanceEnv(BalanceEnv):
         self.residual = build(ResidualScales, given, "residual")
         scale = np.array(list(self.residual.entries().values()))
         self._moved = np.flatnonzero(scale)
-        self._offsets = np.zeros(len(scale))
+        self._offsets = apart(len(scale))
         if len(self._moved) == 0:
             raise ConfigError("at least one scale must be above 0", field="residual")
         super().__init__(robot, config, render_mode=render_mode, **overrides)
@@ -243,7 +244,7 @@ class ResidualBalanceEnv(BalanceEnv):
         self._targets = self.targets.arrays()
         columns = self.motion.coeffs.shape[2]
         self._motion = Motion(
-            self.motion.knots, self.motion.coeffs, self.motion.loop, np.zeros((3, columns))
+            self.motion.knots, self.motion.coeffs, self.motion.loop, apart((3, columns))
         )
 
     def arguments(self) -> dict[str, Any]:

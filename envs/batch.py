@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .arrays import apart
 from .balance import BalanceEnv
 from .episode import EpisodeArrays
 from .errors import ConfigError
@@ -47,9 +48,11 @@ class EnvBatch:
         # a window is drawn to from one thread only
         self.threads = 1 if first.render_mode == "human" else max(1, min(threads, n))
         # the environments' own records become rows of these, so that nothing is gathered by hand
-        self.episodes = EpisodeArrays(
-            *(np.stack(arrays) for arrays in zip(*(env.episode for env in envs), strict=True))
-        )
+        self.episodes = EpisodeArrays(*(apart((n, *array.shape)) for array in first.episode))
+        for rows, arrays in zip(
+            self.episodes, zip(*(env.episode for env in envs), strict=True), strict=True
+        ):
+            rows[:] = arrays
         for env, rows in zip(self.envs, zip(*self.episodes, strict=True), strict=True):
             env.episode = EpisodeArrays(*rows)
         self.observations = np.zeros((n, *first.observation_space.shape), dtype=np.float32)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import RobotArrays
+from .arrays import RobotArrays, apart
 from .jit import compiled
 from .kinematics import StateArrays, support_distance, update_support
 from .observation import Scales
@@ -97,12 +97,12 @@ def judge(limits: FallLimits, weights: RewardWeights, height_com: float) -> Judg
 def allocate_episode(actions: int, observations: int, nc: int) -> EpisodeArrays:
     """Zeroed storage."""
     return EpisodeArrays(
-        action=np.zeros(actions),
-        last_action=np.zeros(actions),
-        observation=np.zeros(observations),
-        reward_terms=np.zeros(len(REWARD_TERMS)),
-        metrics=np.zeros(METRICS),
-        sole_start=np.zeros((nc, 2)),
+        action=apart(actions),
+        last_action=apart(actions),
+        observation=apart(observations),
+        reward_terms=apart(len(REWARD_TERMS)),
+        metrics=apart(METRICS),
+        sole_start=apart((nc, 2)),
     )
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import MAX_VERTICES, Plant, RobotArrays
+from .arrays import GAP, MAX_VERTICES, Plant, RobotArrays, apart
 from .jit import compiled
 
 
@@ -46,7 +46,7 @@ class StateArrays(NamedTuple):
 
 def allocate_state(nv: int, nc: int) -> StateArrays:
     """Zeroed storage for a robot of `nv` degrees of freedom and `nc` soles."""
-    zeros = np.zeros
+    zeros = apart
     return StateArrays(
         qpos=zeros(nv + 1),
         qvel=zeros(nv),
@@ -257,7 +257,8 @@ def _contact(robot, plant, s):
 def update_support(robot: RobotArrays, s: StateArrays):
     """Convex hull of all soles' vertices on the ground (counter-clockwise, monotone chain)."""
     n = 0
-    points = np.empty((robot.sole_polygon.shape[0] * robot.sole_polygon.shape[1], 2))
+    corners = robot.sole_polygon.shape[0] * robot.sole_polygon.shape[1]
+    points = np.empty((corners + 2 * GAP, 2))[GAP:]
     for i in range(robot.sole_vertices.shape[0]):
         axes = s.sole_axes[i]
         for k in range(robot.sole_vertices[i]):
@@ -272,7 +273,7 @@ def update_support(robot: RobotArrays, s: StateArrays):
             points[j + 1, 0], points[j + 1, 1] = points[j, 0], points[j, 1]
             j -= 1
         points[j + 1, 0], points[j + 1, 1] = x, y
-    hull = np.empty((2 * n + 1, 2))
+    hull = np.empty((2 * n + 1 + 2 * GAP, 2))[GAP:]
     size = 0
     for i in range(n):  # lower chain
         while size >= 2 and _turn(hull, size, points, i) <= 0.0:

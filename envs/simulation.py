@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from .arrays import Plant, RobotArrays, plant_views, robot_arrays
+from .arrays import Plant, RobotArrays, apart, plant_views, robot_arrays
 from .jit import compiled
 from .kinematics import allocate_state, update_state
 from .native import mj_step1, mj_step2
@@ -46,7 +46,7 @@ class Simulation:
         self.arrays = robot_arrays(robot)
         self.plant = plant_views(robot.model, self.data)
         self.state_arrays = allocate_state(robot.model.nv, len(robot.soles))
-        self.clock = np.zeros(1, dtype=np.int64)
+        self.clock = apart(1, dtype=np.int64)
         self._warnings = self.data.warning.number  # a view
         self.pushes: tuple[Push | Kick, ...] = ()
         self.push_table = np.zeros((0, TABLE_COLUMNS))
