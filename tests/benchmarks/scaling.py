@@ -100,7 +100,7 @@ def ticks(robot: Robot, variants: Sequence[Robot]) -> list[Cost]:
     """Costs of controllers on the way back from a push; the last one of them acts."""
     model, simulation = robot.model, Simulation(robot)
     body = model.body(robot.root_body_id).name
-    simulation.reset(pushes=[Push(body, 0.02, 0.1, 0.15 * robot.mass, 30.0)])
+    simulation.reset(pushes=[Push(body, 0.02, 0.1, 0.15 * robot.mass, 0.0)])
     rigs = [Rig(variant, simulation) for variant in variants]
     shadow, steps = mujoco.MjData(model), []
     for _ in range(TICKS):
