@@ -162,7 +162,8 @@ def _write_problems(
 def npz(arrays: dict[str, Any]) -> bytes:
     """The content of a compressed .npz file; None becomes the object array that qpsolvers reads."""
     content = io.BytesIO()
-    np.savez_compressed(content, **{name: np.array(array) for name, array in arrays.items()})
+    plain: dict[str, Any] = {name: np.array(array) for name, array in arrays.items()}
+    np.savez_compressed(content, **plain)
     return content.getvalue()
 
 

@@ -22,6 +22,7 @@ from poise.envs.state import RobotState
 from .limits import PushLimits
 from .suite import generator, start_seed
 
+End = Literal["recovered", "fell", "not quiet"]
 DIRECTIONS = 8
 FRACTIONS = (0.6, 1.5, 0.85, 1.15, 1.0)  # of the limit in the push's direction
 PUSH_START, PUSH_DURATION = 0.2, 0.1  # [s]
@@ -79,7 +80,7 @@ class Recovery:
 
     push: Push
     seed: int
-    end: Literal["recovered", "fell", "not quiet"]
+    end: End
     ticks: list[Tick]
     met: int
 
@@ -98,7 +99,7 @@ def recoveries(robot: Robot, controller: str, limits: PushLimits, seed: int) -> 
         while not ended:
             _, fallen, truncated = env.step_in_place(action)
             ended = fallen or truncated
-        end = "fell" if env.fallen else "recovered" if env.recovered else "not quiet"
+        end: End = "fell" if env.fallen else "recovered" if env.recovered else "not quiet"
         yield Recovery(push, start, end, recorder.ticks, recorder.met)
         number += 1
 

@@ -1,7 +1,16 @@
 """All benchmarks: `make bench`."""
 
-from . import momentum_qp, solvers, step, vector
+from . import (
+    flywheel_limit,
+    momentum_qp,
+    qp_set,
+    scaling,
+    solvers,
+    startup,
+    step,
+    vector,
+)
 
-for benchmark in (step, vector, momentum_qp, solvers):
+for benchmark in (step, vector, momentum_qp, solvers, qp_set, scaling, startup, flywheel_limit):
     print(f"\n{benchmark.__name__.rsplit('.', 1)[-1]}")
     benchmark.main()
