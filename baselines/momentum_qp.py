@@ -69,7 +69,7 @@ FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the who
 def accept(s: StateArrays, p: QPParameters, status: int, ws: Workspace, memory: Memory):
     """Torques from a solved QP; otherwise the last good ones, blended into damping."""
     if status == 0:
-        recover(s, p, ws)
+        recover(p, ws)
         if np.all(np.isfinite(ws.tau)):
             memory.torques[:] = ws.tau
             memory.streak[0] = 0
@@ -105,13 +105,14 @@ def momentum_tick(
     """One control tick with the compiled solver: `ws.tau` (nj,) holds the torques."""
     assemble(robot, s, p, t, period, ws)
     status = solve_dual(
-        ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS
+        ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS, True
     )
     if status == INFEASIBLE:  # always because of joint limits, which the joints hold by themselves
         release_joints(ws)
         status = solve_dual(
-            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS
-        )
+            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS,
+            True,
+        )  # fmt: skip
     accept(s, p, status, ws, memory)
 
 
@@ -130,10 +131,7 @@ class MomentumQP:
         self.arrays = robot_arrays(robot)
         self.parameters = qp_parameters(robot, self.arrays, self.config)
         self.workspace = allocate_workspace(
-            robot.model.nv,
-            len(robot.soles),
-            self.parameters.cone.shape[1],
-            self.config.root == "soft",
+            self.arrays, self.parameters.cone.shape[1], self.config.root == "soft"
         )
         limit = self.parameters.torque_limit
         self.memory = Memory(
@@ -173,6 +171,7 @@ class MomentumQP:
         self.memory.torques[:] = 0.0
         self.memory.streak[0] = self.memory.failures[0] = 0
         self.workspace.cop_prev[:] = np.nan
+        self.workspace.iscratch[:] = 0  # no row to start from
         self.workspace.tau[:] = 0.0
         self.workspace.root_wrench[:] = 0.0
         if self.solver is not None:

@@ -3,7 +3,7 @@
 The readable problem of `formulation.py` has the unknowns (v̇, w) and two sets of equalities.
 Here both are solved first [Macchietto09, Moskalev24 §2.1]:
 
-    J v̇ = b                        v̇ = v̇₀ + N z           N spans the null space of J
+    J v̇ = b                        v̇ = v̇₀ + V z           V spans the null space of J
     A v̇ + A_bias = G w (+ u)       w = w₀ + E x           the wrench about the CoM, shared out
 
 With W = A v̇ + A_bias − u the total wrench that the ground must give, each of the nc soles takes
@@ -20,6 +20,7 @@ from poise.envs.arrays import RobotArrays, apart
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, cross
 
+from .null_space import NullSpace, allocate_null_space, solve_soles
 from .solvers.dual_active_set import iscratch_size, scratch_size
 
 
@@ -68,28 +69,37 @@ class TargetArrays(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch of the reduced problem; `H`, `g`, `C`, `l`, `u` are the QP after `assemble`."""
+    """Scratch of the reduced problem; `H`, `g`, `C`, `l`, `u` are the QP after `assemble`.
 
-    reflectors: np.ndarray  # (k, nv) rows: Householder vectors below, R above the diagonal
-    diagonal: np.ndarray  # (k,)
-    beta: np.ndarray  # (k,)
-    pivot: np.ndarray  # (k,) int
-    sole_rhs: np.ndarray  # (k,)
-    y: np.ndarray  # (nv,)
-    N: np.ndarray  # (nz, nv) rows span the null space of J
-    weighted: np.ndarray  # (nv,)
-    accel_des: np.ndarray  # (nv,)
+    v̇, the total wrench W, the sole wrenches w and the joint torques τ are affine in x: V x + v̇₀,
+    B x + W₀, E x + w₀, T x + τ₀. They lie one below the other in `rows` and `offsets`.
+    """
+
+    rows: np.ndarray  # (r, n), r = nv + 6 + k + nj
+    offsets: np.ndarray  # (r,)
+    wanted: np.ndarray  # (r,) what each should be
+    weights: np.ndarray  # (r,) of the squared differences
+    weighted: np.ndarray  # (r, n) rows times weights
+    values: np.ndarray  # (r,) at the solution
+    V: np.ndarray  # (nv, n) a view, like the next seven; columns span the null space of J, or are 0
+    B: np.ndarray  # (6, n) A V
+    E: np.ndarray  # (k, n)
+    T: np.ndarray  # (nj, n)
     vdot0: np.ndarray  # (nv,)
+    W0: np.ndarray  # (6,) A v̇₀ + A_bias
+    w0: np.ndarray  # (k,)
+    tau0: np.ndarray  # (nj,)
+    accel_des: np.ndarray  # (nv,) a view of `wanted`
+    space: NullSpace
+    sole_rhs: np.ndarray  # (k,)
+    y: np.ndarray  # (6,)
     cop_prev: np.ndarray  # (2,) last measured p
     cop_vel: np.ndarray  # (2,) ṗ
     momentum_rate: np.ndarray  # (6,) [Ṗ_des; L̇_des]
-    B: np.ndarray  # (6, nz) A N
-    W0: np.ndarray  # (6,) A v̇₀ + A_bias
     BBt: np.ndarray  # (6, 6)
-    E: np.ndarray  # (k, n)
-    w0: np.ndarray  # (k,)
-    T: np.ndarray  # (nj, n)
-    tau0: np.ndarray  # (nj,)
+    JtE: np.ndarray  # (nv, n) Jᵀ E
+    local: np.ndarray  # (6, n) E of one sole, its own axes
+    local0: np.ndarray  # (6,) w₀ of one sole, its own axes
     H: np.ndarray  # (n, n)
     g: np.ndarray  # (n,)
     C: np.ndarray  # (m, n)
@@ -99,28 +109,38 @@ class Workspace(NamedTuple):
     lam: np.ndarray  # (m,)
     scratch: np.ndarray
     iscratch: np.ndarray
-    vdot: np.ndarray  # (nv,) solution
+    vdot: np.ndarray  # (nv,) solution, a view of `values` like the next one
     wrenches: np.ndarray  # (k,) solution
     tau: np.ndarray  # (nj,) solution
     root_wrench: np.ndarray  # (6,) solution, about the CoM; zero with a hard root
 
+    @property
+    def N(self) -> np.ndarray:
+        """(nz, nv) rows span the null space of J: the first columns of V."""
+        held, steps = self.space.held, len(self.space.beta)
+        return self.V[:, : len(held) - steps + len(self.space.free)].T
 
-def allocate_workspace(nv: int, nc: int, cone_rows: int, soft_root: bool) -> Workspace:
-    """Zeroed scratch for `nv` degrees of freedom on `nc` soles."""
-    k, nj = 6 * nc, nv - 6
-    nz = nv - k
-    n = nz + 6 * (nc - 1) + (6 if soft_root else 0)
-    m = nc * cone_rows + 2 * nj
+
+def allocate_workspace(robot: RobotArrays, cone_rows: int, soft_root: bool) -> Workspace:
+    """Zeroed scratch for one robot, whose wrench cones have `cone_rows` rows each."""
+    space = allocate_null_space(robot)
+    nj, nc = len(robot.q_standing), len(robot.sole_body)
+    nv, k = nj + 6, 6 * nc
+    n = nv - len(space.beta) + 6 * (nc - 1) + (6 if soft_root else 0)
+    m, r = nc * cone_rows + 2 * nj, nv + 6 + k + nj
     z = apart
+    rows, offsets, wanted, values = z((r, n)), z(r), z(r), z(r)
+    V, B, E, T = (slice(0, nv), slice(nv, nv + 6), slice(nv + 6, nv + 6 + k), slice(r - nj, r))
     ws = Workspace(
-        reflectors=z((k, nv)), diagonal=z(k), beta=z(k), pivot=z(k, dtype=np.int64),
-        sole_rhs=z(k), y=z(nv), N=z((nz, nv)), weighted=z(nv), accel_des=z(nv), vdot0=z(nv),
-        cop_prev=z(2), cop_vel=z(2), momentum_rate=z(6), B=z((6, nz)), W0=z(6),
-        BBt=z((6, 6)),
-        E=z((k, n)), w0=z(k), T=z((nj, n)), tau0=z(nj), H=z((n, n)), g=z(n), C=z((m, n)),
-        l=z(m), u=z(m), x=z(n), lam=z(m), scratch=z(scratch_size(n, m)),
-        iscratch=z(iscratch_size(n, m), dtype=np.int64), vdot=z(nv), wrenches=z(k), tau=z(nj),
-        root_wrench=z(6),
+        rows=rows, offsets=offsets, wanted=wanted, weights=z(r),
+        weighted=z((r, n)), values=values, V=rows[V], B=rows[B], E=rows[E], T=rows[T],
+        vdot0=offsets[V], W0=offsets[B], w0=offsets[E], tau0=offsets[T],
+        accel_des=wanted[V], space=space,
+        sole_rhs=z(k), y=z(6), cop_prev=z(2), cop_vel=z(2), momentum_rate=z(6),
+        BBt=z((6, 6)), JtE=z((nv, n)), local=z((6, n)), local0=z(6),
+        H=z((n, n)), g=z(n), C=z((m, n)), l=z(m), u=z(m), x=z(n), lam=z(m),
+        scratch=z(scratch_size(n, m)), iscratch=z(iscratch_size(n, m), dtype=np.int64),
+        vdot=values[V], wrenches=values[E], tau=z(nj), root_wrench=z(6),
     )  # fmt: skip
     ws.cop_prev[:] = np.nan
     return ws
@@ -142,7 +162,7 @@ def assemble(
     _share_wrench(s, p, ws)
     _carry_momentum(p, t, ws)
     _torques(s, ws)
-    _objective(robot, s, p, ws)
+    _objective(robot, p, ws)
     _constraints(robot, s, p, ws)
 
 
@@ -205,128 +225,65 @@ def desired_momentum_rate(robot, s, p, t, tick, ws):
 
 @compiled
 def _eliminate_soles(s, p, ws):
-    """v̇₀ and N from J v̇ = −k_v J v − J̇ v by Householder QR of Jᵀ with column pivoting.
-
-    Rows of `reflectors` are columns of Jᵀ, so that inner loops run over contiguous memory. Rows
-    of J that depend on others (a straight leg) are dropped: their part of v̇₀ is zero.
-    """
-    W, nv = ws.reflectors, s.J.shape[1]
-    k = s.J.shape[0]
-    for r in range(k):
+    """v̇₀ and V from J v̇ = −k_v J v − J̇ v."""
+    for r in range(s.J.shape[0]):
         ws.sole_rhs[r] = -p.sole_damping * s.J_v[r] - s.Jdot_v[r]
-        ws.pivot[r] = r
-        W[r, :] = s.J[r, :]
-    for r in range(k):
-        best, norm2 = r, -1.0
-        for c in range(r, k):
-            total = 0.0
-            for i in range(r, nv):
-                total += W[c, i] * W[c, i]
-            if total > norm2 * (1.0 + 1e-9):
-                best, norm2 = c, total
-        if best != r:
-            ws.pivot[r], ws.pivot[best] = ws.pivot[best], ws.pivot[r]
-            for i in range(nv):
-                W[r, i], W[best, i] = W[best, i], W[r, i]
-        v = W[r]
-        alpha = -np.sqrt(norm2) if v[r] > 0.0 else np.sqrt(norm2)
-        length2 = 2.0 * (norm2 - alpha * v[r])
-        ws.diagonal[r] = alpha
-        v[r] -= alpha
-        ws.beta[r] = 2.0 / length2 if length2 > 0.0 else 0.0
-        for c in range(r + 1, k):
-            total = 0.0
-            for i in range(r, nv):
-                total += v[i] * W[c, i]
-            total *= ws.beta[r]
-            for i in range(r, nv):
-                W[c, i] -= total * v[i]
-    y = ws.y
-    y[:] = 0.0
-    smallest = 1e-6 * abs(ws.diagonal[0])
-    for r in range(k):
-        total = ws.sole_rhs[ws.pivot[r]]
-        for i in range(r):
-            total -= W[r, i] * y[i]
-        y[r] = total / ws.diagonal[r] if abs(ws.diagonal[r]) > smallest else 0.0
-    ws.vdot0[:] = y
-    _apply_reflectors(W, ws.beta, ws.vdot0)
-    for i in range(nv - k):
-        ws.N[i, :] = 0.0
-        ws.N[i, k + i] = 1.0
-        _apply_reflectors(W, ws.beta, ws.N[i])
-
-
-@compiled
-def _apply_reflectors(W, beta, vector):
-    """vector ← Q vector."""
-    for r in range(W.shape[0] - 1, -1, -1):
-        total = 0.0
-        for i in range(r, W.shape[1]):
-            total += W[r, i] * vector[i]
-        total *= beta[r]
-        for i in range(r, W.shape[1]):
-            vector[i] -= total * W[r, i]
+    solve_soles(s.J, ws.sole_rhs, ws.space, ws.vdot0, ws.V)
 
 
 @compiled
 def _share_wrench(s, p, ws):
     """B, W₀ and the sole wrenches w = w₀ + E x: W/nc each, plus internal wrenches."""
-    nz, nv = ws.N.shape
     nc = s.sole_point.shape[0]
     n = ws.g.shape[0]
+    soft = n - 6
+    internal = n - 6 * nc if p.soft_root else n - 6 * (nc - 1)  # the first internal wrench in x
+    np.dot(s.A, ws.V, ws.B)
     for a in range(6):
         total = s.A_bias[a]
-        for j in range(nv):
+        for j in range(ws.vdot0.shape[0]):
             total += s.A[a, j] * ws.vdot0[j]
         ws.W0[a] = total
-        for i in range(nz):
-            total = 0.0
-            for j in range(nv):
-                total += s.A[a, j] * ws.N[i, j]
-            ws.B[a, i] = total
-    ws.E[:, :] = 0.0
     share = 1.0 / nc
-    soft = n - 6
     for i in range(nc):
-        row = 6 * i
+        E, w0 = ws.E[6 * i : 6 * i + 6], ws.w0[6 * i : 6 * i + 6]
         for a in range(6):
-            ws.w0[row + a] = share * ws.W0[a]
-            for j in range(nz):
-                ws.E[row + a, j] = share * ws.B[a, j]
+            w0[a] = share * ws.W0[a]
+            for j in range(n):
+                E[a, j] = share * ws.B[a, j]
             if i < nc - 1:
-                ws.E[row + a, nz + 6 * i + a] = 1.0
+                E[a, internal + 6 * i + a] = 1.0
             else:
                 for other in range(nc - 1):
-                    ws.E[row + a, nz + 6 * other + a] = -1.0
+                    E[a, internal + 6 * other + a] = -1.0
             if p.soft_root:
-                ws.E[row + a, soft + a] = -share
+                E[a, soft + a] = -share
         # about the CoM → about the sole: the force's moment over the arm is subtracted
         rx = s.sole_point[i, 0] - s.com[0]
         ry = s.sole_point[i, 1] - s.com[1]
         rz = s.sole_point[i, 2] - s.com[2]
-        fx, fy, fz = ws.w0[row], ws.w0[row + 1], ws.w0[row + 2]
-        ws.w0[row + 3] -= ry * fz - rz * fy
-        ws.w0[row + 4] -= rz * fx - rx * fz
-        ws.w0[row + 5] -= rx * fy - ry * fx
+        w0[3] -= ry * w0[2] - rz * w0[1]
+        w0[4] -= rz * w0[0] - rx * w0[2]
+        w0[5] -= rx * w0[1] - ry * w0[0]
         for j in range(n):
-            fx, fy, fz = ws.E[row, j], ws.E[row + 1, j], ws.E[row + 2, j]
-            ws.E[row + 3, j] -= ry * fz - rz * fy
-            ws.E[row + 4, j] -= rz * fx - rx * fz
-            ws.E[row + 5, j] -= rx * fy - ry * fx
+            fx, fy, fz = E[0, j], E[1, j], E[2, j]
+            E[3, j] -= ry * fz - rz * fy
+            E[4, j] -= rz * fx - rx * fz
+            E[5, j] -= rx * fy - ry * fx
 
 
 @compiled
 def _carry_momentum(p, t, ws):
-    """Posture velocities that carry L_ref: a_des += d_t N z, the least z with B z = [0; L_ref].
+    """Posture velocities that carry L_ref: a_des += d_t V z, the least z with B z = [0; L_ref].
 
-    The soles and the CoM stay where they are (A_P N z = 0), so this asks the trunk and arms to
+    The soles and the CoM stay where they are (A_P V z = 0), so this asks the trunk and arms to
     turn, which is what the posture's own damping holds back.
     """
     L = t.angular_momentum
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return
-    nz, nv = ws.N.shape
+    nv = ws.V.shape[0]
+    nz = nv - ws.space.beta.shape[0]
     G, y = ws.BBt, ws.y
     trace = 0.0
     for a in range(6):
@@ -354,124 +311,91 @@ def _carry_momentum(p, t, ws):
         for a in range(6):
             z += ws.B[a, i] * y[a]
         for j in range(3, nv):
-            ws.accel_des[j] += p.damping[j] * ws.N[i, j] * z
+            ws.accel_des[j] += p.damping[j] * ws.V[j, i] * z
 
 
 @compiled
 def _torques(s, ws):
     """τ = τ₀ + T x on every joint's row of M v̇ + h − Jᵀw."""
-    nz, nv = ws.N.shape
     nj, n = ws.T.shape
+    np.dot(s.M[6:], ws.V, ws.T)
+    np.dot(s.J.T, ws.E, ws.JtE)
     for a in range(nj):
-        d = 6 + a
-        total = s.h[d]
-        for j in range(nv):
-            total += s.M[d, j] * ws.vdot0[j]
-        for i in range(nz):
-            row = 0.0
-            for j in range(nv):
-                row += s.M[d, j] * ws.N[i, j]
-            ws.T[a, i] = row
-        for i in range(nz, n):
-            ws.T[a, i] = 0.0
-        for r in range(s.J.shape[0]):
-            lever = s.J[r, d]
-            if lever != 0.0:
-                total -= lever * ws.w0[r]
-                for i in range(n):
-                    ws.T[a, i] -= lever * ws.E[r, i]
+        total = s.h[6 + a]
+        for j in range(ws.vdot0.shape[0]):
+            total += s.M[6 + a, j] * ws.vdot0[j]
         ws.tau0[a] = total
-
-
-@compiled
-def _add_square(H, g, row, offset, weight):
-    """H, g += weight (row·x + offset)², upper triangle; `row` may be shorter than x."""
-    for i in range(row.shape[0]):
-        scaled = weight * row[i]
-        g[i] += scaled * offset
-        for j in range(i, row.shape[0]):
-            H[i, j] += scaled * row[j]
-
-
-@compiled
-def _objective(robot, s, p, ws):
-    """½ the weighted squares: posture, Ṗ, L̇, and small costs of wrenches, torques and x."""
-    nz, nv = ws.N.shape
-    n = ws.g.shape[0]
-    H, g = ws.H, ws.g
-    H[:, :] = 0.0
-    g[:] = 0.0
-    for i in range(nz):
-        gradient = 0.0
-        for j in range(nv):
-            ws.weighted[j] = p.accel_weight[j] * ws.N[i, j]
-            gradient += ws.weighted[j] * (ws.vdot0[j] - ws.accel_des[j])
-        g[i] += gradient
-        for k in range(i, nz):
-            total = 0.0
-            for j in range(nv):
-                total += ws.weighted[j] * ws.N[k, j]
-            H[i, k] += total
-    for a in range(3):
-        gravity = robot.mass * robot.gravity if a == 2 else 0.0
-        offset = ws.W0[a] - gravity - ws.momentum_rate[a]
-        _add_square(H, g, ws.B[a], offset, p.com_weight[a])
-        offset = ws.W0[3 + a] - ws.momentum_rate[3 + a]
-        _add_square(H, g, ws.B[3 + a], offset, p.angular_weight[a])
+        for j in range(n):
+            ws.T[a, j] -= ws.JtE[6 + a, j]
     for r in range(ws.w0.shape[0]):
-        weight = p.force_weight if r % 6 < 3 else p.moment_weight
-        _add_square(H, g, ws.E[r], ws.w0[r], weight)
+        for a in range(nj):
+            ws.tau0[a] -= s.J[r, 6 + a] * ws.w0[r]
+
+
+@compiled
+def _objective(robot, p, ws):
+    """½ the weighted squares: posture, Ṗ, L̇, and small costs of wrenches, torques and x."""
+    nv, n = ws.V.shape
+    nz = nv - ws.space.beta.shape[0]
+    weights, wanted = ws.weights, ws.wanted  # which holds the posture's accelerations already
+    for j in range(nv):
+        weights[j] = p.accel_weight[j]
+    for a in range(3):
+        weights[nv + a], weights[nv + 3 + a] = p.com_weight[a], p.angular_weight[a]
+        wanted[nv + a], wanted[nv + 3 + a] = ws.momentum_rate[a], ws.momentum_rate[3 + a]
+    wanted[nv + 2] += robot.mass * robot.gravity
+    first = nv + 6
+    for r in range(ws.w0.shape[0]):
+        weights[first + r] = p.force_weight if r % 6 < 3 else p.moment_weight
+    first += ws.w0.shape[0]
     for a in range(ws.tau0.shape[0]):
-        if p.torque_weight[a] > 0.0:
-            _add_square(H, g, ws.T[a], ws.tau0[a], p.torque_weight[a])
+        weights[first + a] = p.torque_weight[a]
+    ws.g[:] = 0.0
+    for r in range(weights.shape[0]):
+        residual = weights[r] * (ws.offsets[r] - wanted[r])
+        for j in range(n):
+            ws.weighted[r, j] = weights[r] * ws.rows[r, j]
+            ws.g[j] += residual * ws.rows[r, j]
+    np.dot(ws.rows.T, ws.weighted, ws.H)
     if p.soft_root:
         for i in range(6):
-            H[n - 6 + i, n - 6 + i] += p.root_weight[i]
+            ws.H[n - 6 + i, n - 6 + i] += p.root_weight[i]
     for i in range(n):
         if i < nz:
-            H[i, i] += p.accel_floor
+            ws.H[i, i] += p.accel_floor
         for j in range(i):
-            H[i, j] = H[j, i]
+            ws.H[i, j] = ws.H[j, i]
 
 
 @compiled
 def _constraints(robot, s, p, ws):
     """Rows of C: wrench cones, torque limits, joint limits by braking distance."""
-    nz = ws.N.shape[0]
     nc, rows = p.cone.shape[0], p.cone.shape[1]
-    nj, n = ws.T.shape
-    m = 0
+    nj, m = ws.T.shape[0], nc * p.cone.shape[1]
     for i in range(nc):
-        axes = s.sole_axes[i]
+        axes, first = s.sole_axes[i], i * rows
+        for a in range(6):
+            r, c = 6 * i + a // 3 * 3, a % 3  # of the force or the moment; the sole's axis
+            x, y, z = axes[0, c], axes[1, c], axes[2, c]
+            ws.local0[a] = x * ws.w0[r] + y * ws.w0[r + 1] + z * ws.w0[r + 2]
+            for j in range(ws.local.shape[1]):
+                ws.local[a, j] = x * ws.E[r, j] + y * ws.E[r + 1, j] + z * ws.E[r + 2, j]
+        np.dot(p.cone[i], ws.local, ws.C[first : first + rows])
         for r in range(rows):
-            offset = 0.0
-            for j in range(n):
-                ws.C[m, j] = 0.0
+            total = 0.0
             for a in range(6):
-                block, axis = 3 * (a // 3), a % 3
-                coefficient = 0.0  # the cone is given in the sole's axes
-                for b in range(3):
-                    coefficient += p.cone[i, r, block + b] * axes[axis, b]
-                offset += coefficient * ws.w0[6 * i + a]
-                for j in range(n):
-                    ws.C[m, j] += coefficient * ws.E[6 * i + a, j]
-            ws.l[m], ws.u[m] = -np.inf, -offset
-            m += 1
+                total += p.cone[i, r, a] * ws.local0[a]
+            ws.l[first + r], ws.u[first + r] = -np.inf, -total
+    ws.C[m : m + nj] = ws.T
+    ws.C[m + nj :] = ws.V[6:]
     for a in range(nj):
-        for j in range(n):
-            ws.C[m, j] = ws.T[a, j]
-        ws.l[m] = -p.torque_limit[a] - ws.tau0[a]
-        ws.u[m] = p.torque_limit[a] - ws.tau0[a]
-        m += 1
-    for a in range(nj):
-        for j in range(n):
-            ws.C[m, j] = ws.N[j, 6 + a] if j < nz else 0.0
+        ws.l[m + a] = -p.torque_limit[a] - ws.tau0[a]
+        ws.u[m + a] = p.torque_limit[a] - ws.tau0[a]
         low, high = braking_bounds(
             s.qpos[7 + a], s.qvel[6 + a], robot.q_min[a], robot.q_max[a],
             p.brake_accel, p.brake_horizon, p.brake_floor,
         )  # fmt: skip
-        ws.l[m], ws.u[m] = low - ws.vdot0[6 + a], high - ws.vdot0[6 + a]
-        m += 1
+        ws.l[m + nj + a], ws.u[m + nj + a] = low - ws.vdot0[6 + a], high - ws.vdot0[6 + a]
 
 
 @compiled
@@ -504,24 +428,14 @@ def stopping_speed(distance, accel, horizon):
 
 
 @compiled
-def recover(s: StateArrays, p: QPParameters, ws: Workspace):
+def recover(p: QPParameters, ws: Workspace):
     """Accelerations, wrenches and torques from the solution x."""
-    nz, nv = ws.N.shape
-    nj, n = ws.T.shape
-    for j in range(nv):
-        ws.vdot[j] = ws.vdot0[j]
-    for i in range(nz):
-        for j in range(nv):
-            ws.vdot[j] += ws.N[i, j] * ws.x[i]
-    for r in range(ws.w0.shape[0]):
-        total = ws.w0[r]
-        for j in range(n):
-            total += ws.E[r, j] * ws.x[j]
-        ws.wrenches[r] = total
+    n, nj = ws.g.shape[0], ws.tau.shape[0]
+    np.dot(ws.rows, ws.x, ws.values)
+    for r in range(ws.values.shape[0]):
+        ws.values[r] += ws.offsets[r]
+    first = ws.values.shape[0] - nj
     for a in range(nj):
-        total = ws.tau0[a]
-        for j in range(n):
-            total += ws.T[a, j] * ws.x[j]
-        ws.tau[a] = min(max(total, -p.torque_limit[a]), p.torque_limit[a])
+        ws.tau[a] = min(max(ws.values[first + a], -p.torque_limit[a]), p.torque_limit[a])
     for a in range(6):
         ws.root_wrench[a] = ws.x[n - 6 + a] if p.soft_root else 0.0

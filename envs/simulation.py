@@ -60,7 +60,7 @@ class Simulation:
     @property
     def diverged(self) -> bool:
         """Whether numbers became too large since the reset; MuJoCo then starts anew by itself."""
-        return bool(self._warnings[BAD_STATE].any())
+        return any(self._warnings[i] for i in BAD_STATE)
 
     @property
     def state(self) -> RobotState:

@@ -221,3 +221,20 @@ def test_weights_behave(robot):
     plain, com, posture = missed(1.0, 1.0), missed(100.0, 1.0), missed(1.0, 1000.0)
     assert com[0] < 0.5 * plain[0] < plain[0] < posture[0]
     assert posture[1] < plain[1]
+
+
+def test_reset_forgets_where_the_solver_stopped(robot):
+    """A tick starts from the rows active in the last; after a reset, as in a new controller."""
+    ticks = [tick for tick in recovery() if tick.solved]
+    used, new = controller(robot), controller(robot)
+    remembered = 0
+    for tick in ticks[:20]:
+        used.torques(tick.state, tick.targets)
+        remembered = max(remembered, used.workspace.iscratch[1])
+    assert remembered > 5
+    used.reset()
+    assert used.workspace.iscratch[1] == 0
+    for tick in ticks[5:10]:
+        np.testing.assert_array_equal(
+            used.torques(tick.state, tick.targets), new.torques(tick.state, tick.targets)
+        )

@@ -1,7 +1,8 @@
 """The control tick and the environment's step against physics: `python -m tests.benchmarks.step`.
 
-All on states of real push recoveries, in one process. The yardstick is `mj_step` of the same
-robot in the same states.
+All on states of real push recoveries, in one process, interleaved. The yardstick is `mj_step` of
+the same robot in the same states. A tick is timed inside compiled code, in three parts: MuJoCo's
+position and velocity stages (which the physics step shares), `update_state`, `momentum_tick`.
 """
 
 from __future__ import annotations
@@ -11,26 +12,21 @@ import time
 import mujoco
 import numpy as np
 
-from poise.baselines.momentum_qp import momentum_tick
 from poise.baselines.residual_balance import ResidualBalanceEnv
 
 from .recoveries import DIRECTIONS, IMPULSES, record
+from .tick_clock import TickClock
 
 
 def tick_times() -> np.ndarray:
-    """Seconds of each compiled control tick, called from Python."""
-    env, recoveries = record()
-    controller, times = env.controller, []
+    """(ticks, 3) seconds of the parts of each control tick, every policy step of the recoveries."""
+    env, recoveries = record(every=1)
+    clock = TickClock(env.controller)
+    clock.time(recoveries[0][0])  # compiled
+    times = []
     for recovery in recoveries:
-        controller.reset()
-        for tick in recovery:
-            arguments = (
-                controller.arrays, tick.state.arrays, controller.parameters,
-                tick.targets.arrays(), controller.period, controller.workspace, controller.memory,
-            )  # fmt: skip
-            start = time.perf_counter()
-            momentum_tick(*arguments)
-            times.append(time.perf_counter() - start)
+        env.controller.reset()
+        times += [clock.time(tick) for tick in recovery]
     return np.array(times)
 
 
@@ -62,14 +58,25 @@ def step_times() -> tuple[np.ndarray, np.ndarray]:
 
 def main() -> None:
     steps, physics = step_times()
-    ticks = tick_times()
-    print("| path | median | p99 | over physics |")
-    print("| --- | --- | --- | --- |")
+    parts = tick_times()
+    print("| path | median | p99 | over physics | p99 over median |")
+    print("| --- | --- | --- | --- | --- |")
     floor = float(np.median(physics))
-    rows = {"10 × mj_step": physics, "ResidualBalance-v0.step": steps, "control tick": ticks}
+    rows = {
+        "10 × mj_step": physics,
+        "ResidualBalance-v0.step": steps,
+        "tick: mj_step1": parts[:, 0],
+        "tick: update_state": parts[:, 1],
+        "tick: momentum_tick": parts[:, 2],
+        "tick, positions and velocities to torques": parts.sum(axis=1),
+    }
     for name, times in rows.items():
-        median, slow = np.median(times), np.percentile(times, 99)
-        print(f"| {name} | {1e6 * median:.0f} µs | {1e6 * slow:.0f} µs | {median / floor:.2f} |")
+        median, slow = float(np.median(times)), float(np.percentile(times, 99))
+        print(f"| {name} | {1e6 * median:.1f} µs | {1e6 * slow:.1f} µs | {median / floor:.2f} | "
+              f"{slow / median:.2f} |")  # fmt: skip
+    print(f"{len(steps)} steps and {len(parts)} ticks of real push recoveries.")
+    pairs = np.median(steps / physics)
+    print(f"step / (10 mj_step), median of the interleaved pairs: {pairs:.2f}")
 
 
 if __name__ == "__main__":
