@@ -19,7 +19,7 @@ compiled = numba.njit(
 )
 
 PATIENCE = 1.0  # [s] of compilation before the user is told
-MESSAGE = "poise: compiling for the first use; this takes about half a minute, once"
+MESSAGE = "poise: compiling for the first use; this takes about a minute, once"
 
 
 class Patience(event.Listener):
