@@ -17,17 +17,25 @@ from poise.baselines.residual_balance import ResidualBalanceEnv
 from .recoveries import DIRECTIONS, IMPULSES, record
 from .tick_clock import TickClock
 
+PASSES = 5  # over the same ticks: the least time of each is what it takes undisturbed
+
 
 def tick_times() -> np.ndarray:
-    """(ticks, 3) seconds of the parts of each control tick, every policy step of the recoveries."""
+    """(ticks, 3) seconds of the parts of each control tick, every policy step of the recoveries.
+
+    A tick does the same in every pass, for the controller's memory is reset with each recovery.
+    """
     env, recoveries = record(every=1)
     clock = TickClock(env.controller)
     clock.time(recoveries[0][0])  # compiled
-    times = []
-    for recovery in recoveries:
-        env.controller.reset()
-        times += [clock.time(tick) for tick in recovery]
-    return np.array(times)
+    passes = []
+    for _ in range(PASSES):
+        times = []
+        for recovery in recoveries:
+            env.controller.reset()
+            times += [clock.time(tick) for tick in recovery]
+        passes.append(times)
+    return np.array(passes).min(axis=0)
 
 
 def step_times() -> tuple[np.ndarray, np.ndarray]:
@@ -74,7 +82,7 @@ def main() -> None:
         median, slow = float(np.median(times)), float(np.percentile(times, 99))
         print(f"| {name} | {1e6 * median:.1f} µs | {1e6 * slow:.1f} µs | {median / floor:.2f} | "
               f"{slow / median:.2f} |")  # fmt: skip
-    print(f"{len(steps)} steps and {len(parts)} ticks of real push recoveries.")
+    print(f"{len(steps)} steps, each once, and {len(parts)} ticks, each the least of {PASSES}.")
     pairs = np.median(steps / physics)
     print(f"step / (10 mj_step), median of the interleaved pairs: {pairs:.2f}")
 

@@ -32,6 +32,7 @@ from .tick_clock import TickClock
 from .urdf import urdf
 
 STATES = 2000
+PASSES = 5  # over the same ticks: the least time of each is what it takes undisturbed
 FORCE_WEIGHT = 1e-5
 
 
@@ -133,22 +134,23 @@ def main() -> None:
     env, recoveries = record(every=1)
     other, clock = TsidTick(env.robot, env.controller), TickClock(env.controller)
     clock.time(recoveries[0][0])  # compiled
-    ours, theirs, unsolved = [], [], 0
-    for recovery in recoveries:
-        env.controller.reset()
-        other.begin(recovery[0].targets.com.copy())
-        for tick in recovery:
-            other.check(tick.state)
-            seconds, solved = other.time(tick.state)
-            theirs.append(seconds)
-            unsolved += not solved
-            ours.append(clock.time(tick))
-    chosen = np.linspace(0, len(theirs) - 1, min(STATES, len(theirs))).astype(int)
-    base = np.array(theirs)[chosen]
-    parts = np.array(ours)[chosen]
+    least, unsolved = None, 0
+    for _ in range(PASSES):
+        times = []
+        for recovery in recoveries:
+            env.controller.reset()
+            other.begin(recovery[0].targets.com.copy())
+            for tick in recovery:
+                other.check(tick.state)
+                seconds, solved = other.time(tick.state)
+                unsolved += not solved
+                times.append([seconds, *clock.time(tick)])
+        least = np.array(times) if least is None else np.minimum(least, times)
+    chosen = least[np.linspace(0, len(least) - 1, min(STATES, len(least))).astype(int)]
+    base, parts = chosen[:, 0], chosen[:, 1:]
     rows = {"TSID": base, "ours, q and v to torques": parts.sum(axis=1),
             "ours, momentum_tick alone": parts[:, 2]}  # fmt: skip
-    print(f"{len(chosen)} states; TSID left {unsolved} of {len(theirs)} unsolved")
+    print(f"{len(chosen)} states; TSID left {unsolved} of {PASSES * len(least)} unsolved")
     print("| tick | median | p99 | p99 over median | over TSID |")
     print("| --- | --- | --- | --- | --- |")
     for name, times in rows.items():

@@ -28,7 +28,7 @@ def urdf(robot: Robot) -> str:
         rotation = Rotation.from_matrix(sole.rotation)
         position = np.asarray(sole.position) - _anchor(robot, sole.body_id)
         parts.append(f'<link name="{name}"/>')
-        parts.append(_joint(name, "fixed", parent, name, position, rotation))
+        parts.append(_joint(f"{name}_joint", "fixed", parent, name, position, rotation))
     return "\n".join([*parts, "</robot>"])
 
 
