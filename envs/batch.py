@@ -49,10 +49,10 @@ class EnvBatch:
         self.threads = 1 if first.render_mode == "human" else max(1, min(threads, n))
         # the environments' own records become rows of these, so that nothing is gathered by hand
         self.episodes = EpisodeArrays(*(apart((n, *array.shape)) for array in first.episode))
-        for rows, arrays in zip(
+        for shared, own in zip(
             self.episodes, zip(*(env.episode for env in envs), strict=True), strict=True
         ):
-            rows[:] = arrays
+            shared[:] = own
         for env, rows in zip(self.envs, zip(*self.episodes, strict=True), strict=True):
             env.episode = EpisodeArrays(*rows)
         self.observations = np.zeros((n, *first.observation_space.shape), dtype=np.float32)

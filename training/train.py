@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
@@ -42,6 +43,7 @@ def train(
     prepare()
     normalize = _training_envs(config)
     model = make_model(config, normalize)
+    normalize.seed(_env_seed(config.seed))
     state: dict[str, Any] = {}
     if checkpoint is not None:
         robot = normalize.get_attr("robot")[0]
@@ -115,7 +117,12 @@ def _training_envs(config: TrainConfig) -> VecNormalize:
 
 def _reseed(model: PPO, env: VecNormalize, seed: int) -> None:
     model.set_random_seed(seed)
-    env.seed(seed)
+    env.seed(_env_seed(seed))
+
+
+def _env_seed(seed: int) -> int:
+    """Seed of the first environment; the others follow, and runs with neighbouring seeds differ."""
+    return int(np.random.SeedSequence(seed).generate_state(1)[0])
 
 
 def _check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
