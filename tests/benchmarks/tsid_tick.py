@@ -6,6 +6,9 @@ PYTHON is one that has TSID 1.10 and Poise's own dependencies (no torch):
     CMEEL_RUN_TESTS=OFF venv_tsid/bin/pip install --no-binary tsid tsid==1.10.0
     venv_tsid/bin/pip install .
 
+or Poise's own Python with `venv_tsid/lib/python3.X/site-packages/cmeel.prefix/lib/python3.X/
+site-packages` in PYTHONPATH.
+
 Both controllers get the same humanoid, states and tasks: CoM, posture, angular momentum, two
 soles held with friction, the motors' limits. TSID's tick is `computeProblemData` (with Pinocchio's
 kinematics), `SolverHQuadProgFast.solve` and `getActuatorForces`; ours MuJoCo's position and
