@@ -8,8 +8,9 @@ import numpy as np
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
+from .around_qp import AroundQP
 from .controller import Targets
-from .momentum_qp import MomentumQP, MomentumQPConfig
+from .momentum_qp import MomentumQPConfig
 
 
 @dataclass(frozen=True)
@@ -23,33 +24,17 @@ class Abe07Config:
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
 
 
-class Abe07:
+class Abe07(AroundQP):
     """min β h_t + h_c: no angular momentum, β = floor + (1 − floor) exp(−(|c − c_ref| / d)²).
 
     A CoM far from its goal counts more than the motion; near it, the motion is followed again.
     """
 
     def __init__(self, robot: Robot, config: Abe07Config | None = None):
-        self.robot = robot
         self.config = config or Abe07Config()
         cop = replace(self.config.qp.cop, weight=0.0, yaw_weight=0.0)
-        self.qp = MomentumQP(robot, replace(self.config.qp, cop=cop))
-        self.period, self.com_offset = self.qp.period, self.qp.com_offset
+        super().__init__(robot, replace(self.config.qp, cop=cop))
         self._tracking = self.qp.parameters.accel_weight.copy()
-
-    @property
-    def failures(self) -> int:
-        """Ticks since the reset at which the QP was not solved."""
-        return self.qp.failures
-
-    @property
-    def root_wrench(self) -> np.ndarray:
-        """(6,) u_root of the last tick, soft root only."""
-        return self.qp.root_wrench
-
-    def reset(self, state: RobotState | None = None) -> None:
-        """Forget the last trial."""
-        self.qp.reset(state)
 
     def tracking(self, state: RobotState, targets: Targets) -> float:
         """β of this state."""

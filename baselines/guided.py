@@ -8,11 +8,12 @@ import numpy as np
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
+from .around_qp import AroundQP
 from .controller import Targets
-from .momentum_qp import MomentumQP, MomentumQPConfig
+from .momentum_qp import MomentumQPConfig
 
 
-class Guided(ABC):
+class Guided(AroundQP, ABC):
     """c̈_des = ω² (c − p) and p_ref = p, with p chosen by `cop` each tick.
 
     The linear inverted pendulum c̈ = ω² (c − p) [Koolen12]. The QP gets c_ref = c, ċ_ref = ċ and
@@ -20,24 +21,8 @@ class Guided(ABC):
     """
 
     def __init__(self, robot: Robot, qp: MomentumQPConfig):
-        self.robot = robot
-        self.qp = MomentumQP(robot, qp)
-        self.period, self.com_offset = self.qp.period, self.qp.com_offset
+        super().__init__(robot, qp)
         self._guided: Targets | None = None
-
-    @property
-    def failures(self) -> int:
-        """Ticks since the reset at which the QP was not solved."""
-        return self.qp.failures
-
-    @property
-    def root_wrench(self) -> np.ndarray:
-        """(6,) u_root of the last tick, soft root only."""
-        return self.qp.root_wrench
-
-    def reset(self, state: RobotState | None = None) -> None:
-        """Forget the last trial."""
-        self.qp.reset(state)
 
     @abstractmethod
     def cop(self, state: RobotState, targets: Targets) -> np.ndarray:

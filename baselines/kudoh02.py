@@ -8,8 +8,9 @@ import numpy as np
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
+from .around_qp import AroundQP
 from .controller import Targets
-from .momentum_qp import MomentumQP, MomentumQPConfig
+from .momentum_qp import MomentumQPConfig
 from .pd import PDGains
 from .stable_pd import StablePD, StablePDConfig
 
@@ -35,7 +36,7 @@ class Kudoh02Config:
             raise ValueError("near must not be larger than far")
 
 
-class Kudoh02:
+class Kudoh02(AroundQP):
     """Switches by the distance of the CoM from its goal, with hysteresis.
 
     The paper switches by the CoM's position; the capture point is taken here, because at the
@@ -43,27 +44,14 @@ class Kudoh02:
     """
 
     def __init__(self, robot: Robot, config: Kudoh02Config | None = None):
-        self.robot = robot
         self.config = config or Kudoh02Config()
-        self.qp = MomentumQP(robot, self.config.qp)
-        period = self.config.qp.period
-        self.pd = StablePD(robot, StablePDConfig(period=period, gains=self.config.pd))
-        self.period, self.com_offset = period, self.qp.com_offset
+        super().__init__(robot, self.config.qp)
+        self.pd = StablePD(robot, StablePDConfig(period=self.period, gains=self.config.pd))
         self.reset()
-
-    @property
-    def failures(self) -> int:
-        """Ticks since the reset at which the QP was not solved."""
-        return self.qp.failures
-
-    @property
-    def root_wrench(self) -> np.ndarray:
-        """(6,) u_root of the QP's last tick, soft root only."""
-        return self.qp.root_wrench
 
     def reset(self, state: RobotState | None = None) -> None:
         """Forget the last trial: start with PD."""
-        self.qp.reset(state)
+        super().reset(state)
         self.large = False  # whether the deviation is large
         self._share = 0.0  # of the QP in the torques
 

@@ -31,6 +31,8 @@ KINDS: dict[str, tuple[type, type]] = {
     "lip-mpc": (LIPMPCConfig, LIPMPC),
 }
 
+CONTROLLERS = tuple(controller for _, controller in KINDS.values())
+
 
 def controller_config(name_or_path: str | Path) -> Any:
     """The configuration in a packaged file or a path, of the class that its `kind` names.

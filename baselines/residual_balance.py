@@ -19,7 +19,7 @@ from poise.envs.vector import make_vector_env
 from .controller import Controller, Targets
 from .momentum_qp import MomentumQP, MomentumQPConfig
 from .motions import ReferenceMotion, load_motion
-from .registry import load_controller
+from .registry import CONTROLLERS, load_controller
 from .residual_step import Motion, residual_step, soft_root_force
 from .targets import update_targets
 
@@ -252,7 +252,7 @@ class ResidualBalanceEnv(BalanceEnv):
 
         Raises ConfigError for a controller from outside: its memory cannot be shared.
         """
-        if type(self.controller) is not MomentumQP:
+        if type(self.controller) not in CONTROLLERS:
             raise ConfigError(
                 "one object cannot control several environments: give each its own",
                 field="controller",
@@ -263,6 +263,7 @@ class ResidualBalanceEnv(BalanceEnv):
             "motion": self.motion,
             "residual": self.residual,
             "smoothing": self.smoothing,
+            "gate": self.gate,
         }
 
     def _check_robots(self) -> None:

@@ -13,6 +13,7 @@ from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
 from poise.baselines.targets import update_targets
 from poise.envs.balance import EnvConfig
+from poise.envs.batch import replicate
 from poise.envs.episode import RewardWeights
 from poise.envs.errors import ConfigError
 from poise.envs.observation import observation_table
@@ -262,3 +263,39 @@ def test_both_docstrings_tell_the_same_of_rewards_start_end_and_info():
     _, info = env.reset(seed=0)
     for key in [*info, *info["push"][0]]:
         assert key.split("_")[0] in parts[0]
+
+
+def test_smoothing_is_a_first_order_lag():
+    """a ← a + (1 − e^(−T/τ)) (action − a): the observed action and the moved target follow it."""
+    env = ResidualBalanceEnv(robot(), pushes=None, smoothing=0.05)
+    env.reset(seed=0, options={"noise": 0.0})
+    action, expected = np.array([0.5, -1.0, 0.0, 0.2]), np.zeros(4)
+    for _ in range(3):
+        env.step(action)
+        expected += (1.0 - np.exp(-0.02 / 0.05)) * (action - expected)
+        np.testing.assert_allclose(env.episode.action, expected, rtol=1e-12)
+        np.testing.assert_allclose(env._offsets[:4], expected * [0.2, 0.2, 0.15, 0.15], rtol=1e-12)
+
+
+def test_the_gate_opens_with_the_capture_point():
+    """Shut at the reference, 1 − e⁻¹ open at the distance `gate`, open far away."""
+    env = ResidualBalanceEnv(robot(), pushes=None, gate=0.04)
+    env.reset(seed=0, options={"noise": 0.0})
+    s = env.simulation.state_arrays
+    reference = s.origin[:2] + env._com_offset * s.heading
+    for distance, share in ((0.0, 0.0), (0.04, 1.0 - np.exp(-1.0)), (0.4, 1.0)):
+        s.capture_point[:] = reference + distance * np.array([0.6, -0.8])
+        assert env._openness() == pytest.approx(share, abs=1e-9)
+
+
+@pytest.mark.parametrize("changes", [{"smoothing": 0.05}, {"gate": 0.04}, {"controller": "abe07"}])
+def test_a_replica_acts_alike(changes):
+    """Whatever an environment was made with, its copies have too: the same bits."""
+    first = ResidualBalanceEnv(robot(), pushes=None, **changes)
+    seen = []
+    for env in replicate(first, 2):
+        env.reset(seed=3)
+        for _ in range(5):
+            observation, *_ = env.step(np.array([1.0, -0.5, 0.3, 0.2]))
+        seen.append(observation)
+    np.testing.assert_array_equal(seen[0], seen[1])

@@ -86,8 +86,8 @@ def evaluate(
     it is started again alike. The result is the same for any number of workers.
 
     Args:
-        controllers: momentum-qp, residual (the shipped policy), zero (no torque), a .yaml file of
-            a controller, or a folder written by poise train.
+        controllers: a name of `poise list`, residual (the shipped policy), zero (no torque), a
+            .yaml file of a controller, or a folder written by poise train.
         suite: random, envelope, grid, quiet, or a .yaml file.
         out: folder to write to; out/SUITE if not given.
         robot: a packaged robot (see poise list) or a .yaml description.

@@ -101,7 +101,7 @@ def fall_probability(
     unit: Unit = "N·s",
     bins: int = 8,
     xlabel: str | None = None,
-    title: str = "Probability of a fall",
+    title: str = "Pushes that are not recovered",
 ) -> None:
     """Share of trials that ended in a fall against the impulse, with the fitted curves.
 
