@@ -1,6 +1,7 @@
 """What every controller is: state and targets in, joint torques out."""
 
 from dataclasses import dataclass, field, fields
+from operator import is_not
 from typing import Protocol
 
 import numpy as np
@@ -55,13 +56,18 @@ class Targets:
             array = apart(given.shape)
             array[...] = given
             setattr(self, item.name, array)
+        self._arrays: tuple[np.ndarray, ...] = ()
 
     def arrays(self) -> TargetArrays:
         """The same arrays, not copies, for compiled code."""
-        return TargetArrays(
+        arrays = (
             self.q_ref, self.v_ref, self.a_ref, self.root_axes, self.root_vel, self.root_acc,
             self.com, self.com_vel, self.com_acc, self.cop, self.angular_momentum,
         )  # fmt: skip
+        if not self._arrays or any(map(is_not, arrays, self._arrays)):
+            self._arrays = arrays
+            self._block = TargetArrays(*arrays)
+        return self._block
 
 
 class Controller(Protocol):

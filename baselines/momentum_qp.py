@@ -1,13 +1,14 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from poise.envs.arrays import RobotArrays, apart, robot_arrays
+from poise.envs.block import Block
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays
+from poise.envs.kinematics import StateArrays, copy
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
@@ -52,7 +53,8 @@ class MomentumQPConfig:
     joint: JointLimit = field(default_factory=JointLimit)
 
 
-class Memory(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Memory(Block):
     """What outlives a tick: the torques to fall back on and the count of failures."""
 
     torques: np.ndarray  # (nj,) of the last solved tick [N·m]
@@ -71,7 +73,7 @@ def accept(s: StateArrays, p: QPParameters, status: int, ws: Workspace, memory: 
     if status == 0:
         recover(p, ws)
         if np.all(np.isfinite(ws.tau)):
-            memory.torques[:] = ws.tau
+            copy(ws.tau, memory.torques)
             memory.streak[0] = 0
             return
     memory.streak[0] += 1

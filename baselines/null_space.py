@@ -5,17 +5,19 @@ is one orthonormal vector for each other joint, its own acceleration, and an ort
 the held part, from Householder's QR of Jᵀ with column pivoting.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from poise.envs.arrays import RobotArrays, apart
+from poise.envs.block import Block
 from poise.envs.jit import compiled
 
 DEPENDENT = 1e-6  # pivot, relative to the first, below which a row of J follows from the others
 
 
-class NullSpace(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class NullSpace(Block):
     """Scratch for `solve_soles`: nh held degrees of freedom, k rows of J, padded to kp."""
 
     held: np.ndarray  # (nh,) int
@@ -114,7 +116,8 @@ def _reduce(J, space):
         space.open[best] = False
         space.pivot[r] = best
         v = space.reflectors[r]
-        v[:] = rows[:, best]
+        for i in range(v.shape[0]):
+            v[i] = rows[i, best]
         alpha = -np.sqrt(norm2) if v[r] > 0.0 else np.sqrt(norm2)
         length2 = 2.0 * (norm2 - alpha * v[r])
         v[r] -= alpha

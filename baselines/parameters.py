@@ -47,6 +47,8 @@ def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig")
     com_stiffness = np.array([com.stiffness, com.stiffness, com.height_stiffness])
     return QPParameters(
         accel_weight=accel_weight / omega**4,
+        far_share=posture.far_share,
+        far_distance=posture.far_distance * h,
         stiffness=stiffness * omega**2,
         damping=2.0 * posture.damping_ratio * np.sqrt(stiffness) * omega,
         com_weight=np.array([com.weight, com.weight, com.height_weight]) / force**2,

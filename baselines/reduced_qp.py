@@ -12,22 +12,26 @@ x = (z, y_1 … y_{nc−1}, u), u only with a soft root; 15 + 6 (+ 6) for a huma
 Torques follow: τ = M v̇ + h − Jᵀw on the joints' rows.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from poise.envs.arrays import RobotArrays, apart
+from poise.envs.block import Block
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays, cross
+from poise.envs.kinematics import StateArrays, copy, cross
 
 from .null_space import NullSpace, allocate_null_space, solve_soles
 from .solvers.dual_active_set import iscratch_size, scratch_size
 
 
-class QPParameters(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class QPParameters(Block):
     """What tasks, contacts and limits hand to the compiled code (nv dofs, nc soles)."""
 
     accel_weight: np.ndarray  # (nv,) posture
+    far_share: float  # of these weights, with the CoM far from c_ref
+    far_distance: float  # [m]
     stiffness: np.ndarray  # (nv,) k_t [1/s²]
     damping: np.ndarray  # (nv,) d_t [1/s]
     com_weight: np.ndarray  # (3,) ω_c per N²
@@ -52,7 +56,8 @@ class QPParameters(NamedTuple):
     root_weight: np.ndarray  # (6,) ω_root per N² and per (N·m)²
 
 
-class TargetArrays(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class TargetArrays(Block):
     """What the controller is asked to reach (nj = nv−6 joints), world axes."""
 
     q_ref: np.ndarray  # (nj,)
@@ -68,7 +73,8 @@ class TargetArrays(NamedTuple):
     angular_momentum: np.ndarray  # (3,) L_ref that the posture is to carry; zero: none
 
 
-class Workspace(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Workspace(Block):
     """Scratch of the reduced problem; `H`, `g`, `C`, `l`, `u` are the QP after `assemble`.
 
     v̇, the total wrench W, the sole wrenches w and the joint torques τ are affine in x: V x + v̇₀,
@@ -162,7 +168,7 @@ def assemble(
     _share_wrench(s, p, ws)
     _carry_momentum(p, t, ws)
     _torques(s, ws)
-    _objective(robot, p, ws)
+    _objective(robot, s, p, t, ws)
     _constraints(robot, s, p, ws)
 
 
@@ -333,13 +339,22 @@ def _torques(s, ws):
 
 
 @compiled
-def _objective(robot, p, ws):
+def tracking_share(s, p, t):
+    """β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally: what the posture's weights keep."""
+    x, y = s.com[0] - t.com[0], s.com[1] - t.com[1]
+    away = (x * x + y * y) / (p.far_distance * p.far_distance)
+    return p.far_share + (1.0 - p.far_share) * np.exp(-away)
+
+
+@compiled
+def _objective(robot, s, p, t, ws):
     """½ the weighted squares: posture, Ṗ, L̇, and small costs of wrenches, torques and x."""
     nv, n = ws.V.shape
     nz = nv - ws.space.beta.shape[0]
     weights, wanted = ws.weights, ws.wanted  # which holds the posture's accelerations already
+    share = tracking_share(s, p, t)
     for j in range(nv):
-        weights[j] = p.accel_weight[j]
+        weights[j] = share * p.accel_weight[j]
     for a in range(3):
         weights[nv + a], weights[nv + 3 + a] = p.com_weight[a], p.angular_weight[a]
         wanted[nv + a], wanted[nv + 3 + a] = ws.momentum_rate[a], ws.momentum_rate[3 + a]
@@ -386,9 +401,9 @@ def _constraints(robot, s, p, ws):
             for a in range(6):
                 total += p.cone[i, r, a] * ws.local0[a]
             ws.l[first + r], ws.u[first + r] = -np.inf, -total
-    ws.C[m : m + nj] = ws.T
-    ws.C[m + nj :] = ws.V[6:]
     for a in range(nj):
+        copy(ws.T[a], ws.C[m + a])
+        copy(ws.V[6 + a], ws.C[m + nj + a])
         ws.l[m + a] = -p.torque_limit[a] - ws.tau0[a]
         ws.u[m + a] = p.torque_limit[a] - ws.tau0[a]
         low, high = braking_bounds(

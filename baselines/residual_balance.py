@@ -20,8 +20,8 @@ from .controller import Controller, Targets
 from .momentum_qp import MomentumQP, MomentumQPConfig
 from .motions import ReferenceMotion, load_motion
 from .registry import CONTROLLERS, load_controller
-from .residual_step import Motion, residual_step, soft_root_force
-from .targets import update_targets
+from .residual_step import ResidualStep, residual_step, soft_root_force
+from .targets import Motion, update_targets
 
 
 @dataclass(frozen=True)
@@ -228,24 +228,44 @@ class ResidualBalanceEnv(BalanceEnv):
         self._share = float(share)
         scale[7:] *= 10.0 * self.scales.momentum
         self._scale = scale[self._moved]
-        self.controller: Any = load_controller(controller, self.robot)
+        self.controller = load_controller(controller, self.robot)
         self.motion = (
             motion if isinstance(motion, ReferenceMotion) else load_motion(motion, self.robot)
         )
-        self._check_robots()
-        self.control_substeps = self._whole(
-            self.controller.period, self.arrays.timestep, "controller period"
-        )
-        self.ticks = self._whole(self.config.policy_period, self.controller.period, "policy_period")
-        # other solvers and controllers are called from Python, tick by tick
-        self._compiled = type(self.controller) is MomentumQP and self.controller.solver is None
-        self._com_offset = float(getattr(self.controller, "com_offset", 0.0))
+        if self.motion.coeffs.shape[2] != len(self.robot.joint_names) + 6:
+            raise ConfigError(
+                f"{self.motion.name!r} is not a motion of {self.robot.name!r}", field="motion"
+            )
         self.targets = Targets.standing(self.robot, self.simulation.state)
         self._targets = self.targets.arrays()
         columns = self.motion.coeffs.shape[2]
         self._motion = Motion(
             self.motion.knots, self.motion.coeffs, self.motion.loop, apart((3, columns))
         )
+
+    @property
+    def controller(self) -> Any:
+        """Whose targets the action moves; may be replaced between episodes.
+
+        Raises ConfigError for one of another robot, or with a period that does not fit.
+        """
+        return self._controller
+
+    @controller.setter
+    def controller(self, controller: Any) -> None:
+        made_for = getattr(controller, "robot", self.robot)
+        if made_for.fingerprint != self.robot.fingerprint:  # compiled code trusts array sizes
+            raise ConfigError(
+                f"is for the robot {made_for.name!r}, not {self.robot.name!r}", field="controller"
+            )
+        period = controller.period
+        self.control_substeps = self._whole(period, self.arrays.timestep, "controller period")
+        self.ticks = self._whole(self.config.policy_period, period, "policy_period")
+        self._controller = controller
+        # other solvers and controllers are called from Python, tick by tick
+        self._compiled = type(controller) is MomentumQP and controller.solver is None
+        self._com_offset = float(getattr(controller, "com_offset", 0.0))
+        self._step: ResidualStep | None = None
 
     def arguments(self) -> dict[str, Any]:
         """What makes another environment like this one; robot and motion are shared.
@@ -266,18 +286,6 @@ class ResidualBalanceEnv(BalanceEnv):
             "gate": self.gate,
         }
 
-    def _check_robots(self) -> None:
-        """Compiled code trusts the sizes of its arrays."""
-        made_for = getattr(self.controller, "robot", self.robot)
-        if made_for.fingerprint != self.robot.fingerprint:
-            raise ConfigError(
-                f"is for the robot {made_for.name!r}, not {self.robot.name!r}", field="controller"
-            )
-        if self.motion.coeffs.shape[2] != len(self.robot.joint_names) + 6:
-            raise ConfigError(
-                f"{self.motion.name!r} is not a motion of {self.robot.name!r}", field="motion"
-            )
-
     def _action_names(self) -> tuple[str, ...]:
         names = list(self.residual.entries())
         return tuple(names[i] for i in self._moved)
@@ -292,22 +300,28 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _update_targets(self, residual: np.ndarray) -> None:
         update_targets(
-            self.arrays, self.simulation.state_arrays, *self._motion[:3], self.simulation.time,
-            self._com_offset, residual, self._motion.samples, self._targets,
+            self.arrays, self.simulation.state_arrays, self._motion, self.simulation.time,
+            self._com_offset, residual, self._targets,
         )  # fmt: skip
 
     def _advance(self) -> float:
-        sim, controller = self.simulation, self.controller
         residual, e = self._offsets, self.episode
         if self._share < 1.0:
             e.action[:] = e.last_action + self._share * (e.action - e.last_action)
         residual[self._moved] = self._openness() * self._scale * e.action
         if not self._compiled:
             return self._advance_in_python(residual)
-        return residual_step(
-            self.arrays, sim.plant, sim.state_arrays, sim.push_table, sim.clock,
+        step, p = self._step, self.controller.parameters
+        if step is None or step.episode is not e or step.parameters is not p:
+            step = self._step = self._bind()
+        return residual_step(step, self.simulation.push_table)
+
+    def _bind(self) -> ResidualStep:
+        sim, controller = self.simulation, self.controller
+        return ResidualStep(
+            self.arrays, sim.plant, sim.state_arrays, sim.clock,
             controller.parameters, self._targets, controller.workspace, controller.memory,
-            self._motion, self._com_offset, residual,
+            self._motion, self._com_offset, self._offsets,
             self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
         )  # fmt: skip
 

@@ -1,10 +1,11 @@
 """One policy step of the momentum QP and the physics, compiled."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from poise.envs.arrays import Plant, RobotArrays
+from poise.envs.block import Block
 from poise.envs.episode import (
     ROOT_FORCE,
     ROOT_MOMENT,
@@ -20,16 +21,7 @@ from poise.envs.simulation import advance
 
 from .momentum_qp import Memory, momentum_tick
 from .reduced_qp import QPParameters, TargetArrays, Workspace
-from .targets import update_targets
-
-
-class Motion(NamedTuple):
-    """A reference motion as compiled code reads it."""
-
-    knots: np.ndarray
-    coeffs: np.ndarray
-    loop: bool
-    samples: np.ndarray  # scratch
+from .targets import Motion, update_targets
 
 
 @compiled
@@ -48,34 +40,39 @@ def soft_root_force(s: StateArrays, wrench: np.ndarray, qfrc_applied: np.ndarray
         )
 
 
+@dataclass(frozen=True, eq=False)
+class ResidualStep(Block):
+    """All that a policy step works on."""
+
+    robot: RobotArrays
+    plant: Plant
+    state: StateArrays
+    clock: np.ndarray  # (1,) int
+    parameters: QPParameters
+    targets: TargetArrays
+    workspace: Workspace
+    memory: Memory
+    motion: Motion
+    com_offset: float  # [m]
+    residual: np.ndarray  # (9,) see `update_targets`
+    scales: Scales
+    judge: Judge
+    ticks: int
+    substeps: int  # physics steps of each
+    episode: EpisodeArrays
+
+
 @compiled
-def residual_step(
-    robot: RobotArrays,
-    plant: Plant,
-    s: StateArrays,
-    pushes: np.ndarray,
-    clock: np.ndarray,
-    p: QPParameters,
-    t: TargetArrays,
-    ws: Workspace,
-    memory: Memory,
-    motion: Motion,
-    com_offset: float,
-    residual: np.ndarray,
-    scale: Scales,
-    j: Judge,
-    ticks: int,
-    substeps: int,
-    e: EpisodeArrays,
-) -> float:
+def residual_step(step: ResidualStep, pushes: np.ndarray) -> float:
     """One policy step: `ticks` times the QP, each held for `substeps` physics steps."""
-    period = substeps * robot.timestep
-    for _ in range(ticks):
+    robot, plant, s, clock, motion = step.robot, step.plant, step.state, step.clock, step.motion
+    p, t, ws, e = step.parameters, step.targets, step.workspace, step.episode
+    period = step.substeps * robot.timestep
+    for _ in range(step.ticks):
         update_targets(
-            robot, s, motion.knots, motion.coeffs, motion.loop, clock[0] * robot.timestep,
-            com_offset, residual, motion.samples, t,
-        )  # fmt: skip
-        momentum_tick(robot, s, p, t, period, ws, memory)
+            robot, s, motion, clock[0] * robot.timestep, step.com_offset, step.residual, t
+        )
+        momentum_tick(robot, s, p, t, period, ws, step.memory)
         for i in range(plant.ctrl.shape[0]):
             plant.ctrl[i] = ws.tau[robot.motor_dofs[i] - 6]
         if p.soft_root:
@@ -84,7 +81,8 @@ def residual_step(
             m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
             m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
         record_tick(robot, s, plant.ctrl, period, e)
-        for _ in range(substeps):
+        for _ in range(step.substeps):
             advance(robot, plant, pushes, clock)
         update_state(robot, plant, s)
-    return judge_step(robot, s, scale, j, t.q_ref, plant.ctrl, clock[0] * robot.timestep, e)
+    now = clock[0] * robot.timestep
+    return judge_step(robot, s, step.scales, step.judge, t.q_ref, plant.ctrl, now, e)

@@ -1,26 +1,36 @@
 """Targets of one tick from a reference motion and a residual, compiled."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from poise.envs.arrays import RobotArrays
+from poise.envs.block import Block
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays
+from poise.envs.kinematics import StateArrays, copy
 
 from .reduced_qp import TargetArrays
 from .splines import evaluate
+
+
+@dataclass(frozen=True, eq=False)
+class Motion(Block):
+    """A reference motion as compiled code reads it."""
+
+    knots: np.ndarray
+    coeffs: np.ndarray
+    loop: bool
+    samples: np.ndarray  # (3, nj + 6) scratch: position, velocity and acceleration
 
 
 @compiled
 def update_targets(
     robot: RobotArrays,
     s: StateArrays,
-    knots: np.ndarray,
-    coeffs: np.ndarray,
-    loop: bool,
+    motion: Motion,
     time: float,
     com_offset: float,
     residual: np.ndarray,
-    samples: np.ndarray,
     t: TargetArrays,
 ):
     """Fill `t` for `time`: the motion's joints and CoM, moved by the residual.
@@ -29,15 +39,14 @@ def update_targets(
     forward of it; p_ref lies under it. `residual` (9,) adds Δc_ref (x, y) and Δp_ref (x, y) [m],
     the CoM's height [m], a lean of the root, a rotation about the axes x and y [rad],
     and the angular momentum that the posture is to carry about x and y [N·m·s].
-    `samples` (3, nj+6) is scratch. The root's
-    reference is R = R_heading exp(φ) R_standing; its rate R_heading φ̇ is exact while φ keeps its
-    axis, as it does in every motion that bows or leans.
+    The root's reference is R = R_heading exp(φ) R_standing; its rate R_heading φ̇ is exact while φ
+    keeps its axis, as it does in every motion that bows or leans.
     """
-    nj = t.q_ref.shape[0]
-    evaluate(knots, coeffs, loop, time, samples[0], samples[1], samples[2])
-    t.q_ref[:] = samples[0, :nj]
-    t.v_ref[:] = samples[1, :nj]
-    t.a_ref[:] = samples[2, :nj]
+    nj, samples = t.q_ref.shape[0], motion.samples
+    evaluate(motion.knots, motion.coeffs, motion.loop, time, samples[0], samples[1], samples[2])
+    copy(samples[0], t.q_ref)
+    copy(samples[1], t.v_ref)
+    copy(samples[2], t.a_ref)
     cos, sin = s.heading[0], s.heading[1]
     samples[0, nj + 3] += residual[5]
     samples[0, nj + 4] += residual[6]

@@ -24,7 +24,7 @@ class Rows(NamedTuple):
 
 
 def posture_rows(state: RobotState, targets: Targets, p: QPParameters) -> Rows:
-    """h_t = ‖v̇ − (a_ref + k_t (q_ref ⊖ q) + d_t (v_ref + v* − v))‖².
+    """h_t = β ‖v̇ − (a_ref + k_t (q_ref ⊖ q) + d_t (v_ref + v* − v))‖².
 
     The root's q_ref ⊖ q is the rotation vector of RᵀR_ref, in body axes like its velocity; where
     the root is, is the CoM's business: its three linear rows have no weight. v* carries the
@@ -36,7 +36,13 @@ def posture_rows(state: RobotState, targets: Targets, p: QPParameters) -> Rows:
     a_ref = np.concatenate([np.zeros(3), targets.root_acc, targets.a_ref])
     v_ref = v_ref + carrying_velocity(state, targets.angular_momentum)
     desired = a_ref + p.stiffness * error + p.damping * (v_ref - state.qvel)
-    return Rows(np.eye(len(desired)), desired, p.accel_weight)
+    return Rows(np.eye(len(desired)), desired, tracking_share(state, targets, p) * p.accel_weight)
+
+
+def tracking_share(state: RobotState, targets: Targets, p: QPParameters) -> float:
+    """β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally: what the posture's weights keep."""
+    away = float(np.linalg.norm(state.com[:2] - targets.com[:2])) / p.far_distance
+    return p.far_share + (1.0 - p.far_share) * float(np.exp(-(away**2)))
 
 
 def carrying_velocity(state: RobotState, angular_momentum: np.ndarray) -> np.ndarray:

@@ -21,7 +21,9 @@ class PostureTask:
     """h_t = ‖v̇ − (a_ref + k_t (q_ref ⊖ q) + d_t (v_ref − v))‖², weights per kind of joint.
 
     Joints are told apart by what they carry: legs move one sole, the trunk moves several, the
-    rest (arms, head) none. Damping is d_t = 2 ζ √k_t.
+    rest (arms, head) none. Damping is d_t = 2 ζ √k_t. All weights fall to a share of themselves
+    as the CoM leaves c_ref: β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally [Abe07]; then
+    balance counts more than the posture.
     """
 
     leg_weight: float = _above(0.0, 1.0)
@@ -32,6 +34,8 @@ class PostureTask:
     free_stiffness: float = _at_least(0.0, 2.5)
     root_stiffness: float = _at_least(0.0, 2.5)
     damping_ratio: float = _at_least(0.0, 1.0)
+    far_share: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})  # s; 1: no fall
+    far_distance: float = _above(0.0, 0.02)  # d, in h
 
 
 @dataclass(frozen=True)

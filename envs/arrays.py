@@ -1,14 +1,15 @@
-"""What compiled code sees of a robot and of one simulation: named tuples of arrays.
+"""What compiled code sees of a robot and of one simulation: blocks of arrays.
 
 `RobotArrays` is constant and shared; `Plant` holds views into one `MjData`, so a kernel reads
 and writes the simulation itself. Whoever holds a `Plant` must keep its `MjData` alive.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass, fields
 
 import mujoco
 import numpy as np
 
+from .block import Block
 from .robot import Robot
 
 GAP = 64  # 512 bytes: more than a vector loop handles at once
@@ -25,7 +26,8 @@ def apart(shape: int | tuple[int, ...], dtype: type = float) -> np.ndarray:
     return np.zeros(size + 2 * GAP, dtype=dtype)[GAP : GAP + size].reshape(shape)
 
 
-class RobotArrays(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class RobotArrays(Block):
     """Constants of one robot (nv degrees of freedom, nu motors, nc soles)."""
 
     timestep: float  #: physics step [s]
@@ -54,7 +56,8 @@ class RobotArrays(NamedTuple):
     sole_sensor: np.ndarray  #: (nc,) addresses: contacts of that foot with the ground
 
 
-class Plant(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Plant(Block):
     """Views into one `MjData`; two addresses for the C functions."""
 
     model_address: int
@@ -105,8 +108,8 @@ def robot_arrays(robot: Robot) -> RobotArrays:
         q_standing=robot.standing_qpos[7:].copy(),
         q_min=robot.joint_range[:, 0].copy(),
         q_max=robot.joint_range[:, 1].copy(),
-        motor_dofs=np.asarray(robot.motor_dofs, dtype=np.int64),
-        torque_limit=np.asarray(robot.torque_limit, dtype=float),
+        motor_dofs=np.array(robot.motor_dofs, dtype=np.int64),
+        torque_limit=np.array(robot.torque_limit, dtype=float),
         sole_body=np.array([sole.body_id for sole in soles], dtype=np.int64),
         sole_position=np.array([sole.position for sole in soles], dtype=float),
         sole_rotation=np.array([sole.rotation for sole in soles], dtype=float),
@@ -124,7 +127,7 @@ def robot_arrays(robot: Robot) -> RobotArrays:
 
 def plant_views(model: mujoco.MjModel, data: mujoco.MjData) -> Plant:
     """Views into `data` under their MuJoCo names."""
-    views = {name: getattr(data, name) for name in Plant._fields[2:]}
+    views = {field.name: getattr(data, field.name) for field in fields(Plant)[2:]}
     return Plant(model._address, data._address, **views)
 
 

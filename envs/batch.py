@@ -48,12 +48,13 @@ class EnvBatch:
         # a window is drawn to from one thread only
         self.threads = 1 if first.render_mode == "human" else max(1, min(threads, n))
         # the environments' own records become rows of these, so that nothing is gathered by hand
-        self.episodes = EpisodeArrays(*(apart((n, *array.shape)) for array in first.episode))
-        for shared, own in zip(
-            self.episodes, zip(*(env.episode for env in envs), strict=True), strict=True
-        ):
-            shared[:] = own
-        for env, rows in zip(self.envs, zip(*self.episodes, strict=True), strict=True):
+        self.episodes = EpisodeArrays(
+            *(apart((n, *array.shape)) for array in first.episode.members())
+        )
+        for i, env in enumerate(self.envs):
+            rows = [array[i] for array in self.episodes.members()]
+            for row, own in zip(rows, env.episode.members(), strict=True):
+                row[...] = own
             env.episode = EpisodeArrays(*rows)
         self.observations = np.zeros((n, *first.observation_space.shape), dtype=np.float32)
         self.final_observations = np.zeros_like(self.observations)

@@ -1,11 +1,11 @@
 """What is recorded during an episode: fall, quiet time, effort, excursions; and the reward."""
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
 from .arrays import RobotArrays, apart
+from .block import Block
 from .jit import compiled
 from .kinematics import StateArrays, support_distance, update_support
 from .observation import Scales
@@ -60,7 +60,8 @@ REWARD_TERMS = tuple(RewardWeights.__dataclass_fields__)
 METRICS = 13
 
 
-class EpisodeArrays(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class EpisodeArrays(Block):
     """What compiled steps write about the running episode."""
 
     action: np.ndarray  # (na,)
@@ -71,7 +72,8 @@ class EpisodeArrays(NamedTuple):
     sole_start: np.ndarray  # (nc, 2)
 
 
-class Judge(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Judge(Block):
     """Limits and weights as compiled code reads them."""
 
     height: float  # [m]

@@ -6,15 +6,17 @@ the wrench about the root's origin, so moving it to the CoM gives the centroidal
 matrix [Orin08] and its bias without building either.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from .arrays import GAP, MAX_VERTICES, Plant, RobotArrays, apart
+from .block import Block
 from .jit import compiled
 
 
-class StateArrays(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class StateArrays(Block):
     """Storage of one robot state; see `RobotState` for the meaning of each name."""
 
     qpos: np.ndarray  # (nv + 1,)
@@ -77,6 +79,13 @@ def allocate_state(nv: int, nc: int) -> StateArrays:
 
 
 @compiled
+def copy(source, out):
+    """`out[:] = source` of two vectors; NumPy's form compiles checks and their messages too."""
+    for i in range(out.shape[0]):
+        out[i] = source[i]
+
+
+@compiled
 def cross(a, b, out):
     """out = a × b for arrays of three."""
     x = a[1] * b[2] - a[2] * b[1]
@@ -97,8 +106,8 @@ def update_state(robot: RobotArrays, plant: Plant, s: StateArrays):
 @compiled
 def _dynamics(robot, plant, s):
     nv = s.M.shape[0]
-    s.qpos[:] = plant.qpos
-    s.qvel[:] = plant.qvel
+    copy(plant.qpos, s.qpos)
+    copy(plant.qvel, s.qvel)
     for i in range(nv):
         start = robot.M_rowadr[i]
         for k in range(robot.M_rownnz[i]):

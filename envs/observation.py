@@ -2,16 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from .arrays import RobotArrays
+from .block import Block
 from .jit import compiled
 from .kinematics import StateArrays
 
 
-class Scales(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Scales(Block):
     """What the observation and the reward are measured in."""
 
     support_x: float  #: half length of the standing support polygon [m]

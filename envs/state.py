@@ -18,7 +18,7 @@ class RobotState:
 
     def copy(self) -> "RobotState":
         """A snapshot that no simulation writes to."""
-        arrays = StateArrays(*(array.copy() for array in self.arrays))
+        arrays = StateArrays(*(array.copy() for array in self.arrays.members()))
         return RobotState(self.robot, arrays, self.time)
 
     @property

@@ -1,6 +1,7 @@
 """`poise/TorqueBalance-v0`: the action is the joints' torques."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 
 from .arrays import Plant, RobotArrays
 from .balance import BalanceEnv, EnvConfig
+from .block import Block
 from .episode import EpisodeArrays, Judge, judge_step, record_tick
 from .jit import compiled
 from .kinematics import StateArrays, update_state
@@ -18,28 +20,32 @@ from .simulation import advance
 from .vector import make_vector_env
 
 
+@dataclass(frozen=True, eq=False)
+class TorqueStep(Block):
+    """All that a policy step works on."""
+
+    robot: RobotArrays
+    plant: Plant
+    state: StateArrays
+    clock: np.ndarray  # (1,) int
+    scales: Scales
+    judge: Judge
+    substeps: int
+    episode: EpisodeArrays
+
+
 @compiled
-def torque_step(
-    robot: RobotArrays,
-    plant: Plant,
-    s: StateArrays,
-    pushes: np.ndarray,
-    clock: np.ndarray,
-    scale: Scales,
-    j: Judge,
-    substeps: int,
-    e: EpisodeArrays,
-) -> float:
+def torque_step(step: TorqueStep, pushes: np.ndarray) -> float:
     """One policy step: torques are held for `substeps` physics steps; returns the reward."""
+    robot, plant, s, clock, e = step.robot, step.plant, step.state, step.clock, step.episode
     for i in range(plant.ctrl.shape[0]):
         plant.ctrl[i] = e.action[i] * robot.torque_limit[i]
-    record_tick(robot, s, plant.ctrl, substeps * robot.timestep, e)
-    for _ in range(substeps):
+    record_tick(robot, s, plant.ctrl, step.substeps * robot.timestep, e)
+    for _ in range(step.substeps):
         advance(robot, plant, pushes, clock)
     update_state(robot, plant, s)
-    return judge_step(
-        robot, s, scale, j, robot.q_standing, plant.ctrl, clock[0] * robot.timestep, e
-    )
+    now = clock[0] * robot.timestep
+    return judge_step(robot, s, step.scales, step.judge, robot.q_standing, plant.ctrl, now, e)
 
 
 class TorqueBalanceEnv(BalanceEnv):
@@ -221,6 +227,7 @@ class TorqueBalanceEnv(BalanceEnv):
     ):
         super().__init__(robot, config, render_mode=render_mode, **overrides)
         self._still = np.zeros(len(self.robot.joint_names))
+        self._step: TorqueStep | None = None
 
     def _action_names(self) -> tuple[str, ...]:
         model = self.robot.model
@@ -230,11 +237,13 @@ class TorqueBalanceEnv(BalanceEnv):
         return self.arrays.q_standing, self._still
 
     def _advance(self) -> float:
-        sim = self.simulation
-        return torque_step(
-            self.arrays, sim.plant, sim.state_arrays, sim.push_table, sim.clock,
-            self.scales, self.judge, self.substeps, self.episode,
-        )  # fmt: skip
+        sim, e = self.simulation, self.episode
+        if self._step is None or self._step.episode is not e:
+            self._step = TorqueStep(
+                self.arrays, sim.plant, sim.state_arrays, sim.clock,
+                self.scales, self.judge, self.substeps, e,
+            )  # fmt: skip
+        return torque_step(self._step, sim.push_table)
 
 
 vector_env = partial(make_vector_env, TorqueBalanceEnv)  # for gymnasium.make_vec

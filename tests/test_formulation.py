@@ -100,7 +100,7 @@ def test_a_task_without_cost_is_disabled(tick):
     """With ω_c = 0 the CoM's target does not matter; with its weight it does."""
     state, p = tick.state, tick.parameters
     far = replace(tick.targets, com=tick.targets.com + [0.1, 0.0, 0.0])
-    without = p._replace(com_weight=np.zeros(3), angular_weight=np.zeros(3))
+    without = replace(p, com_weight=np.zeros(3), angular_weight=np.zeros(3))
     x, y = (solve(build(state, t, without)).x for t in (tick.targets, far))
     np.testing.assert_allclose(x, y, atol=1e-9)
     x, y = (solve(build(state, t, p)).x for t in (tick.targets, far))
@@ -125,9 +125,9 @@ def test_users_may_add_a_task_and_a_constraint(tick):
 def test_building_is_pure(tick):
     """Two builds give the same numbers, and neither the state nor the targets change."""
     state, targets = tick.state, tick.targets
-    before = [array.copy() for array in (*state.arrays, *targets.arrays())]
+    before = [array.copy() for array in (*state.arrays.members(), *targets.arrays().members())]
     first, second = (build(state, targets, tick.parameters, tick.cop_vel) for _ in range(2))
     for name in "HgClu":
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
-    for a, b in zip(before, (*state.arrays, *targets.arrays()), strict=True):
+    for a, b in zip(before, (*state.arrays.members(), *targets.arrays().members()), strict=True):
         np.testing.assert_array_equal(a, b)

@@ -99,7 +99,7 @@ def test_a_joint_stops_at_its_limit(robot):
         targets = Targets.standing(robot, simulation.state)
         targets.q_ref[i] = limit + 1.0
         if not knows:
-            qp.arrays = qp.arrays._replace(q_max=np.full(len(robot.joint_names), np.inf))
+            qp.arrays = replace(qp.arrays, q_max=np.full(len(robot.joint_names), np.inf))
         angles = []
         run(qp, simulation, targets, 300, lambda state, _, angles=angles: angles.append(state.q[i]))
         passed[knows] = max(angles) - limit
@@ -191,7 +191,7 @@ def test_a_robot_on_one_sole(robot):
     one = replace(robot, soles=robot.soles[:1])
     qp, state = controller(one), Simulation(one).state
     assert len(qp.problem(state, Targets.standing(one, state)).g) == robot.model.nv - 6
-    qp.parameters = qp.parameters._replace(accel_floor=0.0)
+    qp.parameters = replace(qp.parameters, accel_floor=0.0)
     targets = Targets.standing(one, state)
     torques = qp.torques(state, targets)
     assert qp.failures == 0
@@ -211,8 +211,8 @@ def test_weights_behave(robot):
     def missed(com, posture):
         qp = controller(robot)
         p = qp.parameters
-        qp.parameters = p._replace(
-            com_weight=com * p.com_weight, accel_weight=posture * p.accel_weight
+        qp.parameters = replace(
+            p, com_weight=com * p.com_weight, accel_weight=posture * p.accel_weight
         )
         qp.torques(state, targets)
         rate = (state.A @ qp.vdot + state.Adot_v)[0] / state.mass

@@ -1,5 +1,7 @@
 """Accelerations that leave the soles where they are, from random Jacobians."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from poise.baselines.null_space import allocate_null_space, solve_soles
@@ -67,7 +69,7 @@ def test_joints_that_move_no_sole_are_free():
 def test_a_robot_of_one_sole_has_more_null_vectors_than_rows():
     """The scratch is wide enough for both; the same equations hold."""
     space = allocate_null_space(
-        robot_arrays(robot_named("humanoid"))._replace(sole_body=np.zeros(1))
+        replace(robot_arrays(robot_named("humanoid")), sole_body=np.zeros(1))
     )
     rng = np.random.default_rng(3)
     J, rhs = random_jacobian(rng, space)[:6].copy(), rng.normal(size=6)

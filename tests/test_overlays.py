@@ -50,9 +50,9 @@ def test_marks_are_where_the_state_says(simulation):
 def test_marks_only_read(simulation):
     """No array of the state changes, not even one that is computed on demand."""
     run(simulation, 0.1)
-    before = [array.tobytes() for array in simulation.state_arrays]
+    before = [array.tobytes() for array in simulation.state_arrays.members()]
     marks(simulation)
-    assert [array.tobytes() for array in simulation.state_arrays] == before
+    assert [array.tobytes() for array in simulation.state_arrays.members()] == before
 
 
 def test_no_centre_of_pressure_in_the_air(simulation, robot):

@@ -1,5 +1,7 @@
 """The eliminated problem: every x obeys physics, and the solution obeys every limit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -109,7 +111,7 @@ def test_an_acceleration_that_nothing_hinders_is_reproduced(robot):
     """Targets that all ask for one feasible motion get it: v̇ is the desired one."""
     qp = controller(robot)
     p = qp.parameters
-    qp.parameters = p._replace(angular_weight=np.zeros(3))
+    qp.parameters = replace(p, angular_weight=np.zeros(3))
     state = Simulation(robot).state
     targets = Targets.standing(robot, state)
     qp.problem(state, targets)  # for N

@@ -54,7 +54,11 @@ def trajectory(robot, render):
     base: Any = env.unwrapped
     frame, history = None, []
     data = base.simulation.data
-    arrays = [*base.simulation.plant[2:], *base.simulation.state_arrays, data.qacc]
+    arrays = [
+        *base.simulation.plant.members()[2:],
+        *base.simulation.state_arrays.members(),
+        data.qacc,
+    ]
     arrays += [data.qacc_warmstart, data.light_xpos, base.simulation.clock]
     for _ in range(10):
         observation = env.step(np.full(4, 0.3))[0]

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from poise.baselines.controller import Targets
-from poise.baselines.momentum_qp import MomentumQP
+from poise.baselines.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.baselines.motions import load_motion
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
-from poise.baselines.targets import update_targets
+from poise.baselines.targets import Motion, update_targets
+from poise.baselines.tasks import CoMTask
 from poise.envs.balance import EnvConfig
 from poise.envs.batch import replicate
 from poise.envs.episode import RewardWeights
@@ -44,17 +45,16 @@ def test_action_zero_is_the_controller_alone(motion):
     state = simulation.reset(data.qpos.copy(), data.qvel.copy(), env.simulation.pushes)
     controller = load_controller("momentum-qp", robot())
     controller.reset(state)
-    reference = load_motion(motion, robot())
-    targets = Targets.standing(robot(), state)
-    scratch, none = np.zeros((3, reference.coeffs.shape[2])), np.zeros(len(env._offsets))
+    m = load_motion(motion, robot())
+    reference = Motion(m.knots, m.coeffs, m.loop, np.zeros((3, m.coeffs.shape[2])))
+    targets, none = Targets.standing(robot(), state), np.zeros(len(env._offsets))
     count = round(controller.period / robot().model.opt.timestep)
     for _ in range(40):
         env.step(zero(env))
         while simulation.time < env.simulation.time - 1e-9:
             update_targets(
-                simulation.arrays, state.arrays, reference.knots, reference.coeffs,
-                reference.loop, simulation.time, controller.com_offset, none, scratch,
-                targets.arrays(),
+                simulation.arrays, state.arrays, reference, simulation.time,
+                controller.com_offset, none, targets.arrays(),
             )  # fmt: skip
             state = simulation.step(controller.torques(state, targets), count)
         assert np.array_equal(simulation.data.qpos, data.qpos)
@@ -299,3 +299,19 @@ def test_a_replica_acts_alike(changes):
             observation, *_ = env.step(np.array([1.0, -0.5, 0.3, 0.2]))
         seen.append(observation)
     np.testing.assert_array_equal(seen[0], seen[1])
+
+
+def test_a_controller_may_be_replaced(env):
+    """Its offset, gains and period count from then on, as if the environment were made with it."""
+    config = MomentumQPConfig(com=CoMTask(offset=0.03), period=0.01)
+    env.reset(seed=0)
+    env.step(zero(env))
+    env.controller = MomentumQP(robot(), config)
+    made = ResidualBalanceEnv(robot(), controller=config)
+    for other in (env, made):
+        other.reset(seed=4, options={"push": PUSH})
+        for _ in range(10):
+            other.step(zero(other))
+    assert env.ticks == 2
+    assert np.array_equal(env.simulation.data.qpos, made.simulation.data.qpos)
+    assert np.array_equal(env.targets.com, made.targets.com)

@@ -25,7 +25,7 @@ def test_a_heavy_soft_root_is_a_hard_root():
     light = soft.parameters
     errors, leaning = [], []
     for weight in (1e2, 1e4, 1e6, 1e8):
-        soft.parameters = light._replace(root_weight=weight * light.root_weight / 1e3)
+        soft.parameters = replace(light, root_weight=weight * light.root_weight / 1e3)
         differences, wrenches = [], []
         for tick in hard:
             soft.reset()

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.baselines.controller import Targets
 from poise.baselines.motions import load_motion
-from poise.baselines.targets import update_targets
+from poise.baselines.targets import Motion, update_targets
 from poise.envs.simulation import Simulation
 
 from .physics import robot_named
@@ -39,8 +39,9 @@ class Scene:
         values[2:4] = residual.get("cop", (0.0, 0.0))
         m = self.motion
         update_targets(
-            self.simulation.arrays, self.simulation.state_arrays, m.knots, m.coeffs, m.loop, time,
-            offset, values, np.zeros((3, m.coeffs.shape[2])), targets.arrays(),
+            self.simulation.arrays, self.simulation.state_arrays,
+            Motion(m.knots, m.coeffs, m.loop, np.zeros((3, m.coeffs.shape[2]))),
+            time, offset, values, targets.arrays(),
         )  # fmt: skip
         return targets
 
@@ -81,7 +82,7 @@ def test_standing_targets_are_the_constant_motion(name):
     """`Targets.standing` and the motion called standing ask for the same."""
     scene = Scene(name, "standing", yaw=-2.0)
     moving, standing = scene.at(3.3), Targets.standing(scene.robot, scene.state)
-    for ours, theirs in zip(moving.arrays(), standing.arrays(), strict=True):
+    for ours, theirs in zip(moving.arrays().members(), standing.arrays().members(), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-6)
 
 

@@ -48,7 +48,7 @@ def test_posture_rows_vanish_on_the_reference_and_bring_back_to_it(robot):
     mujoco.mj_integratePos(robot.model, qpos, 0.3 * rng.normal(size=robot.model.nv), 1.0)
     state = simulation.reset(qpos)
     targets.a_ref[:] = 0.0
-    stiff = p._replace(stiffness=np.ones(robot.model.nv), damping=np.zeros(robot.model.nv))
+    stiff = replace(p, stiffness=np.ones(robot.model.nv), damping=np.zeros(robot.model.nv))
     step = posture_rows(state, targets, stiff).b
     mujoco.mj_integratePos(robot.model, qpos, step, 1.0)
     state = simulation.reset(qpos)
@@ -56,11 +56,24 @@ def test_posture_rows_vanish_on_the_reference_and_bring_back_to_it(robot):
     np.testing.assert_allclose(state.root_axes, targets.root_axes, atol=1e-6)
 
 
+def test_the_posture_counts_less_with_the_com_away(tick):
+    """β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally, on all of the posture's weights."""
+    targets = replace(tick.targets)
+    p = replace(tick.parameters, far_share=0.1, far_distance=0.05)
+    shares = []
+    for away in ([0.0, 0.0, 0.4], [0.03, -0.04, 0.0], [9.0, 0.0, 0.0]):
+        targets.com[:] = tick.state.com + away
+        rows = posture_rows(tick.state, targets, p)
+        shares.append(rows.weights[6:] / p.accel_weight[6:])
+    for share, expected in zip(shares, (1.0, 0.1 + 0.9 / np.e, 0.1), strict=True):
+        np.testing.assert_allclose(share, expected)
+
+
 def test_desired_momentum_rates(tick):
     """Ṗ_des is a PD law on c; L̇_des has its moment from the force Ṗ_des − m g at p_des."""
     state, targets = tick.state, tick.targets
-    p = tick.parameters._replace(
-        com_stiffness=np.array([2.0, 3.0, 4.0]), com_damping=np.array([5.0, 6.0, 7.0]),
+    p = replace(tick.parameters, com_stiffness=np.array([2.0, 3.0, 4.0]),
+        com_damping=np.array([5.0, 6.0, 7.0]),
         cop_horizon=0.1, cop_stiffness=10.0, cop_damping=2.0, angular_damping=3.0,
     )  # fmt: skip
     moving = replace(targets, com_vel=np.array([0.1, 0.2, 0.3]), com_acc=np.array([1.0, 2.0, 3.0]))

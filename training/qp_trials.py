@@ -67,7 +67,7 @@ class Recorder(MomentumQP):
         solution = self._exact.solve(qp)
         torques = super().torques(state, targets)
         if solution.solved:
-            kept = replace(targets, **{k: v.copy() for k, v in vars(targets).items()})
+            kept = replace(targets)  # copies what it holds
             active = int(np.count_nonzero(solution.lam))
             self.ticks.append(Tick(state.time, state.copy(), kept, cop_vel, qp,
                                    matrix, offset, torques, active))  # fmt: skip

@@ -106,7 +106,7 @@ def _resume(
             d[k] = bound[k] - sign[k] * s[active[k]]
         lift(Jt, Rt, q, d, z)
         solve_upper(Rt, q, d, r)
-        pulling = -1
+        pulling = int(np.int64(-1))  # not a literal, as above
         for k in range(equalities, q):
             if r[k] < 0.0 and (pulling < 0 or r[k] < r[pulling]):
                 pulling = k
@@ -167,7 +167,8 @@ def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter, warm=False): 
     active, sign = iscratch[2 : 2 + n], iscratch[2 + n : 2 + 2 * n]  # +1 at lower, −1 at upper
     last, last_sign = iscratch[2 + 2 * n : 2 + 3 * n], iscratch[2 + 3 * n : 2 + 4 * n]
     lasts = iscratch[1] if warm and 0 <= iscratch[1] <= n else 0  # rows to start from
-    last[:lasts], last_sign[:lasts] = active[:lasts], sign[:lasts]
+    for k in range(lasts):
+        last[k], last_sign[k] = active[k], sign[k]
     iscratch[0], iscratch[1] = 0, 0
     lam[:] = 0.0
     trace = factorise(H, Jt)
@@ -189,7 +190,8 @@ def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter, warm=False): 
     s[:] = 0.0
     advance(Ct, x, 1.0, s, work)
 
-    q, equalities, next_row, checks, skipped = 0, 0, 0, 0, False
+    q, equalities = np.int64(0), np.int64(0)  # a literal 0 would compile what it is handed to twice
+    next_row, checks, skipped = 0, 0, False
     while True:
         # Choose a row: the equalities in their order, then the most violated.
         row, violation = -1, 0.0

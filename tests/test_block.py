@@ -1,0 +1,129 @@
+"""Blocks: what compiled code reads through an address is what Python holds."""
+
+import copy
+import pickle
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+import pytest
+
+from poise.envs.block import Block
+
+
+@dataclass(frozen=True, eq=False)
+class Inner(Block):
+    """A part of another block."""
+
+    vector: np.ndarray
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Outer(Block):
+    """One member of each kind."""
+
+    flag: bool
+    number: float
+    cube: np.ndarray
+    inner: Inner
+    indices: np.ndarray
+    open: np.ndarray
+
+
+def outer(flag: bool = True, number: float = -2.5, count: int = -7) -> Outer:
+    """A block of distinct numbers."""
+    return Outer(
+        flag=flag,
+        number=number,
+        cube=np.arange(24.0).reshape(2, 3, 4),
+        inner=Inner(np.array([0.5, 0.25]), count),
+        indices=np.array([3, 1, 2]),
+        open=np.array([True, False]),
+    )
+
+
+@numba.njit
+def read(block):
+    """Every member, in ways that need its type, its shape and its strides."""
+    last = block.cube[1, 2, 3], block.cube[1][:, 2].sum(), block.cube.shape
+    inner = block.inner
+    return (
+        block.flag, block.number, last, inner.vector[1], inner.count, inner.vector.size,
+        block.indices[-1], block.open[0], block.open[1],
+    )  # fmt: skip
+
+
+@numba.njit
+def write(block, value):
+    """Changes arrays in place."""
+    block.inner.vector[:] = value
+    for i in range(3):
+        block.cube[0, i] += block.cube[1, i]
+
+
+def test_compiled_code_reads_every_kind_of_member():
+    """Numbers, arrays with their shapes, and blocks within blocks."""
+    last = (23.0, 14.0 + 18.0 + 22.0, (2, 3, 4))
+    assert read(outer()) == (True, -2.5, last, 0.25, -7, 2, 2, True, False)
+    assert read(outer(flag=False, number=1e300, count=2**40))[:2] == (False, 1e300)
+    assert read(outer(count=2**40))[4] == 2**40
+
+
+def test_arrays_are_shared():
+    """What compiled code writes, Python sees, and the other way round."""
+    block = outer()
+    write(block, 4.0)
+    assert block.inner.vector.tolist() == [4.0, 4.0]
+    assert np.array_equal(block.cube[0], np.arange(12.0).reshape(3, 4) * 2 + 12)
+    block.inner.vector[1] = 9.0
+    assert read(block)[3] == 9.0
+
+
+def test_loops_see_what_they_have_written():
+    """Addresses may be kept in registers, contents may not."""
+
+    @numba.njit
+    def doubled(block):
+        for _ in range(10):
+            for i in range(block.inner.vector.shape[0]):
+                block.inner.vector[i] = block.inner.vector[i] + block.inner.vector[0]
+        return block.inner.vector[0]
+
+    assert doubled(outer()) == 0.5 * 2**10
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda b: pickle.loads(pickle.dumps(b))])
+def test_copies_have_memory_of_their_own(duplicate):
+    """A copy reads its own arrays, not those of the block it was made from."""
+    block = outer()
+    other = duplicate(block)
+    write(other, 4.0)
+    assert read(other)[3] == 4.0 and read(block)[3] == 0.25
+
+
+def test_blocks_of_one_kind_share_their_code():
+    """Other sizes and values do not compile anew."""
+    read(outer())
+    compiled = len(read.signatures)
+    inner = Inner(np.ones(9), 1)
+    bigger = Outer(False, 0.0, np.ones((5, 6, 7)), inner, np.ones(4, int), np.ones(3, bool))
+    assert read(bigger)[2][2] == (5, 6, 7) and len(read.signatures) == compiled
+
+
+@pytest.mark.parametrize("vector", [np.arange(6.0)[::2], [1.0, 2.0], "x", None])
+def test_what_cannot_be_held_is_refused(vector):
+    """Strided arrays and foreign objects."""
+    with pytest.raises(TypeError, match="block"):
+        Inner(vector, 1)
+
+
+def test_an_unknown_member_is_a_typing_error():
+    """As an unknown attribute of any other type."""
+
+    @numba.njit
+    def wrong(block):
+        return block.nothing
+
+    with pytest.raises(numba.TypingError, match="nothing"):
+        wrong(outer())
