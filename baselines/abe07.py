@@ -33,7 +33,8 @@ class Abe07(AroundQP):
     def __init__(self, robot: Robot, config: Abe07Config | None = None):
         self.config = config or Abe07Config()
         cop = replace(self.config.qp.cop, weight=0.0, yaw_weight=0.0)
-        super().__init__(robot, replace(self.config.qp, cop=cop))
+        posture = replace(self.config.qp.posture, far_share=1.0)  # β is applied here
+        super().__init__(robot, replace(self.config.qp, cop=cop, posture=posture))
         self._tracking = self.qp.parameters.accel_weight.copy()
 
     def tracking(self, state: RobotState, targets: Targets) -> float:

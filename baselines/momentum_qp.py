@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from poise.envs.arrays import RobotArrays, apart, robot_arrays
-from poise.envs.block import Block
+from poise.envs.block import Block, address_of
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy
 from poise.envs.robot import Robot
@@ -95,6 +95,21 @@ def release_joints(ws: Workspace):
 
 
 @compiled
+def solve(ws: Workspace) -> int:
+    """Solve the assembled problem, starting from the last tick's active rows; the status."""
+    status = solve_dual(
+        ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS, True
+    )
+    if status == INFEASIBLE:  # always because of joint limits, which the joints hold by themselves
+        release_joints(ws)
+        status = solve_dual(
+            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS,
+            True,
+        )  # fmt: skip
+    return status
+
+
+@compiled
 def momentum_tick(
     robot: RobotArrays,
     s: StateArrays,
@@ -106,16 +121,28 @@ def momentum_tick(
 ):
     """One control tick with the compiled solver: `ws.tau` (nj,) holds the torques."""
     assemble(robot, s, p, t, period, ws)
-    status = solve_dual(
-        ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS, True
-    )
-    if status == INFEASIBLE:  # always because of joint limits, which the joints hold by themselves
-        release_joints(ws)
-        status = solve_dual(
-            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS,
-            True,
-        )  # fmt: skip
-    accept(s, p, status, ws, memory)
+    accept(s, p, solve(ws), ws, memory)
+
+
+@dataclass(frozen=True, eq=False)
+class Tick(Block):
+    """What a control tick works on."""
+
+    robot: RobotArrays
+    state: StateArrays
+    parameters: QPParameters
+    targets: TargetArrays
+    period: float  # [s]
+    workspace: Workspace
+    memory: Memory
+
+
+def tick(block: Tick) -> None:
+    """`momentum_tick` of a block, to be called by its address."""
+    momentum_tick(
+        block.robot, block.state, block.parameters, block.targets, block.period,
+        block.workspace, block.memory,
+    )  # fmt: skip
 
 
 class MomentumQP:
@@ -178,6 +205,14 @@ class MomentumQP:
         self.workspace.root_wrench[:] = 0.0
         if self.solver is not None:
             self.solver.reset()
+
+    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Tick]:
+        """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""
+        block = Tick(
+            self.arrays, state.arrays, self.parameters, targets.arrays(), self.period,
+            self.workspace, self.memory,
+        )  # fmt: skip
+        return address_of(tick, block), block
 
     def problem(self, state: RobotState, targets: Targets) -> QP:
         """The reduced QP of this state: pure, nothing is solved or remembered."""

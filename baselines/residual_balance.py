@@ -22,6 +22,7 @@ from .motions import ReferenceMotion, load_motion
 from .registry import CONTROLLERS, load_controller
 from .residual_step import ResidualStep, residual_step, soft_root_force
 from .targets import Motion, update_targets
+from .warmup import prepare
 
 
 @dataclass(frozen=True)
@@ -210,6 +211,7 @@ class ResidualBalanceEnv(BalanceEnv):
         render_mode: str | None = None,
         **overrides: Any,
     ):
+        prepare()
         given = {} if residual is None else to_dict(residual)
         self.residual = build(ResidualScales, given, "residual")
         scale = np.array(list(self.residual.entries().values()))
@@ -312,16 +314,17 @@ class ResidualBalanceEnv(BalanceEnv):
         if not self._compiled:
             return self._advance_in_python(residual)
         step, p = self._step, self.controller.parameters
-        if step is None or step.episode is not e or step.parameters is not p:
+        if step is None or step.episode is not e or step.tick.parameters is not p:
             step = self._step = self._bind()
         return residual_step(step, self.simulation.push_table)
 
     def _bind(self) -> ResidualStep:
-        sim, controller = self.simulation, self.controller
+        sim, controller, ws = self.simulation, self.controller, self.controller.workspace
         return ResidualStep(
             self.arrays, sim.plant, sim.state_arrays, sim.clock,
-            controller.parameters, self._targets, controller.workspace, controller.memory,
-            self._motion, self._com_offset, self._offsets,
+            *controller.compiled_tick(sim.state, self.targets),
+            ws.tau, ws.root_wrench, controller.parameters.soft_root,
+            self._targets, self._motion, self._com_offset, self._offsets,
             self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
         )  # fmt: skip
 

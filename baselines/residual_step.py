@@ -1,11 +1,11 @@
-"""One policy step of the momentum QP and the physics, compiled."""
+"""One policy step of a controller and the physics, compiled."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from poise.envs.arrays import Plant, RobotArrays
-from poise.envs.block import Block
+from poise.envs.block import Block, call
 from poise.envs.episode import (
     ROOT_FORCE,
     ROOT_MOMENT,
@@ -19,8 +19,7 @@ from poise.envs.kinematics import StateArrays, update_state
 from poise.envs.observation import Scales
 from poise.envs.simulation import advance
 
-from .momentum_qp import Memory, momentum_tick
-from .reduced_qp import QPParameters, TargetArrays, Workspace
+from .reduced_qp import TargetArrays
 from .targets import Motion, update_targets
 
 
@@ -48,10 +47,12 @@ class ResidualStep(Block):
     plant: Plant
     state: StateArrays
     clock: np.ndarray  # (1,) int
-    parameters: QPParameters
+    address: int  # of the controller's tick
+    tick: Block  # what it works on
+    tau: np.ndarray  # (nj,) what it finds [N·m]
+    root_wrench: np.ndarray  # (6,) of a soft root
+    soft_root: bool
     targets: TargetArrays
-    workspace: Workspace
-    memory: Memory
     motion: Motion
     com_offset: float  # [m]
     residual: np.ndarray  # (9,) see `update_targets`
@@ -64,20 +65,20 @@ class ResidualStep(Block):
 
 @compiled
 def residual_step(step: ResidualStep, pushes: np.ndarray) -> float:
-    """One policy step: `ticks` times the QP, each held for `substeps` physics steps."""
+    """One policy step: `ticks` times the controller, each held for `substeps` physics steps."""
     robot, plant, s, clock, motion = step.robot, step.plant, step.state, step.clock, step.motion
-    p, t, ws, e = step.parameters, step.targets, step.workspace, step.episode
+    t, e, tau, w = step.targets, step.episode, step.tau, step.root_wrench
     period = step.substeps * robot.timestep
     for _ in range(step.ticks):
         update_targets(
             robot, s, motion, clock[0] * robot.timestep, step.com_offset, step.residual, t
         )
-        momentum_tick(robot, s, p, t, period, ws, step.memory)
+        call(step.address, step.tick)
         for i in range(plant.ctrl.shape[0]):
-            plant.ctrl[i] = ws.tau[robot.motor_dofs[i] - 6]
-        if p.soft_root:
-            soft_root_force(s, ws.root_wrench, plant.qfrc_applied)
-            w, m = ws.root_wrench, e.metrics
+            plant.ctrl[i] = tau[robot.motor_dofs[i] - 6]
+        if step.soft_root:
+            soft_root_force(s, w, plant.qfrc_applied)
+            m = e.metrics
             m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
             m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
         record_tick(robot, s, plant.ctrl, period, e)

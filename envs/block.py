@@ -17,11 +17,14 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
     infer_getattr,
+    intrinsic,
     lower_getattr_generic,
     register_model,
     typeof_impl,
     unbox,
 )
+
+from .jit import OPTIONS
 
 WORD = 8  # bytes
 
@@ -150,3 +153,32 @@ def _array(context: Any, builder: Any, kind: types.Array, word: Any) -> Any:
     array.meminfo = cgutils.get_null_value(array.meminfo.type)
     array.parent = cgutils.get_null_value(array.parent.type)
     return array._getvalue()
+
+
+_functions: dict[tuple[Any, BlockType], Any] = {}
+
+
+def address_of(function: Any, block: Block) -> int:
+    """The address of `function(block)`, compiled for blocks of this kind, for `call`.
+
+    A function called by its address is compiled apart from its caller: neither waits for the
+    other, and it is not optimised once more with all that it is called from.
+    """
+    kind = block.numba_type  # type: ignore[attr-defined]
+    key = function, kind
+    if key not in _functions:
+        _functions[key] = numba.cfunc(types.void(kind), **OPTIONS)(function)
+    return int(_functions[key].address)
+
+
+@intrinsic
+def call(typing: Any, address: Any, block: Any) -> Any:
+    """`function(block)` by the address of the function."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        pointer = args[1].type
+        function = llvmlite.ir.FunctionType(llvmlite.ir.VoidType(), [pointer]).as_pointer()
+        builder.call(builder.inttoptr(args[0], function), [args[1]])
+        return context.get_dummy_value()
+
+    return types.void(address, block), generate

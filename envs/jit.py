@@ -5,21 +5,22 @@ import hashlib
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numba
 from numba.core import event
 
-#: Compiled without the GIL, cached on disk, NumPy's rules for division by zero. Sums may be
-#: reordered (SIMD), but NaN and infinity keep their meaning: checks rely on them.
-compiled = numba.njit(
-    nogil=True,
-    cache=True,
-    error_model="numpy",
-    fastmath={"contract", "reassoc", "nsz", "arcp"},
-)
+#: Cached on disk, NumPy's rules for division by zero. Sums may be reordered (SIMD), but NaN and
+#: infinity keep their meaning: checks rely on them.
+OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "error_model": "numpy",
+    "fastmath": {"contract", "reassoc", "nsz", "arcp"},
+}
+compiled = numba.njit(nogil=True, **OPTIONS)
 
 PATIENCE = 1.0  # [s] of compilation before the user is told
-MESSAGE = "poise: compiling for the first use; this takes about a minute, once"
+MESSAGE = "poise: compiling for the first use; this takes some twenty seconds, once"
 
 
 class Patience(event.Listener):
@@ -44,7 +45,13 @@ class Patience(event.Listener):
         self.depth -= 1
 
 
-event.register("numba:compile", Patience())
+_patience = Patience()
+event.register("numba:compile", _patience)
+
+
+def quiet() -> None:
+    """No message from this process: the one that started it has told."""
+    _patience.told = True
 
 
 _ROOM = Path(__file__).resolve().parent

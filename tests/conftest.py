@@ -42,6 +42,6 @@ def can_render() -> None:
 
 def pytest_sessionstart(session):
     """Compile the kernels in a process of their own, so that this one and its children agree."""
-    from poise.training.warmup import prepare
+    from poise.baselines.warmup import prepare
 
     prepare()

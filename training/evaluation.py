@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from poise.baselines.warmup import prepare
 from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
 from poise.envs.push_schedule import LimitTable
@@ -25,7 +26,6 @@ from .suite import Suite
 from .suites import load_suite
 from .summary import plain, summarise
 from .trials import Trial, row
-from .warmup import prepare
 from .workers import Workers
 
 

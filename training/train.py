@@ -10,6 +10,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecNormalize
 
+from poise.baselines.warmup import prepare
 from poise.envs.batch import replicate
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
@@ -19,7 +20,6 @@ from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, resto
 from .config import TrainConfig
 from .schedules import CurriculumCallback, ExplorationCallback
 from .vec_env import ThreadedVecEnv
-from .warmup import prepare
 
 LAST, BEST = "last", "best"
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("envs", "baselines", "training", "configs")
 REPEATS = 5
-FIRST_USE = "from poise.training.warmup import compile_all; compile_all()"
+FIRST_USE = "from poise.baselines.warmup import prepare; prepare()"
 
 
 class Spent(NamedTuple):
