@@ -268,6 +268,7 @@ class ResidualBalanceEnv(BalanceEnv):
         self._compiled = type(controller) is MomentumQP and controller.solver is None
         self._com_offset = float(getattr(controller, "com_offset", 0.0))
         self._step: ResidualStep | None = None
+        self._gains: Any = None  # with which it was made
 
     def arguments(self) -> dict[str, Any]:
         """What makes another environment like this one; robot and motion are shared.
@@ -313,17 +314,17 @@ class ResidualBalanceEnv(BalanceEnv):
         residual[self._moved] = self._openness() * self._scale * e.action
         if not self._compiled:
             return self._advance_in_python(residual)
-        step, p = self._step, self.controller.parameters
-        if step is None or step.episode is not e or step.tick.parameters is not p:
-            step = self._step = self._bind()
-        return residual_step(step, self.simulation.push_table)
+        gains = self.controller.parameters
+        if self._step is None or self._step.episode is not e or self._gains is not gains:
+            self._step, self._gains = self._bind(), gains
+        return residual_step(self._step, self.simulation.push_table)
 
     def _bind(self) -> ResidualStep:
         sim, controller, ws = self.simulation, self.controller, self.controller.workspace
+        address, tick = controller.compiled_tick(sim.state, self.targets)
         return ResidualStep(
             self.arrays, sim.plant, sim.state_arrays, sim.clock,
-            *controller.compiled_tick(sim.state, self.targets),
-            ws.tau, ws.root_wrench, controller.parameters.soft_root,
+            address, tick, ws.tau, ws.root_wrench, controller.parameters.soft_root,
             self._targets, self._motion, self._com_offset, self._offsets,
             self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
         )  # fmt: skip
