@@ -16,8 +16,9 @@ from .momentum_qp import MomentumQPConfig
 class Guided(AroundQP, ABC):
     """c̈_des = ω² (c − p) and p_ref = p, with p chosen by `cop` each tick.
 
-    The linear inverted pendulum c̈ = ω² (c − p) [Koolen12]. The QP gets c_ref = c, ċ_ref = ċ and
-    c̈_ref = c̈_des in the plane, so that its own CoM gains act on the height only.
+    The linear inverted pendulum c̈ = ω² (c − p) [Koolen12]. In the plane the QP gets
+    c̈_ref = c̈_des − s_c (c_ref − c) − d_c (ċ_ref − ċ), which takes its own CoM gains out; c_ref
+    stays, for the posture's weights go by its distance.
     """
 
     def __init__(self, robot: Robot, qp: MomentumQPConfig):
@@ -36,7 +37,11 @@ class Guided(AroundQP, ABC):
         for item in fields(Targets):
             getattr(guided, item.name)[:] = getattr(targets, item.name)
         p = self.cop(state, targets)
-        guided.com[:2], guided.com_vel[:2] = state.com[:2], state.com_vel[:2]
-        guided.com_acc[:2] = state.omega**2 * (state.com[:2] - p) + targets.com_acc[:2]
+        gains = self.qp.parameters
+        guided.com_acc[:2] += (
+            state.omega**2 * (state.com[:2] - p)
+            - gains.com_stiffness[:2] * (targets.com[:2] - state.com[:2])
+            - gains.com_damping[:2] * (targets.com_vel[:2] - state.com_vel[:2])
+        )
         guided.cop[:] = p
         return self.qp.torques(state, guided)

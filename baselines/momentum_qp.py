@@ -42,7 +42,7 @@ class MomentumQPConfig:
     kind: Literal["momentum-qp"] = "momentum-qp"
     period: float = field(default=0.004, metadata={"above": 0.0, "max": 0.05})  # [s]
     solver: str = COMPILED_SOLVER
-    solver_options: dict[str, float] = field(default_factory=dict)
+    solver_options: dict[str, bool | float] = field(default_factory=dict)
     root: Literal["hard", "soft"] = "hard"
     root_weight: float = field(default=1e3, metadata={"above": 0.0})
     posture: PostureTask = field(default_factory=PostureTask)

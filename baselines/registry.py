@@ -82,7 +82,16 @@ def load_controller(controller: Any, robot: Robot) -> Any:
 
 
 def _build(data: dict[str, Any], source: str) -> Any:
-    """A configuration; `qp` may be the name of one of the momentum QP, or its mapping."""
+    """A configuration; `qp` may be the name of one of the momentum QP, or its mapping.
+
+    `base` names a controller whose fields hold where `data` has none of its own.
+    """
+    if "base" in data:
+        if not isinstance(data["base"], str):
+            raise ConfigError("must be a name", source=source, field="base",
+                              choices=packaged("controllers"))  # fmt: skip
+        base = read_yaml(resolve("controllers", data["base"]))
+        data = _merged(base, {key: value for key, value in data.items() if key != "base"})
     kind = data.get("kind", "momentum-qp")
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigError(
@@ -92,3 +101,12 @@ def _build(data: dict[str, Any], source: str) -> Any:
         inner = resolve("controllers", data["qp"])
         data = {**data, "qp": read_yaml(inner)}
     return build(KINDS[kind][0], data, source)
+
+
+def _merged(base: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
+    """`base` with the entries of `data` in their places, mappings merged."""
+    merged = dict(base)
+    for key, value in data.items():
+        both = isinstance(value, dict) and isinstance(base.get(key), dict)
+        merged[key] = _merged(base[key], value) if both else value
+    return merged

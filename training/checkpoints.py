@@ -124,7 +124,9 @@ def check_controller(state: dict[str, Any], config: TrainConfig, path: Path) -> 
 
 
 def controller_fingerprint(config: TrainConfig) -> str:
-    """Hash of the configuration of the controller below the policy."""
+    """Hash of the configuration of the controller below the policy; empty if there is none."""
+    if config.action == "torque":
+        return ""
     return hashlib.sha256(to_yaml(controller_config(config.controller)).encode()).hexdigest()
 
 

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
-from poise.envs.balance import EnvConfig
+from poise.envs.balance import BalanceEnv, EnvConfig
 from poise.envs.config import build, read_yaml, resolve
 from poise.envs.push_schedule import PushSampler
 from poise.envs.robot import Robot
+from poise.envs.torque_balance import TorqueBalanceEnv
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,14 @@ class EvaluationConfig:
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """A residual policy on a controller of a robot."""
+    """A policy that moves a controller's targets, or one that gives the torques itself.
+
+    With `action` "torque" the environment is `poise/TorqueBalance-v0`, and controller, motion,
+    residual, smoothing and gate are not used.
+    """
 
     robot: str = "humanoid"
+    action: Literal["residual", "torque"] = "residual"
     controller: str = "momentum-qp"
     motion: str = "standing"
     seed: int = 0
@@ -76,11 +82,13 @@ class TrainConfig:
     curriculum: Curriculum = field(default_factory=Curriculum)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
-    def make_env(self, robot: Robot | None = None, **overrides: Any) -> ResidualBalanceEnv:
+    def make_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
         """The environment of this run; `overrides` replace its arguments or fields of `env`.
 
         A loaded `robot` spares loading it again.
         """
+        if self.action == "torque":
+            return TorqueBalanceEnv(robot or self.robot, self.env, **overrides)
         arguments = {
             "controller": self.controller,
             "motion": self.motion,

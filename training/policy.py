@@ -1,4 +1,4 @@
-"""A trained residual policy, ready to use: observation in, action out, plain NumPy."""
+"""A trained policy, ready to use: observation in, action out, plain NumPy."""
 
 import io
 import zipfile
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.balance import BalanceEnv
 from poise.envs.config import build, packaged_folder, read_yaml
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot, load_robot
@@ -67,7 +67,7 @@ class Policy:
         weight, bias = self.layers[-1]
         return np.clip(x @ weight + bias, -1.0, 1.0)[..., 0, :]
 
-    def make_env(self, **overrides: Any) -> ResidualBalanceEnv:
+    def make_env(self, **overrides: Any) -> BalanceEnv:
         """The environment that the policy was trained in; `overrides` as in `EnvConfig`."""
         return self.config.make_env(**overrides)
 
