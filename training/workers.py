@@ -9,7 +9,7 @@ import multiprocessing.connection
 import os
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -24,6 +24,11 @@ from .players import Player, load_player
 from .trials import Outcome, Trial, run_trial
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+
+DIED = (
+    "a worker process has died (out of memory?); the finished trials are kept: "
+    "run the same command again to go on, with fewer --workers"
+)
 
 _players: list[Player] = []  # of this worker process
 
@@ -45,25 +50,16 @@ class Workers:
         self.count = count
 
     def __enter__(self) -> "Workers":
-        self._threads = {name: os.environ.get(name) for name in THREADS}
-        os.environ.update(dict.fromkeys(THREADS, "1"))  # inherited; sums keep their order
-        self.pool = ProcessPoolExecutor(
-            self.count,
-            mp_context=multiprocessing.get_context("spawn"),
-            initializer=_start,
-            initargs=self.arguments,
-        )
+        self._threads = single_threaded()
+        self._threads.__enter__()
+        self.pool = process_pool(self.count, _load, self.arguments)
         return self
 
     def __exit__(
         self, kind: type | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.pool.shutdown(wait=error is None, cancel_futures=True)
-        for name, value in self._threads.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        self._threads.__exit__(None, None, None)
 
     def play(self, trials: Sequence[Trial]) -> Iterator[tuple[Trial, list[Outcome]]]:
         """Each trial with the outcome of every controller, as they are done.
@@ -71,20 +67,44 @@ class Workers:
         Raises:
             PoiseError: a process has died.
         """
-        with _without_interrupt():
+        with without_interrupt():
             futures = {self.pool.submit(_play, trial): trial for trial in trials}
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except BrokenProcessPool:
-            raise PoiseError(
-                "a worker process has died (out of memory?); the finished trials are kept: "
-                "run the same command again to go on, with fewer --workers"
-            ) from None
+            raise PoiseError(DIED) from None
 
 
 @contextmanager
-def _without_interrupt() -> Iterator[None]:
+def single_threaded() -> Iterator[None]:
+    """Processes started inside use one thread each for linear algebra; sums keep their order."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def process_pool(
+    count: int, load: Callable[..., None] | None = None, arguments: tuple[Any, ...] = ()
+) -> ProcessPoolExecutor:
+    """Fresh processes that leave Ctrl-C to this one and end with it; each calls `load` first."""
+    return ProcessPoolExecutor(
+        count,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_start,
+        initargs=(load, arguments),
+    )
+
+
+@contextmanager
+def without_interrupt() -> Iterator[None]:
     """Processes started inside never see Ctrl-C: the main process alone answers it."""
     resource_tracker.ensure_running()  # its start would undo the block
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -94,9 +114,14 @@ def _without_interrupt() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
-def _start(controllers: tuple[str, ...], robot: str, overrides: dict[str, Any]) -> None:
+def _start(load: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    if load is not None:
+        load(*arguments)
+
+
+def _load(controllers: tuple[str, ...], robot: str, overrides: dict[str, Any]) -> None:
     loaded = load_robot(robot)
     _players[:] = [load_player(name, loaded, **overrides) for name in controllers]
 

@@ -1,0 +1,1 @@
+"""The push-recovery benchmark: suites with factors, trials on many processes, figures, ranking."""
