@@ -22,7 +22,7 @@ WIDTH = 120  # of tables that no terminal shows
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run a sub-command; returns 0, 2 after bad input, or 130 after Ctrl-C."""
+    """Run a sub-command; returns 0, 1 (see `benchmark`), 2 after bad input, 130 after Ctrl-C."""
     args = list(sys.argv[1:] if args is None else args)
     # Small matrices lose time to threads, and sums may change their order. Read at import.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -33,12 +33,13 @@ def main(args: Sequence[str] | None = None) -> int:
 
             run(args[1:])
         else:
-            tyro.extras.subcommand_cli_from_dict(
+            code = tyro.extras.subcommand_cli_from_dict(
                 COMMANDS,
                 prog="poise",
                 description="Keep a simulated humanoid on its feet while it is pushed.",
                 args=args,
             )
+            return code if isinstance(code, int) else 0
     except PoiseError as error:
         print(f"poise: {error}", file=sys.stderr)
         return 2
@@ -118,6 +119,53 @@ def evaluate(
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)
         print(write_limits)
+
+
+def benchmark(
+    *,
+    out: Path,
+    controllers: tuple[str, ...] = (),
+    suite: str = "standard",
+    robot: str = "humanoid",
+    seed: int = 0,
+    workers: int | None = None,
+    backend: Literal["local", "joblib", "ray"] = "local",
+    trials: int | None = None,
+    overwrite: Switch = False,
+) -> int:
+    """Rank controllers: J50 per direction, factors one at a time, a random mix; see docs.
+
+    Writes settings.yaml, trials.jsonl, trials.csv and summary.json. The same command goes on where
+    it was stopped; with other controllers it adds them. Exit code 1 if a controller raised.
+
+    Args:
+        out: folder to write to.
+        controllers: names as poise evaluate takes them; all packaged ones and residual if not
+            given.
+        suite: quick (minutes), standard (an hour), full (many hours), or a .yaml file.
+        robot: a packaged robot or a .yaml description.
+        seed: of the cases.
+        workers: number of processes; all cores if not given.
+        backend: local (processes of this machine), joblib (the same by joblib), ray (a cluster).
+        trials: at most as many in every cell of the suite, to try things out.
+        overwrite: replace what the folder holds.
+    """
+    from .benchmark.run import benchmark, errors
+
+    try:
+        summary = benchmark(
+            controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
+            trials=trials, overwrite=overwrite, console=_console(),
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        if (out / "trials.jsonl").exists():
+            print(f"poise: the finished trials are kept in {out}; the same command goes on",
+                  file=sys.stderr)  # fmt: skip
+        raise
+    if failed := errors(summary):
+        print(f"poise: a controller raised an error in {failed} trials; see the column error of "
+              f"{out / 'trials.csv'}", file=sys.stderr)  # fmt: skip
+    return 1 if failed else 0
 
 
 def replay(
@@ -222,7 +270,8 @@ def list_names() -> None:
     """List what can be named: robots, controllers, suites, training configurations, motions."""
     from poise.envs.config import packaged
 
-    for kind in ("robots", "controllers", "suites", "training", "motions", "limits"):
+    kinds = ("robots", "controllers", "suites", "benchmarks", "training", "motions", "limits")
+    for kind in kinds:
         print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
     print("also as controllers: residual, zero, a folder written by poise train")
 
@@ -231,6 +280,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "demo": demo,
     "train": train,
     "evaluate": evaluate,
+    "benchmark": benchmark,
     "replay": replay,
     "tune": tune,
     "qp-set": qp_set,

@@ -9,15 +9,16 @@
 import csv
 import io
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
-from poise.envs.errors import ConfigError, PoiseError
+from poise.envs.errors import ConfigError
 from poise.envs.push_schedule import LimitTable
 
+from .trial_log import TrialLog, read_log
 from .trials import COLUMNS, Outcome
 
 SETTINGS, PARTIAL, TRIALS, SUMMARY = (
@@ -68,7 +69,7 @@ class EvaluationFolder:
     def __init__(self, path: Path, settings: Settings, overwrite: bool = False):
         self.path, self.settings = path, settings
         self.finished: dict[int, list[Outcome]] = {}
-        self._partial: TextIO | None = None
+        self._partial: TrialLog | None = None
         if path.exists() and not path.is_dir():
             raise ConfigError("is not a folder", source=path, field="out")
         if overwrite:
@@ -78,18 +79,14 @@ class EvaluationFolder:
             self._check()
             self._read_partial()
         write_atomic(path / SETTINGS, to_yaml(settings))
-        write_atomic(path / PARTIAL, "".join(map(_line, self.finished.items())))
-        try:
-            self._partial = (path / PARTIAL).open("a")
-        except OSError as error:
-            raise PoiseError(f"{path / PARTIAL}: cannot be written ({error.strerror})") from None
+        entries = {number: _plain(outcomes) for number, outcomes in self.finished.items()}
+        self._partial = TrialLog(path / PARTIAL, entries)
 
     def append(self, number: int, outcomes: list[Outcome]) -> None:
         """Keep the outcome of a trial, in the order of the controllers."""
         assert self._partial is not None
+        self._partial.append(number, _plain(outcomes))
         self.finished[number] = outcomes
-        self._partial.write(_line((number, outcomes)))
-        self._partial.flush()
 
     def close(self) -> None:
         """Stop; what is finished stays."""
@@ -99,7 +96,7 @@ class EvaluationFolder:
     def finish(self, rows: Sequence[dict[str, Any]], summary: dict[str, Any]) -> None:
         """Write the trials and, last, the summary."""
         self.close()
-        write_atomic(self.path / TRIALS, _csv(rows))
+        write_atomic(self.path / TRIALS, csv_text(rows))
         write_atomic(self.path / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
         (self.path / PARTIAL).unlink(missing_ok=True)
 
@@ -121,14 +118,13 @@ class EvaluationFolder:
             )
 
     def _read_partial(self) -> None:
-        """Outcomes up to the first line that a kill has cut off."""
+        """Outcomes of all whole lines: a kill may have cut off the last one."""
         path = self.path / PARTIAL
-        for line in path.read_text().splitlines() if path.exists() else []:
+        for number, outcomes in read_log(path)[0]:
             try:
-                number, outcomes = json.loads(line)
                 self.finished[number] = [build(Outcome, o, str(path)) for o in outcomes]
-            except (ValueError, TypeError, ConfigError):
-                break
+            except (TypeError, ConfigError):
+                continue
 
 
 def read_settings(folder: Path) -> Settings:
@@ -137,14 +133,14 @@ def read_settings(folder: Path) -> Settings:
     return build(Settings, read_yaml(path), str(path))
 
 
-def _line(item: tuple[int, Iterable[Outcome]]) -> str:
-    number, outcomes = item
-    return json.dumps([number, [asdict(outcome) for outcome in outcomes]]) + "\n"
+def _plain(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
+    return [asdict(outcome) for outcome in outcomes]
 
 
-def _csv(rows: Sequence[dict[str, Any]]) -> str:
+def csv_text(rows: Sequence[dict[str, Any]], columns: Sequence[str] = COLUMNS) -> str:
+    """Rows as CSV with a header."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()

@@ -29,9 +29,9 @@ def summarise(
     """
     controllers = {}
     for name, results in outcomes.items():
-        entry = _counts(results)
+        entry = counts(results)
         if suite.by_direction:
-            entry |= _envelope(trials, results, limits)
+            entry |= envelope(trials, results, limits)
         elif trials[0].push is not None:
             entry |= _fractions(trials, results, limits)
         controllers[name] = entry
@@ -64,7 +64,8 @@ def sectors(trials: Sequence[Trial], results: Sequence[Outcome]) -> EnvelopeFit:
     return mean_over_directions(middle, fractions(trials), won(results))
 
 
-def _counts(results: Sequence[Outcome]) -> dict[str, Any]:
+def counts(results: Sequence[Outcome]) -> dict[str, Any]:
+    """How many were recovered, how, and medians of what was recorded."""
     recovered = won(results)
     trials, count = len(results), int(recovered.sum())
 
@@ -96,9 +97,10 @@ def _counts(results: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
-def _envelope(
+def envelope(
     trials: Sequence[Trial], results: Sequence[Outcome], limits: PushLimits
 ) -> dict[str, Any]:
+    """J50 [N·s], J90 and η of each direction, and their means."""
     direction, impulse, duration = pushes(trials)
     fit = mean_over_directions(direction, impulse, won(results))
     ankle = [limits.ankle(angle, float(duration[0])) for angle in fit.directions]

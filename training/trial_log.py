@@ -1,0 +1,68 @@
+"""A file of finished trials, one JSON line each, that a kill or a full disk cannot spoil."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+from poise.envs.config import write_atomic
+from poise.envs.errors import PoiseError
+
+
+def read_log(path: Path) -> tuple[list[tuple[Any, Any]], int]:
+    """(key, value) of every line, and how many lines could not be read; a missing file is empty.
+
+    A kill cuts off the last line; lines that a broken disk spoils are left out alike.
+    """
+    entries, damaged = [], 0
+    for line in path.read_bytes().splitlines() if path.exists() else []:
+        try:
+            key, value = json.loads(line)
+            entries.append((key, value))
+        except (ValueError, TypeError):
+            damaged += 1
+    return entries, damaged
+
+
+class TrialLog:
+    """Opens the file with the entries that it is to have, whole lines only, and appends to it.
+
+    Raises PoiseError when the file cannot be written.
+    """
+
+    def __init__(self, path: Path, entries: Mapping[Any, Any]):
+        self.path = path
+        write_atomic(path, "".join(_line(key, value) for key, value in entries.items()))
+        try:
+            self._file: TextIO = path.open("a")
+        except OSError as error:
+            raise self._error(error) from None
+
+    def append(self, key: Any, value: Any) -> None:
+        """Write an entry to the disk; raises PoiseError, and what was written before stays."""
+        try:
+            self._file.write(_line(key, value))
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise self._error(error) from None
+
+    def close(self) -> None:
+        """Stop; what was appended stays."""
+        try:
+            self._file.close()
+        except OSError:
+            pass  # the line that could not be written, once more
+
+    def _error(self, error: OSError) -> PoiseError:
+        return PoiseError(
+            f"{self.path}: cannot be written ({error.strerror}); the finished trials are kept: "
+            "run the same command again to go on"
+        )
+
+
+def _line(key: Any, value: Any) -> str:
+    return json.dumps([key, value]) + "\n"
