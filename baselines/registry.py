@@ -14,7 +14,9 @@ from .jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
 from .kudoh02 import Kudoh02, Kudoh02Config
 from .lip_mpc import LIPMPC, LIPMPCConfig
 from .lqr_lip import LQRLIP, LQRLIPConfig
+from .macchietto09 import Macchietto09, Macchietto09Config
 from .momentum_qp import MomentumQP, MomentumQPConfig
+from .outside import OutsideConfig, OutsideController, is_outside, outside_config
 from .pd import PD, PDConfig
 from .stable_pd import StablePD, StablePDConfig
 
@@ -26,9 +28,11 @@ KINDS: dict[str, tuple[type, type]] = {
     "jacobian-transpose": (JacobianTransposeConfig, JacobianTranspose),
     "kudoh02": (Kudoh02Config, Kudoh02),
     "abe07": (Abe07Config, Abe07),
+    "macchietto09": (Macchietto09Config, Macchietto09),
     "capture-point": (CapturePointConfig, CapturePoint),
     "lqr-lip": (LQRLIPConfig, LQRLIP),
     "lip-mpc": (LIPMPCConfig, LIPMPC),
+    "outside": (OutsideConfig, OutsideController),
 }
 
 CONTROLLERS = tuple(controller for _, controller in KINDS.values())
@@ -37,8 +41,10 @@ CONTROLLERS = tuple(controller for _, controller in KINDS.values())
 def controller_config(name_or_path: str | Path) -> Any:
     """The configuration in a packaged file or a path, of the class that its `kind` names.
 
-    Raises ConfigError naming the file, the field and the choices.
+    ``module:Class`` is one from outside. Raises ConfigError naming the file, the field and the choices.
     """
+    if is_outside(name_or_path):
+        return outside_config(str(name_or_path))
     path = resolve("controllers", name_or_path)
     return _build(read_yaml(path), str(path))
 
@@ -100,7 +106,10 @@ def _build(data: dict[str, Any], source: str) -> Any:
     if isinstance(data.get("qp"), str):
         inner = resolve("controllers", data["qp"])
         data = {**data, "qp": read_yaml(inner)}
-    return build(KINDS[kind][0], data, source)
+    config = build(KINDS[kind][0], data, source)
+    if isinstance(config, OutsideConfig):  # with the hash of what is there now
+        return outside_config(config.name, config.arguments)
+    return config
 
 
 def _merged(base: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:

@@ -168,6 +168,40 @@ def benchmark(
     return 1 if failed else 0
 
 
+def compare(
+    a: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_A")],
+    b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_B")],
+    /,
+) -> None:
+    """Say what changed from one result to another, with intervals.
+
+    Args:
+        a: written by poise benchmark or poise evaluate.
+        b: another of the same kind.
+    """
+    from .benchmark.compare import compare, print_comparison
+
+    print_comparison(compare(a, b), a, b, _console())
+
+
+def leaderboard(
+    result: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULT")],
+    /,
+    *,
+    page: Path = Path("docs/leaderboard.md"),
+) -> None:
+    """Write the leaderboard page from a benchmark's result.
+
+    Args:
+        result: a summary.json of poise benchmark, or the folder that holds it.
+        page: the Markdown file to write.
+    """
+    from .benchmark.leaderboard import write_leaderboard
+
+    write_leaderboard(result, page)
+    print(page)
+
+
 def replay(
     folder: Folder,
     /,
@@ -281,6 +315,8 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "train": train,
     "evaluate": evaluate,
     "benchmark": benchmark,
+    "compare": compare,
+    "leaderboard": leaderboard,
     "replay": replay,
     "tune": tune,
     "qp-set": qp_set,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.outside import find_outside, is_outside, make_outside, outside_config
 from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.balance import BalanceEnv
@@ -28,12 +29,14 @@ class Player:
         env: the environment it acts in.
         act: deterministic action (na,) for an observation (no,).
         fingerprint: hash of the controller's configuration and the policy's weights.
+        begin: called at the start of every trial, for policies with a memory.
     """
 
     name: str
     env: BalanceEnv
     act: Callable[[np.ndarray], np.ndarray]
     fingerprint: str
+    begin: Callable[[], Any] | None = None
 
 
 def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
@@ -41,8 +44,8 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
 
     Args:
         name: a packaged controller or a path to a ``.yaml`` of one (played with action zero),
-            ``residual`` (the shipped policy), ``zero`` (no torque at all), or a folder written by
-            ``poise train``.
+            ``residual`` (the shipped policy), ``zero`` (no torque at all), a folder written by
+            ``poise train``, or ``module:Class`` or ``file.py:Class`` of a controller or a policy.
         robot: who is controlled. A policy must have been trained on it.
         overrides: arguments of the environment, or fields of its `EnvConfig`.
 
@@ -53,11 +56,14 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
         return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
     if name == SHIPPED or Path(name).is_dir():
         return _policy(name, robot, overrides)
+    if is_outside(name) and not _is_controller(name, robot):
+        return _outside_policy(name, robot, overrides)
     names = packaged("controllers")
-    if name not in names and not (Path(name).is_file() and Path(name).suffix in (".yaml", ".yml")):
+    is_file = Path(name).is_file() and Path(name).suffix in (".yaml", ".yml")
+    if name not in names and not is_file and not is_outside(name):
         raise ConfigError(
             f"no such controller: {name!r}; give a name, a .yaml file of a controller, "
-            "or a folder written by poise train",
+            "a folder written by poise train, or module:Class",
             field="controller",
             choices=(*names, SHIPPED, NO_CONTROL),
         )
@@ -86,6 +92,32 @@ def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
         )
     weights = [array.tobytes() for layer in policy.layers for array in layer]
     return Player(name, env, policy.act, _hash(to_yaml(policy.config).encode(), *weights))
+
+
+ENVIRONMENTS = {"residual": ResidualBalanceEnv, "torque": TorqueBalanceEnv}
+
+
+def _is_controller(name: str, robot: Robot) -> bool:
+    """Whether a class, or what a function makes, gives torques."""
+    found = find_outside(name)
+    return hasattr(found if isinstance(found, type) else make_outside(name, robot), "torques")
+
+
+def _outside_policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
+    """A policy from outside: `act(observation)` in the environment that it names, or makes."""
+    policy = make_outside(name, robot)
+    if not hasattr(policy, "act"):
+        raise ConfigError("has neither torques (a controller) nor act (a policy)", source=name)
+    if hasattr(policy, "make_env"):
+        env = policy.make_env(robot=robot, **overrides)
+    else:
+        kind = getattr(policy, "environment", "torque")
+        if kind not in ENVIRONMENTS:
+            raise ConfigError(f"no such environment: {kind!r}", source=name, field="environment",
+                              choices=ENVIRONMENTS)  # fmt: skip
+        env = ENVIRONMENTS[kind](robot, **overrides)
+    content = to_yaml(outside_config(name)).encode()
+    return Player(name, env, policy.act, _hash(content), getattr(policy, "reset", None))
 
 
 def _hash(*parts: bytes) -> str:

@@ -97,6 +97,8 @@ def run_trial(
     """Play a trial to its end; `watch(env)` is called after the reset and after every step."""
     env = player.env
     observation, _ = env.reset(seed=trial.seed, options=trial.options)
+    if player.begin is not None:
+        player.begin()
     state = env.simulation.state  # its arrays follow the simulation
     settled = round(SETTLED / env.config.policy_period)
     actions, steps, drift = 0.0, 0, 0.0
