@@ -88,7 +88,7 @@ def evaluate(
 
     Args:
         controllers: a name of `poise list`, residual (the shipped policy), zero (no torque), a
-            .yaml file of a controller, or a folder written by poise train.
+            .yaml file of a controller, a folder written by poise train, or module:Class.
         suite: random, envelope, grid, quiet, or a .yaml file.
         out: folder to write to; out/SUITE if not given.
         robot: a packaged robot (see poise list) or a .yaml description.
@@ -211,10 +211,10 @@ def replay(
     video: Path | None = None,
     plot: Path | None = None,
 ) -> None:
-    """Play one trial of an evaluation again, exactly, and say whether it ends as it was recorded.
+    """Play one trial of a result again, exactly, and say whether it ends as it was recorded.
 
     Args:
-        folder: written by poise evaluate.
+        folder: written by poise evaluate or poise benchmark.
         trial: its number in trials.csv.
         controller: which of the evaluated ones; the last if not given.
         video: an MP4 file to write.
@@ -307,7 +307,7 @@ def list_names() -> None:
     kinds = ("robots", "controllers", "suites", "benchmarks", "training", "motions", "limits")
     for kind in kinds:
         print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
-    print("also as controllers: residual, zero, a folder written by poise train")
+    print("also as controllers: residual, zero, a folder written by poise train, module:Class")
 
 
 COMMANDS: dict[str, Callable[..., Any]] = {

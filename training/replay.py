@@ -14,6 +14,7 @@ from poise.envs.errors import ConfigError
 from poise.envs.pushes import Push
 from poise.envs.robot import load_robot
 
+from .benchmark.reading import is_benchmark, load_benchmark_data, player_of, read_case
 from .evaluation_folder import SUMMARY, TRIALS, Settings, read_settings
 from .players import Player, load_player
 from .suites import build_suite
@@ -45,10 +46,10 @@ def replay(
     video: str | Path | None = None,
     plot: str | Path | None = None,
 ) -> Replay:
-    """Play a trial of the evaluation in `folder` again and compare it with what was recorded.
+    """Play a trial of an evaluation or a benchmark again and compare it with what was recorded.
 
     Args:
-        folder: written by `evaluate`.
+        folder: written by `evaluate` or `benchmark`.
         trial: its number in trials.csv.
         controller: one of the evaluation's; None: the last, which is the first if it is alone.
         video: an MP4 file to write.
@@ -59,16 +60,8 @@ def replay(
             that is no longer the one that was evaluated.
         PoiseError: nothing can be drawn here, or a file cannot be written.
     """
-    folder = Path(folder)
-    settings = read_settings(folder)
-    names = tuple(settings.controllers)
-    name = names[-1] if controller is None else controller
-    if name not in names:
-        raise ConfigError(f"{name!r} was not evaluated", source=folder, field="controller",
-                          choices=names)  # fmt: skip
-    line = _find(folder, trial, name)
-    again = _trial(line, folder / TRIALS)
-    player = _player(settings, name, folder)
+    find = _of_benchmark if is_benchmark(folder) else _of_evaluation
+    name, line, again, player = find(Path(folder), trial, controller)
     watch = _Watch() if plot is not None else None
     outcome = run_trial(player, again, watch)
     differences = {
@@ -83,6 +76,33 @@ def replay(
 
         record(player.env, player.act, video, {"seed": again.seed, "options": again.options})
     return Replay(again, name, outcome, differences)
+
+
+Found = tuple[str, Mapping[str, str], Trial, Player]
+
+
+def _of_evaluation(folder: Path, trial: int, controller: str | None) -> Found:
+    settings = read_settings(folder)
+    name = _choose(folder, settings.controllers, controller)
+    line = _find(folder, trial, name)
+    return name, line, _trial(line, folder / TRIALS), _player(settings, name, folder)
+
+
+def _of_benchmark(folder: Path, trial: int, controller: str | None) -> Found:
+    data = load_benchmark_data(folder)
+    name = _choose(folder, data.settings.controllers, controller)
+    line = data.row(name, trial)
+    case = read_case(line, folder / TRIALS)
+    return name, line, case, player_of(data, name).prepare(case)
+
+
+def _choose(folder: Path, names: Mapping[str, str], controller: str | None) -> str:
+    """The controller asked for, else the last."""
+    name = tuple(names)[-1] if controller is None else controller
+    if name not in names:
+        raise ConfigError(f"{name!r} was not evaluated", source=folder, field="controller",
+                          choices=names)  # fmt: skip
+    return name
 
 
 def _find(folder: Path, trial: int, controller: str) -> Mapping[str, str]:
@@ -166,5 +186,5 @@ class _Watch:
         names = ("com", "cop", "capture_point", "support", "torque")
         t, *columns = (np.array(column) for column in zip(*self.rows, strict=True))
         signals = dict(zip(names, columns, strict=True))
-        pushes = [(trial.push.start, trial.push.duration)] if trial.push else []
+        pushes = [(push.start, push.duration) for push in trial.options["push"]]
         trial_timeseries(path, t, signals, pushes=pushes, title=title)

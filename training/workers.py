@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing import resource_tracker
 from types import TracebackType
 from typing import Any
@@ -50,8 +50,8 @@ class Workers:
         self.count = count
 
     def __enter__(self) -> "Workers":
-        self._threads = single_threaded()
-        self._threads.__enter__()
+        self._open = ExitStack()
+        self._open.enter_context(single_threaded())
         self.pool = process_pool(self.count, _load, self.arguments)
         return self
 
@@ -59,7 +59,7 @@ class Workers:
         self, kind: type | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.pool.shutdown(wait=error is None, cancel_futures=True)
-        self._threads.__exit__(None, None, None)
+        self._open.close()
 
     def play(self, trials: Sequence[Trial]) -> Iterator[tuple[Trial, list[Outcome]]]:
         """Each trial with the outcome of every controller, as they are done.

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
 from typing import Any, Literal
 
 from poise.envs.errors import ConfigError, PoiseError
@@ -45,8 +46,8 @@ class Crew:
         self._pool: ProcessPoolExecutor | None = None
 
     def __enter__(self) -> Crew:
-        self._threads = single_threaded()
-        self._threads.__enter__()
+        self._open = ExitStack()
+        self._open.enter_context(single_threaded())
         if self.backend == "local":
             self._pool = process_pool(self.workers)
         elif self.backend == "ray":
@@ -62,7 +63,7 @@ class Crew:
 
                 get_reusable_executor().shutdown(wait=True, kill_workers=kind is not None)
         finally:
-            self._threads.__exit__(None, None, None)
+            self._open.close()
 
     def play(self, jobs: Sequence[Job]) -> Finished:
         """Each job with its result, as they are done.

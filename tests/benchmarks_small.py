@@ -1,0 +1,56 @@
+"""Small benchmarks for tests: a suite of seconds, and a crew that plays in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from poise.training.benchmark.case import Result
+from poise.training.benchmark.play import Job, play
+
+SMALL: dict[str, Any] = {
+    "duration": 1.6,
+    "start": 0.1,
+    "interval": 0.3,
+    "envelope": {"directions": 2, "fractions": [0.2, 2.0], "first_trials": 2, "trials": 2},
+    "margin": {"directions": [90], "levels": [0.2, 3.0], "runs": 1},
+    "factors": {
+        "trials": 1,
+        "levels": {"friction": [0.4], "delay": [0.02], "mass_error": [0.1], "pushes": [2]},
+    },
+    "mix": {"trials": 2, "delay": [0.008]},
+}
+TRIALS = 4 + 4 + 2 + 5 + 2  # of one controller
+
+
+def write_small(folder: Path, **changes: Any) -> Path:
+    """The suite's file."""
+    path = folder / "small.yaml"
+    path.write_text(yaml.safe_dump({**SMALL, **changes}))
+    return path
+
+
+class InProcessCrew:
+    """Plays like `Crew`, without processes; `played` counts, `stop_after` interrupts."""
+
+    played = 0
+    stop_after: int | None = None
+
+    def __init__(self, backend: str, workers: int):
+        pass
+
+    def __enter__(self) -> InProcessCrew:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def play(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
+        for job in reversed(jobs):  # any order must do
+            if InProcessCrew.played == InProcessCrew.stop_after:
+                raise KeyboardInterrupt
+            InProcessCrew.played += 1
+            yield job, play(job)
