@@ -41,7 +41,9 @@ CONTROLLERS = tuple(controller for _, controller in KINDS.values())
 def controller_config(name_or_path: str | Path) -> Any:
     """The configuration in a packaged file or a path, of the class that its `kind` names.
 
-    ``module:Class`` is one from outside. Raises ConfigError naming the file, the field and the choices.
+    ``module:Class`` is one from outside.
+
+    Raises ConfigError naming the file, the field and the choices.
     """
     if is_outside(name_or_path):
         return outside_config(str(name_or_path))

@@ -39,8 +39,8 @@ class InProcessCrew:
     played = 0
     stop_after: int | None = None
 
-    def __init__(self, backend: str, workers: int):
-        pass
+    def __init__(self, backend: str, workers: int | None):
+        self.workers = 1
 
     def __enter__(self) -> InProcessCrew:
         return self

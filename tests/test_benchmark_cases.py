@@ -26,7 +26,7 @@ def small(seed: int = 0, **changes: object) -> Cases:
 
 @pytest.mark.parametrize("name", packaged("benchmarks"))
 def test_the_packaged_suites_load(name: str) -> None:
-    """Every case has a number and a push of its own; the standard suite asks what the issue asks."""
+    """Every case has a number of its own; the standard suite asks all that the issue asks."""
     cases = Cases(load_benchmark(name), robot(), 0)
     every = [*cases.first, *cases.second({case.number: True for case in cases.first})]
     numbers = [case.number for case in [*every, *cases.others]]

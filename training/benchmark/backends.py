@@ -15,12 +15,14 @@ from typing import Any, Literal
 
 from poise.envs.errors import ConfigError, PoiseError
 
+from ..provenance import usable_cores
 from ..workers import DIED, process_pool, single_threaded, without_interrupt
 from .case import Result
 from .play import Job
 
 Backend = Literal["local", "joblib", "ray"]
 BACKENDS: tuple[Backend, ...] = ("local", "joblib", "ray")
+BLOCK = 8  # jobs per process that Ray is given at a time
 Finished = Iterator[tuple[Job, Result]]
 
 
@@ -38,11 +40,15 @@ def check_backend(backend: str) -> None:
 
 
 class Crew:
-    """Plays jobs on `workers` processes until closed; use as a context."""
+    """Plays jobs on `workers` processes until closed; use as a context.
 
-    def __init__(self, backend: str, workers: int):
+    None: all cores, of this machine or of the cluster; `workers` tells how many once it is open.
+    """
+
+    def __init__(self, backend: str, workers: int | None):
         check_backend(backend)
-        self.backend, self.workers = backend, workers
+        self.backend, self.workers = backend, workers or usable_cores()
+        self._given = workers is not None
         self._pool: ProcessPoolExecutor | None = None
 
     def __enter__(self) -> Crew:
@@ -51,7 +57,8 @@ class Crew:
         if self.backend == "local":
             self._pool = process_pool(self.workers)
         elif self.backend == "ray":
-            _start_ray(self.workers)
+            cores = _start_ray(self.workers)
+            self.workers = self.workers if self._given else cores
         return self
 
     def __exit__(self, kind: type | None, *error: Any) -> None:
@@ -79,17 +86,21 @@ class Crew:
     def _with_joblib(self, jobs: Sequence[Job]) -> Finished:
         import joblib
 
-        name = "ray" if self.backend == "ray" else "loky"
+        ray = self.backend == "ray"
         call: Callable = joblib.delayed(play_at)
         tasks = [call(job, tuple(sys.path)) for job in jobs]
-        with joblib.parallel_config(name, n_jobs=self.workers):
-            done = joblib.Parallel(return_as="generator_unordered", batch_size=1)(tasks)
-            try:
-                yield from done
-            except Exception as error:
-                if "Worker" in type(error).__name__ or "Pool" in type(error).__name__:
+        # Ray's backend gives results only when all are there: so a few at a time
+        block = BLOCK * self.workers if ray else len(tasks)
+        way = "list" if ray else "generator_unordered"
+        with joblib.parallel_config("ray" if ray else "loky", n_jobs=self.workers):
+            for first in range(0, len(tasks), block):
+                parallel = joblib.Parallel(return_as=way, batch_size=1)
+                try:
+                    yield from parallel(tasks[first : first + block])
+                except Exception as error:  # loky's and ray's own kinds
+                    if not any(word in type(error).__name__ for word in ("Worker", "Actor")):
+                        raise
                     raise PoiseError(DIED) from None
-                raise
 
 
 def play_at(job: Job, path: tuple[str, ...] = ()) -> tuple[Job, Result]:
@@ -112,8 +123,8 @@ def _in_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job]) -> Finished:
         raise PoiseError(DIED) from None
 
 
-def _start_ray(workers: int) -> None:
-    """Join the cluster that RAY_ADDRESS names, else start one on this machine."""
+def _start_ray(workers: int) -> int:
+    """Join the cluster that RAY_ADDRESS names, else start one here; returns its cores."""
     import ray
     from ray.util.joblib import register_ray
 
@@ -123,3 +134,4 @@ def _start_ray(workers: int) -> None:
             settings |= {"num_cpus": workers, "include_dashboard": False}
         ray.init(**settings)
     register_ray()
+    return int(ray.cluster_resources().get("CPU", workers))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-import numpy as np
-
 from poise.envs.pushes import Push
 
 from ..trials import OUTCOMES, PUSH_COLUMNS, Outcome, Trial, row
@@ -89,11 +87,7 @@ def case_row(case: Case, controller: str, result: Result) -> dict[str, Any]:
     return line | {name: getattr(result, name) for name in RESULT_COLUMNS}
 
 
-
-
 def last_start(case: Case) -> float:
     """When the last push starts [s]."""
     assert isinstance(case.push, Push)
     return float(case.push.start + (case.pushes - 1) * case.interval)
-
-

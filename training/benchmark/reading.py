@@ -143,9 +143,7 @@ def player_of(data: BenchmarkData, controller: str) -> BenchmarkPlayer:
         raise ConfigError(f"the robot {settings.robot!r} has changed since", source=data.folder,
                           field="robot_fingerprint")  # fmt: skip
     suite = build(BenchmarkSuite, settings.suite, str(data.folder))
-    player = load_player(
-        controller, robot, duration=suite.duration, pushes=None, noise=suite.noise
-    )
+    player = load_player(controller, robot, duration=suite.duration, pushes=None, noise=suite.noise)
     if player.fingerprint != settings.controllers[controller]:
         raise ConfigError(f"the controller {controller!r} has changed since", source=data.folder,
                           field="controllers")  # fmt: skip

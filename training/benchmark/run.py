@@ -18,7 +18,7 @@ from poise.envs.robot import Robot, load_robot
 from ..evaluation_folder import SUMMARY, TRIALS
 from ..players import SHIPPED, Player, load_player
 from ..progress import progress_bar
-from ..provenance import commit, machine, usable_cores, versions
+from ..provenance import commit, machine, versions
 from ..report import print_paths
 from ..summary import plain
 from ..warmup import prepare
@@ -98,9 +98,9 @@ def benchmark(
     folder = BenchmarkFolder(Path(out), settings, overwrite)
     _announce(folder, console)
     names = tuple(folder.settings.controllers)
-    count = workers or usable_cores()
+    crew = Crew(backend, workers)
     try:
-        _play(folder, cases, names, stage, Crew(backend, count), console)
+        _play(folder, cases, names, stage, crew, console)
     finally:
         folder.close()
     for name in names:
@@ -131,7 +131,7 @@ def benchmark(
             "command": shlex.join(sys.argv),
             "versions": versions(),
             "machine": machine(),
-            "workers": count,
+            "workers": crew.workers,
             "backend": backend,
             "commit": commit(),
             "seconds": round(time.perf_counter() - started, 1),
@@ -184,6 +184,7 @@ def _play(
     console: Console,
 ) -> None:
     """Play what is missing: first stages, then all that follows from them."""
+
     def missing(wanted: Iterable[tuple[str, Case]]) -> list[Job]:
         return [
             Job(stage, name, case)

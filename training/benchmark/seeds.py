@@ -44,9 +44,7 @@ def _configuration(folder: str) -> tuple[str, int]:
     return to_yaml(replace(config, seed=0)), config.seed
 
 
-def _aggregate(
-    members: list[str], seeds: list[int], entries: Mapping[str, Any]
-) -> dict[str, Any]:
+def _aggregate(members: list[str], seeds: list[int], entries: Mapping[str, Any]) -> dict[str, Any]:
     eta = [[direction["eta"] for direction in entries[name]["directions"]] for name in members]
     group: dict[str, Any] = {
         "members": members,
