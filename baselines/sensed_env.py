@@ -12,7 +12,6 @@ from poise.envs.balance import BalanceEnv
 from poise.envs.episode import judge_step, record_tick
 from poise.envs.robot import Robot
 from poise.envs.sensed import SensedSimulation
-from poise.envs.simulation import Simulation
 from poise.envs.state import RobotState
 from poise.envs.torque_balance import TorqueBalanceEnv
 
@@ -59,7 +58,7 @@ class Sensed(BalanceEnv):
         try:
             yield
         finally:
-            self.simulation: Simulation = true
+            self.simulation = true
 
     def _observe(self) -> None:
         with self._through_sensors():

@@ -79,6 +79,16 @@ class BalanceEnv(gymnasium.Env):
         self._renderer: SceneRenderer | None = None
         self._needs_reset = True
 
+    @property
+    def simulation(self) -> Simulation:
+        """The robot and its world; may be replaced between episodes."""
+        return self._simulation
+
+    @simulation.setter
+    def simulation(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._step: Any = None  # what compiled code is bound to, with the simulation of before
+
     def arguments(self) -> dict[str, Any]:
         """What makes another environment like this one; the robot is shared."""
         return {"robot": self.robot, "config": self.config, "render_mode": self.render_mode}

@@ -32,7 +32,7 @@ def test_help_is_light() -> None:
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for name in ("train", "evaluate", "replay", "demo", "tune", "qp-set", "list"):
+    for name in ("benchmark", "compare", "leaderboard", "train", "evaluate", "replay", "demo", "tune", "qp-set", "list"):
         assert name in done.stdout
 
 

@@ -17,8 +17,8 @@ HEAD = """# Leaderboard
 
 Suite `{suite}`, robot `{robot}`, seed {seed}; Poise {poise}, MuJoCo {mujoco}, commit `{commit}`;
 {processor}, {cores} cores. Intervals are 95 %; what the columns mean: [benchmark.md](benchmark.md).
-`lost, won` and McNemar's p are against `{reference}` on the mix. `root [N]` is the largest force that
-a controller took from nowhere: only those with 0 obey physics.
+`lost, won` and McNemar's p are against `{reference}` on the mix. `root [N]` is the largest
+force that a controller took from nowhere: only those with 0 obey physics.
 
 """
 

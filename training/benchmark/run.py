@@ -11,6 +11,7 @@ from typing import Any
 
 from rich.console import Console
 
+from poise.baselines.warmup import prepare
 from poise.envs.config import packaged, to_dict
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot, load_robot
@@ -21,7 +22,6 @@ from ..progress import progress_bar
 from ..provenance import commit, machine, versions
 from ..report import print_paths
 from ..summary import plain
-from ..warmup import prepare
 from .backends import Crew, check_backend
 from .case import Case, case_row
 from .cases import Cases

@@ -59,7 +59,6 @@ class _Clock:
             clocked = None
             if isinstance(env, ResidualBalanceEnv):
                 clocked = env.controller = Clocked(inner)
-                compiled, env._compiled = env._compiled, False
             push = {"specific_impulse": 0.2, "start": 0.05}
             observation, _ = env.reset(seed=seed, options={"push": push})
             for _ in range(round(SECONDS / env.config.policy_period)):
@@ -73,7 +72,7 @@ class _Clock:
             self.broken = True
         finally:
             if isinstance(env, ResidualBalanceEnv):
-                env.controller, env._compiled = inner, compiled
+                env.controller = inner
 
     def _timed(self, act: Callable[[np.ndarray], np.ndarray]) -> Callable:
         def timed(observation: np.ndarray) -> np.ndarray:
