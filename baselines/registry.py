@@ -108,7 +108,7 @@ def _build(data: dict[str, Any], source: str) -> Any:
     if isinstance(data.get("qp"), str):
         inner = resolve("controllers", data["qp"])
         data = {**data, "qp": read_yaml(inner)}
-    config = build(KINDS[kind][0], data, source)
+    config: Any = build(KINDS[kind][0], data, source)
     if isinstance(config, OutsideConfig):  # with the hash of what is there now
         return outside_config(config.name, config.arguments)
     return config

@@ -103,7 +103,7 @@ def sensed_env(env: BalanceEnv) -> SensedResidualEnv | SensedTorqueEnv:
         return SensedResidualEnv(
             env.robot,
             env.config,
-            controller=SensingController(env.controller),  # type: ignore[arg-type]
+            controller=SensingController(env.controller),
             motion=env.motion,
             residual=env.residual,
             smoothing=env.smoothing,

@@ -16,6 +16,7 @@ from poise.training.benchmark.case import Case, Result, failed
 from poise.training.benchmark.compare import compare, print_comparison
 from poise.training.benchmark.figures import controller_figures, pair_figures, paired
 from poise.training.benchmark.leaderboard import leaderboard, write_leaderboard
+from poise.training.benchmark.reading import read_summary
 from poise.training.benchmark.seeds import seed_groups
 from poise.training.benchmark.ticks import tick_times
 from poise.training.cli import main
@@ -232,3 +233,12 @@ def test_ticks_are_timed_and_leave_no_trace() -> None:
     assert 5.0 < times["momentum-qp"] < 1e5 and times["broken"] is None
     assert 0.0 < times["zero"] < times["momentum-qp"]
     assert players["momentum-qp"].env.controller is inner and players["momentum-qp"].env._compiled
+
+
+def test_the_committed_leaderboard_is_generated() -> None:
+    """docs/leaderboard.md is what the command makes of docs/leaderboard.json."""
+    docs = Path(__file__).parents[1] / "docs"
+    if not (docs / "leaderboard.json").exists():
+        pytest.skip("no committed result")
+    text = leaderboard(read_summary(docs / "leaderboard.json"), "docs/leaderboard.json")
+    assert (docs / "leaderboard.md").read_text() == text

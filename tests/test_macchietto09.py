@@ -17,7 +17,7 @@ from .shared import generic_state, robot
 
 def test_without_binding_limits_it_is_the_momentum_qp() -> None:
     """At rest no motor is near its limit: the torques are those of the QP without their cost."""
-    config = controller_config("momentum-qp")
+    config = controller_config("macchietto09").qp
     simulation = generic_state()
     simulation.reset()
     targets = Targets.standing(robot(), simulation.state)

@@ -40,7 +40,8 @@ def relative_gain(
     """b/a − 1 and its interval, from the difference of the logarithms; None if any is not > 0."""
     if min(a, b, *a_ci, *b_ci) <= 0.0:
         return None, None
-    gap, ends = difference(np.log(a), np.log(a_ci), np.log(b), np.log(b_ci))
+    logs_a, logs_b = np.log(a_ci).tolist(), np.log(b_ci).tolist()
+    gap, ends = difference(float(np.log(a)), logs_a, float(np.log(b)), logs_b)
     return float(np.expm1(gap)), Interval(float(np.expm1(ends[0])), float(np.expm1(ends[1])))
 
 

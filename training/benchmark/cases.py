@@ -91,7 +91,7 @@ class Cases:
         self, number: int, angle: float, low: float, high: float, count: int, stage: int
     ) -> list[Case]:
         """One impulse in each of `count` equal parts of [low, high]."""
-        cases = []
+        cases: list[Case] = []
         for part in range(count):
             share = (part + generator(self.seed, number).uniform()) / count
             push = self._push(angle, low + share * (high - low))
@@ -151,7 +151,7 @@ class Cases:
         part = self.suite.mix
         if part is None:
             return []
-        cases = []
+        cases: list[Case] = []
         for angle, fraction in self._stratified(number, part.trials, part.fractions):
             rng = generator(self.seed, number + len(cases))
             duration = float(np.exp(rng.uniform(*np.log(part.duration))))

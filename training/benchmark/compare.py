@@ -164,12 +164,12 @@ def _changes(name: str, a: _Result, b: _Result) -> Iterator[Change]:
                               ("factors", factor, level))  # fmt: skip
     else:
         yield from _rates(name, "recovered", one, two, a, b, ())
-    after_by_angle = {d["direction"]: d for d in two.get("directions", ())}
+    angles: dict[float, Mapping] = {d["direction"]: d for d in two.get("directions", ())}
     for before in one.get("directions", ()):
-        after = after_by_angle.get(before["direction"])
-        if after is not None:
+        other = angles.get(before["direction"])
+        if other is not None:
             title = f"J50 at {before['direction']:g}° [N·s]"
-            yield from _by_intervals(name, title, before, after, "j50", "j50_ci95")
+            yield from _by_intervals(name, title, before, other, "j50", "j50_ci95")
 
 
 def _by_intervals(
