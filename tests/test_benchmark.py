@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from poise.envs.env_config import StartNoise
 from poise.envs.errors import ConfigError
 from poise.training.benchmark import run
 from poise.training.benchmark.case import Case
-from poise.training.benchmark.play import BenchmarkPlayer, play_case
+from poise.training.benchmark.play import BenchmarkPlayer, Job, Stage, play, play_case
 from poise.training.benchmark.reading import load_benchmark_data, read_case, replay_case
 from poise.training.benchmark.run import benchmark, default_controllers
 from poise.training.cli import main
@@ -211,6 +212,26 @@ def test_a_controller_that_raises_costs_its_trial_alone(
     summary = json.loads((tmp_path / "out/summary.json").read_text())
     assert summary["controllers"]["flaky.py:Flaky"]["errors"] == len(failed)
     assert summary["reference"] == "flaky.py:Flaky"
+
+
+def test_a_controller_that_cannot_be_loaded_is_no_trial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: type[InProcessCrew]
+) -> None:
+    """Neither where it is played, nor one that the folder has from before: nothing is recorded."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "flaky.py").write_text(FLAKY)
+    suite, out = write_small(tmp_path, mix=None, factors=None), tmp_path / "out"
+    in_process.stop_after = 2
+    with pytest.raises(KeyboardInterrupt):
+        benchmark(["flaky.py:Flaky"], suite, out=out)
+    before = (out / "trials.jsonl").read_bytes()
+    job = Job(Stage("humanoid", 1.6, StartNoise()), "gone.py:Gone", read_case(CASE_LINE))
+    with pytest.raises(ConfigError, match="gone.py.*cannot be imported"):
+        play(job)
+    (tmp_path / "flaky.py").write_text(FLAKY + "# changed")
+    with pytest.raises(ConfigError, match="holds trials of 'flaky.py:Flaky', which has changed"):
+        benchmark(["zero"], suite, out=out)
+    assert (out / "trials.jsonl").read_bytes() == before
 
 
 @pytest.mark.parametrize(

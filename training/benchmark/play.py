@@ -46,14 +46,15 @@ class Job:
 
 
 def play(job: Job) -> Result:
-    """Play a job; what the controller raises becomes the result's `error`."""
-    player = None
+    """Play a job; what the controller raises while it plays becomes the result's `error`.
+
+    Raises PoiseError when the controller cannot be loaded here: that is no trial.
+    """
+    player = _player(job.stage, job.controller)
     try:
-        player = _player(job.stage, job.controller)
         return play_case(player, job.case)
     except Exception as error:  # a controller from outside may raise anything
-        if player is not None:  # it may be broken: the next trial gets a new one
-            _players.pop((job.stage, job.controller), None)
+        del _players[job.stage, job.controller]  # it may be broken: the next trial gets a new one
         return failed(error)
 
 

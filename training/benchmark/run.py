@@ -98,14 +98,14 @@ def benchmark(
     folder = BenchmarkFolder(Path(out), settings, overwrite)
     _announce(folder, console)
     names = tuple(folder.settings.controllers)
+    for name in names:
+        if name not in players:
+            players[name] = _load_again(name, loaded, stage, folder)
     crew = Crew(backend, workers)
     try:
         _play(folder, cases, names, stage, crew, console)
     finally:
         folder.close()
-    for name in names:
-        if name not in players:
-            players[name] = _load(name, loaded, stage)
     played = {name: _played(folder, cases, name) for name in names}
     entries = {name: controller_figures(played[name], cases) for name in names}
     ticks = tick_times(players)
@@ -157,6 +157,17 @@ def errors(summary: dict[str, Any]) -> int:
 
 def _load(name: str, robot: Robot, stage: Stage) -> Player:
     return load_player(name, robot, duration=stage.duration, pushes=None, noise=stage.noise)
+
+
+def _load_again(name: str, robot: Robot, stage: Stage, folder: BenchmarkFolder) -> Player:
+    """A controller that the folder has besides; raises ConfigError if it is no longer the same."""
+    player = _load(name, robot, stage)
+    if player.fingerprint != folder.settings.controllers[name]:
+        raise ConfigError(
+            f"holds trials of {name!r}, which has changed since: choose another folder",
+            source=folder.path, field="controllers",
+        )  # fmt: skip
+    return player
 
 
 def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | None) -> None:
