@@ -106,6 +106,26 @@ def test_a_comparison_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert text.strip() == "the same outcome in every trial: pd"
 
 
+def test_evaluations_are_compared_alike(tmp_path: Path) -> None:
+    """Without parts; trials with other pushes are no pairs, their rates are compared apart."""
+    folders = []
+    for name, outcomes in (("a", YES), ("b", NO), ("c", NO)):
+        folder = write_result(tmp_path / name, {"pd": outcomes})
+        summary = json.loads((folder / "summary.json").read_text())
+        del summary["benchmark"]
+        summary["controllers"]["pd"] = rate(sum(outcomes), 4)
+        (folder / "summary.json").write_text(json.dumps(summary))
+        folders.append(folder)
+    other = (folders[2] / "trials.csv").read_text()
+    (folders[2] / "trials.csv").write_text(other.replace(".5,", ".7,"))
+    (change,) = compare(folders[0], folders[1]).changes
+    assert (change.figure, change.change) == ("recovered", -0.75)
+    assert change.note == "3 lost, 0 won, p = 0.25"
+    (apart,) = compare(folders[0], folders[2]).changes
+    assert apart.change == -0.75 and not apart.note
+    assert (apart.low, apart.high) == pytest.approx((-0.75 - 0.02**0.5, -0.75 + 0.02**0.5))
+
+
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
