@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, PoiseError
 from poise.training.benchmark.case import Result, failed
 from poise.training.benchmark.folder import (
     FORMAT,
@@ -105,6 +105,17 @@ def test_missing_and_cut_off_logs(tmp_path: Path) -> None:
     log.unlink()
     with pytest.raises(ConfigError, match="trials.jsonl: is missing"):
         start(tmp_path)
+
+
+def test_two_runs_do_not_write_to_one_folder(tmp_path: Path) -> None:
+    """The second is refused until the first has stopped, also with --overwrite."""
+    first = start(tmp_path)
+    for overwrite in (False, True):
+        with pytest.raises(PoiseError, match="another poise benchmark is writing there"):
+            BenchmarkFolder(tmp_path, SETTINGS, overwrite)
+    first.append("pd", 0, RESULT)
+    first.close()
+    assert list(start(tmp_path).finished) == [("pd", 0)]
 
 
 def test_overwrite_removes_only_what_is_ours(tmp_path: Path) -> None:

@@ -8,14 +8,16 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, PoiseError
 
 from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS, csv_text
 from ..trial_log import TrialLog, read_log
@@ -72,6 +74,15 @@ class BenchmarkFolder:
         self.finished: dict[Key, Result] = {}
         if path.exists() and not path.is_dir():
             raise ConfigError("is not a folder", source=path, field="out")
+        self._lock = FolderLock(path)
+        try:
+            self._open(overwrite)
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def _open(self, overwrite: bool) -> None:
+        path, settings = self.path, self.settings
         if overwrite:
             for name in FILES:
                 (path / name).unlink(missing_ok=True)
@@ -93,12 +104,13 @@ class BenchmarkFolder:
     def close(self) -> None:
         """Stop; what is finished stays."""
         self._log.close()
+        self._lock.release()
 
     def finish(self, rows: Sequence[dict[str, Any]], summary: dict[str, Any]) -> None:
         """Write the trials and, last, the summary."""
-        self.close()
         write_atomic(self.path / TRIALS, csv_text(rows, COLUMNS))
         write_atomic(self.path / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
+        self.close()
 
     def _check(self) -> BenchmarkSettings:
         """Refuse to go on from anything but this benchmark; returns its settings."""
@@ -123,6 +135,36 @@ class BenchmarkFolder:
         if (path / SUMMARY).exists() and not (path / LOG).exists():
             raise ConfigError(f"is missing, and with it the trials: {ADVICE}", source=path / LOG)
         return before
+
+
+class FolderLock:
+    """One process at a time writes to a folder: two would lose each other's trials.
+
+    The folder is made if missing. The lock ends with `release`, or with the process.
+
+    Raises PoiseError when another process holds it, or the folder cannot be made.
+    """
+
+    def __init__(self, path: Path):
+        self._file: int | None = None
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_RDONLY)
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self.release()
+            raise PoiseError(f"{path}: another poise benchmark is writing there") from None
+        except OSError as error:
+            self.release()
+            raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
+
+    def release(self) -> None:
+        """Let others write."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    __del__ = release
 
 
 def read_results(folder: Path) -> tuple[dict[Key, Result], int]:

@@ -6,6 +6,7 @@ import shlex
 import sys
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -96,52 +97,50 @@ def benchmark(
         controllers={name: player.fingerprint for name, player in players.items()},
     )
     folder = BenchmarkFolder(Path(out), settings, overwrite)
-    _announce(folder, console)
-    names = tuple(folder.settings.controllers)
-    for name in names:
-        if name not in players:
-            players[name] = _load_again(name, loaded, stage, folder)
-    crew = Crew(backend, workers)
-    try:
+    with closing(folder):
+        _announce(folder, console)
+        names = tuple(folder.settings.controllers)
+        for name in names:
+            if name not in players:
+                players[name] = _load_again(name, loaded, stage, folder)
+        crew = Crew(backend, workers)
         _play(folder, cases, names, stage, crew, console)
-    finally:
-        folder.close()
-    played = {name: _played(folder, cases, name) for name in names}
-    entries = {name: controller_figures(played[name], cases) for name in names}
-    ticks = tick_times(players)
-    for name, entry in entries.items():
-        entry["tick_us"] = ticks[name]
-        entry["fingerprint"] = folder.settings.controllers[name]
-    reference = REFERENCE if REFERENCE in names else names[0]
-    summary = plain(
-        {
-            "benchmark": FORMAT,
-            "suite": str(suite),
-            "seed": seed,
-            "robot": {"name": loaded.name, **robot_figures(cases.limits)},
-            "reference": reference,
-            "ranking": sorted(names, key=lambda name: -entries[name]["j50_mean"]),
-            "controllers": entries,
-            "pairs": [
-                pair_figures(reference, name, played, entries)
-                for name in names
-                if name != reference
-            ],
-            "seeds": seed_groups(names, entries),
-            "command": shlex.join(sys.argv),
-            "versions": versions(),
-            "machine": machine(),
-            "workers": crew.workers,
-            "backend": backend,
-            "commit": commit(),
-            "seconds": round(time.perf_counter() - started, 1),
-        }
-    )
-    rows = [case_row(case, name, result) for name in names for case, result in played[name]]
-    folder.finish(rows, summary)
-    print_benchmark(summary, console)
-    print_paths([Path(out) / TRIALS, Path(out) / SUMMARY], console)
-    return summary
+        played = {name: _played(folder, cases, name) for name in names}
+        entries = {name: controller_figures(played[name], cases) for name in names}
+        ticks = tick_times(players)
+        for name, entry in entries.items():
+            entry["tick_us"] = ticks[name]
+            entry["fingerprint"] = folder.settings.controllers[name]
+        reference = REFERENCE if REFERENCE in names else names[0]
+        summary = plain(
+            {
+                "benchmark": FORMAT,
+                "suite": str(suite),
+                "seed": seed,
+                "robot": {"name": loaded.name, **robot_figures(cases.limits)},
+                "reference": reference,
+                "ranking": sorted(names, key=lambda name: -entries[name]["j50_mean"]),
+                "controllers": entries,
+                "pairs": [
+                    pair_figures(reference, name, played, entries)
+                    for name in names
+                    if name != reference
+                ],
+                "seeds": seed_groups(names, entries),
+                "command": shlex.join(sys.argv),
+                "versions": versions(),
+                "machine": machine(),
+                "workers": crew.workers,
+                "backend": backend,
+                "commit": commit(),
+                "seconds": round(time.perf_counter() - started, 1),
+            }
+        )
+        rows = [case_row(case, name, result) for name in names for case, result in played[name]]
+        folder.finish(rows, summary)
+        print_benchmark(summary, console)
+        print_paths([Path(out) / TRIALS, Path(out) / SUMMARY], console)
+        return summary
 
 
 def default_controllers() -> tuple[str, ...]:
