@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import os
@@ -133,7 +134,8 @@ def write_atomic(path: str | Path, content: str | bytes) -> None:
     except OSError as error:
         raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
     finally:
-        part.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # its folder may be a file
+            part.unlink(missing_ok=True)
 
 
 def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:

@@ -34,7 +34,7 @@ def test_help_is_light() -> None:
     assert done.returncode == 0, done.stderr
     names = (
         *("train", "evaluate", "benchmark", "compare", "leaderboard", "replay", "demo", "tune"),
-        *("qp-set", "list"),
+        *("qp-set", "report", "list"),
     )
     for name in names:
         assert name in done.stdout
@@ -57,6 +57,8 @@ def test_help_is_light() -> None:
         (["benchmark", "--out", "out", "--suite", "bad.yaml"], "bad.yaml: kind: unknown field"),
         (["compare", "run", "run"], "summary.json: cannot be read"),
         (["leaderboard", "run"], "summary.json: cannot be read"),
+        (["report", "run"], "holds no finished evaluation or benchmark"),
+        (["report", "nowhere"], "nowhere: no such folder"),
         (["train", "--out", "run", "--config", "nothing"], "no such name: 'nothing'"),
         (["train", "--out", "run", "--seed", "1", "--ppo.gamma", "2"], "ppo.gamma"),
         (["train", "--out", "run", "--config", "bad.yaml"], "bad.yaml: kind: unknown field"),

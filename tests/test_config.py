@@ -277,6 +277,14 @@ def test_write_atomic_does_not_write_into_the_old_file(tmp_path: Path) -> None:
     assert (path.read_text(), other.read_text()) == ("new", "old")
 
 
+def test_write_atomic_into_a_file_is_told(tmp_path: Path) -> None:
+    """A folder that is a file: one error, and the file stays."""
+    (tmp_path / "file").write_text("old")
+    with pytest.raises(PoiseError, match="cannot be written"):
+        write_atomic(tmp_path / "file" / "new", "text")
+    assert (tmp_path / "file").read_text() == "old"
+
+
 def test_write_atomic_keeps_the_old_content_when_it_fails(tmp_path: Path, monkeypatch) -> None:
     """A failure half way leaves the old file and no part of the new one."""
     path = tmp_path / "file.txt"

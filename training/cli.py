@@ -132,11 +132,13 @@ def benchmark(
     backend: Literal["local", "joblib", "ray"] = "local",
     trials: int | None = None,
     overwrite: Switch = False,
+    report: bool = True,
 ) -> int:
     """Rank controllers: J50 per direction, factors one at a time, a random mix; see docs.
 
-    Writes settings.yaml, trials.jsonl, trials.csv and summary.json. The same command goes on where
-    it was stopped; with other controllers it adds them. Exit code 1 if a controller raised.
+    Writes settings.yaml, trials.jsonl, trials.csv, summary.json and report.html. The same command
+    goes on where it was stopped; with other controllers it adds them. Exit code 1 if a controller
+    raised.
 
     Args:
         out: folder to write to.
@@ -149,7 +151,11 @@ def benchmark(
         backend: local (processes of this machine), joblib (the same by joblib), ray (a cluster).
         trials: at most as many in every cell of the suite, to try things out.
         overwrite: replace what the folder holds.
+        report: write report.html at the end, as poise report does.
     """
+    from poise.envs.gl import choose_gl_backend
+
+    choose_gl_backend()
     from .benchmark.run import benchmark, errors
 
     try:
@@ -165,6 +171,10 @@ def benchmark(
     if failed := errors(summary):
         print(f"poise: a controller raised an error in {failed} trials; see the column error of "
               f"{out / 'trials.csv'}", file=sys.stderr)  # fmt: skip
+    if report:
+        from .html_report import write_report
+
+        write_report(out, console=_console())
     return 1 if failed else 0
 
 
@@ -236,6 +246,24 @@ def replay(
     for path in (video, plot):
         if path is not None:
             print(path)
+
+
+def report(folder: Folder, /, *, out: Path | None = None, films: bool = True) -> None:
+    """Write one HTML file that shows a result: ranking, envelopes, falls, worst trials, numbers.
+
+    The file opens from disk and needs nothing else.
+
+    Args:
+        folder: written by poise evaluate or poise benchmark.
+        out: file to write; report.html in the folder if not given.
+        films: play the worst trials again, for pictures and plots over time (seconds for each).
+    """
+    from poise.envs.gl import choose_gl_backend
+
+    choose_gl_backend()
+    from .html_report import write_report
+
+    write_report(folder, out, films=films, console=_console())
 
 
 def tune(
@@ -318,6 +346,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "compare": compare,
     "leaderboard": leaderboard,
     "replay": replay,
+    "report": report,
     "tune": tune,
     "qp-set": qp_set,
     "list": list_names,

@@ -178,3 +178,18 @@ def check_trials(impulse: ArrayLike, recovered: ArrayLike) -> tuple[np.ndarray, 
     if not np.all((outcome == 0) | (outcome == 1)):
         raise ValueError("recovered must be 0 or 1 (false or true)")
     return impulse, outcome.astype(bool)
+
+
+def trial_bins(
+    impulse: np.ndarray, recovered: np.ndarray, bins: int
+) -> list[tuple[float, int, int]]:
+    """(mean impulse, trials not recovered, trials) of bins with about equally many trials each.
+
+    With at most as many distinct impulses as bins, each of them is a bin. In rising order.
+    """
+    levels = np.unique(impulse)
+    if levels.size <= bins:
+        groups = [np.flatnonzero(impulse == level) for level in levels]
+    else:
+        groups = np.array_split(np.argsort(impulse, kind="stable"), bins)
+    return [(float(impulse[g].mean()), int((~recovered[g]).sum()), len(g)) for g in groups]

@@ -11,7 +11,7 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import ArrayLike
 
-from .fits import LogisticFit, check_trials
+from .fits import LogisticFit, check_trials, trial_bins
 from .plot_style import GREY, INK, legend_below, look, saved_figure
 from .statistics import wilson_interval
 
@@ -138,7 +138,7 @@ def fall_probability(
                 ax.plot(fit.j50, 0.5, color=style.colour, marker="|", ms=15, mew=2.5, zorder=4)
             # The same pushes make the same bins: set the controllers a little apart.
             shift = (k - (len(trials) - 1) / 2) * 0.006 * np.ptp(impulse)
-            for i, (x_bin, fallen, count) in enumerate(_bins(impulse, recovered, bins)):
+            for i, (x_bin, fallen, count) in enumerate(trial_bins(impulse, recovered, bins)):
                 rate, ci = fallen / count, wilson_interval(fallen, count)
                 ax.errorbar(
                     x_bin + shift,
@@ -170,13 +170,3 @@ def _closed(directions: ArrayLike, *values: ArrayLike) -> tuple[np.ndarray, list
     order = np.argsort(theta)
     order = np.append(order, order[0])
     return np.append(theta[order[:-1]], theta[order[0]] + 2 * np.pi), [row[order] for row in rows]
-
-
-def _bins(impulse: np.ndarray, recovered: np.ndarray, bins: int) -> list[tuple[float, int, int]]:
-    """(mean impulse, falls, trials) of each bin, in rising order."""
-    levels = np.unique(impulse)
-    if levels.size <= bins:
-        groups = [np.flatnonzero(impulse == level) for level in levels]
-    else:
-        groups = np.array_split(np.argsort(impulse, kind="stable"), bins)
-    return [(float(impulse[g].mean()), int((~recovered[g]).sum()), len(g)) for g in groups]

@@ -1,12 +1,10 @@
 """Playing one trial of an evaluation again, exactly, from its folder."""
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build
@@ -17,6 +15,7 @@ from poise.envs.robot import load_robot
 from .benchmark.reading import is_benchmark, load_benchmark_data, player_of, read_case
 from .evaluation_folder import SUMMARY, TRIALS, Settings, read_settings
 from .players import Player, load_player
+from .signals import Signals
 from .suites import build_suite
 from .trials import COLUMNS, PUSH_COLUMNS, Outcome, Trial, run_trial
 
@@ -45,6 +44,7 @@ def replay(
     *,
     video: str | Path | None = None,
     plot: str | Path | None = None,
+    watch: Callable[[BalanceEnv], Any] | None = None,
 ) -> Replay:
     """Play a trial of an evaluation or a benchmark again and compare it with what was recorded.
 
@@ -54,6 +54,7 @@ def replay(
         controller: one of the evaluation's; None: the last, which is the first if it is alone.
         video: an MP4 file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
+        watch: called with the environment after the reset and after every step.
 
     Raises:
         ConfigError: no evaluation there, no such trial or controller, or a controller or robot
@@ -62,15 +63,16 @@ def replay(
     """
     find = _of_benchmark if is_benchmark(folder) else _of_evaluation
     name, line, again, player = find(Path(folder), trial, controller)
-    watch = _Watch() if plot is not None else None
-    outcome = run_trial(player, again, watch)
+    signals = Signals() if plot is not None else None
+    watches = [each for each in (signals, watch) if each is not None]
+    outcome = run_trial(player, again, lambda env: [each(env) for each in watches])
     differences = {
         key: (line[key], text)
         for key, value in asdict(outcome).items()
         if line[key] != (text := "" if value is None else str(value))
     }
-    if watch is not None:
-        watch.draw(Path(str(plot)), again, f"Trial {trial}, {name}")
+    if plot is not None and signals is not None:
+        _draw(signals, Path(plot), again, f"Trial {trial}, {name}")
     if video is not None:
         from .video import record
 
@@ -154,37 +156,9 @@ def _player(settings: Settings, name: str, folder: Path) -> Player:
     return player
 
 
-class _Watch:
-    """Keeps what a time plot shows, in the heading frame of the start."""
+def _draw(signals: Signals, path: Path, trial: Trial, title: str) -> None:
+    from .time_plots import trial_timeseries
 
-    def __init__(self) -> None:
-        self.rows: list[tuple[Any, ...]] = []
-        self.origin, self.axes = np.zeros(2), np.eye(2)
-
-    def __call__(self, env: BalanceEnv) -> None:
-        state = env.simulation.state
-        if not self.rows:
-            cos, sin = state.heading
-            self.origin, self.axes = state.origin[:2].copy(), np.array([[cos, -sin], [sin, cos]])
-        support = self._local(state.support_polygon)
-        load = np.abs(env.simulation.plant.ctrl) / env.robot.torque_limit
-        self.rows.append((
-            env.simulation.time,
-            self._local(state.com[:2]),
-            self._local(state.cop),
-            self._local(state.capture_point),
-            np.stack([support.min(axis=0), support.max(axis=0)], axis=1),
-            float(load.max()),
-        ))  # fmt: skip
-
-    def _local(self, points: np.ndarray) -> np.ndarray:
-        return (points - self.origin) @ self.axes
-
-    def draw(self, path: Path, trial: Trial, title: str) -> None:
-        from .time_plots import trial_timeseries
-
-        names = ("com", "cop", "capture_point", "support", "torque")
-        t, *columns = (np.array(column) for column in zip(*self.rows, strict=True))
-        signals = dict(zip(names, columns, strict=True))
-        pushes = [(push.start, push.duration) for push in trial.options["push"]]
-        trial_timeseries(path, t, signals, pushes=pushes, title=title)
+    shown = {k: v for k, v in signals.columns.items() if k != "angular_momentum"}
+    pushes = [(push.start, push.duration) for push in trial.options["push"]]
+    trial_timeseries(path, signals.t, shown, pushes=pushes, title=title)
