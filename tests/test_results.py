@@ -1,4 +1,4 @@
-"""training/results.py."""
+"""training/results.py and training/values.py."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from poise.envs.errors import ConfigError
-from poise.training.results import interval, load_results, number
+from poise.training.results import load_results
+from poise.training.values import interval, number
 
 from .report_folders import copied, finished
 

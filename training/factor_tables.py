@@ -11,8 +11,9 @@ from poise.envs.errors import ConfigError
 
 from .html_plots import Series, level_curves, level_text
 from .html_table import Cell, Column, Table, cell, name_cell, p_cell
-from .results import Results, interval, number
+from .results import Results
 from .statistics import wilson_interval
+from .values import interval, number
 
 TITLES = {
     "duration": "duration of the push [s]",

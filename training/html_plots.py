@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,9 +57,9 @@ def forest(series: Sequence[Series], title: str, form: str, scale: float = 1.0) 
         with _series(svg, s):
             svg.text(left - 10, y + 4, _short(s.name, 20), "name end")
             if np.isfinite(s.low[0]):
-                x = chart.x(np.array([s.low[0], s.high[0]]) * scale)
-                svg.line(x[0], y, x[1], y, "whisker")
-            svg.marker(chart.x(s.y[0] * scale), y, s.index, values[k])
+                first, last = chart.x(np.array([s.low[0], s.high[0]]) * scale)
+                svg.line(first, y, last, y, "whisker")
+            svg.marker(float(chart.x(s.y[0] * scale)), y, s.index, values[k])
     return svg.render()
 
 
@@ -208,7 +209,7 @@ def _dots(svg: Svg, chart: Chart, s: Series, shift: float) -> None:
         svg.marker(x[k], y[k], s.index, f"{s.name}: {_with_ends(s, k, '.0%')}")
 
 
-def _series(svg: Svg, s: Series):  # type: ignore[no-untyped-def]
+def _series(svg: Svg, s: Series) -> AbstractContextManager[None]:
     """The group that the page shows, hides and brings to the front."""
     return svg.group(class_=f"series {colour(s.index)}", data_series=str(s.index))
 

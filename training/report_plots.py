@@ -11,8 +11,9 @@ from .fits import fit_logistic, trial_bins
 from .html_plots import Series, fall_curves, forest, polar, rate_series
 from .html_table import Download, csv_text, download
 from .report_tables import per_direction, ranked
-from .results import Record, Results, interval, number
+from .results import Record, Results
 from .statistics import wilson_interval
+from .values import interval, number
 
 BINS = 8
 PARTS = {"envelope": "Standard pushes", "mix": "Random mix"}

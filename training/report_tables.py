@@ -9,8 +9,9 @@ from typing import Any
 from poise.envs.errors import ConfigError
 
 from .html_table import Cell, Column, Table, cell, name_cell, p_cell
-from .results import Results, interval, number
+from .results import Results
 from .statistics import wilson_interval
+from .values import interval, number
 from .worst_trials import smallest_lost
 
 SMALLEST = 3  # pushes listed for each controller
@@ -83,7 +84,7 @@ def ranking(results: Results, baseline: str) -> Table:
             cell(value("eta_mean"), ".2f", interval(entry, "eta_mean_ci95", where)),
             cell(value("eta_min"), ".2f"),
             cell(value("fraction50"), ".2f", sign=bound),
-            cell(rate, ".1%", tuple(wilson_interval(count, of))),
+            cell(rate, ".1%", wilson_interval(count, of)),
             cell(of, "d"),
             cell(lost, "d"),
             cell(won, "d"),

@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping
 
 from .report_tables import assisted, ranked
-from .results import Record, Results, interval, number
+from .results import Record, Results
 from .svg import number_text
+from .values import interval, number
 
 
 def lead(results: Results) -> list[str]:

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from poise.envs.errors import ConfigError
 from .benchmark.flat import flat
 from .benchmark.folder import LOG, BenchmarkSettings, read_benchmark_settings
 from .evaluation_folder import PARTIAL, SETTINGS, SUMMARY, TRIALS, Settings, read_settings
+from .values import number
 
 NEEDED = ("trial", "controller", "seed", "body", "impulse", "direction", "duration",
           "limit_fraction", "recovered", "fallen", "fall_time")  # fmt: skip
@@ -189,11 +189,14 @@ def _record(line: Mapping[str, Any], number: int, path: Path) -> Record:
         raise ConfigError(f"line {number} has another number of columns than the first",
                           source=path)  # fmt: skip
     try:
+        impulse, direction, duration, fraction, fall_time = (
+            float(line[name] or "nan")
+            for name in ("impulse", "direction", "duration", "limit_fraction", "fall_time")
+        )
+        recovered, fallen = FLAGS[line["recovered"]], FLAGS[line["fallen"]]
         return Record(
-            int(line["trial"]), line["controller"], FLAGS[line["recovered"]], FLAGS[line["fallen"]],
-            *(float(line[name] or "nan")
-              for name in ("impulse", "direction", "duration", "limit_fraction", "fall_time")),
-            line=line,
+            int(line["trial"]), line["controller"], recovered, fallen, impulse, direction, duration,
+            fraction, fall_time, line,
         )  # fmt: skip
     except (ValueError, KeyError) as error:
         raise ConfigError(f"line {number} does not parse: {error}", source=path) from None
@@ -223,31 +226,3 @@ def _check(
                 f"has {counts[name]} trials of {name!r}, but {SUMMARY} has {expected}: cut off?",
                 source=folder / TRIALS,
             )
-
-
-def number(entry: Mapping[str, Any], key: str, where: str, needed: bool = False) -> float | None:
-    """A finite number of the summary, or None where it has none.
-
-    Raises ConfigError for anything else, or where it is `needed` and missing.
-    """
-    value = entry.get(key)
-    if value is None and not needed:
-        return None
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ConfigError(f"must be a number, not {value!r}", source=where, field=key)
-    return value
-
-
-def interval(entry: Mapping[str, Any], key: str, where: str) -> tuple[float, float] | None:
-    """[low, high] of the summary, or None where it has none; raises ConfigError for others."""
-    value = entry.get(key)
-    if value is None:
-        return None
-    if not isinstance(value, list) or len(value) != 2:
-        raise ConfigError(f"must be [low, high], not {value!r}", source=where, field=key)
-    if None in value:
-        return None
-    ends = {"low": value[0], "high": value[1]}
-    low, high = (number(ends, end, f"{where}: {key}", needed=True) for end in ends)
-    assert low is not None and high is not None
-    return low, high

@@ -6,7 +6,7 @@ looks like in light and in dark. Lengths are in units of the viewBox, about one 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -190,7 +190,7 @@ def _number(value: float) -> str:
     return f"{value:.1f}".removesuffix(".0")
 
 
-def _written(attributes: dict[str, object]) -> str:
+def _written(attributes: Mapping[str, object]) -> str:
     words = []
     for name, value in attributes.items():
         if value is None:
