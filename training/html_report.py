@@ -153,7 +153,9 @@ def _film(
         reason = str(error)
     except Exception as error:  # a controller from outside may raise anything
         reason = f"{type(error).__name__}: {error}"
-    notes.append(f"Trial {record.trial} of {record.controller} was not played again: {reason}.")
+    note = f"{record.controller} was not played again: {reason}."
+    if note not in notes:
+        notes.append(note)
     return None
 
 
