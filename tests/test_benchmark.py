@@ -95,8 +95,8 @@ def test_the_summary_has_what_readers_rely_on(finished: Path) -> None:
             "seconds"} == set(summary)  # fmt: skip
     assert summary["ranking"] == list(BOTH) and summary["reference"] == "momentum-qp"
     entry = summary["controllers"]["momentum-qp"]
-    assert {"trials", "errors", "tick_us", "fingerprint", "j50_mean", "j50_mean_ci95", "eta_mean",
-            "eta_mean_ci95", "eta_min", "directions", "mix", "factors",
+    assert {"trials", "errors", "root_force_max", "tick_us", "fingerprint", "j50_mean",
+            "j50_mean_ci95", "eta_mean", "eta_mean_ci95", "eta_min", "directions", "mix", "factors",
             "eurobench"} <= set(entry)  # fmt: skip
     assert entry["trials"] == TRIALS and entry["errors"] == 0 and entry["tick_us"] == 12.5
     assert [d["trials"] for d in entry["directions"]] == [4, 4]

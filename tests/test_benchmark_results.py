@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ LOST = failed(RuntimeError("no"))
 def rate(won: int, trials: int) -> dict[str, Any]:
     share = won / trials
     return {"recovered": won, "trials": trials, "recovered_rate": share,
-            "recovered_ci95": [share - 0.1, share + 0.1], "root_force_max": 0.0}  # fmt: skip
+            "recovered_ci95": [share - 0.1, share + 0.1]}  # fmt: skip
 
 
 def write_result(folder: Path, recovered: dict[str, list[bool]], **j50: float) -> Path:
@@ -42,8 +43,8 @@ def write_result(folder: Path, recovered: dict[str, list[bool]], **j50: float) -
     names = list(recovered)
     entries = {
         name: {
-            "trials": 4, "errors": 0, "tick_us": 80.0, "j50_mean": j50.get(name, 10.0),
-            "j50_mean_ci95": [j50.get(name, 10.0) - 1, j50.get(name, 10.0) + 1], "j50_bounded": 0,
+            "trials": 4, "errors": 0, "root_force_max": 3.0, "tick_us": 80.0,
+            "j50_mean": j50.get(name, 10.0), "j50_mean_ci95": [j50.get(name, 10.0) - 1, j50.get(name, 10.0) + 1], "j50_bounded": 0,
             "eta_mean": 0.7, "eta_mean_ci95": [0.6, 0.8], "eta_min": 0.5,
             "mix": rate(sum(recovered[name]), 4),
             "factors": [{"factor": "delay", "standard": "0", "levels": [
@@ -199,7 +200,10 @@ def test_levels_are_compared_with_the_standard_case_on_the_same_trials() -> None
     every = [*cases.first, *second, *cases.others]
     lost = {case.number for case in every if case.factor == "delay" or case.level == "3"}
     played = [(case, LOST if case.number in lost else WON) for case in every]
+    pulled = Result(replace(OUTCOME, root_force=12.5))  # outside of the mix
+    played[1] = (played[1][0], pulled)
     entry = controller_figures(played, cases)
+    assert entry["root_force_max"] == 12.5
     assert entry["errors"] == len(lost) and entry["trials"] == len(every)
     (delay,) = (f for f in entry["factors"] if f["factor"] == "delay")
     standard, level = delay["levels"]

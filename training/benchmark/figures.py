@@ -36,6 +36,7 @@ def controller_figures(played: Played, cases: Cases) -> dict[str, Any]:
     return {
         "trials": len(played),
         "errors": sum(result.error is not None for _, result in played),
+        "root_force_max": max((result.outcome.root_force or 0.0) for _, result in played),
         **_envelope(part(played, "envelope"), limits),
         "mix": counts([result.outcome for _, result in mix]) if mix else None,
         "factors": _factors(factors, cases.standard),

@@ -58,7 +58,7 @@ def ranking_rows(summary: Mapping[str, Any]) -> list[list[str]]:
             with_range(mix["recovered_rate"], mix["recovered_ci95"], ".0%") if mix else "–",
             f"{pair['only_a']}, {pair['only_b']}" if pair else "–",
             f"{pair['p_mcnemar']:.2g}" if pair else "–",
-            f"{_root(entry):.0f}",
+            f"{entry['root_force_max']:.0f}",
             "–" if entry["tick_us"] is None else f"{entry['tick_us']:.0f}",
         ])  # fmt: skip
     return rows
@@ -73,8 +73,3 @@ def with_range(value: float, interval: Any, form: str) -> str:
 def _bounds(entry: Mapping[str, Any]) -> str:
     """A mark where the pushes did not reach from recovery to fall in every direction."""
     return f" ({entry['j50_bounded']} bounds)" if entry["j50_bounded"] else ""
-
-
-def _root(entry: Mapping[str, Any]) -> float:
-    """Largest force that came from nowhere [N]."""
-    return float((entry["mix"] or {}).get("root_force_max") or 0.0)
