@@ -44,7 +44,8 @@ def write_result(folder: Path, recovered: dict[str, list[bool]], **j50: float) -
     entries = {
         name: {
             "trials": 4, "errors": 0, "root_force_max": 3.0, "tick_us": 80.0,
-            "j50_mean": j50.get(name, 10.0), "j50_mean_ci95": [j50.get(name, 10.0) - 1, j50.get(name, 10.0) + 1], "j50_bounded": 0,
+            "j50_mean": j50.get(name, 10.0),
+            "j50_mean_ci95": [j50.get(name, 10.0) - 1, j50.get(name, 10.0) + 1], "j50_bounded": 0,
             "eta_mean": 0.7, "eta_mean_ci95": [0.6, 0.8], "eta_min": 0.5,
             "mix": rate(sum(recovered[name]), 4),
             "factors": [{"factor": "delay", "standard": "0", "levels": [
