@@ -1,0 +1,272 @@
+"""Feet in place as long as that holds; then steps to where the capture point can be stopped."""
+
+from dataclasses import dataclass, field, fields
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from poise.envs.robot import Robot
+from poise.envs.state import RobotState
+
+from .around_qp import AroundQP
+from .capturability import Reach, drifted
+from .contact_sets import ContactSets
+from .controller import Targets
+from .momentum_qp import MomentumQPConfig
+from .support import nearest_inside
+from .swing import Swing, SwingTask, swing_rows
+
+
+def _length(default: float):
+    return field(default=default, metadata={"min": 0.0})
+
+
+@dataclass(frozen=True)
+class StepLimits:
+    """Where a foot may be put, from the other one, heading frame; in h. Times in 1/ω."""
+
+    ahead: float = _length(0.75)
+    behind: float = _length(0.7)
+    width_min: float = _length(0.19)
+    width_max: float = _length(0.75)
+    speed: float = field(default=0.7, metadata={"above": 0.0})  # mean, of the swing [h ω]
+    time_min: float = field(default=0.65, metadata={"above": 0.0})
+    time_max: float = field(default=1.4, metadata={"above": 0.0})
+
+
+@dataclass(frozen=True)
+class CaptureStepConfig:
+    """`qp` holds the feet in place, `step_qp` and `swing` step."""
+
+    kind: Literal["capture-step"] = "capture-step"
+    trigger: float = 0.0  # how far ξ leaves the reach of both soles before a step [h]
+    overshoot: float = 0.04  # of the foothold beyond ξ [h]
+    gain: float = field(default=1.0, metadata={"above": 0.0})  # k of p = ξ + k (ξ − ξ_ref)
+    share: float = field(default=0.95, metadata={"above": 0.0, "max": 1.0})  # of the reach
+    ramp: float = field(default=0.1, metadata={"min": 0.0})  # of the load after touchdown [1/ω]
+    pause: float = field(default=0.15, metadata={"min": 0.0})  # between two steps [1/ω]
+    limits: StepLimits = field(default_factory=StepLimits)
+    swing: SwingTask = field(default_factory=SwingTask)
+    qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+    step_qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+
+
+class Plan(NamedTuple):
+    """A step: which foot, where to, how long; what of the fall it leaves [m]."""
+
+    foot: int
+    foothold: np.ndarray  # (2,)
+    time: float
+    residual: float
+
+
+class CaptureStep(AroundQP):
+    """The momentum QP with feet in place, and steps by capturability where those cannot hold.
+
+    Stands by `qp`, bit for bit, until the capture point ξ leaves what the CoP can reach; then
+    steps until it is inside again, and stays where it came to rest.
+    """
+
+    def __init__(self, robot: Robot, config: CaptureStepConfig | None = None):
+        self.config = config or CaptureStepConfig()
+        super().__init__(robot, self.config.qp)
+        self.sets = ContactSets(robot, self.config.step_qp)
+        self.reach = Reach(robot, self.config.share)
+        self.h = robot.height_com
+        self.rate = float(np.sqrt(self.qp.arrays.gravity / self.h))  # ω
+        self._guided: Targets | None = None
+        self.reset()
+
+    @property
+    def failures(self) -> int:
+        """Ticks since the reset at which a QP was not solved."""
+        return self.qp.failures + self.sets.failures
+
+    def reset(self, state: RobotState | None = None) -> None:
+        """Forget the last trial."""
+        super().reset(state)
+        self.sets.reset()
+        self.steps = 0
+        self.swing: Swing | None = None
+        self.foot = -1
+        self.yaw = 0.0
+        self.clock = 0.0  # since the last touchdown
+        self.stepped = False
+        self._region: np.ndarray | None = None
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] for the next `period`."""
+        if self.swing is None:
+            if self._must_step(state):
+                self._begin(state, self.plan(state))
+            elif not self.stepped:
+                return self.qp.torques(state, targets)
+        guided = self._copy(state, targets)
+        if self.swing is not None and self._landed(state):
+            self._land(state)
+        return self._swing(state, guided) if self.swing is not None else self._stand(state, guided)
+
+    # ---- when, with which foot, where to
+
+    def _yaws(self, state: RobotState) -> np.ndarray:
+        return np.arctan2(state.sole_axes[:, 1, 0], state.sole_axes[:, 0, 0])
+
+    def region(self, state: RobotState) -> np.ndarray:
+        """(k, 2) where the CoP can be with both soles on the ground."""
+        if self._region is None:
+            self._region = self.reach.both(state.sole_points, self._yaws(state))
+        return self._region
+
+    def _must_step(self, state: RobotState) -> bool:
+        if self.stepped and self.clock < self.config.pause / self.rate:
+            self.clock += self.period
+            return False
+        xi = state.capture_point
+        away = np.linalg.norm(xi - nearest_inside(self.region(state), xi))
+        return bool(away > self.config.trigger * self.h)
+
+    def plan(self, state: RobotState) -> Plan:
+        """The step that leaves least of the fall; of equal ones the shortest in time."""
+        best, cost = None, np.inf
+        limits = self.config.limits
+        times = np.linspace(limits.time_min, limits.time_max, 8) / self.rate
+        for foot in range(2):
+            for time in times:
+                plan = self.step(state, foot, float(time))
+                c = plan.residual + 0.1 * time + 0.02 * float(state.contacts[foot])
+                if c < cost:
+                    best, cost = plan, c
+        assert best is not None
+        return best
+
+    def step(
+        self, state: RobotState, foot: int, time: float, start: np.ndarray | None = None
+    ) -> Plan:
+        """The step of `foot` that is over in `time` seconds."""
+        stance = 1 - foot
+        omega, limits, h = state.omega, self.config.limits, self.h
+        yaw = self.yaw if self.stepped else state.heading_yaw
+        c, s = np.cos(yaw), np.sin(yaw)
+        R = np.array([[c, -s], [s, c]])
+        p0 = state.sole_points[stance, :2]
+        under = self.reach.placed(stance, p0, yaw)
+        xi = state.capture_point
+        p = nearest_inside(under, xi)
+        end = drifted(xi, p, omega, time)
+        middle = under.mean(axis=0) - p0
+        way = end - under.mean(axis=0)
+        way /= max(np.linalg.norm(way), 1e-9)
+        wanted = end - middle + self.config.overshoot * h * way
+        local = R.T @ (wanted - p0)
+        side = 1.0 if foot == 0 else -1.0
+        local[0] = np.clip(local[0], -limits.behind * h, limits.ahead * h)
+        local[1] = side * np.clip(side * local[1], limits.width_min * h, limits.width_max * h)
+        foothold = p0 + R @ local
+        begin = state.sole_points[foot, :2] if start is None else start
+        span = limits.speed * h * self.rate * time
+        gap = foothold - begin
+        distance = np.linalg.norm(gap)
+        if distance > span:
+            foothold = begin + gap * span / distance
+        points = np.array(state.sole_points[:, :2])
+        points[foot] = foothold
+        region = self.reach.both(points, np.array([yaw, yaw]))
+        residual = float(np.linalg.norm(end - nearest_inside(region, end)))
+        return Plan(foot, foothold, time, residual)
+
+    def replan(self, state: RobotState, swing: Swing) -> Plan:
+        """Foothold and time left of a running step."""
+        best, cost = None, np.inf
+        limits = self.config.limits
+        low = max(limits.time_min / self.rate - swing.time, Swing.FROZEN)
+        high = max(limits.time_max / self.rate - swing.time, low)
+        here = swing.reference[0, :2] + swing.reference[1, :2] * 0.5 * min(swing.remaining, 0.1)
+        for time in {*np.linspace(low, high, 8), swing.remaining}:
+            plan = self.step(state, self.foot, float(time), here)
+            c = plan.residual + 0.1 * time + 0.02 * abs(time - swing.remaining)
+            if c < cost:
+                best, cost = plan, c
+        assert best is not None
+        return best
+
+    # ---- swing
+
+    def _begin(self, state: RobotState, plan: Plan) -> None:
+        if not self.stepped:
+            self.yaw = state.heading_yaw
+        self.stepped = True
+        self.steps += 1
+        self.foot = plan.foot
+        point = state.sole_points[plan.foot].copy()
+        self.swing = Swing(point, plan.time, self.config.swing, self.h)
+        self.swing.ground = float(state.sole_points[1 - plan.foot, 2])
+        self.swing.aim(plan.foothold)
+        self._start = point[:2].copy()
+
+    def _landed(self, state: RobotState) -> bool:
+        assert self.swing is not None
+        return bool(
+            state.contacts[self.foot] > 0.5 and self.swing.time > 0.6 * self.swing.duration
+        )
+
+    def _land(self, state: RobotState) -> None:
+        self.swing, self.clock, self._region = None, 0.0, None
+
+    def _swing(self, state: RobotState, t: Targets) -> np.ndarray:
+        swing, foot = self.swing, self.foot
+        assert swing is not None
+        stance = 1 - foot
+        if swing.remaining > Swing.FROZEN:
+            plan = self.replan(state, swing)
+            swing.aim(plan.foothold, swing.time + plan.time)
+        reference = swing.advance(self.period)
+        under = self.reach.placed(stance, state.sole_points[stance], self.yaw)
+        self._guide(state, t, nearest_inside(under, state.capture_point))
+        t.com[2] = state.sole_points[stance, 2] + self._height(
+            np.linalg.norm(swing.foothold - state.sole_points[stance, :2])
+        )
+        rows = swing_rows(state, foot, reference, self._level(), self.config.swing)
+        return self.sets.tick(state, t, (stance,), [rows])
+
+    def _level(self) -> np.ndarray:
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    # ---- both feet on the ground, somewhere
+
+    def _stand(self, state: RobotState, t: Targets) -> np.ndarray:
+        region = self.region(state)
+        xi, reference = state.capture_point, region.mean(axis=0)
+        p = nearest_inside(region, xi + self.config.gain * (xi - reference))
+        self._guide(state, t, p)
+        spread = np.linalg.norm(state.sole_points[0, :2] - state.sole_points[1, :2])
+        t.com[2] = state.sole_points[:, 2].mean() + self._height(spread)
+        limits = None
+        ramp = self.config.ramp / self.rate
+        if self.clock < ramp:
+            limits = np.full(2, np.inf)
+            limits[self.foot] = state.mass * 9.81 * (0.3 + 2.0 * self.clock / ramp)
+        self.clock += self.period
+        return self.sets.tick(state, t, (0, 1), (), limits)
+
+    def _height(self, spread: float) -> float:
+        """CoM height above the soles that legs with the feet `spread` apart allow [m]."""
+        reach = 1.02 * self.h
+        return float(min(self.h, np.sqrt(max(reach**2 - (0.5 * spread) ** 2, 0.0))))
+
+    def _copy(self, state: RobotState, targets: Targets) -> Targets:
+        if self._guided is None:
+            self._guided = Targets.standing(self.robot, state)
+        for item in fields(Targets):
+            getattr(self._guided, item.name)[:] = getattr(targets, item.name)
+        self._guided.root_axes[:] = self._level() @ self.qp.arrays.root_standing
+        self._guided.root_vel[:] = 0.0
+        self._guided.root_acc[:] = 0.0
+        return self._guided
+
+    def _guide(self, state: RobotState, t: Targets, p: np.ndarray) -> None:
+        """c̈_ref = ω² (c − p) and p_ref = p in the plane."""
+        t.com[:2], t.com_vel[:2] = state.com[:2], state.com_vel[:2]
+        t.com_acc[:2] = state.omega**2 * (state.com[:2] - p)
+        t.com_vel[2] = t.com_acc[2] = 0.0
+        t.cop[:] = p
