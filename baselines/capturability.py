@@ -6,6 +6,8 @@ from scipy.spatial import ConvexHull
 
 from poise.envs.robot import Robot
 
+from .support import nearest_inside
+
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
 
 
@@ -19,6 +21,16 @@ def capture_distance(steps: int, reach: float, length: float, omega: float, time
     stance foot to come to rest in N steps of length l and time T_s [Koolen12]."""
     a = np.exp(-omega * time)
     return float(reach + length * a * (1.0 - a**steps) / (1.0 - a))
+
+
+def outside(polygon: np.ndarray, point: np.ndarray) -> float:
+    """Distance [m] of a point from a convex counter-clockwise polygon (k, 2); < 0 inside it."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    length = np.maximum(np.linalg.norm(edges, axis=1), 1e-12)
+    beyond = (edges[:, 1] * (point - polygon)[:, 0] - edges[:, 0] * (point - polygon)[:, 1]) / length
+    if np.all(beyond <= 0.0):
+        return float(beyond.max())
+    return float(np.linalg.norm(point - nearest_inside(polygon, point)))
 
 
 def clipped(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:

@@ -9,7 +9,7 @@ from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .around_qp import AroundQP
-from .capturability import Reach, drifted
+from .capturability import Reach, drifted, outside
 from .contact_sets import ContactSets
 from .controller import Targets
 from .momentum_qp import MomentumQPConfig
@@ -30,7 +30,7 @@ class StepLimits:
     width_min: float = _length(0.19)
     width_max: float = _length(0.75)
     speed: float = field(default=0.7, metadata={"above": 0.0})  # mean, of the swing [h ω]
-    time_min: float = field(default=0.65, metadata={"above": 0.0})
+    time_min: float = field(default=0.9, metadata={"above": 0.0})
     time_max: float = field(default=1.4, metadata={"above": 0.0})
 
 
@@ -40,6 +40,7 @@ class CaptureStepConfig:
 
     kind: Literal["capture-step"] = "capture-step"
     trigger: float = 0.0  # how far ξ leaves the reach of both soles before a step [h]
+    margin: float = _length(0.06)  # by which ξ is to land inside the new reach, if it can [h]
     overshoot: float = 0.04  # of the foothold beyond ξ [h]
     gain: float = field(default=1.0, metadata={"above": 0.0})  # k of p = ξ + k (ξ − ξ_ref)
     share: float = field(default=0.95, metadata={"above": 0.0, "max": 1.0})  # of the reach
@@ -171,7 +172,7 @@ class CaptureStep(AroundQP):
         points = np.array(state.sole_points[:, :2])
         points[foot] = foothold
         region = self.reach.both(points, np.array([yaw, yaw]))
-        residual = float(np.linalg.norm(end - nearest_inside(region, end)))
+        residual = max(outside(region, end), -self.config.margin * h)
         return Plan(foot, foothold, time, residual)
 
     def replan(self, state: RobotState, swing: Swing) -> Plan:
