@@ -6,9 +6,15 @@ from scipy.spatial import ConvexHull
 
 from poise.envs.robot import Robot
 
-from .support import nearest_inside
-
+_ANGLES = np.arange(16) * (2.0 * np.pi / 16)
+DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
+
+
+def turn(yaw: float) -> np.ndarray:
+    """(2, 2) rotation by `yaw` in the plane."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s], [s, c]])
 
 
 def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float) -> np.ndarray:
@@ -21,16 +27,6 @@ def capture_distance(steps: int, reach: float, length: float, omega: float, time
     stance foot to come to rest in N steps of length l and time T_s [Koolen12]."""
     a = np.exp(-omega * time)
     return float(reach + length * a * (1.0 - a**steps) / (1.0 - a))
-
-
-def outside(polygon: np.ndarray, point: np.ndarray) -> float:
-    """Distance [m] of a point from a convex counter-clockwise polygon (k, 2); < 0 inside it."""
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    length = np.maximum(np.linalg.norm(edges, axis=1), 1e-12)
-    beyond = (edges[:, 1] * (point - polygon)[:, 0] - edges[:, 0] * (point - polygon)[:, 1]) / length
-    if np.all(beyond <= 0.0):
-        return float(beyond.max())
-    return float(np.linalg.norm(point - nearest_inside(polygon, point)))
 
 
 def clipped(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
@@ -80,41 +76,56 @@ def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 class Reach:
-    """Where soles can put the centre of pressure, with the torques that their ankles have."""
+    """Where soles can put the centre of pressure, with the torques that their ankles have.
+
+    Both soles together reach p = λ p_0 + (1 − λ) p_1, p_i what sole i reaches under its share of
+    the load: the less it carries, the further its ankles can move the pressure.
+    """
 
     def __init__(self, robot: Robot, share: float = 0.95):
         self.polygons = [share * sole.polygon for sole in robot.soles]
         self.limits = [ankle_limits(robot, i) for i in range(len(robot.soles))]
-        self._local = {
-            (i, load): self._one(i, load, share)
-            for i in range(len(robot.soles))
-            for load in SHARES
-            if load > 0.0
-        }
+        self._share = share
+        self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
+        self.middle = [polygon.mean(axis=0) for polygon in self.alone]
+        if len(robot.soles) == 2:
+            self._sums = [self._sum(load) for load in SHARES]
+            self._support = np.array([(sums @ DIRECTIONS.T).max(axis=0) for sums in self._sums])
 
-    def _one(self, sole: int, load: float, share: float) -> np.ndarray:
+    def _under(self, sole: int, load: float) -> np.ndarray:
         polygon = self.polygons[sole]
         for normal, offset, bound in zip(*self.limits[sole], strict=True):
-            room = share * bound / load
+            room = self._share * bound / max(load, 1e-3)
             polygon = clipped(polygon, normal, offset + room)
             polygon = clipped(polygon, -normal, room - offset)
         return polygon
 
-    def placed(self, sole: int, point: np.ndarray, yaw: float, load: float = 1.0) -> np.ndarray:
-        """(k, 2) the polygon of one sole at `point`, turned by `yaw`, under `load` m g [m]."""
-        c, s = np.cos(yaw), np.sin(yaw)
-        return np.asarray(point)[:2] + self._local[sole, load] @ np.array([[c, s], [-s, c]])
+    def _sum(self, load: float) -> np.ndarray:
+        first, second = load * self._under(0, load), (1.0 - load) * self._under(1, 1.0 - load)
+        return (first[:, None] + second[None]).reshape(-1, 2)
 
-    def both(self, points: np.ndarray, yaws: np.ndarray) -> np.ndarray:
-        """(k, 2) hull of what two soles reach together, over all ways to share the load."""
-        corners = []
-        for load in SHARES:
-            if load in (0.0, 1.0):
-                i = 0 if load == 1.0 else 1
-                corners.append(self.placed(i, points[i], yaws[i]))
-                continue
-            first = load * self.placed(0, points[0], yaws[0], load)
-            second = (1.0 - load) * self.placed(1, points[1], yaws[1], 1.0 - load)
-            corners.append((first[:, None] + second[None]).reshape(-1, 2))
-        cloud = np.vstack(corners)
-        return cloud[ConvexHull(cloud).vertices]
+    def under(self, sole: int, point: np.ndarray, yaw: float) -> np.ndarray:
+        """(k, 2) what the sole at `point`, turned by `yaw`, reaches alone [m]."""
+        return point[:2] + self.alone[sole] @ turn(yaw).T
+
+    def both(self, points: np.ndarray, yaw: float) -> np.ndarray:
+        """(k, 2) hull of what two soles at `points` (2, ≥ 2) reach, for all shares of the load."""
+        cloud = [
+            load * points[0, :2] + (1.0 - load) * points[1, :2] + sums @ turn(yaw).T
+            for load, sums in zip(SHARES, self._sums, strict=True)
+        ]
+        corners = np.vstack(cloud)
+        return corners[ConvexHull(corners).vertices]
+
+    def beyond(
+        self, first: np.ndarray, second: np.ndarray, yaw: float, xi: np.ndarray
+    ) -> np.ndarray:
+        """(n,) how far points `xi` (n, 2) lie outside what two soles reach together; < 0 inside.
+
+        Soles at `first` and `second`, (n, 2) or (2,); in the 16 DIRECTIONS, so at most 2 % short.
+        """
+        R = turn(yaw)
+        a, b, x = (np.asarray(v) @ R @ DIRECTIONS.T for v in (first, second, xi))
+        shares = np.array(SHARES)[:, None]
+        reach = self._support + shares * a[..., None, :] + (1.0 - shares) * b[..., None, :]
+        return (x - reach.max(axis=-2)).max(axis=-1)

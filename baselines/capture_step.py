@@ -9,7 +9,7 @@ from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .around_qp import AroundQP
-from .capturability import Reach, drifted, outside
+from .capturability import Reach, turn
 from .contact_sets import ContactSets
 from .controller import Targets
 from .momentum_qp import MomentumQPConfig
@@ -30,6 +30,7 @@ class StepLimits:
     width_min: float = _length(0.19)
     width_max: float = _length(0.75)
     speed: float = field(default=0.7, metadata={"above": 0.0})  # mean, of the swing [h ω]
+    side_speed: float = field(default=0.5, metadata={"above": 0.0})  # of it sideways [h ω]
     time_min: float = field(default=0.9, metadata={"above": 0.0})
     time_max: float = field(default=1.4, metadata={"above": 0.0})
 
@@ -41,7 +42,9 @@ class CaptureStepConfig:
     kind: Literal["capture-step"] = "capture-step"
     trigger: float = 0.0  # how far ξ leaves the reach of both soles before a step [h]
     margin: float = _length(0.06)  # by which ξ is to land inside the new reach, if it can [h]
-    overshoot: float = 0.04  # of the foothold beyond ξ [h]
+    overshoot: float = 0.04  # of the foothold beyond ξ, forward or backward [h]
+    outward: float = 0.03  # of the foothold beyond ξ, to the side of the foot [h]
+    haste: float = _length(0.04)  # price of time, in h per 1/ω
     gain: float = field(default=1.0, metadata={"above": 0.0})  # k of p = ξ + k (ξ − ξ_ref)
     share: float = field(default=0.95, metadata={"above": 0.0, "max": 1.0})  # of the reach
     ramp: float = field(default=0.1, metadata={"min": 0.0})  # of the load after touchdown [1/ω]
@@ -53,12 +56,12 @@ class CaptureStepConfig:
 
 
 class Plan(NamedTuple):
-    """A step: which foot, where to, how long; what of the fall it leaves [m]."""
+    """A step: which foot, where to, how long, at what cost [m]."""
 
     foot: int
     foothold: np.ndarray  # (2,)
     time: float
-    residual: float
+    cost: float
 
 
 class CaptureStep(AroundQP):
@@ -109,86 +112,79 @@ class CaptureStep(AroundQP):
 
     # ---- when, with which foot, where to
 
-    def _yaws(self, state: RobotState) -> np.ndarray:
-        return np.arctan2(state.sole_axes[:, 1, 0], state.sole_axes[:, 0, 0])
-
     def region(self, state: RobotState) -> np.ndarray:
         """(k, 2) where the CoP can be with both soles on the ground."""
         if self._region is None:
-            self._region = self.reach.both(state.sole_points, self._yaws(state))
+            self._region = self.reach.both(state.sole_points, self._heading(state))
         return self._region
+
+    def _heading(self, state: RobotState) -> float:
+        return self.yaw if self.stepped else state.heading_yaw
 
     def _must_step(self, state: RobotState) -> bool:
         if self.stepped and self.clock < self.config.pause / self.rate:
-            self.clock += self.period
             return False
-        xi = state.capture_point
-        away = np.linalg.norm(xi - nearest_inside(self.region(state), xi))
+        feet, yaw = state.sole_points[:, :2], self._heading(state)
+        away = self.reach.beyond(feet[0], feet[1], yaw, state.capture_point)
         return bool(away > self.config.trigger * self.h)
 
     def plan(self, state: RobotState) -> Plan:
         """The step that leaves least of the fall; of equal ones the shortest in time."""
-        best, cost = None, np.inf
         limits = self.config.limits
         times = np.linspace(limits.time_min, limits.time_max, 8) / self.rate
+        plans = []
         for foot in range(2):
-            for time in times:
-                plan = self.step(state, foot, float(time))
-                c = plan.residual + 0.1 * time + 0.02 * float(state.contacts[foot])
-                if c < cost:
-                    best, cost = plan, c
-        assert best is not None
-        return best
-
-    def step(
-        self, state: RobotState, foot: int, time: float, start: np.ndarray | None = None
-    ) -> Plan:
-        """The step of `foot` that is over in `time` seconds."""
-        stance = 1 - foot
-        omega, limits, h = state.omega, self.config.limits, self.h
-        yaw = self.yaw if self.stepped else state.heading_yaw
-        c, s = np.cos(yaw), np.sin(yaw)
-        R = np.array([[c, -s], [s, c]])
-        p0 = state.sole_points[stance, :2]
-        under = self.reach.placed(stance, p0, yaw)
-        xi = state.capture_point
-        p = nearest_inside(under, xi)
-        end = drifted(xi, p, omega, time)
-        middle = under.mean(axis=0) - p0
-        way = end - under.mean(axis=0)
-        way /= max(np.linalg.norm(way), 1e-9)
-        wanted = end - middle + self.config.overshoot * h * way
-        local = R.T @ (wanted - p0)
-        side = 1.0 if foot == 0 else -1.0
-        local[0] = np.clip(local[0], -limits.behind * h, limits.ahead * h)
-        local[1] = side * np.clip(side * local[1], limits.width_min * h, limits.width_max * h)
-        foothold = p0 + R @ local
-        begin = state.sole_points[foot, :2] if start is None else start
-        span = limits.speed * h * self.rate * time
-        gap = foothold - begin
-        distance = np.linalg.norm(gap)
-        if distance > span:
-            foothold = begin + gap * span / distance
-        points = np.array(state.sole_points[:, :2])
-        points[foot] = foothold
-        region = self.reach.both(points, np.array([yaw, yaw]))
-        residual = max(outside(region, end), -self.config.margin * h)
-        return Plan(foot, foothold, time, residual)
+            footholds, residual = self.steps_of(state, foot, times, state.sole_points[foot, :2])
+            cost = residual + self.config.haste * times * self.h * self.rate
+            k = int(np.argmin(cost))
+            plans.append(Plan(foot, footholds[k], float(times[k]), float(cost[k])))
+        return min(plans, key=lambda plan: plan.cost)
 
     def replan(self, state: RobotState, swing: Swing) -> Plan:
         """Foothold and time left of a running step."""
-        best, cost = None, np.inf
         limits = self.config.limits
         low = max(limits.time_min / self.rate - swing.time, Swing.FROZEN)
         high = max(limits.time_max / self.rate - swing.time, low)
-        here = swing.reference[0, :2] + swing.reference[1, :2] * 0.5 * min(swing.remaining, 0.1)
-        for time in {*np.linspace(low, high, 8), swing.remaining}:
-            plan = self.step(state, self.foot, float(time), here)
-            c = plan.residual + 0.1 * time + 0.02 * abs(time - swing.remaining)
-            if c < cost:
-                best, cost = plan, c
-        assert best is not None
-        return best
+        times = np.append(np.linspace(low, high, 8), max(swing.remaining, Swing.FROZEN))
+        here = swing.reference[0, :2] + 0.5 * swing.reference[1, :2] * min(swing.remaining, 0.1)
+        footholds, residual = self.steps_of(state, self.foot, times, here)
+        cost = residual + self.config.haste * times * self.h * self.rate
+        cost += 0.02 * np.abs(times - swing.remaining)
+        k = int(np.argmin(cost))
+        return Plan(self.foot, footholds[k], float(times[k]), float(cost[k]))
+
+    def steps_of(
+        self, state: RobotState, foot: int, times: np.ndarray, start: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Footholds (n, 2) of steps of `foot` that land after `times` (n,) [s], and how far ξ will
+        then be outside the reach of both soles [m], no less than −margin.
+
+        The CoP is taken to stay where the stance sole brakes ξ most; the foothold is a little
+        beyond ξ, as far as limits of place and speed let it.
+        """
+        config, limits, h = self.config, self.config.limits, self.h
+        stance, yaw = 1 - foot, self._heading(state)
+        R = turn(yaw)
+        p0 = state.sole_points[stance, :2]
+        xi = state.capture_point
+        p = nearest_inside(self.reach.under(stance, p0, yaw), xi)
+        end = p + (xi - p) * np.exp(state.omega * times)[:, None]
+        side = 1.0 if foot == 0 else -1.0
+        local = (end - p0) @ R - self.reach.middle[foot]
+        local[:, 0] += config.overshoot * h * np.tanh(local[:, 0] / (0.1 * h))
+        local[:, 1] += side * config.outward * h
+        local[:, 0] = np.clip(local[:, 0], -limits.behind * h, limits.ahead * h)
+        local[:, 1] = side * np.clip(
+            side * local[:, 1], limits.width_min * h, limits.width_max * h
+        )
+        gap = local - (start - p0) @ R
+        span = np.array([limits.speed, limits.side_speed]) * h * self.rate * times[:, None]
+        excess = np.linalg.norm(gap / span, axis=1)
+        local -= gap * (1.0 - 1.0 / np.maximum(excess, 1.0))[:, None]
+        footholds = p0 + local @ R.T
+        feet = (footholds, p0) if foot == 0 else (p0, footholds)
+        residual = self.reach.beyond(*feet, yaw, end)
+        return footholds, np.maximum(residual, -config.margin * h)
 
     # ---- swing
 
@@ -221,7 +217,7 @@ class CaptureStep(AroundQP):
             plan = self.replan(state, swing)
             swing.aim(plan.foothold, swing.time + plan.time)
         reference = swing.advance(self.period)
-        under = self.reach.placed(stance, state.sole_points[stance], self.yaw)
+        under = self.reach.under(stance, state.sole_points[stance], self.yaw)
         self._guide(state, t, nearest_inside(under, state.capture_point))
         t.com[2] = state.sole_points[stance, 2] + self._height(
             np.linalg.norm(swing.foothold - state.sole_points[stance, :2])
