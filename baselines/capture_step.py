@@ -45,7 +45,11 @@ class CaptureStepConfig:
     overshoot: float = 0.04  # of the foothold beyond ξ, forward or backward [h]
     outward: float = 0.03  # of the foothold beyond ξ, to the side of the foot [h]
     haste: float = _length(0.04)  # price of time, in h per 1/ω
+    stretch: float = field(default=1.0, metadata={"above": 0.0})  # legs at touchdown [h]
     gain: float = field(default=1.0, metadata={"above": 0.0})  # k of p = ξ + k (ξ − ξ_ref)
+    hips: float = _length(0.0)  # by which p may be asked for beyond the reach, standing [h]
+    swing_hips: float = _length(0.0)  # the same in a swing
+    again: float = 0.01  # `trigger` of a further step [h]
     share: float = field(default=0.95, metadata={"above": 0.0, "max": 1.0})  # of the reach
     ramp: float = field(default=0.1, metadata={"min": 0.0})  # of the load after touchdown [1/ω]
     pause: float = field(default=0.15, metadata={"min": 0.0})  # between two steps [1/ω]
@@ -126,7 +130,8 @@ class CaptureStep(AroundQP):
             return False
         feet, yaw = state.sole_points[:, :2], self._heading(state)
         away = self.reach.beyond(feet[0], feet[1], yaw, state.capture_point)
-        return bool(away > self.config.trigger * self.h)
+        limit = self.config.again if self.stepped else self.config.trigger
+        return bool(away > limit * self.h)
 
     def plan(self, state: RobotState) -> Plan:
         """The step that leaves least of the fall; of equal ones the shortest in time."""
@@ -174,9 +179,7 @@ class CaptureStep(AroundQP):
         local[:, 0] += config.overshoot * h * np.tanh(local[:, 0] / (0.1 * h))
         local[:, 1] += side * config.outward * h
         local[:, 0] = np.clip(local[:, 0], -limits.behind * h, limits.ahead * h)
-        local[:, 1] = side * np.clip(
-            side * local[:, 1], limits.width_min * h, limits.width_max * h
-        )
+        local[:, 1] = side * np.clip(side * local[:, 1], limits.width_min * h, limits.width_max * h)
         gap = local - (start - p0) @ R
         span = np.array([limits.speed, limits.side_speed]) * h * self.rate * times[:, None]
         excess = np.linalg.norm(gap / span, axis=1)
@@ -202,9 +205,7 @@ class CaptureStep(AroundQP):
 
     def _landed(self, state: RobotState) -> bool:
         assert self.swing is not None
-        return bool(
-            state.contacts[self.foot] > 0.5 and self.swing.time > 0.6 * self.swing.duration
-        )
+        return bool(state.contacts[self.foot] > 0.5 and self.swing.time > 0.6 * self.swing.duration)
 
     def _land(self, state: RobotState) -> None:
         self.swing, self.clock, self._region = None, 0.0, None
@@ -218,7 +219,9 @@ class CaptureStep(AroundQP):
             swing.aim(plan.foothold, swing.time + plan.time)
         reference = swing.advance(self.period)
         under = self.reach.under(stance, state.sole_points[stance], self.yaw)
-        self._guide(state, t, nearest_inside(under, state.capture_point))
+        xi = state.capture_point
+        wanted = xi + self.config.gain * (xi - under.mean(axis=0))
+        self._guide(state, t, self._within(under, wanted, self.config.swing_hips))
         t.com[2] = state.sole_points[stance, 2] + self._height(
             np.linalg.norm(swing.foothold - state.sole_points[stance, :2])
         )
@@ -234,7 +237,7 @@ class CaptureStep(AroundQP):
     def _stand(self, state: RobotState, t: Targets) -> np.ndarray:
         region = self.region(state)
         xi, reference = state.capture_point, region.mean(axis=0)
-        p = nearest_inside(region, xi + self.config.gain * (xi - reference))
+        p = self._within(region, xi + self.config.gain * (xi - reference), self.config.hips)
         self._guide(state, t, p)
         spread = np.linalg.norm(state.sole_points[0, :2] - state.sole_points[1, :2])
         t.com[2] = state.sole_points[:, 2].mean() + self._height(spread)
@@ -246,9 +249,15 @@ class CaptureStep(AroundQP):
         self.clock += self.period
         return self.sets.tick(state, t, (0, 1), (), limits)
 
+    def _within(self, region: np.ndarray, wanted: np.ndarray, hips: float) -> np.ndarray:
+        """The point of `region` nearest to `wanted`, or up to `hips` beyond: that takes the hips."""
+        inside = nearest_inside(region, wanted)
+        over = wanted - inside
+        return inside + over * min(1.0, hips * self.h / max(np.linalg.norm(over), 1e-9))
+
     def _height(self, spread: float) -> float:
         """CoM height above the soles that legs with the feet `spread` apart allow [m]."""
-        reach = 1.02 * self.h
+        reach = self.config.stretch * self.h
         return float(min(self.h, np.sqrt(max(reach**2 - (0.5 * spread) ** 2, 0.0))))
 
     def _copy(self, state: RobotState, targets: Targets) -> Targets:

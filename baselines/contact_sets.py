@@ -118,9 +118,7 @@ class ContactSets:
             ws.cop_prev[:] = np.nan
             ws.iscratch[:] = 0
             self.active = soles
-        assemble(
-            chosen.arrays, chosen.state(state.arrays), p, targets.arrays(), self.period, ws
-        )
+        assemble(chosen.arrays, chosen.state(state.arrays), p, targets.arrays(), self.period, ws)
         for task in tasks:
             A = task.A @ ws.V
             offset = task.A @ ws.vdot0 - task.b
