@@ -49,6 +49,8 @@ class CaptureStepConfig:
     gain: float = field(default=1.0, metadata={"above": 0.0})  # k of p = ξ + k (ξ − ξ_ref)
     hips: float = _length(0.0)  # by which p may be asked for beyond the reach, standing [h]
     swing_hips: float = _length(0.0)  # the same in a swing
+    root_accel: float = field(default=1.5, metadata={"above": 0.0})  # most that is asked [ω²]
+    joint_accel: float = field(default=5.0, metadata={"above": 0.0})  # the same of joints [ω²]
     again: float = 0.01  # `trigger` of a further step [h]
     share: float = field(default=0.95, metadata={"above": 0.0, "max": 1.0})  # of the reach
     ramp: float = field(default=0.1, metadata={"min": 0.0})  # of the load after touchdown [1/ω]
@@ -276,3 +278,20 @@ class CaptureStep(AroundQP):
         t.com_acc[:2] = state.omega**2 * (state.com[:2] - p)
         t.com_vel[2] = t.com_acc[2] = 0.0
         t.cop[:] = p
+        self._limit_posture(state, t)
+
+    def _limit_posture(self, state: RobotState, t: Targets) -> None:
+        """Feed-forward that caps what the posture's PD law asks for.
+
+        A push leaves the trunk turning at some rad/s; stopping that at once would cost CoM
+        acceleration, L̇ = (p − c) × f, that no foothold makes good.
+        """
+        p, rate2 = self.sets.parameters, self.rate**2
+        asked = p.stiffness[6:] * (t.q_ref - state.q) + p.damping[6:] * (t.v_ref - state.qvel[6:])
+        bound = self.config.joint_accel * rate2
+        t.a_ref[:] = np.clip(asked, -bound, bound) - asked
+        R = state.root_axes
+        error = 0.5 * sum(np.cross(R[:, i], t.root_axes[:, i]) for i in range(3))
+        asked = p.stiffness[3:6] * (R.T @ error) - p.damping[3:6] * state.qvel[3:6]
+        size = np.linalg.norm(asked)
+        t.root_acc[:] = asked * (min(1.0, self.config.root_accel * rate2 / max(size, 1e-9)) - 1.0)

@@ -71,7 +71,7 @@ class ContactSets:
     def __init__(self, robot: Robot, config: MomentumQPConfig):
         self.robot, self.config, self.period = robot, config, config.period
         self.arrays = robot_arrays(robot)
-        parameters = qp_parameters(robot, self.arrays, config)
+        self.parameters = parameters = qp_parameters(robot, self.arrays, config)
         count = len(robot.soles)
         subsets = [(i,) for i in range(count)]
         if count > 1:
