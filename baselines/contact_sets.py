@@ -5,6 +5,7 @@ contact only; what else is asked of v̇, such as the way of a swing foot, comes 
 """
 
 from collections.abc import Sequence
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -14,19 +15,10 @@ from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .controller import Targets
-from .momentum_qp import (
-    FALLBACK_SPEED,
-    MAX_ITERATIONS,
-    Memory,
-    MomentumQPConfig,
-    accept,
-    release_joints,
-)
+from .momentum_qp import FALLBACK_SPEED, Memory, MomentumQPConfig, accept, solve
 from .parameters import qp_parameters
-from .reduced_qp import QPParameters, allocate_workspace, assemble
+from .reduced_qp import QPParameters, Workspace, allocate_workspace, assemble
 from .solvers import QP
-from .solvers.dual_active_set import solve_dual
-from .solvers.rows import INFEASIBLE
 from .task_rows import Rows
 
 
@@ -37,10 +29,11 @@ class ContactSet:
         pick = np.array(soles)
         self.soles, self.pick = soles, pick
         self.rows = (6 * pick[:, None] + np.arange(6)).ravel()
-        names = [name for name in RobotArrays._fields if name.startswith(("sole_", "chain"))]
-        self.arrays = arrays._replace(**{name: getattr(arrays, name)[pick] for name in names})
+        names = [item.name for item in fields(RobotArrays)]
+        names = [name for name in names if name.startswith(("sole_", "chain"))]
+        self.arrays = replace(arrays, **{name: getattr(arrays, name)[pick] for name in names})
         cone = parameters.cone[pick]  # with a row more for each sole: the bound on its load
-        self.parameters = parameters._replace(cone=np.pad(cone, ((0, 0), (0, 1), (0, 0))))
+        self.parameters = replace(parameters, cone=np.pad(cone, ((0, 0), (0, 1), (0, 0))))
         self.workspace = allocate_workspace(
             self.arrays, self.parameters.cone.shape[1], parameters.soft_root
         )
@@ -50,6 +43,7 @@ class ContactSet:
             "sole_point": apart((nc, 3)), "sole_axes": apart((nc, 3, 3)), "origin": apart(3),
             "contacts": apart(nc),
         }  # fmt: skip
+        self._source: StateArrays | None = None
 
     def state(self, s: StateArrays) -> StateArrays:
         """`s` with the soles of this set only."""
@@ -59,7 +53,9 @@ class ContactSet:
         for name in ("sole_point", "sole_axes", "contacts"):
             own[name][:] = getattr(s, name)[self.pick]
         own["origin"][:] = own["sole_point"].mean(axis=0)
-        return s._replace(**own)
+        if self._source is not s:
+            self._source, self._state = s, replace(s, **own)
+        return self._state
 
 
 class ContactSets:
@@ -109,7 +105,7 @@ class ContactSets:
         """The reduced QP with `soles` in contact.
 
         Args:
-            tasks: further rows in v̇ (at most nv columns).
+            tasks: further rows in v̇: nv columns.
             load_limits: (len(soles),) largest vertical force of each sole [N]; none if left out.
         """
         chosen = self.sets[soles]
@@ -145,21 +141,10 @@ class ContactSets:
         self.problem(state, targets, soles, tasks, load_limits)
         chosen = self.sets[soles]
         ws, p = chosen.workspace, chosen.parameters
-        status = self._solve(ws)
-        if status == INFEASIBLE:
-            release_joints(ws)
-            status = self._solve(ws)
-        accept(state.arrays, p, status, ws, self.memory)
+        accept(state.arrays, p, solve(ws), ws, self.memory)
         return ws.tau[self._motor_joints].copy()
 
-    @staticmethod
-    def _solve(ws) -> int:
-        return solve_dual(
-            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS,
-            True,
-        )  # fmt: skip
-
     @property
-    def workspace(self):
+    def workspace(self) -> Workspace:
         """Scratch and solution of the set that was used last."""
         return self.sets[self.active or tuple(range(len(self.robot.soles)))].workspace

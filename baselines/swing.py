@@ -8,6 +8,8 @@ from poise.envs.state import RobotState
 
 from .task_rows import Rows
 
+GRAVITY = 9.81  # [m/s²] of the landing speed's unit
+
 
 @dataclass(frozen=True)
 class SwingTask:
@@ -52,7 +54,7 @@ class Swing:
     FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
 
     def __init__(self, point: np.ndarray, duration: float, task: SwingTask, height: float):
-        omega = np.sqrt(9.81 / height)
+        omega = np.sqrt(GRAVITY / height)
         self.task, self.duration, self.time = task, duration, 0.0
         self.apex = task.clearance * height
         self.ground = float(point[2])
