@@ -6,7 +6,7 @@ from scipy.spatial import ConvexHull
 
 from poise.envs.robot import Robot
 
-_ANGLES = np.arange(16) * (2.0 * np.pi / 16)
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
 
@@ -134,7 +134,8 @@ class Reach:
     ) -> np.ndarray:
         """(n,) how far points `xi` (n, 2) lie outside what two soles reach together; < 0 inside.
 
-        Soles at `first` and `second`, (n, 2) or (2,); in the 16 DIRECTIONS, so at most 2 % short.
+        Soles at `first` and `second`, (n, 2) or (2,). Measured along 48 DIRECTIONS only, which
+        lets corners reach some millimetres further.
         """
         R = turn(yaw)
         a, b, x = (np.asarray(v) @ R @ DIRECTIONS.T for v in (first, second, xi))

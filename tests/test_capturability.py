@@ -50,7 +50,8 @@ def test_clipping_keeps_the_half_plane():
     """A square cut by x ≤ 0.2 has its corners there; one wholly outside leaves its nearest."""
     square = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     cut = clipped(square, np.array([1.0, 0.0]), 0.2)
-    assert sorted(cut.tolist()) == [[-1.0, -1.0], [-1.0, 1.0], [0.2, -1.0], [0.2, 1.0]]
+    corners = [[-1.0, -1.0], [-1.0, 1.0], [0.2, -1.0], [0.2, 1.0]]
+    np.testing.assert_allclose(sorted(cut.round(9).tolist()), corners)
     assert clipped(square, np.array([1.0, 0.0]), -3.0)[0, 0] == -1.0
 
 
@@ -101,6 +102,6 @@ def test_distance_beyond_the_reach_agrees_with_its_hull():
         feet = feet @ turn(yaw).T
         corners = reach.both(feet, yaw)
         gaps = reach.beyond(feet[0], feet[1], yaw, corners)
-        assert np.all(gaps < 1e-9) and np.all(gaps > -0.02)
+        assert np.all(gaps < 1e-9) and np.all(gaps > -0.01)
         far = feet.mean(axis=0) + np.array([5.0, 0.0])
         assert reach.beyond(feet[0], feet[1], yaw, far) > 3.0
