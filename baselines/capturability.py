@@ -17,7 +17,7 @@ def turn(yaw: float) -> np.ndarray:
     return np.array([[c, -s], [s, c]])
 
 
-def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float) -> np.ndarray:
+def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float | np.ndarray) -> np.ndarray:
     """ξ(t) = p + (ξ − p) e^(ωt): where the capture point gets while the CoP stays at p."""
     return p + (xi - p) * np.exp(omega * t)
 

@@ -69,7 +69,7 @@ class ContactSets:
         self.arrays = robot_arrays(robot)
         self.parameters = parameters = qp_parameters(robot, self.arrays, config)
         count = len(robot.soles)
-        subsets = [(i,) for i in range(count)]
+        subsets: list[tuple[int, ...]] = [(i,) for i in range(count)]
         if count > 1:
             subsets.append(tuple(range(count)))
         self.sets = {soles: ContactSet(self.arrays, parameters, soles) for soles in subsets}
