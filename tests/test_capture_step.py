@@ -53,7 +53,7 @@ def test_feet_do_not_cross():
     def watch(env):
         state, controller = env.simulation.state, env.controller
         if controller.steps > len(widths) and controller.swing is None:
-            widths.append((state.sole_points[0, 1] - state.sole_points[1, 1]))
+            widths.append(state.sole_points[0, 1] - state.sole_points[1, 1])
 
     trial("capture-step", 22.0, 0.0, watch=watch)
     assert widths
