@@ -10,6 +10,7 @@ from poise.envs.robot import Robot
 
 from .abe07 import Abe07, Abe07Config
 from .capture_point import CapturePoint, CapturePointConfig
+from .capture_step import CaptureStep, CaptureStepConfig
 from .jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
 from .kudoh02 import Kudoh02, Kudoh02Config
 from .lip_mpc import LIPMPC, LIPMPCConfig
@@ -33,6 +34,7 @@ KINDS: dict[str, tuple[type, type]] = {
     "lqr-lip": (LQRLIPConfig, LQRLIP),
     "lip-mpc": (LIPMPCConfig, LIPMPC),
     "outside": (OutsideConfig, OutsideController),
+    "capture-step": (CaptureStepConfig, CaptureStep),
 }
 
 CONTROLLERS = tuple(controller for _, controller in KINDS.values())

@@ -1,0 +1,144 @@
+"""Where a linear inverted pendulum can be stopped: capture regions and CoP reach [Koolen12]."""
+
+import mujoco
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from poise.envs.robot import Robot
+
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
+
+
+def turn(yaw: float) -> np.ndarray:
+    """(2, 2) rotation by `yaw` in the plane."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s], [s, c]])
+
+
+def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float | np.ndarray) -> np.ndarray:
+    """ξ(t) = p + (ξ − p) e^(ωt): where the capture point gets while the CoP stays at p."""
+    return p + (xi - p) * np.exp(omega * t)
+
+
+def capture_distance(steps: int, reach: float, length: float, omega: float, time: float) -> float:
+    """d_N = r + l a (1 − a^N)/(1 − a), a = e^(−ω T_s): how far the capture point may be from the
+    stance foot to come to rest in N steps of length l and time T_s [Koolen12]."""
+    a = np.exp(-omega * time)
+    return float(reach + length * a * (1.0 - a**steps) / (1.0 - a))
+
+
+def clipped(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
+    """The part of a convex polygon (k, 2) with normal · p ≤ offset; at least its nearest point."""
+    over = polygon @ normal - offset
+    if np.all(over <= 0.0):
+        return polygon
+    if np.all(over > 0.0):
+        return polygon[[int(np.argmin(over))]]
+    kept = []
+    for i in range(len(polygon)):
+        j = (i + 1) % len(polygon)
+        if over[i] <= 0.0:
+            kept.append(polygon[i])
+        if (over[i] <= 0.0) != (over[j] <= 0.0):
+            share = over[i] / (over[i] - over[j])
+            kept.append(polygon[i] + share * (polygon[j] - polygon[i]))
+    return np.array(kept)
+
+
+def sides(robot: Robot) -> np.ndarray:
+    """(2,) 1 for the left foot, −1 for the right one, in the standing posture."""
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_kinematics(robot.model, data)
+    feet = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position
+            for s in robot.soles]  # fmt: skip
+    left = data.xmat[robot.soles[0].body_id].reshape(3, 3) @ robot.soles[0].rotation[:, 1]
+    sign = 1.0 if (feet[0] - feet[1]) @ left > 0.0 else -1.0
+    return np.array([sign, -sign])
+
+
+def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """N (k, 2), o (k,), b (k,): |N p − o| ≤ b/λ for a CoP p [m, sole frame] under a load of λ m g.
+
+    One row for each motor joint of the foot itself: the moment of a vertical force about its axis
+    in the standing posture, over its torque limit.
+    """
+    model, foot = robot.model, robot.soles[sole]
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_kinematics(model, data)
+    body = foot.body_id
+    R = data.xmat[body].reshape(3, 3) @ foot.rotation
+    point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot.position
+    weight = robot.mass * -model.opt.gravity[2]
+    normals, offsets, bounds = [], [], []
+    for joint in range(model.njnt):
+        dof = model.jnt_dofadr[joint]
+        motor = np.flatnonzero(np.asarray(robot.motor_dofs) == dof)
+        if model.jnt_bodyid[joint] != body or len(motor) == 0:
+            continue
+        axis, anchor = data.xaxis[joint], data.xanchor[joint]
+        # (axis × (point + R p − anchor))_z, affine in p
+        offsets.append(-np.cross(axis, point - anchor)[2])
+        normals.append([np.cross(axis, R[:, a])[2] for a in range(2)])
+        bounds.append(robot.torque_limit[motor[0]] / weight)
+    return np.reshape(normals, (-1, 2)), np.array(offsets), np.array(bounds)
+
+
+class Reach:
+    """Where soles can put the centre of pressure, with the torques that their ankles have.
+
+    Both soles together reach p = λ p_0 + (1 − λ) p_1, p_i what sole i reaches under its share of
+    the load: the less it carries, the further its ankles can move the pressure.
+    """
+
+    def __init__(self, robot: Robot, share: float = 0.95):
+        self.polygons = [share * sole.polygon for sole in robot.soles]
+        self.limits = [ankle_limits(robot, i) for i in range(len(robot.soles))]
+        self._share = share
+        self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
+        self.middle = [polygon.mean(axis=0) for polygon in self.alone]
+        if len(robot.soles) == 2:
+            self._sums = [self._sum(load) for load in SHARES]
+            self._support = np.array([(sums @ DIRECTIONS.T).max(axis=0) for sums in self._sums])
+
+    def _under(self, sole: int, load: float) -> np.ndarray:
+        polygon = self.polygons[sole]
+        for normal, offset, bound in zip(*self.limits[sole], strict=True):
+            room = self._share * bound / max(load, 1e-3)
+            polygon = clipped(polygon, normal, offset + room)
+            polygon = clipped(polygon, -normal, room - offset)
+        return polygon
+
+    def _sum(self, load: float) -> np.ndarray:
+        first, second = load * self._under(0, load), (1.0 - load) * self._under(1, 1.0 - load)
+        return (first[:, None] + second[None]).reshape(-1, 2)
+
+    def under(self, sole: int, point: np.ndarray, yaw: float) -> np.ndarray:
+        """(k, 2) what the sole at `point`, turned by `yaw`, reaches alone [m]."""
+        return point[:2] + self.alone[sole] @ turn(yaw).T
+
+    def both(self, points: np.ndarray, yaw: float) -> np.ndarray:
+        """(k, 2) hull of what two soles at `points` (2, ≥ 2) reach, for all shares of the load."""
+        cloud = [
+            load * points[0, :2] + (1.0 - load) * points[1, :2] + sums @ turn(yaw).T
+            for load, sums in zip(SHARES, self._sums, strict=True)
+        ]
+        corners = np.vstack(cloud)
+        return corners[ConvexHull(corners).vertices]
+
+    def beyond(
+        self, first: np.ndarray, second: np.ndarray, yaw: float, xi: np.ndarray
+    ) -> np.ndarray:
+        """(n,) how far points `xi` (n, 2) lie outside what two soles reach together; < 0 inside.
+
+        Soles at `first` and `second`, (n, 2) or (2,). Measured along 48 DIRECTIONS only, which
+        lets corners reach some millimetres further.
+        """
+        R = turn(yaw)
+        a, b, x = (np.asarray(v) @ R @ DIRECTIONS.T for v in (first, second, xi))
+        shares = np.array(SHARES)[:, None]
+        reach = self._support + shares * a[..., None, :] + (1.0 - shares) * b[..., None, :]
+        return (x - reach.max(axis=-2)).max(axis=-1)

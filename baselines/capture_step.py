@@ -1,0 +1,217 @@
+"""Feet in place as long as that holds; then steps to where the capture point can be stopped."""
+
+from dataclasses import dataclass, field, fields
+from typing import Literal
+
+import numpy as np
+
+from poise.envs.errors import ConfigError
+from poise.envs.robot import Robot
+from poise.envs.state import RobotState
+
+from .around_qp import AroundQP
+from .capturability import Reach, turn
+from .contact_sets import ContactSets
+from .controller import Targets
+from .momentum_qp import MomentumQPConfig
+from .step_plan import Foothold, Plan, StepLimits, StepPlanner
+from .support import nearest_inside
+from .swing import Swing, SwingTask, swing_rows
+
+LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
+FIRST_LOAD = 0.3  # [m g] that a foot may bear at touchdown; then the limit rises by m g a ramp
+
+
+@dataclass(frozen=True)
+class CaptureStepConfig:
+    """`qp` holds the feet in place, `step_qp` and `swing` move them; lengths in h, times in 1/ω.
+
+    `trigger`, `again`: how far ξ leaves the reach of both soles before the first step and before
+    further ones. `gain` k of p = ξ + k (ξ − ξ_ref); `hips`: how far beyond its reach p may be
+    asked for, which costs angular momentum. `share` of the reach that counts. `stretch`: length
+    of the legs at touchdown, which sets the CoM's height. `ramp` of a landed foot's load;
+    `pause` between two steps. `root_accel`, `joint_accel`: most that the posture asks for [ω²].
+    """
+
+    kind: Literal["capture-step"] = "capture-step"
+    trigger: float = 0.0
+    again: float = 0.01
+    gain: float = field(default=1.0, metadata={"above": 0.0})
+    hips: float = field(default=0.0, metadata={"min": 0.0})
+    share: float = field(default=0.95, metadata={"above": 0.0, "max": 1.0})
+    stretch: float = field(default=0.96, metadata={"above": 0.0})
+    ramp: float = field(default=0.1, metadata={"min": 0.0})
+    pause: float = field(default=0.15, metadata={"min": 0.0})
+    root_accel: float = field(default=100.0, metadata={"above": 0.0})
+    joint_accel: float = field(default=100.0, metadata={"above": 0.0})
+    limits: StepLimits = field(default_factory=StepLimits)
+    foothold: Foothold = field(default_factory=Foothold)
+    swing: SwingTask = field(default_factory=SwingTask)
+    qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+    step_qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+
+
+class CaptureStep(AroundQP):
+    """The momentum QP with feet in place, and steps by capturability where those cannot hold.
+
+    Stands by `qp`, bit for bit, until the capture point ξ leaves what the CoP can reach; then
+    steps until it is inside again, and stays where it came to rest. In a step the CoM follows
+    c̈ = ω² (c − p), p = ξ + k (ξ − ξ_ref) at most at the edge of the soles in contact [Koolen12,
+    Englsberger11], and the foothold follows ξ. Raises ConfigError unless there are two soles.
+    """
+
+    def __init__(self, robot: Robot, config: CaptureStepConfig | None = None):
+        if len(robot.soles) != 2:
+            raise ConfigError(
+                f"needs two feet, {robot.name!r} has {len(robot.soles)}", field="controller"
+            )
+        self.config = config or CaptureStepConfig()
+        super().__init__(robot, self.config.qp)
+        self.sets = ContactSets(robot, self.config.step_qp)
+        self.reach = Reach(robot, self.config.share)
+        self.planner = StepPlanner(robot, self.reach, self.config.limits, self.config.foothold)
+        self.h, self.rate = self.planner.h, self.planner.rate
+        self._guided: Targets | None = None
+        self.reset()
+
+    @property
+    def failures(self) -> int:
+        """Ticks since the reset at which a QP was not solved."""
+        return self.qp.failures + self.sets.failures
+
+    def reset(self, state: RobotState | None = None) -> None:
+        """Forget the last trial."""
+        super().reset(state)
+        self.sets.reset()
+        self.steps = 0  #: begun since the reset
+        self.swing: Swing | None = None  #: of the running step
+        self.foot = -1  #: that stepped last
+        self._yaw = 0.0  # heading at the first step
+        self._clock = 0.0  # since the last touchdown [s]
+        self._region: np.ndarray | None = None
+
+    @property
+    def stepped(self) -> bool:
+        """Whether a step has begun since the reset."""
+        return self.steps > 0
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] for the next `period`."""
+        if self.swing is None:
+            if self._must_step(state):
+                self._begin(state)
+            elif not self.stepped:
+                return self.qp.torques(state, targets)
+        guided = self._copy(state, targets)
+        if self.swing is not None and self._landed(state, self.swing):
+            self.swing, self._clock, self._region = None, 0.0, None
+        if self.swing is not None:
+            return self._swing(state, guided, self.swing)
+        return self._stand(state, guided)
+
+    def _must_step(self, state: RobotState) -> bool:
+        if self.stepped and self._clock < self.config.pause / self.rate:
+            return False
+        feet, yaw = state.sole_points[:, :2], self._heading(state)
+        away = self.reach.beyond(feet[0], feet[1], yaw, state.capture_point)
+        limit = self.config.again if self.stepped else self.config.trigger
+        return bool(away > limit * self.h)
+
+    def _heading(self, state: RobotState) -> float:
+        return self._yaw if self.stepped else state.heading_yaw
+
+    def _begin(self, state: RobotState) -> None:
+        self._yaw = self._heading(state)
+        plan: Plan = self.planner.plan(state, self._yaw)
+        self.steps += 1
+        self.foot = plan.foot
+        self.swing = Swing(state.sole_points[plan.foot], plan.time, self.config.swing, self.h)
+        self.swing.ground = float(state.sole_points[1 - plan.foot, 2])
+        self.swing.aim(plan.foothold)
+
+    def _landed(self, state: RobotState, swing: Swing) -> bool:
+        return bool(state.contacts[self.foot] > 0.5 and swing.time > LANDING * swing.duration)
+
+    def _swing(self, state: RobotState, t: Targets, swing: Swing) -> np.ndarray:
+        """A tick on one foot."""
+        stance = 1 - self.foot
+        if swing.remaining > Swing.FROZEN:
+            plan = self.planner.replan(state, self.foot, self._yaw, swing)
+            swing.aim(plan.foothold, swing.time + plan.time)
+        under = self.reach.under(stance, state.sole_points[stance], self._yaw)
+        way = swing.foothold - state.sole_points[stance, :2]
+        self._guide(state, t, under, 0.0, state.sole_points[stance, 2], way)
+        rows = swing_rows(
+            state, self.foot, swing.advance(self.period), self._level(), self.config.swing
+        )
+        return self.sets.tick(state, t, (stance,), [rows])
+
+    def _stand(self, state: RobotState, t: Targets) -> np.ndarray:
+        """A tick on both feet, wherever they are."""
+        feet = state.sole_points
+        if self._region is None:  # feet have just come to rest
+            self._region = self.reach.both(feet, self._yaw)
+        way = feet[0, :2] - feet[1, :2]
+        self._guide(state, t, self._region, self.config.hips, float(feet[:, 2].mean()), way)
+        limits, ramp = None, self.config.ramp / self.rate
+        if self._clock < ramp:
+            weight = state.mass * state.robot.gravity
+            limits = np.full(2, np.inf)
+            limits[self.foot] = weight * (FIRST_LOAD + self._clock / ramp)
+        self._clock += self.period
+        return self.sets.tick(state, t, (0, 1), (), limits)
+
+    def _level(self) -> np.ndarray:
+        """(3, 3) axes of a level sole along the heading."""
+        axes = np.eye(3)
+        axes[:2, :2] = turn(self._yaw)
+        return axes
+
+    def _copy(self, state: RobotState, targets: Targets) -> Targets:
+        """Targets of our own: those given, but upright at rest along the heading."""
+        if self._guided is None:
+            self._guided = Targets.standing(self.robot, state)
+        for item in fields(Targets):
+            getattr(self._guided, item.name)[:] = getattr(targets, item.name)
+        self._guided.root_axes[:] = self._level() @ self.qp.arrays.root_standing
+        self._guided.root_vel[:] = 0.0
+        return self._guided
+
+    def _guide(
+        self,
+        state: RobotState,
+        t: Targets,
+        region: np.ndarray,
+        hips: float,
+        ground: float,
+        way: np.ndarray,
+    ) -> None:
+        """c̈_ref = ω² (c − p) in the plane; a height that legs reach with the feet `way` apart."""
+        xi = state.capture_point
+        wanted = xi + self.config.gain * (xi - region.mean(axis=0))
+        p = nearest_inside(region, wanted)
+        over = wanted - p
+        p = p + over * min(1.0, hips * self.h / max(np.linalg.norm(over), 1e-9))
+        t.com[:2], t.com_vel[:2] = state.com[:2], state.com_vel[:2]
+        t.com_acc[:2] = state.omega**2 * (state.com[:2] - p)
+        t.cop[:] = p
+        leg = self.config.stretch * self.h
+        t.com[2] = ground + min(self.h, np.sqrt(max(leg**2 - 0.25 * (way @ way), 0.0)))
+        t.com_vel[2] = t.com_acc[2] = 0.0
+        self._limit_posture(state, t)
+
+    def _limit_posture(self, state: RobotState, t: Targets) -> None:
+        """Feed-forward that caps what the posture's PD law asks for.
+
+        A push leaves the trunk turning at some rad/s. To stop that at once would cost CoM
+        acceleration, L̇ = (p − c) × f, which no foothold makes good.
+        """
+        p, rate2 = self.sets.parameters, self.rate**2
+        asked = p.stiffness[6:] * (t.q_ref - state.q) + p.damping[6:] * (t.v_ref - state.qvel[6:])
+        bound = self.config.joint_accel * rate2
+        t.a_ref[:] = np.clip(asked, -bound, bound) - asked
+        R = state.root_axes
+        error = 0.5 * sum(np.cross(R[:, i], t.root_axes[:, i]) for i in range(3))
+        asked = p.stiffness[3:6] * (R.T @ error) - p.damping[3:6] * state.qvel[3:6]
+        bound = self.config.root_accel * rate2 / max(float(np.linalg.norm(asked)), 1e-9)
+        t.root_acc[:] = asked * (min(1.0, bound) - 1.0)

@@ -1,0 +1,92 @@
+"""Steps where feet in place are not enough; none where they are."""
+
+import numpy as np
+import pytest
+
+from poise.baselines.capture_step import CaptureStep, CaptureStepConfig
+from poise.baselines.registry import controller_config, load_controller
+from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.errors import ConfigError
+
+from .shared import robot
+
+QUIET_STEPS = 0
+
+
+def trial(controller, impulse, direction, seed=0, duration=4.0, watch=None):
+    """Whether it fell, and the environment at the end."""
+    env = ResidualBalanceEnv(robot(), controller=controller, duration=duration)
+    push = {"impulse": impulse, "direction": direction, "start": 0.2, "body": "torso"}
+    env.reset(seed=seed, options={"push": push})
+    done, action = False, np.zeros(4)
+    while not done:
+        _, fallen, over = env.step_in_place(action)
+        done = fallen or over
+        if watch is not None:
+            watch(env)
+    return fallen, env
+
+
+def test_a_small_push_is_the_feet_in_place_controllers_bit_for_bit():
+    """Until the capture point leaves what the feet reach, nothing differs from its own `qp`."""
+    ends = []
+    for controller in (controller_config("capture-step").qp, "capture-step"):
+        _, env = trial(controller, 10.0, 45.0, duration=1.0)
+        ends.append(env.simulation.data.qpos.copy())
+    np.testing.assert_array_equal(*ends)
+    assert env.controller.steps == 0
+
+
+@pytest.mark.parametrize("direction", [0.0, 45.0])
+def test_steps_recover_what_feet_in_place_do_not(direction):
+    """A push half above the baseline's limit: the momentum QP falls, this one comes to rest."""
+    fallen, _ = trial("momentum-qp", 26.0, direction)
+    assert fallen
+    fallen, env = trial("capture-step", 26.0, direction, duration=6.0)
+    assert not fallen and env.recovered and env.controller.steps >= 1
+
+
+def test_feet_do_not_cross():
+    """At every touchdown each foot is on its own side of the other."""
+    widths = []
+
+    def watch(env):
+        state, controller = env.simulation.state, env.controller
+        if controller.steps > len(widths) and controller.swing is None:
+            widths.append(state.sole_points[0, 1] - state.sole_points[1, 1])
+
+    trial("capture-step", 22.0, 0.0, watch=watch)
+    assert widths
+    assert min(widths) > 0.1
+
+
+def test_replicas_start_anew():
+    """After a reset nothing of the last trial is left."""
+    _, env = trial("capture-step", 22.0, 180.0, duration=1.0)
+    assert env.controller.stepped
+    env.controller.reset(env.simulation.state)
+    assert not env.controller.stepped and env.controller.swing is None
+    assert env.controller.steps == env.controller.failures == 0
+
+
+def test_packaged_configuration():
+    """`capture-step` is a packaged controller of this kind, with physical roots."""
+    config = controller_config("capture-step")
+    assert isinstance(config, CaptureStepConfig)
+    assert config.qp.root == "hard" and config.step_qp.root == "hard"
+    assert isinstance(load_controller("capture-step", robot()), CaptureStep)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"gain": 0.0}, "gain"),
+        ({"limits": {"time_min": -1.0}}, "limits.time_min"),
+        ({"swing": {"lift": 1.5}}, "swing.lift"),
+        ({"width": 1.0}, "width"),
+    ],
+)
+def test_wrong_fields_are_named(change, field):
+    """A wrong or unknown field is an error that says which."""
+    with pytest.raises(ConfigError, match=field.rsplit(".", maxsplit=1)[-1]):
+        load_controller({"kind": "capture-step", **change}, robot())
