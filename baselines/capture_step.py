@@ -191,7 +191,7 @@ class CaptureStep(AroundQP):
         wanted = xi + self.config.gain * (xi - region.mean(axis=0))
         p = nearest_inside(region, wanted)
         over = wanted - p
-        p = p + over * min(1.0, hips * self.h / max(np.linalg.norm(over), 1e-9))
+        p = p + over * min(1.0, hips * self.h / max(float(np.linalg.norm(over)), 1e-9))
         t.com[:2], t.com_vel[:2] = state.com[:2], state.com_vel[:2]
         t.com_acc[:2] = state.omega**2 * (state.com[:2] - p)
         t.cop[:] = p

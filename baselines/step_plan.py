@@ -131,5 +131,6 @@ class StepPlanner:
         excess = np.maximum(np.linalg.norm(gap / span, axis=1), 1.0)
         local -= gap * (1.0 - 1.0 / excess)[:, None]
         footholds = stance + local @ R.T
-        feet = (footholds, stance) if foot == 0 else (stance, footholds)
-        return footholds, np.maximum(self.reach.beyond(*feet, yaw, end), -choice.margin * h)
+        first, second = (footholds, stance) if foot == 0 else (stance, footholds)
+        outside = self.reach.beyond(first, second, yaw, end)
+        return footholds, np.maximum(outside, -choice.margin * h)
