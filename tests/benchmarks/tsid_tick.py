@@ -12,7 +12,8 @@ site-packages` in PYTHONPATH.
 Both controllers get the same humanoid, states and tasks: CoM, posture, angular momentum, two
 soles held with friction, the motors' limits. TSID's tick is `computeProblemData` (with Pinocchio's
 kinematics), `SolverHQuadProgFast.solve` and `getActuatorForces`; ours MuJoCo's position and
-velocity stages, contacts included, `update_state` and `momentum_tick`. They take turns.
+velocity stages, contacts included, `update_state` and `momentum_tick`, or, with OSQP, the call of
+the controller from Python. They take turns.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ import pinocchio as pin
 import tsid
 
 from poise.baselines.momentum_qp import MomentumQP
+from poise.baselines.registry import load_controller
 from poise.baselines.wrench_cone import sole_friction
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
@@ -136,23 +138,29 @@ class TsidTick:
 def main() -> None:
     env, recoveries = record(every=1)
     other, clock = TsidTick(env.robot, env.controller), TickClock(env.controller)
+    osqp = load_controller("momentum-qp-osqp", env.robot)
     clock.time(recoveries[0][0])  # compiled
     least, unsolved = None, 0
     for _ in range(PASSES):
         times = []
         for recovery in recoveries:
             env.controller.reset()
+            osqp.reset()
             other.begin(recovery[0].targets.com.copy())
             for tick in recovery:
                 other.check(tick.state)
                 seconds, solved = other.time(tick.state)
                 unsolved += not solved
-                times.append([seconds, *clock.time(tick)])
+                ours = clock.time(tick)
+                start = time.perf_counter()
+                osqp.torques(tick.state, tick.targets)
+                times.append([seconds, *ours, time.perf_counter() - start])
         least = np.array(times) if least is None else np.minimum(least, times)
     chosen = least[np.linspace(0, len(least) - 1, min(STATES, len(least))).astype(int)]
-    base, parts = chosen[:, 0], chosen[:, 1:]
+    base, parts, slow_solver = chosen[:, 0], chosen[:, 1:4], chosen[:, 4]
     rows = {"TSID": base, "ours, q and v to torques": parts.sum(axis=1),
-            "ours, momentum_tick alone": parts[:, 2]}  # fmt: skip
+            "ours, momentum_tick alone": parts[:, 2],
+            "ours with OSQP, from Python": slow_solver + parts[:, :2].sum(axis=1)}  # fmt: skip
     print(f"{len(chosen)} states; TSID left {unsolved} of {PASSES * len(least)} unsolved")
     print("| tick | median | p99 | p99 over median | over TSID |")
     print("| --- | --- | --- | --- | --- |")
