@@ -16,8 +16,11 @@ import numpy as np
 from poise.baselines.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.config import to_yaml, write_atomic
+from poise.envs.episode import MAX_SLIDE
 from poise.envs.pushes import Push
 from poise.envs.robot import load_robot
+
+from .trials import STEP_LENGTH
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,8 @@ def set_gains(
 def score(env: ResidualBalanceEnv, config: MomentumQPConfig, rows: list[list[Push]], seed: int):
     """Mean over directions of the impulse recovered, plus half of the worst; and the detail.
 
-    A trial that fell counts for at most 0.3 by how long it stood, one that is not quiet 0.6.
+    A trial that fell counts for at most 0.3 by how long it stood, one that is not quiet, or that
+    dragged a foot further than `STEP_LENGTH`, 0.6.
     """
     env.controller = MomentumQP(env.robot, config)
     action = np.zeros(env.action_space.shape)
@@ -132,7 +136,8 @@ def score(env: ResidualBalanceEnv, config: MomentumQPConfig, rows: list[list[Pus
             while not (terminated or truncated):
                 _, _, terminated, truncated, _ = env.step(action)
             if truncated:
-                value = 1.0 if env.recovered else 0.6
+                in_place = env.episode.metrics[MAX_SLIDE] <= STEP_LENGTH
+                value = 1.0 if env.recovered and in_place else 0.6
             else:
                 value = 0.3 * env.steps / env.max_steps
             total += value * step
