@@ -15,7 +15,7 @@ from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .controller import Targets
-from .momentum_qp import FALLBACK_SPEED, Memory, MomentumQPConfig, accept, solve
+from .momentum_qp import MomentumQPConfig, accept, allocate_memory, forget, solve
 from .parameters import qp_parameters
 from .reduced_qp import QPParameters, Workspace, allocate_workspace, assemble
 from .solvers import QP
@@ -73,13 +73,7 @@ class ContactSets:
         if count > 1:
             subsets.append(tuple(range(count)))
         self.sets = {soles: ContactSet(self.arrays, parameters, soles) for soles in subsets}
-        limit = parameters.torque_limit
-        self.memory = Memory(
-            torques=apart(len(limit)),
-            damping=limit / FALLBACK_SPEED,
-            streak=apart(1, dtype=np.int64),
-            failures=apart(1, dtype=np.int64),
-        )
+        self.memory = allocate_memory(parameters.torque_limit)
         self._motor_joints = self.arrays.motor_dofs - 6
         self.active: tuple[int, ...] | None = None
 
@@ -90,8 +84,7 @@ class ContactSets:
 
     def reset(self) -> None:
         """Forget the last trial."""
-        self.memory.torques[:] = 0.0
-        self.memory.streak[0] = self.memory.failures[0] = 0
+        forget(self.memory)
         self.active = None
 
     def problem(

@@ -63,6 +63,22 @@ class Memory(Block):
     failures: np.ndarray  # (1,) int: failures since the reset
 
 
+def allocate_memory(torque_limit: np.ndarray) -> Memory:
+    """Nothing remembered yet; `torque_limit` (nj,) [N·m]."""
+    return Memory(
+        torques=apart(len(torque_limit)),
+        damping=torque_limit / FALLBACK_SPEED,
+        streak=apart(1, dtype=np.int64),
+        failures=apart(1, dtype=np.int64),
+    )
+
+
+def forget(memory: Memory) -> None:
+    """As before the first tick."""
+    memory.torques[:] = 0.0
+    memory.streak[0] = memory.failures[0] = 0
+
+
 FALLBACK_DECAY = 0.8  # per tick: share that the last good torques keep
 FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the whole torque limit
 
@@ -162,13 +178,7 @@ class MomentumQP:
         self.workspace = allocate_workspace(
             self.arrays, self.parameters.cone.shape[1], self.config.root == "soft"
         )
-        limit = self.parameters.torque_limit
-        self.memory = Memory(
-            torques=apart(len(limit)),
-            damping=limit / FALLBACK_SPEED,
-            streak=apart(1, dtype=np.int64),
-            failures=apart(1, dtype=np.int64),
-        )
+        self.memory = allocate_memory(self.parameters.torque_limit)
         self.com_offset = self.config.com.offset * robot.height_com
         self.solver = None
         if self.config.solver != COMPILED_SOLVER or self.config.solver_options:
@@ -197,8 +207,7 @@ class MomentumQP:
 
     def reset(self, state: RobotState | None = None) -> None:
         """Forget the last trial."""
-        self.memory.torques[:] = 0.0
-        self.memory.streak[0] = self.memory.failures[0] = 0
+        forget(self.memory)
         self.workspace.cop_prev[:] = np.nan
         self.workspace.iscratch[:] = 0  # no row to start from
         self.workspace.tau[:] = 0.0
