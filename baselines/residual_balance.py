@@ -348,7 +348,7 @@ class ResidualBalanceEnv(BalanceEnv):
         for _ in range(self.ticks):
             self._update_targets(self._offsets)
             ctrl[:] = self.controller.torques(sim.state, self.targets)
-            wrench = self._root_wrench()
+            wrench = self.root_wrench()
             soft_root_force(s, wrench, sim.plant.qfrc_applied)
             for metric, part in ((ROOT_FORCE, wrench[:3]), (ROOT_MOMENT, wrench[3:])):
                 e.metrics[metric] = max(e.metrics[metric], float(np.linalg.norm(part)))
@@ -357,10 +357,11 @@ class ResidualBalanceEnv(BalanceEnv):
         judge_step(self.arrays, s, self.scales, self.judge, self.targets.q_ref, ctrl, sim.time, e)
         self._observe()
 
-    def _failures(self) -> int:
+    @property
+    def failures(self) -> int:
         return int(getattr(self.controller, "failures", 0))
 
-    def _root_wrench(self) -> np.ndarray:
+    def root_wrench(self) -> np.ndarray:
         return getattr(self.controller, "root_wrench", np.zeros(6))
 
 

@@ -1,6 +1,6 @@
 """What both environments share: a pushed robot, its observation, reward, fall and record."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from .episode import (
     REWARD_TERMS,
     SATURATED,
     TICKS,
+    EpisodeArrays,
     allocate_episode,
     begin_episode,
     judge,
@@ -284,22 +285,27 @@ class BalanceEnv(gymnasium.Env):
         return bool(quiet >= self.config.fall.quiet_time - 1e-9)
 
     def info(self) -> dict[str, Any]:
-        """Reward terms, push and record of the episode so far."""
+        """Reward terms, push and record of the episode so far; see also `info_columns`."""
         metrics, terms = self.episode.metrics, self.episode.reward_terms.tolist()
         return {
             "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
-            "push": [push_info(push, self.robot) for push in self.simulation.pushes],
+            "push": self.push_infos(),
             "is_success": self.recovered,
-            "solver_failures": self._failures(),
+            "solver_failures": self.failures,
             "torque_saturation": float(metrics[SATURATED] / max(metrics[TICKS], 1.0)),
-            "root_wrench": self._root_wrench(),
+            "root_wrench": self.root_wrench(),
         }
 
-    def _failures(self) -> int:
+    def push_infos(self) -> list[dict[str, Any]]:
+        """What `info` says of the episode's pushes, see `push_info`."""
+        return [push_info(push, self.robot) for push in self.simulation.pushes]
+
+    @property
+    def failures(self) -> int:
         """Control ticks of this episode at which the controller's solver failed."""
         return 0
 
-    def _root_wrench(self) -> np.ndarray:
+    def root_wrench(self) -> np.ndarray:
         """(6,) force and moment that a soft root has taken from nowhere in the last tick."""
         return np.zeros(6)
 
@@ -318,3 +324,19 @@ class BalanceEnv(gymnasium.Env):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
+
+
+def info_columns(envs: Sequence[BalanceEnv], record: EpisodeArrays) -> dict[str, Any]:
+    """What `BalanceEnv.info` says of each, one array for each key; `record` holds their rows."""
+    terms, metrics = record.reward_terms.T.copy(), record.metrics
+    pushes = np.empty(len(envs), dtype=object)
+    for i, env in enumerate(envs):
+        pushes[i] = env.push_infos()
+    return {
+        "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
+        "push": pushes,
+        "is_success": np.array([env.recovered for env in envs]),
+        "solver_failures": np.array([env.failures for env in envs]),
+        "torque_saturation": metrics[:, SATURATED] / np.maximum(metrics[:, TICKS], 1.0),
+        "root_wrench": np.array([env.root_wrench() for env in envs]),
+    }

@@ -57,13 +57,9 @@ def replicate(env: BalanceEnv, count: int) -> list[BalanceEnv]:
 
 
 class EnvBatch:
-    """`len(envs)` environments of one kind; what they report lies in arrays, one row for each.
+    """`len(envs)` environments of one kind; what they report lies in arrays, one row for each."""
 
-    With `infos`, `infos[i]` is at every step what a single environment would return; without, only
-    after a reset.
-    """
-
-    def __init__(self, envs: Sequence[BalanceEnv], threads: int = 1, infos: bool = False):
+    def __init__(self, envs: Sequence[BalanceEnv], threads: int = 1):
         if not envs:
             raise ConfigError("needs at least one environment", field="envs")
         self.envs = list(envs)
@@ -90,8 +86,6 @@ class EnvBatch:
         self.rewards = np.zeros(n)
         self.terminated = np.zeros(n, dtype=bool)
         self.truncated = np.zeros(n, dtype=bool)
-        self.infos: list[dict[str, Any]] = [{} for _ in range(n)]
-        self._wants_infos = infos
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
         self._kernel: tuple[Any, int] = None, 0  # the environments' step and its address
 
@@ -162,8 +156,6 @@ class EnvBatch:
         for i in played:
             env = self.envs[i]
             self.rewards[i], self.terminated[i], self.truncated[i] = env.conclude_step()
-            if self._wants_infos:
-                self.infos[i] = env.info()
         self.observations[:] = self.episodes.observation
 
     def _compiled_steps(self, played: Sequence[int]) -> tuple[int, np.ndarray]:
@@ -193,11 +185,12 @@ class EnvBatch:
             raise ConfigError(
                 f"has shape {vectors.shape}, expected {record.action.shape}", field="action"
             )
-        good = (np.abs(vectors) <= 1.0 + 1e-6).all(axis=1) | ~live
-        for i in np.flatnonzero(~good):
+        good = np.abs(vectors) <= 1.0 + 1e-6  # NaN is not
+        for i in np.flatnonzero(~(good.all(axis=1) | ~live)):
             self.envs[i].set_action(vectors[i])  # raises, and names the entries
-        record.last_action[live] = record.action[live]
-        record.action[live] = np.clip(vectors[live], -1.0, 1.0)
+        rows = slice(None) if live.all() else live
+        record.last_action[rows] = record.action[rows]
+        record.action[rows] = np.minimum(np.maximum(vectors[rows], -1.0), 1.0)
 
     def _play(self, i: int) -> None:
         self.envs[i].advance()
@@ -205,7 +198,7 @@ class EnvBatch:
     def _restart(
         self, i: int, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> None:
-        self.infos[i] = self.envs[i].reset(seed=seed, options=options)[1]
+        self.envs[i].reset(seed=seed, options=options)
 
     def _forget(self, rows: np.ndarray) -> None:
         """Rows that start anew have earned nothing and ended nothing."""

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from .balance import BalanceEnv
+from .balance import BalanceEnv, info_columns
 from .batch import EnvBatch, replicate
 from .errors import ConfigError
 
@@ -59,7 +59,7 @@ class BalanceVectorEnv(VectorEnv):
             ) from None
         if not isinstance(threads, Integral) or threads < 1:
             raise ConfigError(f"must be at least 1, not {threads!r}", field="threads")
-        self.batch = EnvBatch(envs, int(threads), infos=True)
+        self.batch = EnvBatch(envs, int(threads))
         self.envs = self.batch.envs
         first = self.envs[0]
         self.num_envs = len(self.envs)
@@ -69,6 +69,7 @@ class BalanceVectorEnv(VectorEnv):
         self.single_action_space = first.action_space
         self.observation_space = batch_space(first.observation_space, self.num_envs)
         self.action_space = batch_space(first.action_space, self.num_envs)
+        self._own_infos: bool = any(type(env).info is not BalanceEnv.info for env in self.envs)
 
     def reset(
         self,
@@ -94,7 +95,7 @@ class BalanceVectorEnv(VectorEnv):
         elif not mask.any():
             raise ConfigError("needs at least one True", source="reset", field="reset_mask")
         observations = self.batch.reset(seeds, [options] * n, mask)
-        return observations.copy(), stack_infos(self.batch.infos, mask)
+        return observations.copy(), stack_infos([env.info() for env in self.envs], mask)
 
     def step(
         self, actions: np.ndarray
@@ -104,13 +105,13 @@ class BalanceVectorEnv(VectorEnv):
         Raises ConfigError for actions that are not valid (nothing has moved then), PoiseError
         before the first reset.
         """
-        batch, every = self.batch, np.ones(self.num_envs, dtype=bool)
+        batch = self.batch
         infos: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             final: list[dict[str, Any]] = [{} for _ in self.envs]
 
             def at_end(i: int, env: BalanceEnv) -> None:
-                final[i] = batch.infos[i]
+                final[i] = env.info()
 
             batch.step(actions, at_end)
             ended = batch.ended
@@ -128,8 +129,17 @@ class BalanceVectorEnv(VectorEnv):
             batch.rewards.copy(),
             batch.terminated.copy(),
             batch.truncated.copy(),
-            {**stack_infos(batch.infos, every), **infos},
+            {**self._infos(), **infos},
         )
+
+    def _infos(self) -> dict[str, Any]:
+        """`stack_infos` of what each environment's `info` says."""
+        every = np.ones(self.num_envs, dtype=bool)
+        if self._own_infos:  # of a subclass
+            return stack_infos([env.info() for env in self.envs], every)
+        columns = info_columns(self.envs, self.batch.episodes)
+        columns["reward_terms"] = _with_masks(columns["reward_terms"], every)
+        return _with_masks(columns, every)
 
     def render(self) -> tuple[Any, ...]:
         """A frame of each environment, see `BalanceEnv.render`."""
@@ -177,6 +187,14 @@ def stack_infos(infos: Sequence[dict[str, Any]], mask: np.ndarray) -> dict[str, 
     """
     rows = np.flatnonzero(mask).tolist()
     return _stack([infos[i] for i in rows], rows, mask.copy())
+
+
+def _with_masks(columns: dict[str, Any], mask: np.ndarray) -> dict[str, Any]:
+    """The columns, each with the rows that it is reported for."""
+    marked = {}
+    for key, column in columns.items():
+        marked[key], marked[f"_{key}"] = column, mask
+    return marked
 
 
 def _stack(infos: list[dict[str, Any]], rows: list[int], mask: np.ndarray) -> dict[str, Any]:
