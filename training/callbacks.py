@@ -47,7 +47,7 @@ class Throughput(BaseCallback):
 
 
 class Checkpoints(BaseCallback):
-    """Writes last/ after every rollout, and best/ after the best evaluation so far."""
+    """Writes last/ after every rollout, and best/ after the best evaluation of what was trained."""
 
     model: PPO
 
@@ -58,7 +58,8 @@ class Checkpoints(BaseCallback):
         self.config, self.last, self.best, self.table = config, last, best, table
         self.rows: list[dict[str, float]] = list(state.get("evaluations", []))
         self._next = state.get("next_evaluation", 0)
-        self._record = max((row["score"] for row in self.rows), default=-np.inf)
+        scores = [row["score"] for row in self.rows if row["timesteps"] > 0]
+        self._record = max(scores, default=-np.inf)
         self._batch: EnvBatch | None = None
 
     def _on_training_start(self) -> None:
@@ -101,7 +102,8 @@ class Checkpoints(BaseCallback):
         writer.writerows(self.rows)
         write_atomic(self.table, text.getvalue())
         if row["score"] > self._record:
-            self._record = row["score"]
+            if self.num_timesteps > 0:  # anything trained replaces the controller alone
+                self._record = row["score"]
             self._save(self.best)
 
     def _play(self) -> dict[str, float]:
