@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from poise.envs.balance import BalanceEnv
+from poise.envs import batch
 from poise.envs.kinematics import allocate_state
 from poise.envs.robot import load_robot
 from poise.envs.state import RobotState
-from poise.envs.torque_balance import TorqueBalanceEnv
 
 from .controller import Targets
-from .momentum_qp import MomentumQP, accept, solve
+from .momentum_qp import MomentumQP, Tick, accept, momentum_tick, solve
 from .residual_balance import ResidualBalanceEnv
+from .residual_step import residual_step
 from .warmup import begin
 
-__all__ = ["assembly", "begin", "solver", "steps", "ticks"]
+__all__ = ["assembly", "begin", "solver", "steps"]
 
 
 def _standing() -> tuple[MomentumQP, RobotState, Targets]:
@@ -31,26 +31,22 @@ def assembly() -> None:
 
 
 def solver() -> None:
-    """The active-set method, and torques from what it finds."""
-    qp, state, _ = _standing()
+    """The active-set method."""
+    qp, _, _ = _standing()
     solve(qp.workspace)
-    accept(state.arrays, qp.parameters, qp.workspace, qp.memory)
 
 
 def steps() -> None:
-    """Physics, state and episode: a step of torques."""
-    _step(TorqueBalanceEnv(duration=0.1))
-
-
-def ticks() -> None:
-    """The baseline's step, by which everything else is compiled."""
+    """Physics, state and episode, and the policy step from which everything is called."""
     env = ResidualBalanceEnv(duration=0.1)
-    _step(env)
-    env.controller.torques(env.simulation.state, env.targets)
-
-
-def _step(env: BalanceEnv) -> None:
     env.reset(seed=0, options={"push": {"impulse": 1.0, "start": 0.0}})
-    env.step(np.zeros(env.action_space.shape or ()))
-    env.simulation.state.support_distance(np.zeros(2))
     env.simulation.step(np.zeros(env.robot.model.nu))
+    env.simulation.state.support_distance(np.zeros(2))
+    # for its type alone: what is called by these addresses, other processes compile
+    qp = env.controller
+    problem = qp.assembly(env.simulation.state, env.targets)
+    step = env.bind(Tick(problem, qp.memory, 0, 0), 0)
+    residual_step.compile((step.numba_type,))
+    momentum_tick.compile((step.tick.numba_type,))
+    accept(problem.state, problem.parameters, problem.workspace, qp.memory)
+    batch.play(0, batch.NOBODY, np.zeros(1, dtype=np.int64))

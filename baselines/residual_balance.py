@@ -319,16 +319,20 @@ class ResidualBalanceEnv(BalanceEnv):
             step is None or step.episode is not self.episode
             or self._gains is not gains or step.pushes is not pushes
         ):  # fmt: skip
-            sim, controller, ws = self.simulation, self.controller, self.controller.workspace
-            address, tick = controller.compiled_tick(sim.state, self.targets)
-            step = self._step = ResidualStep(
-                self.arrays, sim.plant, sim.state_arrays, sim.clock,
-                address, tick, ws.tau, ws.root_wrench, gains.soft_root,
-                self._targets, self._motion, self._com_offset, self._residual, pushes,
-                self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
-            )  # fmt: skip
-            self._gains = gains
+            address, tick = self.controller.compiled_tick(self.simulation.state, self.targets)
+            step, self._gains = self.bind(tick, address), gains
+            self._step = step
         return step
+
+    def bind(self, tick: Block, kernel: int) -> ResidualStep:
+        """All that a step works on, with the controller's tick and the address of its kernel."""
+        sim, controller, ws = self.simulation, self.controller, self.controller.workspace
+        return ResidualStep(
+            self.arrays, sim.plant, sim.state_arrays, sim.clock,
+            kernel, tick, ws.tau, ws.root_wrench, controller.parameters.soft_root,
+            self._targets, self._motion, self._com_offset, self._residual, sim.push_table,
+            self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
+        )  # fmt: skip
 
     def advance(self) -> None:
         if self._compiled:

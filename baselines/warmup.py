@@ -12,8 +12,7 @@ from poise.envs import jit
 from poise.envs.config import write_atomic
 
 _READY = jit.CACHE_STAMP.with_name("kernels.ready")
-#: One process for each; the last goes on with what needs all of them when the others are done.
-_SHARES = ("assembly()", "solver()", "steps(); input(); ticks()")
+_SHARES = ("assembly", "solver", "steps")  # one process for each
 _compiling = False  # whether this is one of them
 
 
@@ -34,15 +33,12 @@ def prepare() -> None:
 
 def _compile_apart() -> bool:
     """Whether all processes have finished without an error."""
-    jobs: list[subprocess.Popen[bytes]] = []
+    jobs = []
     try:
-        for calls in _SHARES:
-            code = f"from poise.baselines.compilation import *; begin(); {calls}"
-            jobs.append(subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE))
-        *first, last = jobs
-        good = [job.wait() == 0 for job in first]
-        last.communicate(b"\n")
-        return all(good) and last.returncode == 0
+        for share in _SHARES:
+            code = f"from poise.baselines.compilation import *; begin(); {share}()"
+            jobs.append(subprocess.Popen([sys.executable, "-c", code]))
+        return all([job.wait() == 0 for job in jobs])
     finally:
         for job in jobs:
             job.kill()
