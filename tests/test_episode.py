@@ -29,14 +29,14 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         e = allocate_episode(actions, 1, len(r.soles))
         begin_episode(simulation.state_arrays, e)
         e.action[:], e.last_action[:] = [0.5, -0.25, 0.0], [0.1, 0.1, -0.1]
-    reward = judge_step(
+    judge_step(
         simulation.arrays, simulation.state_arrays,
         scales(simulation.arrays, Simulation(r).state.support_polygon),
         judge(limits or FallLimits(), weights or RewardWeights(), r.height_com),
         r.standing_qpos[7:].copy() if q_ref is None else q_ref,
         np.zeros(r.model.nu) if tau is None else tau, time, e,
     )  # fmt: skip
-    return reward, e
+    return float(e.reward[0]), e
 
 
 def test_each_reward_term_is_its_formula():

@@ -246,7 +246,7 @@ def test_reset_forgets_where_the_solver_stopped(robot):
 def test_a_copy_is_a_controller_of_its_own(robot, duplicate):
     """It finds the same torques, whatever has become of the one that it was copied from."""
     simulation = Simulation(robot)
-    state = simulation.reset(seed=2)
+    state = simulation.reset()
     qp = MomentumQP(robot)
     targets = Targets.standing(robot, state)
     torques = qp.torques(state, targets)
