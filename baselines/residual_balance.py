@@ -12,7 +12,7 @@ from poise.envs.arrays import apart
 from poise.envs.balance import BalanceEnv, EnvConfig
 from poise.envs.block import Block
 from poise.envs.config import build, to_dict
-from poise.envs.episode import ROOT_FORCE, ROOT_MOMENT, judge_step, record_tick
+from poise.envs.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step, record_tick
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 from poise.envs.vector import make_vector_env
@@ -329,7 +329,8 @@ class ResidualBalanceEnv(BalanceEnv):
         sim, controller, ws = self.simulation, self.controller, self.controller.workspace
         return ResidualStep(
             self.arrays, sim.plant, sim.state_arrays, sim.clock,
-            kernel, tick, ws.tau, ws.root_wrench, controller.parameters.soft_root,
+            kernel, tick, ws.tau, ws.root_wrench, controller.memory.failures,
+            controller.parameters.soft_root,
             self._targets, self._motion, self._com_offset, self._residual, sim.push_table,
             self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
         )  # fmt: skip
@@ -347,26 +348,20 @@ class ResidualBalanceEnv(BalanceEnv):
     def _advance_in_python(self) -> None:
         """What `residual_step` does, for any controller."""
         sim, e = self.simulation, self.episode
-        s, ctrl = sim.state_arrays, sim.plant.ctrl
+        s, ctrl, wrench = sim.state_arrays, sim.plant.ctrl, e.root_wrench
         self._set_offsets()
         for _ in range(self.ticks):
             self._update_targets(self._offsets)
             ctrl[:] = self.controller.torques(sim.state, self.targets)
-            wrench = self.root_wrench()
+            wrench[:] = getattr(self.controller, "root_wrench", 0.0)
             soft_root_force(s, wrench, sim.plant.qfrc_applied)
             for metric, part in ((ROOT_FORCE, wrench[:3]), (ROOT_MOMENT, wrench[3:])):
                 e.metrics[metric] = max(e.metrics[metric], float(np.linalg.norm(part)))
             record_tick(self.arrays, s, ctrl, self.controller.period, e)
             sim.step(ctrl, self.control_substeps)
+        e.metrics[FAILURES] = getattr(self.controller, "failures", 0)
         judge_step(self.arrays, s, self.scales, self.judge, self.targets.q_ref, ctrl, sim.time, e)
         self._observe()
-
-    @property
-    def failures(self) -> int:
-        return int(getattr(self.controller, "failures", 0))
-
-    def root_wrench(self) -> np.ndarray:
-        return getattr(self.controller, "root_wrench", np.zeros(6))
 
 
 vector_env = partial(make_vector_env, ResidualBalanceEnv)  # for gymnasium.make_vec

@@ -7,6 +7,7 @@ import numpy as np
 from poise.envs.arrays import Plant, RobotArrays
 from poise.envs.block import Block, call
 from poise.envs.episode import (
+    FAILURES,
     ROOT_FORCE,
     ROOT_MOMENT,
     EpisodeArrays,
@@ -15,7 +16,7 @@ from poise.envs.episode import (
     record_tick,
 )
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays, update_state
+from poise.envs.kinematics import StateArrays, copy, update_state
 from poise.envs.observation import Scales, observe
 from poise.envs.simulation import advance
 
@@ -86,6 +87,7 @@ class ResidualStep(Block):
     tick: Block  # what it works on
     tau: np.ndarray  # (nj,) what it finds [N·m]
     root_wrench: np.ndarray  # (6,) of a soft root
+    failures: np.ndarray  # (1,) int: ticks that it could not solve
     soft_root: bool
     targets: TargetArrays
     motion: Motion
@@ -122,6 +124,8 @@ def residual_step(step: ResidualStep):
         for _ in range(step.substeps):
             advance(robot, plant, step.pushes, clock)
         update_state(robot, plant, s)
+    copy(w, e.root_wrench)
+    e.metrics[FAILURES] = step.failures[0]
     now = clock[0] * robot.timestep
     judge_step(robot, s, step.scales, step.judge, t.q_ref, plant.ctrl, now, e)
     observe(robot, s, step.scales, t.q_ref, t.v_ref, e.action, e.observation)

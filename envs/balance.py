@@ -13,6 +13,7 @@ from .block import Block
 from .env_config import EnvConfig as EnvConfig
 from .env_config import env_config
 from .episode import (
+    FAILURES,
     FALLEN,
     QUIET_STEPS,
     REWARD_TERMS,
@@ -291,23 +292,14 @@ class BalanceEnv(gymnasium.Env):
             "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
             "push": self.push_infos(),
             "is_success": self.recovered,
-            "solver_failures": self.failures,
+            "solver_failures": int(metrics[FAILURES]),
             "torque_saturation": float(metrics[SATURATED] / max(metrics[TICKS], 1.0)),
-            "root_wrench": self.root_wrench(),
+            "root_wrench": self.episode.root_wrench.copy(),
         }
 
     def push_infos(self) -> list[dict[str, Any]]:
         """What `info` says of the episode's pushes, see `push_info`."""
         return [push_info(push, self.robot) for push in self.simulation.pushes]
-
-    @property
-    def failures(self) -> int:
-        """Control ticks of this episode at which the controller's solver failed."""
-        return 0
-
-    def root_wrench(self) -> np.ndarray:
-        """(6,) force and moment that a soft root has taken from nowhere in the last tick."""
-        return np.zeros(6)
 
     def render(self) -> np.ndarray | None:
         """A frame (h, w, 3) for "rgb_array"; shows it for "human"."""
@@ -336,7 +328,7 @@ def info_columns(envs: Sequence[BalanceEnv], record: EpisodeArrays) -> dict[str,
         "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
         "push": pushes,
         "is_success": np.array([env.recovered for env in envs]),
-        "solver_failures": np.array([env.failures for env in envs]),
+        "solver_failures": metrics[:, FAILURES].astype(int),
         "torque_saturation": metrics[:, SATURATED] / np.maximum(metrics[:, TICKS], 1.0),
-        "root_wrench": np.array([env.root_wrench() for env in envs]),
+        "root_wrench": record.root_wrench.copy(),
     }

@@ -172,7 +172,11 @@ class EnvBatch:
         kernel, block = steps[0]
         if self._kernel[0] is not kernel:
             self._kernel = kernel, address_of(kernel, block)
-        return self._kernel[1], np.array([block.address for _, block in steps])
+        blocks = np.array([block.address for _, block in steps])
+        # turns from either half, so that threads do not write to neighbouring rows at a time
+        half = len(blocks) // 2
+        blocks[: 2 * half] = blocks[: 2 * half].reshape(2, half).T.ravel()
+        return self._kernel[1], blocks
 
     def _set_actions(self, actions: np.ndarray, live: np.ndarray) -> None:
         """What `BalanceEnv.set_action` does, for all rows at once."""
@@ -186,8 +190,9 @@ class EnvBatch:
                 f"has shape {vectors.shape}, expected {record.action.shape}", field="action"
             )
         good = np.abs(vectors) <= 1.0 + 1e-6  # NaN is not
-        for i in np.flatnonzero(~(good.all(axis=1) | ~live)):
-            self.envs[i].set_action(vectors[i])  # raises, and names the entries
+        if not good.all():
+            for i in np.flatnonzero(~(good.all(axis=1) | ~live)):
+                self.envs[i].set_action(vectors[i])  # raises, and names the entries
         rows = slice(None) if live.all() else live
         record.last_action[rows] = record.action[rows]
         record.action[rows] = np.minimum(np.maximum(vectors[rows], -1.0), 1.0)

@@ -56,8 +56,9 @@ REWARD_TERMS = tuple(RewardWeights.__dataclass_fields__)
     ROOT_FORCE,  # largest force of a soft root [N]
     ROOT_MOMENT,  # largest moment of a soft root [N·m]
     LAST_MOVING,  # time of the last policy step that was not quiet [s]
-) = range(13)
-METRICS = 13
+    FAILURES,  # control ticks at which the controller's solver failed
+) = range(14)
+METRICS = 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +71,7 @@ class EpisodeArrays(Block):
     reward: np.ndarray  # (1,) of the last policy step
     reward_terms: np.ndarray  # (terms,) weighted; their sum is the reward
     metrics: np.ndarray  # (METRICS,)
+    root_wrench: np.ndarray  # (6,) of a soft root in the last tick [N, N·m]
     sole_start: np.ndarray  # (nc, 2)
 
 
@@ -106,6 +108,7 @@ def allocate_episode(actions: int, observations: int, nc: int) -> EpisodeArrays:
         reward=apart(1),
         reward_terms=apart(len(REWARD_TERMS)),
         metrics=apart(METRICS),
+        root_wrench=apart(6),
         sole_start=apart((nc, 2)),
     )
 
@@ -118,6 +121,7 @@ def begin_episode(s: StateArrays, e: EpisodeArrays):
     e.reward[0] = 0.0
     e.reward_terms[:] = 0.0
     e.metrics[:] = 0.0
+    e.root_wrench[:] = 0.0
     e.metrics[MIN_COP_MARGIN] = np.inf
     for i in range(s.sole_point.shape[0]):
         e.sole_start[i, 0], e.sole_start[i, 1] = s.sole_point[i, 0], s.sole_point[i, 1]

@@ -317,3 +317,18 @@ def test_a_controller_may_be_replaced(env):
     assert env.ticks == 2
     assert np.array_equal(env.simulation.data.qpos, made.simulation.data.qpos)
     assert np.array_equal(env.targets.com, made.targets.com)
+
+
+@pytest.mark.parametrize("solver", ["active-set", "daqp"])
+def test_failures_and_the_root_wrench_are_reported(solver):
+    """Whether the controller is compiled or called from Python; a reset forgets both."""
+    config = replace(controller_config("momentum-qp"), root="soft", solver=solver)
+    env = ResidualBalanceEnv(robot(), controller=config, pushes=None)
+    env.reset(seed=0)
+    env.controller.memory.failures[0] = 3
+    info = env.step(zero(env))[-1]
+    assert info["solver_failures"] == 3
+    assert np.array_equal(info["root_wrench"], env.controller.root_wrench)
+    assert info["root_wrench"].any()
+    _, info = env.reset(seed=0)
+    assert info["solver_failures"] == 0 and not info["root_wrench"].any()
