@@ -68,6 +68,7 @@ class BalanceEnv(gymnasium.Env):
         period = self.config.policy_period
         self.substeps = self._whole(period, self.arrays.timestep, "policy_period")
         self.max_steps = round(self.config.duration / period)
+        self.quiet_steps = int(np.ceil(self.config.fall.quiet_time / period - 1e-9))
         state = self.simulation.state
         self.scales = scales(self.arrays, state.support_polygon)
         self.judge = judge(self.config.fall, self.config.reward, self.robot.height_com)
@@ -79,6 +80,8 @@ class BalanceEnv(gymnasium.Env):
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
         self.steps = 0
+        self._described: Any = None  # the pushes of which these are
+        self._descriptions: list[dict[str, Any]] = []
         self._renderer: SceneRenderer | None = None
         self._needs_reset = True
 
@@ -282,8 +285,7 @@ class BalanceEnv(gymnasium.Env):
     @property
     def recovered(self) -> bool:
         """Upright and quiet for the last `quiet_time` seconds."""
-        quiet = self.episode.metrics[QUIET_STEPS] * self.config.policy_period
-        return bool(quiet >= self.config.fall.quiet_time - 1e-9)
+        return bool(self.episode.metrics[QUIET_STEPS] >= self.quiet_steps)
 
     def info(self) -> dict[str, Any]:
         """Reward terms, push and record of the episode so far; see also `info_columns`."""
@@ -299,7 +301,11 @@ class BalanceEnv(gymnasium.Env):
 
     def push_infos(self) -> list[dict[str, Any]]:
         """What `info` says of the episode's pushes, see `push_info`."""
-        return [push_info(push, self.robot) for push in self.simulation.pushes]
+        pushes = self.simulation.pushes
+        if self._described is not pushes:
+            self._described = pushes
+            self._descriptions = [push_info(push, self.robot) for push in pushes]
+        return [description.copy() for description in self._descriptions]
 
     def render(self) -> np.ndarray | None:
         """A frame (h, w, 3) for "rgb_array"; shows it for "human"."""
@@ -327,7 +333,7 @@ def info_columns(envs: Sequence[BalanceEnv], record: EpisodeArrays) -> dict[str,
     return {
         "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
         "push": pushes,
-        "is_success": np.array([env.recovered for env in envs]),
+        "is_success": metrics[:, QUIET_STEPS] >= [env.quiet_steps for env in envs],
         "solver_failures": metrics[:, FAILURES].astype(int),
         "torque_saturation": metrics[:, SATURATED] / np.maximum(metrics[:, TICKS], 1.0),
         "root_wrench": record.root_wrench.copy(),
