@@ -21,7 +21,8 @@ from .workers import DIED, THREADS, end_processes, process_pool, single_threaded
 Backend = Literal["local", "joblib", "ray"]
 BACKENDS: tuple[Backend, ...] = ("local", "joblib", "ray")
 BLOCK = 8  # jobs per process that Ray is given at a time
-Job, Result = TypeVar("Job"), TypeVar("Result")
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 
 def check_backend(backend: str) -> None:

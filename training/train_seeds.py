@@ -148,7 +148,7 @@ def _finished(run: SeedRun) -> bool:
 def _entry(run: SeedRun) -> dict[str, Any]:
     """What seeds.json says of a run: the evaluations at its start and at its best."""
     checkpoint = find_checkpoint(run.folder / LAST)
-    state = read_state(checkpoint / STATE) if checkpoint else {"timesteps": 0}
+    state: dict[str, Any] = read_state(checkpoint / STATE) if checkpoint else {"timesteps": 0}
     rows = state.get("evaluations") or [None]
     best = max(rows, key=lambda row: row["score"] if row else 0.0)  # the first of equals
     return {
