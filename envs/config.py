@@ -81,8 +81,13 @@ def to_yaml(obj: Any) -> str:
 
 
 def packaged(kind: str) -> list[str]:
-    """Names of the packaged configurations of one kind: ``packaged("robots")``."""
-    return sorted(path.stem for path in packaged_folder(kind).glob("*.yaml"))
+    """Names of the packaged configurations of one kind: ``packaged("robots")``.
+
+    A configuration is a file, ``NAME.yaml``, or a folder, ``NAME/config.yaml`` (policies).
+    """
+    folder = packaged_folder(kind)
+    files = [path.stem for path in folder.glob("*.yaml")]
+    return sorted(files + [path.parent.name for path in folder.glob("*/config.yaml")])
 
 
 def packaged_folder(kind: str) -> Path:

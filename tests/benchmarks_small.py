@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from poise.training.benchmark.case import Result
-from poise.training.benchmark.play import Job, play
+from poise.training.benchmark.play import Job
 
 SMALL: dict[str, Any] = {
     "duration": 1.6,
@@ -34,7 +34,7 @@ def write_small(folder: Path, **changes: Any) -> Path:
 
 
 class InProcessCrew:
-    """Plays like `Crew`, without processes; `played` counts, `stop_after` interrupts."""
+    """Works like `Crew`, without processes; `played` counts, `stop_after` interrupts."""
 
     played = 0
     stop_after: int | None = None
@@ -48,9 +48,11 @@ class InProcessCrew:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def play(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
+    def each(
+        self, function: Callable[[Job], Result], jobs: Sequence[Job]
+    ) -> Iterator[tuple[Job, Result]]:
         for job in reversed(jobs):  # any order must do
             if InProcessCrew.played == InProcessCrew.stop_after:
                 raise KeyboardInterrupt
             InProcessCrew.played += 1
-            yield job, play(job)
+            yield job, function(job)

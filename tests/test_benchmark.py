@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from poise.envs.config import packaged
 from poise.envs.env_config import StartNoise
 from poise.envs.errors import ConfigError
 from poise.training.benchmark import run
@@ -257,9 +258,10 @@ def test_bad_input_is_refused_and_nothing_is_written(
 
 
 def test_everyone_takes_part_by_default() -> None:
-    """The reference first, the shipped policy last."""
-    names = default_controllers()
-    assert names[0] == "momentum-qp" and names[-1] == "residual" and len(set(names)) == len(names)
+    """The reference first, the packaged policies last."""
+    names, policies = default_controllers(), packaged("policies")
+    assert names[0] == "momentum-qp" and len(set(names)) == len(names)
+    assert "residual" in policies and list(names[-len(policies) :]) == policies
     assert {"pd", "macchietto09", "moskalev24", "lip-mpc"} <= set(names)
 
 
@@ -270,7 +272,7 @@ def test_every_backend_gives_the_same_trials(
     """trials.csv has the same bytes from two processes of any backend as from this one."""
     if backend == "ray":
         pytest.importorskip("ray")
-    from poise.training.benchmark.backends import Crew
+    from poise.training.backends import Crew
 
     monkeypatch.setattr(run, "Crew", Crew)
     out = tmp_path / "out"

@@ -12,13 +12,11 @@ from rich.console import Console
 
 from poise.envs.config import to_yaml
 from poise.envs.errors import ConfigError
-from poise.training.benchmark import seeds as seeds_module
 from poise.training.benchmark.case import Case, Result, failed
 from poise.training.benchmark.compare import compare, print_comparison
 from poise.training.benchmark.figures import controller_figures, pair_figures, paired
 from poise.training.benchmark.leaderboard import leaderboard, write_leaderboard
 from poise.training.benchmark.reading import read_summary
-from poise.training.benchmark.seeds import seed_groups
 from poise.training.benchmark.ticks import tick_times
 from poise.training.cli import main
 from poise.training.players import Player, load_player
@@ -167,31 +165,6 @@ def test_the_leaderboard_ranks_and_says_where_it_comes_from(tmp_path: Path) -> N
     (folder / "summary.json").write_text("[]")
     with pytest.raises(ConfigError, match="is not a benchmark's summary"):
         write_leaderboard(folder, page)
-
-
-def test_seeds_of_one_configuration_are_taken_together(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Two folders that differ in the seed alone; the IQM of four scores drops the outer two."""
-    names = []
-    for name in ("a0", "a1", "b0"):
-        (tmp_path / name).mkdir()
-        names.append(str(tmp_path / name))
-    monkeypatch.setattr(
-        seeds_module, "_configuration", lambda f: (Path(f).name[0], int(Path(f).name[1]))
-    )
-    scores = dict(zip(names, ([0.1, 0.6], [0.8, 1.9], [9.0, 9.0]), strict=True))
-    entries: dict[str, Any] = {
-        name: {"directions": [{"eta": eta} for eta in etas], "mix": {"recovered_rate": etas[0]}}
-        for name, etas in scores.items()
-    }
-    entries["pd"] = {}
-    (group,) = seed_groups(["pd", *names], entries)
-    assert group["members"] == names[:2] and group["seeds"] == [0, 1]
-    assert group["eta"]["iqm"] == pytest.approx(0.7) and group["eta"]["tasks"] == 2
-    assert group["mix"]["iqm"] == pytest.approx(0.45)
-    low, high = group["eta"]["iqm_ci95"]
-    assert low < 0.7 < high
 
 
 def test_levels_are_compared_with_the_standard_case_on_the_same_trials() -> None:

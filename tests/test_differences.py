@@ -25,6 +25,12 @@ def test_independent_rates_are_those_of_statsmodels(a: int, n: int, b: int, m: i
     assert ends == pytest.approx((low, high), abs=1e-6)
 
 
+def test_newcombes_published_pairs() -> None:
+    """Of 50 pairs 36 both, 12 and 2 one alone: 0.2, interval 0.0569 to 0.3404 [Newcombe98b]."""
+    gap, ends = paired_rates(36, 2, 12, 0)
+    assert gap == pytest.approx(0.2) and ends == pytest.approx((0.0569, 0.3404), abs=5e-5)
+
+
 def test_pairs_without_correlation_are_like_independent_rates() -> None:
     """both · neither = only_a · only_b makes φ = 0; agreement makes the interval narrower."""
     gap, free = paired_rates(12, 18, 8, 12)

@@ -83,6 +83,7 @@ def test_other_settings_do_not_mix(tmp_path: Path, field: str, value: object) ->
 def test_a_finished_evaluation_is_not_written_over(tmp_path: Path) -> None:
     """Not even by the same settings; --overwrite replaces it, files of others stay."""
     (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "report.html").write_text("of before")
     folder = start(tmp_path)
     folder.append(0, [OUTCOME, OUTCOME])
     folder.finish([row(Trial(0, 1), "momentum-qp", OUTCOME)], {"suite": "random"})

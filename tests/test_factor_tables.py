@@ -110,11 +110,13 @@ def test_training_seeds_have_a_row_for_each_group(tmp_path: Path) -> None:
     folder = copied("benchmark", tmp_path)
     data = json.loads((folder / "summary.json").read_text())
     assert factor_tables.seed_table(load_results(folder)) is None
-    figures = {"iqm": 0.8, "iqm_ci95": [0.7, 0.9], "tasks": 2}
-    data["seeds"] = [{"members": ["runs/0", "runs/1"], "seeds": [0, 1], "eta": figures}]
+    figures = {"iqm": 0.8, "iqm_ci95": [0.7, 0.9], "tasks": 2, "worst": 0.65, "worst_seed": 1}
+    data["seeds"] = [{"name": "runs", "members": ["runs/0", "runs/1"], "seeds": [0, 1],
+                      "eta": figures}]  # fmt: skip
     (folder / "summary.json").write_text(json.dumps(data))
     (row,) = rows(factor_tables.seed_table(load_results(folder)))
-    assert row["members"] == "runs/0, runs/1" and row["eta_iqm_high"] == "0.9"
+    assert row["name"] == "runs" and row["eta_iqm_high"] == "0.9" and row["eta_worst"] == "0.65"
+    assert "mix_iqm" not in row
 
 
 def first(data: dict[str, Any]) -> dict[str, Any]:

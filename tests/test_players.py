@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs import config
+from poise.envs.config import packaged
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot, load_robot
 from poise.envs.torque_balance import TorqueBalanceEnv
+from poise.training import policy
+from poise.training.benchmark.run import default_controllers
 from poise.training.players import load_player
+from poise.training.policy import load_policy
+
+from .shared import finished_run
 
 
 @pytest.fixture(scope="module")
@@ -60,3 +68,36 @@ def test_a_folder_without_a_policy_is_refused(robot: Robot, tmp_path: Path) -> N
     """An existing folder is taken for a policy; its missing file is named."""
     with pytest.raises(ConfigError, match="a policy folder holds"):
         load_player(str(tmp_path), robot)
+
+
+def test_a_packaged_policy_is_known_by_its_folder(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Any folder of configs/policies, as a player and by load_policy; an error lists them all."""
+    shutil.copytree(config.packaged_folder("policies"), tmp_path / "policies")
+    shutil.copytree(finished_run() / "last", tmp_path / "policies/residual-pd")
+    real = config.packaged_folder
+
+    def here(kind: str) -> Path:
+        return tmp_path / kind if kind == "policies" else real(kind)
+
+    for module in (config, policy):
+        monkeypatch.setattr(module, "packaged_folder", here)
+    player = load_player("residual-pd", robot)
+    assert player.fingerprint == load_player(str(finished_run() / "last"), robot).fingerprint
+    assert player.fingerprint != load_player("residual", robot).fingerprint
+    assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
+    assert packaged("policies") == ["residual", "residual-pd"]
+    assert default_controllers()[-2:] == ("residual", "residual-pd")
+    with pytest.raises(ConfigError, match="residual, residual-pd, zero"):
+        load_player("residual-abe07", robot)
+
+
+@pytest.mark.parametrize("name", packaged("policies"))
+def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
+    """residual on the baseline, residual-CONTROLLER on another; no larger than need be."""
+    found = load_policy(name)
+    controller = found.config.controller
+    assert name == ("residual" if controller == "momentum-qp" else f"residual-{controller}")
+    files = list((config.packaged_folder("policies") / name).iterdir())
+    assert sum(path.stat().st_size for path in files) < 1_000_000

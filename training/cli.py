@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
-from rich.console import Console
 
 from poise.envs.errors import PoiseError
+
+from .progress import terminal
 
 Names = Annotated[
     tuple[str, ...],
@@ -18,7 +19,6 @@ Names = Annotated[
 ]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
-WIDTH = 120  # of tables that no terminal shows
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -59,7 +59,7 @@ def demo(out: Path = Path("out/demo"), workers: int | None = None, seed: int = 0
     """
     from .demo import demo
 
-    demo(out, workers=workers, seed=seed, console=_console())
+    demo(out, workers=workers, seed=seed, console=terminal())
 
 
 def train() -> None:
@@ -87,8 +87,9 @@ def evaluate(
     it is started again alike. The result is the same for any number of workers.
 
     Args:
-        controllers: a name of `poise list`, residual (the shipped policy), zero (no torque), a
-            .yaml file of a controller, a folder written by poise train, or module:Class.
+        controllers: a name of `poise list`, such as residual (a shipped policy), zero (no torque),
+            a .yaml file of a controller, a folder written by poise train, with --seeds too, or
+            module:Class.
         suite: random, envelope, grid, quiet, or a .yaml file.
         out: folder to write to; out/SUITE if not given.
         robot: a packaged robot (see poise list) or a .yaml description.
@@ -107,7 +108,7 @@ def evaluate(
     try:
         summary = evaluate(
             controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, trials=trials,
-            limits=limits, overwrite=overwrite, console=_console(),
+            limits=limits, overwrite=overwrite, console=terminal(),
         )  # fmt: skip
     except KeyboardInterrupt:
         if (folder / "trials.partial.jsonl").exists():
@@ -142,8 +143,8 @@ def benchmark(
 
     Args:
         out: folder to write to.
-        controllers: names as poise evaluate takes them; all packaged ones and residual if not
-            given.
+        controllers: names as poise evaluate takes them; all packaged controllers and policies if
+            not given.
         suite: quick (minutes), standard (an hour), full (many hours), or a .yaml file.
         robot: a packaged robot or a .yaml description.
         seed: of the cases.
@@ -161,7 +162,7 @@ def benchmark(
     try:
         summary = benchmark(
             controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
-            trials=trials, overwrite=overwrite, console=_console(),
+            trials=trials, overwrite=overwrite, console=terminal(),
         )  # fmt: skip
     except KeyboardInterrupt:
         if (out / "trials.jsonl").exists():
@@ -174,7 +175,7 @@ def benchmark(
     if report:
         from .html_report import write_report
 
-        write_report(out, console=_console())
+        write_report(out, console=terminal())
     return 1 if failed else 0
 
 
@@ -191,7 +192,7 @@ def compare(
     """
     from .benchmark.compare import compare, print_comparison
 
-    print_comparison(compare(a, b), a, b, _console())
+    print_comparison(compare(a, b), a, b, terminal())
 
 
 def leaderboard(
@@ -263,7 +264,7 @@ def report(folder: Folder, /, *, out: Path | None = None, films: bool = True) ->
     choose_gl_backend()
     from .html_report import write_report
 
-    write_report(folder, out, films=films, console=_console())
+    write_report(folder, out, films=films, console=terminal())
 
 
 def tune(
@@ -332,10 +333,19 @@ def list_names() -> None:
     """List what can be named: robots, controllers, suites, training configurations, motions."""
     from poise.envs.config import packaged
 
-    kinds = ("robots", "controllers", "suites", "benchmarks", "training", "motions", "limits")
+    kinds = (
+        "robots",
+        "controllers",
+        "policies",
+        "suites",
+        "benchmarks",
+        "training",
+        "motions",
+        "limits",
+    )
     for kind in kinds:
         print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
-    print("also as controllers: residual, zero, a folder written by poise train, module:Class")
+    print("also as controllers: policies, zero, a folder written by poise train, module:Class")
 
 
 COMMANDS: dict[str, Callable[..., Any]] = {
@@ -351,11 +361,6 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "qp-set": qp_set,
     "list": list_names,
 }
-
-
-def _console() -> Console:
-    console = Console()
-    return console if console.is_terminal else Console(width=WIDTH)
 
 
 if __name__ == "__main__":

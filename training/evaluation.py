@@ -22,6 +22,7 @@ from .players import Player, load_player
 from .progress import progress_bar
 from .provenance import commit, machine, usable_cores, versions
 from .report import draw_plots, print_paths, print_summary
+from .seed_groups import expand_seeds, seed_groups
 from .suite import Suite
 from .suites import load_suite
 from .summary import plain, summarise
@@ -48,7 +49,8 @@ def evaluate(
     on when it is called again alike. The result is the same, bit for bit, for any `workers`.
 
     Args:
-        controllers: names as `load_player` takes them, all different.
+        controllers: names as `load_player` takes them, or folders of several training seeds; all
+            different.
         suite: a packaged suite or a path to a ``.yaml`` of one.
         out: the folder to write to.
         robot: a packaged robot or a path to its description.
@@ -66,6 +68,7 @@ def evaluate(
     """
     console = console or Console(quiet=True)
     started = time.perf_counter()
+    controllers = expand_seeds(controllers)
     _check(controllers, seed, workers, trials)
     chosen = load_suite(suite)
     if trials is not None:
@@ -100,12 +103,14 @@ def evaluate(
         name: [folder.finished[trial.number][i] for trial in done]
         for i, name in enumerate(controllers)
     }
+    figures = summarise(chosen, done, outcomes, pushed)
     summary = plain(
         {
             "suite": str(suite),
             "seed": seed,
             "robot": loaded.name,
-            **summarise(chosen, done, outcomes, pushed),
+            **figures,
+            "seeds": seed_groups(controllers, figures["controllers"]),
             "command": shlex.join(sys.argv),
             "versions": versions(),
             "machine": machine(),

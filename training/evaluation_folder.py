@@ -25,6 +25,7 @@ SETTINGS, PARTIAL, TRIALS, SUMMARY = (
     "settings.yaml", "trials.partial.jsonl", "trials.csv", "summary.json",
 )  # fmt: skip
 PLOTS = ("polar_envelope.png", "fall_probability.png")
+REPORT = "report.html"  # by `poise report`; not of the result, but gone with it
 FILES = (SUMMARY, SETTINGS, PARTIAL, TRIALS, *PLOTS)
 
 
@@ -73,7 +74,7 @@ class EvaluationFolder:
         if path.exists() and not path.is_dir():
             raise ConfigError("is not a folder", source=path, field="out")
         if overwrite:
-            for name in FILES:
+            for name in (*FILES, REPORT):
                 (path / name).unlink(missing_ok=True)
         elif any((path / name).exists() for name in FILES):
             self._check()

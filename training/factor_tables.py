@@ -12,6 +12,7 @@ from poise.envs.errors import ConfigError
 from .html_plots import Series, level_curves, level_text
 from .html_table import Cell, Column, Table, cell, name_cell, p_cell
 from .results import Results
+from .seed_groups import FIGURES
 from .statistics import wilson_interval
 from .values import interval, number
 
@@ -178,23 +179,26 @@ def indicators(results: Results, order: Sequence[str]) -> Table | None:
 
 
 def seed_table(results: Results) -> Table | None:
-    """Interquartile means over training seeds; None without groups of seeds."""
-    columns = [
-        Column("members", "Runs"),
-        Column("seeds", "Seeds"),
-        Column("eta_iqm", "η, IQM", "over seeds and directions", interval=True),
-        Column("mix_iqm", "Recovered, IQM", "over seeds, of the mix", interval=True),
-    ]
+    """Interquartile means over training seeds and the worst seed; None without groups of seeds."""
+    columns = [Column("name", "Runs"), Column("seeds", "Seeds")]
+    for key, title, _ in FIGURES:
+        columns += [
+            Column(f"{key}_iqm", f"{title}, IQM", "interquartile mean over seeds", interval=True),
+            Column(f"{key}_worst", "worst seed", "the smallest value of a seed"),
+        ]
     rows = []
     where = f"{results.folder}: summary.json: seeds"
     for group in _mappings(results.source.get("seeds"), where):
-        members = ", ".join(str(member) for member in group.get("members", []))
-        row = [Cell(members, members), cell(len(group.get("seeds", [])), "d")]
-        for key, form in (("eta", ".2f"), ("mix", ".1%")):
+        name = str(group.get("name", ", ".join(str(member) for member in group.get("members", []))))
+        row = [Cell(name, name), cell(len(group.get("seeds", [])), "d")]
+        for key, _, form in FIGURES:
             found = group.get(key) or {}
             row.append(cell(number(found, "iqm", where), form, interval(found, "iqm_ci95", where)))
+            row.append(cell(number(found, "worst", where), form))
         rows.append(row)
-    return Table("seeds", "Means over training seeds.", columns, rows) if rows else None
+    if not rows:
+        return None
+    return Table("seeds", "Means over training seeds.", columns, rows).without_empty()
 
 
 def error_table(results: Results) -> Table | None:

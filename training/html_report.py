@@ -17,7 +17,7 @@ from poise.envs.config import write_atomic
 from poise.envs.errors import PoiseError
 
 from . import factor_tables, report_plots, report_tables, report_words
-from .evaluation_folder import TRIALS
+from .evaluation_folder import REPORT, TRIALS
 from .html_table import Download, download
 from .html_time_plot import signals_csv, time_plot
 from .report import print_paths
@@ -25,7 +25,6 @@ from .results import Record, Results, load_results
 from .svg import swatch
 from .worst_trials import AFTER, Case, Film, can_draw, choose_cases, film, frame_times
 
-FILE = "report.html"
 CROWD = 4  # of controllers; with more, bands and bars are shown for the one that is pointed at
 EMBEDDED = 600_000  # [bytes] trials.csv is embedded up to this size, beyond it packed
 PACKED = 2_500_000  # [bytes] up to this size
@@ -55,7 +54,7 @@ def write_report(
         PoiseError: the file cannot be written.
     """
     console = console or Console(quiet=True)
-    path = Path(folder) / FILE if out is None else Path(out)
+    path = Path(folder) / REPORT if out is None else Path(out)
     results = load_results(folder)
     page = render(results, films=films, console=console)
     write_atomic(path, page)

@@ -44,7 +44,7 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
 
     Args:
         name: a packaged controller or a path to a ``.yaml`` of one (played with action zero),
-            ``residual`` (the shipped policy), ``zero`` (no torque at all), a folder written by
+            a packaged policy (``residual``), ``zero`` (no torque at all), a folder written by
             ``poise train``, or ``module:Class`` or ``file.py:Class`` of a controller or a policy.
         robot: who is controlled. A policy must have been trained on it.
         overrides: arguments of the environment, or fields of its `EnvConfig`.
@@ -54,7 +54,8 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
     """
     if name == NO_CONTROL:
         return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
-    if name == SHIPPED or Path(name).is_dir():
+    policies = packaged("policies")
+    if name in policies or Path(name).is_dir():
         return _policy(name, robot, overrides)
     if is_outside(name) and not _is_controller(name, robot):
         return _outside_policy(name, robot, overrides)
@@ -65,7 +66,7 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
             f"no such controller: {name!r}; give a name, a .yaml file of a controller, "
             "a folder written by poise train, or module:Class",
             field="controller",
-            choices=(*names, SHIPPED, NO_CONTROL),
+            choices=(*names, *policies, NO_CONTROL),
         )
     env = ResidualBalanceEnv(robot, controller=name, **overrides)
     return _idle(name, env, to_yaml(controller_config(name)))
@@ -80,7 +81,7 @@ def _idle(name: str, env: BalanceEnv, content: str) -> Player:
 def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
     from .policy import load_policy  # loads torch, which the other players do without
 
-    policy = load_policy(None if name == SHIPPED else name, robot)
+    policy = load_policy(name, robot)
     env = policy.make_env(robot=robot, **overrides)
     sizes = (policy.layers[0][0].shape[0], policy.layers[-1][0].shape[1])
     expected = (env.episode.observation.size, len(env.action_names))

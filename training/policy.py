@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from poise.envs.balance import BalanceEnv
-from poise.envs.config import build, packaged_folder, read_yaml
+from poise.envs.config import build, packaged, packaged_folder, read_yaml
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot, load_robot
 
@@ -73,7 +73,9 @@ class Policy:
 
 
 def load_policy(folder: str | Path | None = None, robot: Robot | None = None) -> Policy:
-    """A policy folder, or the best checkpoint of a run folder; None: the shipped policy.
+    """A packaged policy, a policy folder, or the best checkpoint of a run folder.
+
+    None is the packaged policy ``residual``.
 
     Raises ConfigError naming the file when it is missing, truncated, made for another robot
     (of `robot`, or of the configuration's own) or has another number of observations or actions.
@@ -102,10 +104,11 @@ def load_policy(folder: str | Path | None = None, robot: Robot | None = None) ->
 
 
 def _locate(folder: str | Path | None) -> Path:
-    if folder is None:
-        path = packaged_folder("policies") / SHIPPED
+    name = SHIPPED if folder is None else str(folder)
+    if name in packaged("policies"):
+        path = packaged_folder("policies") / name
     else:
-        path = Path(folder)
+        path = Path(name)
         path = find_checkpoint(path / "best") or find_checkpoint(path) or path
     for name in FILES:
         if not (path / name).is_file():

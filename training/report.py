@@ -14,6 +14,7 @@ from .evaluation_folder import PLOTS
 from .fits import fit_logistic
 from .limits import PushLimits
 from .plots import fall_probability, polar_envelope
+from .seed_groups import seed_lines
 from .suite import Suite
 from .summary import Outcomes, fractions, pushes, sectors, won
 from .trials import Trial
@@ -67,11 +68,13 @@ def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, Any]:
 
 
 def print_summary(summary: Mapping[str, Any], console: Console) -> None:
-    """Tables of the controllers and of the pairs."""
+    """Tables of the controllers and of the pairs, a line per group of training seeds."""
     title = escape(f"{summary['suite']} · {summary['robot']} · seed {summary['seed']}")
     console.print(_controllers(summary, title))
     if summary["pairs"]:
         console.print(_pairs(summary))
+    for line in seed_lines(summary["seeds"]):
+        console.print(line, markup=False, highlight=False)
 
 
 def _controllers(summary: Mapping[str, Any], title: str) -> Table:

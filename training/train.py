@@ -38,7 +38,7 @@ def train(
     round; when the configurations or robots differ; when a file of last/ cannot be read.
     """
     out = Path(out)
-    checkpoint = _check_folder(config, out, resume)
+    checkpoint = check_folder(config, out, resume)
     torch.set_num_threads(1)
     prepare()
     normalize = _training_envs(config)
@@ -125,8 +125,8 @@ def _env_seed(seed: int) -> int:
     return int(np.random.SeedSequence(seed).generate_state(1)[0])
 
 
-def _check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
-    """The checkpoint to go on from, or None for a new run."""
+def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
+    """The checkpoint to go on from, or None for a new run; raises ConfigError as `train`."""
     checkpoint = find_checkpoint(out / LAST)
     if not resume:
         if checkpoint is not None:

@@ -1,8 +1,9 @@
-"""`poise train`: a training configuration, changed by flags."""
+"""`poise train`: a training configuration, changed by flags; one run, or one per seed."""
 
 import argparse
+import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -11,8 +12,12 @@ import tyro
 from poise.envs.config import build, to_dict
 from poise.envs.errors import ConfigError
 
+from .backends import Backend
 from .config import TrainConfig, train_config
+from .progress import terminal
+from .seed_groups import SEEDS
 from .train import train
+from .train_seeds import train_seeds
 
 DEFAULT = "residual"
 
@@ -26,20 +31,39 @@ class Command:
         out: folder to write to.
         config: a packaged training configuration or a path to a .yaml file; the flags below
             replace its fields. With --resume, the run's own configuration if not given.
-        resume: go on with the run that the folder holds.
+        resume: go on with the run, or the runs, that the folder holds.
+        seeds: train a run for each of these seeds, in folders seed-SEED of the folder.
+        backend: of runs with several seeds: local (processes of this machine), joblib (the same
+            by joblib), ray (a cluster).
+        workers: with several seeds, runs at a time; all cores if not given.
     """
 
     settings: Annotated[TrainConfig, tyro.conf.arg(name="")]  # no prefix
     out: Path
     config: str | None = None
     resume: tyro.conf.FlagCreatePairsOff[bool] = False
+    seeds: tuple[int, ...] = ()
+    backend: Backend = "local"
+    workers: int | None = None
 
 
 def run(args: Sequence[str]) -> None:
     """Parse and train; raises ConfigError, and SystemExit as command lines do."""
     command = parse(args)
-    best = train(command.settings, command.out, command.resume)
-    print(best)
+    out = command.out
+    if not command.seeds and not (out / SEEDS).exists():
+        print(train(command.settings, out, command.resume))
+        return
+    try:
+        train_seeds(
+            command.settings, command.seeds, out, resume=command.resume,
+            workers=command.workers, backend=command.backend, console=terminal(),
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        if (out / SEEDS).exists():
+            print(f"poise: what is trained is kept in {out}; go on with --resume", file=sys.stderr)
+        raise
+    print(out / SEEDS)
 
 
 def parse(args: Sequence[str]) -> Command:
@@ -53,7 +77,7 @@ def parse(args: Sequence[str]) -> Command:
         config=(tyro.conf.AvoidSubcommands,),
     )
     settings = build(TrainConfig, to_dict(command.settings), "command line")
-    return Command(settings, command.out, command.config, command.resume)
+    return replace(command, settings=settings)
 
 
 def _base(args: Sequence[str]) -> str | Path:

@@ -26,7 +26,7 @@ from .trials import Outcome, Trial, run_trial
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
 DIED = (
-    "a worker process has died (out of memory?); the finished trials are kept: "
+    "a worker process has died (out of memory?); what is finished is kept: "
     "run the same command again to go on, with fewer --workers"
 )
 
@@ -101,6 +101,12 @@ def process_pool(
         initializer=_start,
         initargs=(load, arguments),
     )
+
+
+def end_processes(pool: ProcessPoolExecutor) -> None:
+    """End the pool's processes at once: its own `shutdown` waits for what they are at."""
+    for process in list((pool._processes or {}).values()):
+        process.kill()
 
 
 @contextmanager

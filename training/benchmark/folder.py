@@ -19,7 +19,7 @@ from typing import Any
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
 from poise.envs.errors import ConfigError, PoiseError
 
-from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS, csv_text
+from ..evaluation_folder import REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
 from ..trial_log import TrialLog, read_log
 from .case import COLUMNS, Result
 
@@ -84,7 +84,7 @@ class BenchmarkFolder:
     def _open(self, overwrite: bool) -> None:
         path, settings = self.path, self.settings
         if overwrite:
-            for name in FILES:
+            for name in (*FILES, REPORT):
                 (path / name).unlink(missing_ok=True)
         elif any((path / name).exists() for name in FILES):
             before = self._check()

@@ -8,6 +8,7 @@ from typing import Any
 
 from poise.envs.config import write_atomic
 
+from ..seed_groups import seed_lines
 from .reading import read_summary
 from .table import COLUMNS, ranking_rows
 
@@ -49,6 +50,8 @@ def leaderboard(summary: Mapping[str, Any], source: str) -> str:
         reference=summary["reference"],
     )
     text += _table(["", *(name for name, _ in COLUMNS)], _ranked(summary))
+    if lines := seed_lines(summary["seeds"]):
+        text += "\n" + "\n".join(f"- {line}" for line in lines) + "\n"
     directions = _directions(summary)
     text += "\nη per direction (0° is forward, 90° left):\n\n" + _table(*directions)
     factors = _factors(summary)

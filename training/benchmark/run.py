@@ -17,19 +17,19 @@ from poise.envs.config import packaged, to_dict
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot, load_robot
 
+from ..backends import Crew, check_backend
 from ..evaluation_folder import SUMMARY, TRIALS
-from ..players import SHIPPED, Player, load_player
+from ..players import Player, load_player
 from ..progress import progress_bar
 from ..provenance import commit, machine, versions
 from ..report import print_paths
+from ..seed_groups import expand_seeds, seed_groups
 from ..summary import plain
-from .backends import Crew, check_backend
 from .case import Case, case_row
 from .cases import Cases
 from .figures import controller_figures, pair_figures, robot_figures
 from .folder import FORMAT, BenchmarkFolder, BenchmarkSettings
-from .play import Job, Stage
-from .seeds import seed_groups
+from .play import Job, Stage, play
 from .suite import load_benchmark
 from .table import print_benchmark
 from .ticks import tick_times
@@ -57,8 +57,8 @@ def benchmark(
     and `backend`, but for the time of a tick.
 
     Args:
-        controllers: names as `load_player` takes them; none: all packaged ones and the shipped
-            policy.
+        controllers: names as `load_player` takes them, or folders of several training seeds;
+            none: all packaged controllers and policies.
         suite: a packaged suite (`configs/benchmarks`) or a path to a ``.yaml`` of one.
         out: the folder to write to.
         robot: a packaged robot or a path to its description.
@@ -75,7 +75,7 @@ def benchmark(
     """
     console = console or Console(quiet=True)
     started = time.perf_counter()
-    names = tuple(controllers) or default_controllers()
+    names = expand_seeds(controllers) or default_controllers()
     _check(names, seed, workers, trials)
     check_backend(backend)
     chosen = load_benchmark(suite)
@@ -144,9 +144,9 @@ def benchmark(
 
 
 def default_controllers() -> tuple[str, ...]:
-    """The reference, all other packaged controllers, and the shipped policy."""
+    """The reference, all other packaged controllers, and the packaged policies."""
     others = (name for name in packaged("controllers") if name != REFERENCE)
-    return (REFERENCE, *others, SHIPPED)
+    return (REFERENCE, *others, *packaged("policies"))
 
 
 def errors(summary: dict[str, Any]) -> int:
@@ -210,7 +210,7 @@ def _play(
         shown = {"played": len(won), "won": sum(won)}
 
         def keep(jobs: list[Job]) -> None:
-            for job, result in crew.play(jobs):
+            for job, result in crew.each(play, jobs):
                 folder.append(job.controller, job.case.number, result)
                 shown["played"] += 1
                 shown["won"] += result.outcome.recovered

@@ -9,6 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ..seed_groups import seed_lines
+
 
 def print_benchmark(summary: Mapping[str, Any], console: Console) -> None:
     """Ranking, and what happened besides: errors, groups of training seeds."""
@@ -20,11 +22,8 @@ def print_benchmark(summary: Mapping[str, Any], console: Console) -> None:
     for cells in ranking_rows(summary):
         table.add_row(*(escape(cell) for cell in cells))
     console.print(table)
-    for group in summary["seeds"]:
-        eta = group["eta"]
-        low, high = eta["iqm_ci95"]
-        text = f"{', '.join(group['members'])}: η {eta['iqm']:.2f} [{low:.2f}, {high:.2f}]"
-        console.print(f"IQM over {len(group['members'])} training seeds, {escape(text)}")
+    for line in seed_lines(summary["seeds"]):
+        console.print(line, markup=False, highlight=False)
     for name, entry in summary["controllers"].items():
         if entry["errors"]:
             console.print(f"[red]{escape(name)} raised an error in {entry['errors']} trials[/red]")

@@ -1,6 +1,6 @@
-"""Who plays the jobs: processes of this machine, joblib, or joblib on a Ray cluster.
+"""Who does the jobs: processes of this machine, joblib, or joblib on a Ray cluster.
 
-Whatever plays them, a job's result is the same, so that backends differ in speed alone.
+Whoever does them, a job's result is the same, so that back ends differ in speed alone.
 """
 
 from __future__ import annotations
@@ -11,19 +11,18 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from poise.envs.errors import ConfigError, PoiseError
 
-from ..provenance import usable_cores
-from ..workers import DIED, process_pool, single_threaded, without_interrupt
-from .case import Result
-from .play import Job
+from .provenance import usable_cores
+from .workers import DIED, THREADS, end_processes, process_pool, single_threaded, without_interrupt
 
 Backend = Literal["local", "joblib", "ray"]
 BACKENDS: tuple[Backend, ...] = ("local", "joblib", "ray")
 BLOCK = 8  # jobs per process that Ray is given at a time
-Finished = Iterator[tuple[Job, Result]]
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 
 def check_backend(backend: str) -> None:
@@ -40,9 +39,10 @@ def check_backend(backend: str) -> None:
 
 
 class Crew:
-    """Plays jobs on `workers` processes until closed; use as a context.
+    """Does jobs on `workers` processes until closed; use as a context.
 
     None: all cores, of this machine or of the cluster; `workers` tells how many once it is open.
+    After an error or Ctrl-C the processes are ended at once, whatever they are at.
     """
 
     def __init__(self, backend: str, workers: int | None):
@@ -64,7 +64,9 @@ class Crew:
     def __exit__(self, kind: type | None, *error: Any) -> None:
         try:
             if self._pool is not None:
-                self._pool.shutdown(wait=kind is None, cancel_futures=True)
+                if kind is not None:
+                    end_processes(self._pool)
+                self._pool.shutdown(cancel_futures=True)
             elif self.backend == "joblib":
                 from joblib.externals.loky import get_reusable_executor
 
@@ -72,23 +74,25 @@ class Crew:
         finally:
             self._open.close()
 
-    def play(self, jobs: Sequence[Job]) -> Finished:
-        """Each job with its result, as they are done.
+    def each(
+        self, function: Callable[[Job], Result], jobs: Sequence[Job]
+    ) -> Iterator[tuple[Job, Result]]:
+        """Each job with `function(job)`, as they are done; both are pickled.
 
-        Raises PoiseError when a process has died.
+        Raises PoiseError when a process has died, and what the function raises.
         """
         if not jobs:
             return iter(())
         if self._pool is not None:
-            return _in_pool(self._pool, jobs)
-        return self._with_joblib(jobs)
+            return _in_pool(self._pool, function, jobs)
+        return self._with_joblib(function, jobs)
 
-    def _with_joblib(self, jobs: Sequence[Job]) -> Finished:
+    def _with_joblib(self, function: Callable, jobs: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
         import joblib
 
         ray = self.backend == "ray"
-        call: Callable = joblib.delayed(play_at)
-        tasks = [call(job, tuple(sys.path)) for job in jobs]
+        call: Callable = joblib.delayed(do)
+        tasks = [call(function, job, tuple(sys.path)) for job in jobs]
         # Ray's backend gives results only when all are there: so a few at a time
         block = BLOCK * self.workers if ray else len(tasks)
         way = "list" if ray else "generator_unordered"
@@ -103,19 +107,21 @@ class Crew:
                     raise PoiseError(DIED) from None
 
 
-def play_at(job: Job, path: tuple[str, ...] = ()) -> tuple[Job, Result]:
-    """Play a job where modules are found as in the main process; `path` is its `sys.path`."""
-    from .play import play
-
+def do(
+    function: Callable[[Job], Result], job: Job, path: tuple[str, ...] = ()
+) -> tuple[Job, Result]:
+    """Do a job where modules are found as in the main process; `path` is its `sys.path`."""
     sys.path += [folder for folder in path if folder not in sys.path]
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    for name in THREADS:
         os.environ.setdefault(name, "1")
-    return job, play(job)
+    return job, function(job)
 
 
-def _in_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job]) -> Finished:
+def _in_pool(
+    pool: ProcessPoolExecutor, function: Callable, jobs: Sequence[Any]
+) -> Iterator[tuple[Any, Any]]:
     with without_interrupt():
-        futures = [pool.submit(play_at, job) for job in jobs]
+        futures = [pool.submit(do, function, job) for job in jobs]
     try:
         for future in as_completed(futures):
             yield future.result()
