@@ -19,6 +19,7 @@ from .macchietto09 import Macchietto09, Macchietto09Config
 from .momentum_qp import MomentumQP, MomentumQPConfig
 from .outside import OutsideConfig, OutsideController, is_outside, outside_config
 from .pd import PD, PDConfig
+from .simbicon import Simbicon, SimbiconConfig
 from .stable_pd import StablePD, StablePDConfig
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration).
@@ -35,6 +36,7 @@ KINDS: dict[str, tuple[type, type]] = {
     "lip-mpc": (LIPMPCConfig, LIPMPC),
     "outside": (OutsideConfig, OutsideController),
     "capture-step": (CaptureStepConfig, CaptureStep),
+    "simbicon": (SimbiconConfig, Simbicon),
 }
 
 CONTROLLERS = tuple(controller for _, controller in KINDS.values())
