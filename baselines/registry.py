@@ -11,6 +11,7 @@ from poise.envs.robot import Robot
 from .abe07 import Abe07, Abe07Config
 from .capture_point import CapturePoint, CapturePointConfig
 from .capture_step import CaptureStep, CaptureStepConfig
+from .ipm_step import IPMStep, IPMStepConfig
 from .jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
 from .kudoh02 import Kudoh02, Kudoh02Config
 from .lip_mpc import LIPMPC, LIPMPCConfig
@@ -36,6 +37,7 @@ KINDS: dict[str, tuple[type, type]] = {
     "lip-mpc": (LIPMPCConfig, LIPMPC),
     "outside": (OutsideConfig, OutsideController),
     "capture-step": (CaptureStepConfig, CaptureStep),
+    "ipm-step": (IPMStepConfig, IPMStep),
     "simbicon": (SimbiconConfig, Simbicon),
 }
 

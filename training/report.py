@@ -23,7 +23,7 @@ def draw_plots(
     folder: Path, suite: Suite, trials: Sequence[Trial], outcomes: Outcomes, limits: PushLimits
 ) -> list[Path]:
     """Write the plots of an evaluation; returns their paths, none without pushes."""
-    if trials[0].push is None:
+    if trials[0].push is None or trials[0].later:
         return []
     polar, fall = (folder / name for name in PLOTS)
     direction, impulse, duration = pushes(trials)
@@ -91,11 +91,13 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
         ]
     if "fraction50" in first:
         columns.append((f"half at, of {first['fraction_of']}", _half))
+    if "j50_mean" not in first and "fraction50" not in first:
+        columns.append(("never fell [95 %]",
+                        lambda e: _with_range(e, "never_fell_rate", "never_fell_ci95", ".1%")))  # fmt: skip
     if any(entry["com_drift_max"] is not None for entry in entries.values()):
-        columns += [
-            ("falls", lambda e: f"{e['fallen']}"),
-            ("CoM drift [mm]", lambda e: _milli(e["com_drift_max"])),
-        ]
+        columns.append(("CoM drift [mm]", lambda e: _milli(e["com_drift_max"])))
+    if any(entry["steps_max"] for entry in entries.values()):
+        columns.append(("steps, mean", lambda e: _number(e["steps_mean"], ".1f")))
     columns += [
         ("solver failures", lambda e: f"{e['solver_failures']}"),
         ("mean |action|", lambda e: _number(e["mean_abs_action"], ".3f")),
