@@ -3,10 +3,10 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+import mujoco
 import numpy as np
 
 from poise.envs.arrays import robot_arrays
-from poise.envs.description import match_names
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
@@ -81,7 +81,7 @@ class Simbicon:
     a_j, a_k are the hips' axes; d and v the CoM's place from the stance ankle and its velocity,
     in the sagittal and in the frontal plane. As feed-forward, the pendulum's force
     f = m g (c − p)/z_c through the stance ankle p: τ = h − Jᵀ f. Raises ConfigError for a robot
-    without two feet or without the role `knees`.
+    without two feet or without knees.
     """
 
     def __init__(self, robot: Robot, config: SimbiconConfig | None = None):
@@ -208,31 +208,34 @@ class _Leg:
 
 
 def _leg(robot: Robot, sole: int) -> _Leg:
+    """Joints of a leg by how far down they are: in the upper quarter, in the lower one, between."""
     model = robot.model
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_kinematics(model, data)
 
     def chain(body: int) -> list[int]:
         joints: list[int] = []
         while body != robot.root_body_id:
             first = model.body_jntadr[body]
-            joints = [first + k - 1 for k in range(model.body_jntnum[body])] + joints
+            joints = [first + k for k in range(model.body_jntnum[body])] + joints
             body = model.body_parentid[body]
         return joints
 
-    mine, other = chain(robot.soles[sole].body_id), chain(robot.soles[1 - sole].body_id)
-    names = list(robot.joint_names)
-    scales = match_names(robot.description.roles.get("knees", {}), names, robot.name, "roles.knees")
-    bends = np.array([scales.get(name, 0.0) for name in names])
-    own = [j for j in mine if j not in other]
-    knee = [j for j in own if bends[j] != 0.0]
+    mine, other = (chain(robot.soles[i].body_id) for i in (sole, 1 - sole))
+    own = np.array([j for j in mine if j not in other])
+    top, foot = data.xanchor[own[0]], data.xanchor[own[-1]]
+    depth = (data.xanchor[own] - top) @ (foot - top) / ((foot - top) @ (foot - top))
+    knee = own[(depth > 0.25) & (depth < 0.75)]
     if len(knee) != 1:
-        raise ConfigError(f"needs a knee, {robot.name!r} has no role 'knees'", field="controller")
-    hip = [j for j in own if j < knee[0]]
+        raise ConfigError(f"needs legs with a knee, unlike {robot.name!r}", field="controller")
+    shortens = np.cross(data.xaxis[knee], foot - data.xanchor[knee]) @ (top - foot)
     return _Leg(
-        upper=np.array([j for j in mine if j < knee[0]]),
-        hip=np.array(hip),
-        knee=np.array(knee),
-        ankle=np.array([j for j in own if j > knee[0]]),
-        bend=bends[knee],
+        upper=np.array([j for j in mine if j < knee[0]]) - 1,  # the first joint is the root's
+        hip=own[depth <= 0.25] - 1,
+        knee=knee - 1,
+        ankle=own[depth >= 0.75] - 1,
+        bend=np.sign(shortens),
     )
 
 

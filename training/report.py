@@ -92,8 +92,8 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
     if "fraction50" in first:
         columns.append((f"half at, of {first['fraction_of']}", _half))
     if "j50_mean" not in first and "fraction50" not in first:
-        columns.append(("never fell [95 %]",
-                        lambda e: _with_range(e, "never_fell_rate", "never_fell_ci95", ".1%")))  # fmt: skip
+        rate = ("never_fell_rate", "never_fell_ci95", ".1%")
+        columns.append(("never fell [95 %]", lambda e: _with_range(e, *rate)))
     if any(entry["com_drift_max"] is not None for entry in entries.values()):
         columns.append(("CoM drift [mm]", lambda e: _milli(e["com_drift_max"])))
     if any(entry["steps_max"] for entry in entries.values()):

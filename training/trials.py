@@ -94,7 +94,16 @@ PUSH_COLUMNS = (
     *("body", "start", "duration", "impulse", "direction", "elevation"),
     *("point_x", "point_y", "point_z", "profile"),
 )
-COLUMNS = ("trial", "controller", "seed", "stage", *PUSH_COLUMNS, "limit_fraction", "later", *OUTCOMES)
+COLUMNS = (
+    "trial",
+    "controller",
+    "seed",
+    "stage",
+    *PUSH_COLUMNS,
+    "limit_fraction",
+    "later",
+    *OUTCOMES,
+)
 
 
 def run_trial(
