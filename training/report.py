@@ -14,9 +14,12 @@ from .evaluation_folder import PLOTS
 from .fits import fit_logistic
 from .limits import PushLimits
 from .plots import fall_probability, polar_envelope
+from .step_limits import NStepLimit
 from .suite import Suite
 from .summary import Outcomes, fractions, pushes, sectors, won
 from .trials import Trial
+
+STEPPING = 0.1  # share of recoveries with a step, from which a controller is one that steps
 
 
 def draw_plots(
@@ -35,7 +38,8 @@ def draw_plots(
         }
         fine = np.arange(0.0, 360.0, 2.0)
         limit = [limits.ankle(d, float(duration[0])) for d in fine]
-        polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit))
+        steps = _step_limits(outcomes, limits, fine, float(duration[0]))
+        polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit), step_limits=steps)
         share, label = impulse / ankle, None
     else:
         fits = {name: sectors(trials, results) for name, results in outcomes.items()}
@@ -51,6 +55,21 @@ def draw_plots(
         xlabel=label,
     )
     return [polar, fall]
+
+
+def _step_limits(
+    outcomes: Outcomes, limits: PushLimits, fine: np.ndarray, duration: float
+) -> dict[str, Any]:
+    """What one and two steps could stop, where a controller stepped in a tenth of its recoveries."""
+    standing = [[o.steps > 0 for o in results if o.recovered] for results in outcomes.values()]
+    if not any(stepped and np.mean(stepped) > STEPPING for stepped in standing):
+        return {}
+    limit = NStepLimit(limits)
+    names = {1: "one-step limit", 2: "two-step limit"}
+    return {
+        name: (fine, [limit(angle, duration, count) for angle in fine])
+        for count, name in names.items()
+    }
 
 
 def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, Any]:
