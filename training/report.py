@@ -60,7 +60,7 @@ def draw_plots(
 def _step_limits(
     outcomes: Outcomes, limits: PushLimits, fine: np.ndarray, duration: float
 ) -> dict[str, Any]:
-    """What one and two steps could stop, where a controller stepped in a tenth of its recoveries."""
+    """What one and two steps could stop, if a controller stepped in a tenth of its recoveries."""
     standing = [[o.steps > 0 for o in results if o.recovered] for results in outcomes.values()]
     if not any(stepped and np.mean(stepped) > STEPPING for stepped in standing):
         return {}
