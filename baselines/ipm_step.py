@@ -29,7 +29,7 @@ def rest_distance(speed: float, omega: float, height: float, arc: float = 0.0) -
     """How far ahead of the CoM a foot stops it [m]: the energy left over the foot is 0.
 
     Linear pendulum, orbital energy E = ½ ẋ² − ½ ω² x² = 0:      x = ẋ/ω
-    rigid leg, ½ ẋ² + g z = g √(z² + x²) [Tsai10, Coros10]:      x = ẋ/ω √(1 + ẋ²/(4 g z))
+    rigid leg, ½ ẋ² + g z = g √(z² + x²) [Coros10]:              x = ẋ/ω √(1 + ẋ²/(4 g z))
 
     `arc` leads from the first (0) to the second (1); g = ω² z.
     """
