@@ -53,6 +53,7 @@ def test_the_second_push_of_in_step_is_the_smaller_one(limits: PushLimits) -> No
     for trial in trials:
         first, second = trial.options["push"]
         assert 0.15 <= second.start - first.start - first.duration <= 0.4
+        assert trial.limit_fraction is None
         assert 16.0 <= first.impulse <= 1.4 * 16.0 and first.direction != second.direction
         shares.append(second.impulse / 16.0)
     assert 0.2 <= min(shares) < 0.5 and 0.6 < max(shares) <= 0.6 * 1.4

@@ -7,7 +7,7 @@ from poise.envs.push_schedule import PushSampler, Range, push_bodies
 from poise.envs.pushes import Push
 
 from .limits import PushLimits
-from .suite import Suite, generator, make_trial
+from .suite import Suite, generator, start_seed
 from .trials import Trial
 
 
@@ -17,7 +17,8 @@ class SequenceSuite(Suite):
 
     `pushes.count` of them at most. The impulse of all but the first is multiplied by a number
     drawn from `later`. Without `bodies` the robot's first push body is pushed; a magnitude in
-    controller_fraction is one of `--limits`, which may be a controller's own.
+    controller_fraction is one of `--limits`, which may be a controller's own. `limit_fraction` is
+    left out: no single push decides a trial.
     """
 
     kind: Literal["sequence"] = "sequence"
@@ -55,5 +56,5 @@ class SequenceSuite(Suite):
             first, *rest = [push for push in drawn if isinstance(push, Push)]
             scaled = [replace(p, impulse=p.impulse * rng.uniform(*self.later)) for p in rest]
             later = tuple(push for push in scaled if push.start < self.until)
-            trials.append(replace(make_trial(seed, number, first, limits), later=later))
+            trials.append(Trial(number, start_seed(seed, number), first, later=later))
         return trials
