@@ -11,6 +11,7 @@ from poise.envs.robot import Robot
 from .abe07 import Abe07, Abe07Config
 from .capture_point import CapturePoint, CapturePointConfig
 from .capture_step import CaptureStep, CaptureStepConfig
+from .ipm_step import IPMStep, IPMStepConfig
 from .jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
 from .kudoh02 import Kudoh02, Kudoh02Config
 from .lip_mpc import LIPMPC, LIPMPCConfig
@@ -19,6 +20,7 @@ from .macchietto09 import Macchietto09, Macchietto09Config
 from .momentum_qp import MomentumQP, MomentumQPConfig
 from .outside import OutsideConfig, OutsideController, is_outside, outside_config
 from .pd import PD, PDConfig
+from .simbicon import Simbicon, SimbiconConfig
 from .stable_pd import StablePD, StablePDConfig
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration).
@@ -35,6 +37,8 @@ KINDS: dict[str, tuple[type, type]] = {
     "lip-mpc": (LIPMPCConfig, LIPMPC),
     "outside": (OutsideConfig, OutsideController),
     "capture-step": (CaptureStepConfig, CaptureStep),
+    "ipm-step": (IPMStepConfig, IPMStep),
+    "simbicon": (SimbiconConfig, Simbicon),
 }
 
 CONTROLLERS = tuple(controller for _, controller in KINDS.values())

@@ -115,7 +115,7 @@ class StepPlanner:
         p + (ξ − p) e^(ωt) [Koolen12]; the foothold is what limits of place and speed allow of the
         one wanted there.
         """
-        limits, choice, h = self.limits, self.choice, self.h
+        choice, h = self.choice, self.h
         R, side = turn(yaw), self.sides[foot]
         stance = state.sole_points[1 - foot, :2]
         xi = state.capture_point
@@ -124,13 +124,22 @@ class StepPlanner:
         local = (end - stance) @ R - self.reach.middle[foot]
         local[:, 0] += choice.overshoot * h * np.tanh(local[:, 0] / (0.1 * h))
         local[:, 1] += side * choice.outward * h
-        local[:, 0] = np.clip(local[:, 0], -limits.behind * h, limits.ahead * h)
-        local[:, 1] = side * np.clip(side * local[:, 1], limits.width_min * h, limits.width_max * h)
-        gap = local - (start - stance) @ R
-        span = np.array([limits.speed, limits.side_speed]) * h * self.rate * times[:, None]
-        excess = np.maximum(np.linalg.norm(gap / span, axis=1), 1.0)
-        local -= gap * (1.0 - 1.0 / excess)[:, None]
+        local = self.allowed(local, (start - stance) @ R, foot, times)
         footholds = stance + local @ R.T
         first, second = (footholds, stance) if foot == 0 else (stance, footholds)
         outside = self.reach.beyond(first, second, yaw, end)
         return footholds, np.maximum(outside, -choice.margin * h)
+
+    def allowed(
+        self, local: np.ndarray, start: np.ndarray, foot: int, times: np.ndarray
+    ) -> np.ndarray:
+        """(n, 2) what limits of place and speed leave of footholds `local` (n, 2), both from the
+        stance foot along the heading, for a foot that is at `start` (2,)."""
+        limits, h, side = self.limits, self.h, self.sides[foot]
+        local = local.copy()
+        local[:, 0] = np.clip(local[:, 0], -limits.behind * h, limits.ahead * h)
+        local[:, 1] = side * np.clip(side * local[:, 1], limits.width_min * h, limits.width_max * h)
+        gap = local - start
+        span = np.array([limits.speed, limits.side_speed]) * h * self.rate * times[:, None]
+        excess = np.maximum(np.linalg.norm(gap / span, axis=1), 1.0)
+        return local - gap * (1.0 - 1.0 / excess)[:, None]

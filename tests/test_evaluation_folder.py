@@ -26,6 +26,7 @@ SETTINGS = Settings(
 )
 OUTCOME = Outcome(
     recovered=True, fallen=False, fall_time=None, recovery_time=0.1 + 0.2, stepped=False,
+    steps=0,
     max_com=1 / 3, max_capture=0.1, min_cop_margin=-1e-17, max_slide=0.0, energy=12.0,
     peak_torque=1.0, saturation=0.25, solver_failures=2, mean_abs_action=None, com_drift=None,
     final_speed=1e-5, root_force=0.0,

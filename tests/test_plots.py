@@ -85,6 +85,18 @@ def test_envelope_shows_bands_limit_and_rings_from_zero(tmp_path, figures):
     assert ax.get_ylim()[0] == 0 and ax.get_ylim()[1] >= 21
 
 
+def test_envelope_shows_what_steps_can_stop(tmp_path, figures):
+    """A line for each number of steps, inside the rings."""
+    lines = {
+        "one": (ANGLES, np.full(len(ANGLES), 30.0)),
+        "two": (ANGLES, np.full(len(ANGLES), 50.0)),
+    }
+    polar_envelope(tmp_path / "a.png", {"a": circle(15)}, step_limits=lines)
+    ax = figures[0].axes[0]
+    assert {x.get_label() for x in ax.lines} >= {"a", "one", "two"}
+    assert ax.get_ylim()[1] >= 50
+
+
 def test_envelope_with_a_missing_direction(tmp_path):
     """A direction without a figure is a gap, not an error."""
     directions, j50, low, high = circle(15)

@@ -39,7 +39,7 @@ def test_every_packaged_suite_gives_as_many_trials_as_it_says(
     assert suite.first(limits, 7) == trials[: len(suite.first(limits, 7))]
     other = suite.first(limits, 8)
     assert not {trial.seed for trial in other} & {trial.seed for trial in trials}
-    if name not in ("grid", "quiet"):
+    if name not in ("grid", "quiet", "repeated"):
         assert not {trial.push.impulse for trial in other} & {t.push.impulse for t in trials}
     assert build_suite(to_dict(suite), "again") == suite
 
@@ -100,7 +100,7 @@ def test_the_grid_has_every_magnitude_in_every_direction(limits: PushLimits) -> 
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"kind": "randm"}, "kind.*choices: random, envelope, grid, quiet"),
+        ({"kind": "randm"}, "kind.*choices: random, envelope, grid, quiet, sequence"),
         ({"kind": "random", "trials": 0}, "trials.*at least 1"),
         ({"kind": "random", "pushes": {"magnitude": [1, 2], "unit": "delta_v"}}, "pushes"),
         ({"kind": "random", "pushes": {"magnitude": [2, 1], "unit": "impulse"}}, "magnitude"),

@@ -11,6 +11,7 @@ import pytest
 from poise.envs.pushes import Push
 from poise.envs.robot import load_robot
 from poise.training.limits import PushLimits
+from poise.training.sequence_suite import SequenceSuite
 from poise.training.suites import EnvelopeSuite, QuietSuite, RandomSuite
 from poise.training.summary import plain, summarise
 from poise.training.trials import Outcome, Trial
@@ -85,6 +86,32 @@ def test_without_pushes_there_is_no_j50(limits: PushLimits) -> None:
     entry = found["controllers"]["a"]
     assert entry["com_drift_max"] == 0.004 and entry["mean_abs_action"] == 0.01
     assert "j50_mean" not in entry and "fraction50" not in entry and found["pairs"] == []
+
+
+def test_steps_are_counted_and_feet_in_place_apart(limits: PushLimits) -> None:
+    """A recovery with feet in place has neither a touchdown nor a foot that slid."""
+    four = [
+        OUTCOME,
+        replace(OUTCOME, stepped=True, steps=2),
+        replace(OUTCOME, stepped=True),  # slid
+        replace(OUTCOME, recovered=False, fallen=True, stepped=True, steps=5),
+    ]
+    found = summarise(QuietSuite(), [Trial(i, i) for i in range(4)], {"a": four}, limits)
+    entry = found["controllers"]["a"]
+    assert entry["recovered"] == 3 and entry["recovered_in_place"] == 1
+    assert entry["recovered_with_step"] == 2
+    assert entry["steps_mean"] == 7 / 4 and entry["steps_max"] == 5
+    assert entry["never_fell_rate"] == 0.75 and entry["fallen"] == 1
+    assert entry["never_fell_ci95"][0] < 0.75 < entry["never_fell_ci95"][1]
+
+
+def test_pushes_one_after_the_other_have_no_direction(limits: PushLimits) -> None:
+    """Falls are counted; no J50 is fitted to the first push of many."""
+    push = Push("torso", 0.5, 0.1, 10.0, 0.0)
+    many = [Trial(i, i, push, 0.5, later=(replace(push, start=2.0),)) for i in range(2)]
+    results = {"a": [OUTCOME, replace(OUTCOME, recovered=False, fallen=True)]}
+    entry = summarise(SequenceSuite(), many, results, limits)["controllers"]["a"]
+    assert entry["never_fell_rate"] == 0.5 and "fraction50" not in entry
 
 
 def test_plain_is_json_of_any_reader(limits: PushLimits) -> None:

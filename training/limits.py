@@ -28,6 +28,7 @@ class PushLimits:
     Attributes:
         robot: the robot.
         table: J50 [N·s] of the baseline for 0.1 s square pushes, or None.
+        standing: the robot's state at rest.
         scale: what `fraction` is a fraction of: "baseline J50", or "ankle limit" without a table.
     """
 
@@ -35,11 +36,11 @@ class PushLimits:
         self.robot, self.table = robot, table
         self.scale = "ankle limit" if table is None else "baseline J50"
         self.omega = pendulum_rate(robot)
-        self._standing = Simulation(robot).state.copy()
+        self.standing = Simulation(robot).state.copy()
 
     def margin(self, direction: float) -> float:
         """δ(θ) [m] of the standing posture, `direction` in degrees."""
-        return self._standing.support_margin(direction)
+        return self.standing.support_margin(direction)
 
     def ankle(self, direction: float, duration: float) -> float:
         """Impulse J [N·s] of a square push that the ankles alone hold."""

@@ -31,6 +31,7 @@ def polar_envelope(
     envelopes: Mapping[str, tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]],
     *,
     ankle_limit: tuple[ArrayLike, ArrayLike] | None = None,
+    step_limits: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     title: str = "Recovered impulse by push direction",
     unit: str = "N·s",
 ) -> None:
@@ -41,6 +42,7 @@ def polar_envelope(
         envelopes: name → (directions [°], j50, low, high), four arrays of shape (n,). Directions
             count counter-clockwise from forward, in any order; [low, high] is drawn as a band.
         ankle_limit: (directions [°], limit), the impulse that the ankles alone can hold.
+        step_limits: name → the same for what a number of steps can stop.
         title: above the plot.
         unit: of j50 and limit.
 
@@ -57,6 +59,11 @@ def polar_envelope(
             theta, (limit,) = _closed(*ankle_limit)
             ax.plot(theta, limit, color=INK, lw=1.3, ls=(0, (5, 3)), label="ankle limit", zorder=2)
             top = float(np.nanmax(limit))
+        for k, (name, bound) in enumerate((step_limits or {}).items()):
+            theta, (limit,) = _closed(*bound)
+            dots = (0, (1, 1.5 + 1.5 * k))
+            ax.plot(theta, limit, color=GREY, lw=1.3, ls=dots, label=name, zorder=2)
+            top = max(top, float(np.nanmax(limit)))
         for k, (name, (directions, *values)) in enumerate(envelopes.items()):
             theta, (j50, low, high) = _closed(directions, *values)
             style = look(k)

@@ -1,6 +1,7 @@
 """Playing one trial of an evaluation again, exactly, from its folder."""
 
 import csv
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -137,7 +138,10 @@ def _trial(line: Mapping[str, str], path: Path) -> Trial:
             data["point"] = [data.pop(key) for key in ("point_x", "point_y", "point_z")]
             push = build(Push, data, str(path))
         fraction = float(line["limit_fraction"]) if line["limit_fraction"] else None
-        return Trial(int(line["trial"]), int(line["seed"]), push, fraction, int(line["stage"]))
+        rest = json.loads(line["later"]) if line["later"] else []
+        later = tuple(build(Push, push, str(path)) for push in rest)
+        number, seed, stage = (int(line[key]) for key in ("trial", "seed", "stage"))
+        return Trial(number, seed, push, fraction, stage, later)
     except ValueError as error:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None
 

@@ -15,16 +15,19 @@ from .fits import fit_logistic
 from .limits import PushLimits
 from .plots import fall_probability, polar_envelope
 from .seed_groups import seed_lines
+from .step_limits import NStepLimit
 from .suite import Suite
 from .summary import Outcomes, fractions, pushes, sectors, won
 from .trials import Trial
+
+STEPPING = 0.1  # share of recoveries with a step, from which a controller is one that steps
 
 
 def draw_plots(
     folder: Path, suite: Suite, trials: Sequence[Trial], outcomes: Outcomes, limits: PushLimits
 ) -> list[Path]:
     """Write the plots of an evaluation; returns their paths, none without pushes."""
-    if trials[0].push is None:
+    if trials[0].push is None or trials[0].later:
         return []
     polar, fall = (folder / name for name in PLOTS)
     direction, impulse, duration = pushes(trials)
@@ -36,7 +39,8 @@ def draw_plots(
         }
         fine = np.arange(0.0, 360.0, 2.0)
         limit = [limits.ankle(d, float(duration[0])) for d in fine]
-        polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit))
+        steps = _step_limits(outcomes, limits, fine, float(duration[0]))
+        polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit), step_limits=steps)
         share, label = impulse / ankle, None
     else:
         fits = {name: sectors(trials, results) for name, results in outcomes.items()}
@@ -52,6 +56,21 @@ def draw_plots(
         xlabel=label,
     )
     return [polar, fall]
+
+
+def _step_limits(
+    outcomes: Outcomes, limits: PushLimits, fine: np.ndarray, duration: float
+) -> dict[str, Any]:
+    """What one and two steps could stop, if a controller stepped in a tenth of its recoveries."""
+    standing = [[o.steps > 0 for o in results if o.recovered] for results in outcomes.values()]
+    if not any(stepped and np.mean(stepped) > STEPPING for stepped in standing):
+        return {}
+    limit = NStepLimit(limits)
+    names = {1: "one-step limit", 2: "two-step limit"}
+    return {
+        name: (fine, [limit(angle, duration, count) for angle in fine])
+        for count, name in names.items()
+    }
 
 
 def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, Any]:
@@ -94,11 +113,13 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
         ]
     if "fraction50" in first:
         columns.append((f"half at, of {first['fraction_of']}", _half))
+    if "j50_mean" not in first and "fraction50" not in first:
+        rate = ("never_fell_rate", "never_fell_ci95", ".1%")
+        columns.append(("never fell [95 %]", lambda e: _with_range(e, *rate)))
     if any(entry["com_drift_max"] is not None for entry in entries.values()):
-        columns += [
-            ("falls", lambda e: f"{e['fallen']}"),
-            ("CoM drift [mm]", lambda e: _milli(e["com_drift_max"])),
-        ]
+        columns.append(("CoM drift [mm]", lambda e: _milli(e["com_drift_max"])))
+    if any(entry["steps_max"] for entry in entries.values()):
+        columns.append(("steps, mean", lambda e: _number(e["steps_mean"], ".1f")))
     columns += [
         ("solver failures", lambda e: f"{e['solver_failures']}"),
         ("mean |action|", lambda e: _number(e["mean_abs_action"], ".3f")),

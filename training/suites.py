@@ -15,6 +15,7 @@ from poise.envs.pushes import Push
 
 from .direction_suites import EnvelopeSuite, GridSuite
 from .limits import PushLimits
+from .sequence_suite import SequenceSuite
 from .suite import Suite, generator, make_trial, start_seed
 from .trials import Trial
 
@@ -84,6 +85,7 @@ KINDS: dict[str, type[Suite]] = {
     "envelope": EnvelopeSuite,
     "grid": GridSuite,
     "quiet": QuietSuite,
+    "sequence": SequenceSuite,
 }
 
 

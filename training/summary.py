@@ -32,7 +32,7 @@ def summarise(
         entry = counts(results)
         if suite.by_direction:
             entry |= envelope(trials, results, limits)
-        elif trials[0].push is not None:
+        elif trials[0].push is not None and not trials[0].later:
             entry |= _fractions(trials, results, limits)
         controllers[name] = entry
     pairs = [
@@ -75,13 +75,19 @@ def counts(results: Sequence[Outcome]) -> dict[str, Any]:
         return float(function(values)) if values else None
 
     standing = [outcome for outcome in results if outcome.recovered]
+    fallen = sum(outcome.fallen for outcome in results)
     return {
         "trials": trials,
         "recovered": count,
         "recovered_rate": count / trials,
         "recovered_ci95": wilson_interval(count, trials),
-        "fallen": sum(outcome.fallen for outcome in results),
+        "fallen": fallen,
+        "never_fell_rate": 1.0 - fallen / trials,
+        "never_fell_ci95": wilson_interval(trials - fallen, trials),
         "recovered_with_step": sum(outcome.stepped for outcome in standing),
+        "recovered_in_place": sum(o.steps == 0 and not o.stepped for o in standing),
+        "steps_mean": over("steps", np.mean),
+        "steps_max": over("steps", np.max),
         "solver_failures": sum(outcome.solver_failures for outcome in results),
         "recovery_time_median": over("recovery_time", np.median),
         "max_com_median": over("max_com", np.median, standing),

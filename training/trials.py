@@ -1,5 +1,6 @@
 """One trial of the benchmark: a start, a push, and what became of it."""
 
+import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -11,6 +12,7 @@ from poise.envs.balance import BalanceEnv
 from poise.envs.pushes import Push
 
 from .players import Player
+from .touchdowns import Touchdowns
 
 STEP_LENGTH = 0.05  # [m] a foot that moves further has stepped, or slid as far
 SETTLED = 1.0  # [s] after which actions and drift count
@@ -23,9 +25,10 @@ class Trial:
     Attributes:
         number: of the trial within its evaluation.
         seed: of the disturbed start.
-        push: the push, None for none.
+        push: the push, or the first one; None for none.
         limit_fraction: impulse over the limit of the suite (see `PushLimits.scale`).
         stage: of suites that choose trials by the outcome of earlier ones.
+        later: further pushes.
     """
 
     number: int
@@ -33,11 +36,12 @@ class Trial:
     push: Push | None = None
     limit_fraction: float | None = None
     stage: int = 1
+    later: tuple[Push, ...] = ()
 
     @property
     def options(self) -> dict[str, Any]:
         """For the environment's `reset`."""
-        return {"push": [] if self.push is None else [self.push]}
+        return {"push": [] if self.push is None else [self.push, *self.later]}
 
 
 @dataclass(frozen=True)
@@ -48,8 +52,9 @@ class Outcome:
     Attributes:
         recovered: upright and quiet for the last second.
         fallen: whether it fell; `fall_time` counts from the reset.
-        recovery_time: from the start of the push to the last moment that was not quiet.
+        recovery_time: from the start of the last push to the last moment that was not quiet.
         stepped: a foot moved more than 5 cm.
+        steps: touchdowns of feet that were in the air for 0.08 s.
         max_com, max_capture: largest distance of CoM and capture point from the soles' centre.
         min_cop_margin: smallest distance of the CoP from the edge of the support.
         max_slide: largest distance of a sole from where it started.
@@ -69,6 +74,7 @@ class Outcome:
     fall_time: float | None
     recovery_time: float | None
     stepped: bool
+    steps: int
     max_com: float | None
     max_capture: float | None
     min_cop_margin: float | None
@@ -88,7 +94,16 @@ PUSH_COLUMNS = (
     *("body", "start", "duration", "impulse", "direction", "elevation"),
     *("point_x", "point_y", "point_z", "profile"),
 )
-COLUMNS = ("trial", "controller", "seed", "stage", *PUSH_COLUMNS, "limit_fraction", *OUTCOMES)
+COLUMNS = (
+    "trial",
+    "controller",
+    "seed",
+    "stage",
+    *PUSH_COLUMNS,
+    "limit_fraction",
+    "later",
+    *OUTCOMES,
+)
 
 
 def run_trial(
@@ -102,6 +117,7 @@ def run_trial(
     state = env.simulation.state  # its arrays follow the simulation
     settled = round(SETTLED / env.config.policy_period)
     actions, steps, drift = 0.0, 0, 0.0
+    touchdowns = Touchdowns(len(state.contacts), env.config.policy_period)
     start: np.ndarray | None = None
     done = False
     while not done:
@@ -111,6 +127,7 @@ def run_trial(
         _, terminated, truncated = env.step_in_place(action)
         observation = env.episode.observation.astype(np.float32)
         done = terminated or truncated
+        touchdowns.update(state.contacts)
         if env.steps == settled:
             start = state.com[:2].copy()
         elif start is not None:
@@ -121,6 +138,7 @@ def run_trial(
         watch(env)
     return Outcome(
         mean_abs_action=actions / steps if steps else None,
+        steps=touchdowns.count,
         com_drift=_finite(drift) if steps and trial.push is None else None,
         **_record(env, trial),
     )
@@ -131,7 +149,7 @@ def _record(env: BalanceEnv, trial: Trial) -> dict[str, Any]:
     m = env.episode.metrics
     controller = getattr(env, "controller", None)
     recovered = env.recovered and not env.fallen
-    pushed = trial.push.start if trial.push else 0.0
+    pushed = max((push.start for push in trial.options["push"]), default=0.0)
     return {
         "recovered": recovered,
         "fallen": env.fallen,
@@ -169,5 +187,6 @@ def row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Any]:
         "stage": trial.stage,
         **line,
         "limit_fraction": trial.limit_fraction,
+        "later": json.dumps([asdict(push) for push in trial.later]) if trial.later else None,
         **asdict(outcome),
     }

@@ -65,7 +65,7 @@ class Result:
 def failed(error: Exception) -> Result:
     """The result of a trial in which the controller raised."""
     nothing = dict.fromkeys(OUTCOMES)
-    nothing |= {"recovered": False, "fallen": False, "stepped": False}
+    nothing |= {"recovered": False, "fallen": False, "stepped": False, "steps": 0}
     nothing |= {"saturation": 0.0, "solver_failures": 0}
     text = " ".join(f"{type(error).__name__}: {error}".split())
     return Result(Outcome(**nothing), error=text)  # type: ignore[arg-type]
@@ -83,6 +83,7 @@ COLUMNS = (
 def case_row(case: Case, controller: str, result: Result) -> dict[str, Any]:
     """A line of trials.csv."""
     line = row(case, controller, result.outcome)
+    del line["later"]  # `pushes` and `interval` say how a case goes on
     line |= {name: getattr(case, name) for name in (*CASE_COLUMNS, *FACTOR_COLUMNS)}
     return line | {name: getattr(result, name) for name in RESULT_COLUMNS}
 
