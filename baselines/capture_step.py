@@ -1,6 +1,6 @@
 """Feet in place as long as that holds; then steps to where the capture point can be stopped."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -16,7 +16,7 @@ from .controller import Targets
 from .momentum_qp import MomentumQPConfig
 from .step_plan import Foothold, Plan, StepLimits, StepPlanner
 from .support import nearest_inside
-from .swing import Swing, SwingTask, swing_rows
+from .swing import Swing, SwingTask, rotation_error, swing_rows
 
 LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
 FIRST_LOAD = 0.3  # [m g] that a foot may bear at touchdown; then the limit rises by m g a ramp
@@ -171,8 +171,7 @@ class CaptureStep(AroundQP):
         """Targets of our own: those given, but upright at rest along the heading."""
         if self._guided is None:
             self._guided = Targets.standing(self.robot, state)
-        for item in fields(Targets):
-            getattr(self._guided, item.name)[:] = getattr(targets, item.name)
+        self._guided.take(targets)
         self._guided.root_axes[:] = self._level() @ self.qp.arrays.root_standing
         self._guided.root_vel[:] = 0.0
         return self._guided
@@ -211,7 +210,9 @@ class CaptureStep(AroundQP):
         bound = self.config.joint_accel * rate2
         t.a_ref[:] = np.clip(asked, -bound, bound) - asked
         R = state.root_axes
-        error = 0.5 * sum(np.cross(R[:, i], t.root_axes[:, i]) for i in range(3))
-        asked = p.stiffness[3:6] * (R.T @ error) - p.damping[3:6] * state.qvel[3:6]
+        asked = (
+            p.stiffness[3:6] * (R.T @ rotation_error(R, t.root_axes))
+            - p.damping[3:6] * state.qvel[3:6]
+        )
         bound = self.config.root_accel * rate2 / max(float(np.linalg.norm(asked)), 1e-9)
         t.root_acc[:] = asked * (min(1.0, bound) - 1.0)

@@ -4,22 +4,106 @@ One reduced problem for each subset (see `reduced_qp.py`), built on arrays that 
 contact only; what else is asked of v̇, such as the way of a swing foot, comes as further rows.
 """
 
-from collections.abc import Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from poise.envs.arrays import RobotArrays, apart, robot_arrays
-from poise.envs.kinematics import StateArrays
+from poise.envs.block import Block, bound
+from poise.envs.jit import compiled
+from poise.envs.kinematics import StateArrays, copy
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .controller import Targets
-from .momentum_qp import MomentumQPConfig, accept, allocate_memory, forget, solve
+from .momentum_qp import Memory, MomentumQPConfig, accept, allocate_memory, forget, solve
 from .parameters import qp_parameters
-from .reduced_qp import QPParameters, Workspace, allocate_workspace, assemble
+from .reduced_qp import QPParameters, TargetArrays, Workspace, allocate_workspace, assemble
 from .solvers import QP
 from .task_rows import Rows
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTick(Block):
+    """What a tick of one subset works on; k further rows in v̇, n unknowns."""
+
+    source: StateArrays  # of all soles
+    state: StateArrays  # of the subset
+    pick: np.ndarray  # (nc,) int: its soles
+    robot: RobotArrays
+    parameters: QPParameters
+    targets: TargetArrays
+    period: float  # [s]
+    workspace: Workspace
+    memory: Memory
+    A: np.ndarray  # (k, nv)
+    b: np.ndarray  # (k,)
+    weights: np.ndarray  # (k,)
+    AV: np.ndarray  # (k, n) scratch
+    weighted: np.ndarray  # (k, n) scratch
+    load_limits: np.ndarray  # (nc,) [N]
+    limited: np.ndarray  # (1,) int: whether they count
+
+
+@compiled
+def pick_soles(source: StateArrays, pick: np.ndarray, own: StateArrays):
+    """Copy what belongs to soles; the origin is the mean of those picked."""
+    nc = pick.shape[0]
+    own.origin[:] = 0.0
+    for i in range(nc):
+        sole = pick[i]
+        for r in range(6):
+            copy(source.J[6 * sole + r], own.J[6 * i + r])
+            own.J_v[6 * i + r] = source.J_v[6 * sole + r]
+            own.Jdot_v[6 * i + r] = source.Jdot_v[6 * sole + r]
+        for a in range(3):
+            copy(source.sole_axes[sole, a], own.sole_axes[i, a])
+            own.sole_point[i, a] = source.sole_point[sole, a]
+            own.origin[a] += source.sole_point[sole, a]
+        own.contacts[i] = source.contacts[sole]
+    for a in range(3):
+        own.origin[a] /= nc
+
+
+@compiled
+def add_rows(t: ContactTick):
+    """Add ½ Σ weights (A v̇ − b)², v̇ = v̇₀ + V x, to the objective."""
+    ws, A, AV = t.workspace, t.A, t.AV
+    np.dot(A, ws.V, AV)
+    for r in range(A.shape[0]):
+        offset = -t.b[r]
+        for j in range(A.shape[1]):
+            offset += A[r, j] * ws.vdot0[j]
+        for i in range(AV.shape[1]):
+            t.weighted[r, i] = t.weights[r] * AV[r, i]
+            ws.g[i] += offset * t.weighted[r, i]
+    n = AV.shape[1]
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for r in range(A.shape[0]):
+                total += AV[r, i] * t.weighted[r, j]
+            ws.H[i, j] += total
+
+
+def assemble_contacts(t: ContactTick) -> None:
+    """The reduced QP of a subset; to be called by its address, as the next one."""
+    ws, cone = t.workspace, t.parameters.cone
+    pick_soles(t.source, t.pick, t.state)
+    assemble(t.robot, t.state, t.parameters, t.targets, t.period, ws)
+    if t.A.shape[0] > 0:
+        add_rows(t)
+    if t.limited[0]:
+        for i in range(cone.shape[0]):
+            row = (i + 1) * cone.shape[1] - 1
+            copy(ws.E[6 * i + 2], ws.C[row])
+            ws.u[row] = t.load_limits[i] - ws.w0[6 * i + 2]
+
+
+def solve_contacts(t: ContactTick) -> None:
+    """Torques from the assembled problem."""
+    accept(t.source, t.parameters, solve(t.workspace), t.workspace, t.memory)
 
 
 class ContactSet:
@@ -43,19 +127,30 @@ class ContactSet:
             "sole_point": apart((nc, 3)), "sole_axes": apart((nc, 3, 3)), "origin": apart(3),
             "contacts": apart(nc),
         }  # fmt: skip
-        self._source: StateArrays | None = None
+        self._bound_to: tuple[object, ...] = ()
 
     def state(self, s: StateArrays) -> StateArrays:
         """`s` with the soles of this set only."""
-        own = self._own
-        for name in ("J", "J_v", "Jdot_v"):
-            own[name][:] = getattr(s, name)[self.rows]
-        for name in ("sole_point", "sole_axes", "contacts"):
-            own[name][:] = getattr(s, name)[self.pick]
-        own["origin"][:] = own["sole_point"].mean(axis=0)
-        if self._source is not s:
-            self._source, self._state = s, replace(s, **own)
-        return self._state
+        own = replace(s, **self._own)
+        pick_soles(s, self.pick, own)
+        return own
+
+    def bind(
+        self, s: StateArrays, targets: TargetArrays, rows: int, period: float, memory: Memory
+    ) -> ContactTick:
+        """What a tick from `s` with so many further rows works on; `assemble` and `solve` do it."""
+        if (s, targets, rows) != self._bound_to:  # blocks are equal where they are the same
+            nv, n = self.arrays.q_standing.size + 6, self.workspace.g.size
+            self._tick = ContactTick(
+                s, replace(s, **self._own), self.pick, self.arrays, self.parameters, targets,
+                period, self.workspace, memory, apart((rows, nv)), apart(rows), apart(rows),
+                apart((rows, n)), apart((rows, n)), apart(len(self.soles)),
+                apart(1, dtype=np.int64),
+            )  # fmt: skip
+            self.assemble: Callable[[], None] = bound(assemble_contacts, self._tick)
+            self.solve: Callable[[], None] = bound(solve_contacts, self._tick)
+            self._bound_to = (s, targets, rows)
+        return self._tick
 
 
 class ContactSets:
@@ -102,24 +197,23 @@ class ContactSets:
             load_limits: (len(soles),) largest vertical force of each sole [N]; none if left out.
         """
         chosen = self.sets[soles]
-        ws, p = chosen.workspace, chosen.parameters
+        ws = chosen.workspace
         if soles != self.active:
             ws.cop_prev[:] = np.nan
             ws.iscratch[:] = 0
             self.active = soles
-        assemble(chosen.arrays, chosen.state(state.arrays), p, targets.arrays(), self.period, ws)
+        rows = sum(len(task.b) for task in tasks)
+        block = chosen.bind(state.arrays, targets.arrays(), rows, self.period, self.memory)
+        first = 0
         for task in tasks:
-            A = task.A @ ws.V
-            offset = task.A @ ws.vdot0 - task.b
-            weighted = task.weights[:, None] * A
-            ws.H[:] += A.T @ weighted
-            ws.g[:] += offset @ weighted
+            last = first + len(task.b)
+            block.A[first:last], block.b[first:last] = task.A, task.b
+            block.weights[first:last] = task.weights
+            first = last
+        block.limited[0] = load_limits is not None
         if load_limits is not None:
-            rows = p.cone.shape[1]
-            for i, limit in enumerate(load_limits):
-                row = (i + 1) * rows - 1
-                ws.C[row] = ws.E[6 * i + 2]
-                ws.u[row] = limit - ws.w0[6 * i + 2]
+            block.load_limits[:] = load_limits
+        chosen.assemble()
         return QP(ws.H, ws.g, ws.C, ws.l, ws.u)
 
     def tick(
@@ -133,9 +227,8 @@ class ContactSets:
         """Joint torques (nu,) [N·m]; arguments as of `problem`."""
         self.problem(state, targets, soles, tasks, load_limits)
         chosen = self.sets[soles]
-        ws, p = chosen.workspace, chosen.parameters
-        accept(state.arrays, p, solve(ws), ws, self.memory)
-        return ws.tau[self._motor_joints].copy()
+        chosen.solve()
+        return chosen.workspace.tau[self._motor_joints].copy()
 
     @property
     def workspace(self) -> Workspace:

@@ -10,8 +10,9 @@ import numpy as np
 
 from poise.envs.arrays import apart
 from poise.envs.balance import BalanceEnv, EnvConfig
+from poise.envs.block import bound
 from poise.envs.config import build, to_dict
-from poise.envs.episode import ROOT_FORCE, ROOT_MOMENT, judge_step, record_tick
+from poise.envs.episode import ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 from poise.envs.vector import make_vector_env
@@ -21,7 +22,8 @@ from .momentum_qp import MomentumQP, MomentumQPConfig
 from .motions import ReferenceMotion, load_motion
 from .registry import CONTROLLERS, load_controller
 from .residual_step import ResidualStep, residual_step, soft_root_force
-from .targets import Motion, update_targets
+from .targets import Motion
+from .tick_parts import Aim, Record, aim, record
 from .warmup import prepare
 
 
@@ -269,6 +271,8 @@ class ResidualBalanceEnv(BalanceEnv):
         self._com_offset = float(getattr(controller, "com_offset", 0.0))
         self._step: ResidualStep | None = None
         self._gains: Any = None  # with which it was made
+        self._aim: tuple[Any, Any] = (None, None)  # what was bound, and to which state
+        self._record: tuple[Any, Any] = (None, None)
 
     def arguments(self) -> dict[str, Any]:
         """What makes another environment like this one; robot and motion are shared.
@@ -299,13 +303,19 @@ class ResidualBalanceEnv(BalanceEnv):
     def _begin(self) -> None:
         self.controller.reset(self.simulation.state)
         self._offsets[:] = 0.0
-        self._update_targets(self._offsets)
+        self._update_targets()
 
-    def _update_targets(self, residual: np.ndarray) -> None:
-        update_targets(
-            self.arrays, self.simulation.state_arrays, self._motion, self.simulation.time,
-            self._com_offset, residual, self._targets,
-        )  # fmt: skip
+    def _update_targets(self) -> None:
+        update, state = self._aim
+        sim = self.simulation
+        if state is not sim.state_arrays:
+            parts = Aim(
+                self.arrays, sim.state_arrays, sim.clock, self._motion, self._com_offset,
+                self._offsets, self._targets,
+            )  # fmt: skip
+            update = bound(aim, parts)
+            self._aim = update, sim.state_arrays
+        update()
 
     def _advance(self) -> float:
         residual, e = self._offsets, self.episode
@@ -313,7 +323,7 @@ class ResidualBalanceEnv(BalanceEnv):
             e.action[:] = e.last_action + self._share * (e.action - e.last_action)
         residual[self._moved] = self._openness() * self._scale * e.action
         if not self._compiled:
-            return self._advance_in_python(residual)
+            return self._advance_in_python()
         gains = self.controller.parameters
         if self._step is None or self._step.episode is not e or self._gains is not gains:
             self._step, self._gains = self._bind(), gains
@@ -342,22 +352,39 @@ class ResidualBalanceEnv(BalanceEnv):
         dy = s.capture_point[1] - s.origin[1] - (sin * x + cos * y)
         return float(-np.expm1(-(dx * dx + dy * dy) / self.gate**2))
 
-    def _advance_in_python(self, residual: np.ndarray) -> float:
+    def _advance_in_python(self) -> float:
         """What `residual_step` does, for any controller."""
         sim, e = self.simulation, self.episode
         s, ctrl = sim.state_arrays, sim.plant.ctrl
+        count = self._recorder()
         for _ in range(self.ticks):
-            self._update_targets(residual)
+            self._update_targets()
             ctrl[:] = self.controller.torques(sim.state, self.targets)
-            wrench = self._root_wrench()
-            soft_root_force(s, wrench, sim.plant.qfrc_applied)
-            for metric, part in ((ROOT_FORCE, wrench[:3]), (ROOT_MOMENT, wrench[3:])):
-                e.metrics[metric] = max(e.metrics[metric], float(np.linalg.norm(part)))
-            record_tick(self.arrays, s, ctrl, self.controller.period, e)
+            self._push_root(s, sim.plant.qfrc_applied)
+            count()
             sim.step(ctrl, self.control_substeps)
         return judge_step(
             self.arrays, s, self.scales, self.judge, self.targets.q_ref, ctrl, sim.time, e
         )
+
+    def _recorder(self) -> Any:
+        count, bound_to = self._record
+        sim, e = self.simulation, self.episode
+        if bound_to is None or bound_to[0] is not sim or bound_to[1] is not e:
+            parts = Record(self.arrays, sim.state_arrays, sim.plant, self.controller.period, e)
+            count = bound(record, parts)
+            self._record = count, (sim, e)
+        return count
+
+    def _push_root(self, s: Any, qfrc_applied: np.ndarray) -> None:
+        """Apply a soft root's wrench, and take away the last one."""
+        wrench = self._root_wrench()
+        if not (wrench.any() or qfrc_applied[:6].any()):
+            return
+        soft_root_force(s, wrench, qfrc_applied)
+        metrics = self.episode.metrics
+        for metric, part in ((ROOT_FORCE, wrench[:3]), (ROOT_MOMENT, wrench[3:])):
+            metrics[metric] = max(metrics[metric], float(np.linalg.norm(part)))
 
     def _failures(self) -> int:
         return int(getattr(self.controller, "failures", 0))

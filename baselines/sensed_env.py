@@ -73,9 +73,9 @@ class SensedResidualEnv(Sensed, ResidualBalanceEnv):
         assert isinstance(self.controller, SensingController)
         self.controller.simulation = self.simulation  # type: ignore[assignment]
 
-    def _update_targets(self, residual: np.ndarray) -> None:
+    def _update_targets(self) -> None:
         with self._through_sensors():
-            super()._update_targets(residual)
+            super()._update_targets()
 
     def _openness(self) -> float:
         with self._through_sensors():

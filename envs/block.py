@@ -5,6 +5,8 @@ compiles all of them. A `Block` is handed over as a pointer: its arrays' address
 its numbers, lie one after the other in memory, and only what a function uses is read.
 """
 
+import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -169,6 +171,22 @@ def address_of(function: Any, block: Block) -> int:
     if key not in _functions:
         _functions[key] = numba.cfunc(types.void(kind), **OPTIONS)(function)
     return int(_functions[key].address)
+
+
+_POINTER_IN = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
+
+
+def bound(function: Any, block: Block) -> Callable[[], None]:
+    """`function(block)`, compiled, for Python: a call costs 1 µs.
+
+    Numba's own way to call it looks up each block's type, which takes some 5 µs for each.
+    """
+    run, address = _POINTER_IN(address_of(function, block)), block.address  # type: ignore[attr-defined]
+
+    def run_bound(block: Block = block) -> None:  # holds the block, and with it the arrays
+        run(address)
+
+    return run_bound
 
 
 @intrinsic

@@ -1,6 +1,7 @@
 """Blocks: what compiled code reads through an address is what Python holds."""
 
 import copy
+import gc
 import pickle
 from dataclasses import dataclass
 
@@ -8,7 +9,7 @@ import numba
 import numpy as np
 import pytest
 
-from poise.envs.block import Block
+from poise.envs.block import Block, bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,3 +128,22 @@ def test_an_unknown_member_is_a_typing_error():
 
     with pytest.raises(numba.TypingError, match="nothing"):
         wrong(outer())
+
+
+def double_inner(block):
+    """For `bound`, which compiles plain functions."""
+    for i in range(block.inner.vector.shape[0]):
+        block.inner.vector[i] *= 2.0
+
+
+def test_a_bound_function_works_on_its_block():
+    """Called without arguments it changes what the block holds, which it keeps alive."""
+    first, second = outer(), outer()
+    vector = second.inner.vector
+    double = bound(double_inner, second)
+    del second
+    gc.collect()
+    double()
+    double()
+    np.testing.assert_array_equal(vector, [2.0, 1.0])
+    np.testing.assert_array_equal(first.inner.vector, [0.5, 0.25])
