@@ -15,6 +15,7 @@ from .contact_sets import ContactSets
 from .controller import Targets
 from .momentum_qp import MomentumQPConfig
 from .step_plan import Foothold, Plan, StepLimits, StepPlanner
+from .step_shift import STANDING, Stepping, lean_matrix
 from .support import nearest_inside
 from .swing import Swing, SwingTask, rotation_error, swing_rows
 
@@ -71,6 +72,7 @@ class CaptureStep(AroundQP):
         self.reach = Reach(robot, self.config.share)
         self.planner = StepPlanner(robot, self.reach, self.config.limits, self.config.foothold)
         self.h, self.rate = self.planner.h, self.planner.rate
+        self.shift = self.planner.shift  #: what a policy adds
         self._guided: Targets | None = None
         self.reset()
 
@@ -83,6 +85,7 @@ class CaptureStep(AroundQP):
         """Forget the last trial."""
         super().reset(state)
         self.sets.reset()
+        self.shift.clear()
         self.steps = 0  #: begun since the reset
         self.swing: Swing | None = None  #: of the running step
         self.foot = -1  #: that stepped last
@@ -94,6 +97,16 @@ class CaptureStep(AroundQP):
     def stepped(self) -> bool:
         """Whether a step has begun since the reset."""
         return self.steps > 0
+
+    def stepping(self) -> Stepping:
+        """Where it is in its steps."""
+        if self.swing is None:
+            return STANDING._replace(steps=self.steps, since=self._clock)
+        swing = self.swing
+        phase = swing.time / swing.duration
+        return Stepping(
+            self.steps, self.foot, swing.reference[0], swing.foothold, phase, swing.remaining, 0.0
+        )
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
@@ -115,7 +128,7 @@ class CaptureStep(AroundQP):
         feet, yaw = state.sole_points[:, :2], self._heading(state)
         away = self.reach.beyond(feet[0], feet[1], yaw, state.capture_point)
         limit = self.config.again if self.stepped else self.config.trigger
-        return bool(away > limit * self.h)
+        return bool(away > limit * self.h + self.shift.trigger)
 
     def _heading(self, state: RobotState) -> float:
         return self._yaw if self.stepped else state.heading_yaw
@@ -128,6 +141,7 @@ class CaptureStep(AroundQP):
         self.swing = Swing(state.sole_points[plan.foot], plan.time, self.config.swing, self.h)
         self.swing.ground = float(state.sole_points[1 - plan.foot, 2])
         self.swing.aim(plan.foothold)
+        self.swing.shift = plan.shift
 
     def _landed(self, state: RobotState, swing: Swing) -> bool:
         return bool(state.contacts[self.foot] > 0.5 and swing.time > LANDING * swing.duration)
@@ -138,6 +152,7 @@ class CaptureStep(AroundQP):
         if swing.remaining > Swing.FROZEN:
             plan = self.planner.replan(state, self.foot, self._yaw, swing)
             swing.aim(plan.foothold, swing.time + plan.time)
+            swing.shift = plan.shift
         under = self.reach.under(stance, state.sole_points[stance], self._yaw)
         way = swing.foothold - state.sole_points[stance, :2]
         self._guide(state, t, under, 0.0, state.sole_points[stance, 2], way)
@@ -172,7 +187,8 @@ class CaptureStep(AroundQP):
         if self._guided is None:
             self._guided = Targets.standing(self.robot, state)
         self._guided.take(targets)
-        self._guided.root_axes[:] = self._level() @ self.qp.arrays.root_standing
+        upright = self._level() @ lean_matrix(self.shift.lean)
+        self._guided.root_axes[:] = upright @ self.qp.arrays.root_standing
         self._guided.root_vel[:] = 0.0
         return self._guided
 
@@ -186,16 +202,18 @@ class CaptureStep(AroundQP):
         way: np.ndarray,
     ) -> None:
         """c̈_ref = ω² (c − p) in the plane; a height that legs reach with the feet `way` apart."""
-        xi = state.capture_point
-        wanted = xi + self.config.gain * (xi - region.mean(axis=0))
+        xi, R = state.capture_point, turn(self._yaw)
+        wanted = xi + self.config.gain * (xi - region.mean(axis=0) - R @ self.shift.com)
         p = nearest_inside(region, wanted)
         over = wanted - p
         p = p + over * min(1.0, hips * self.h / max(float(np.linalg.norm(over)), 1e-9))
+        p = p + R @ self.shift.cop
         t.com[:2], t.com_vel[:2] = state.com[:2], state.com_vel[:2]
         t.com_acc[:2] = state.omega**2 * (state.com[:2] - p)
         t.cop[:] = p
         leg = self.config.stretch * self.h
-        t.com[2] = ground + min(self.h, np.sqrt(max(leg**2 - 0.25 * (way @ way), 0.0)))
+        reach = np.sqrt(max(leg**2 - 0.25 * (way @ way), 0.0))
+        t.com[2] = ground + min(self.h, reach) + self.shift.height
         t.com_vel[2] = t.com_acc[2] = 0.0
         self._limit_posture(state, t)
 

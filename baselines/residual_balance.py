@@ -200,6 +200,8 @@ class ResidualBalanceEnv(BalanceEnv):
     Version history: v0, first release.
     """
 
+    scales_class: type[ResidualScales] = ResidualScales  #: whose fields `residual` has
+
     def __init__(
         self,
         robot: str | Path | Robot = "humanoid",
@@ -215,7 +217,7 @@ class ResidualBalanceEnv(BalanceEnv):
     ):
         prepare()
         given = {} if residual is None else to_dict(residual)
-        self.residual = build(ResidualScales, given, "residual")
+        self.residual = build(self.scales_class, given, "residual")
         scale = np.array(list(self.residual.entries().values()))
         self._moved = np.flatnonzero(scale)
         self._offsets = apart(len(scale))
@@ -230,7 +232,7 @@ class ResidualBalanceEnv(BalanceEnv):
         # share of the way that the residual goes to the action in one policy step
         share = 1.0 if smoothing == 0.0 else -np.expm1(-self.config.policy_period / smoothing)
         self._share = float(share)
-        scale[7:] *= 10.0 * self.scales.momentum
+        scale[7:9] *= 10.0 * self.scales.momentum
         self._scale = scale[self._moved]
         self.controller = load_controller(controller, self.robot)
         self.motion = (

@@ -17,6 +17,7 @@ from poise.envs.torque_balance import TorqueBalanceEnv
 
 from .controller import Targets
 from .residual_balance import ResidualBalanceEnv
+from .residual_step_env import ResidualStepEnv
 
 
 class SensingController:
@@ -82,6 +83,10 @@ class SensedResidualEnv(Sensed, ResidualBalanceEnv):
             return super()._openness()
 
 
+class SensedStepEnv(SensedResidualEnv, ResidualStepEnv):
+    """The same of a stepping controller."""
+
+
 class SensedTorqueEnv(Sensed, TorqueBalanceEnv):
     """`TorqueBalanceEnv`, where the policy goes by the believed state."""
 
@@ -100,7 +105,8 @@ class SensedTorqueEnv(Sensed, TorqueBalanceEnv):
 def sensed_env(env: BalanceEnv) -> SensedResidualEnv | SensedTorqueEnv:
     """An environment like `env` with sensors; it shares `env`'s controller. Call `set_plant`."""
     if isinstance(env, ResidualBalanceEnv):
-        return SensedResidualEnv(
+        kind = SensedStepEnv if isinstance(env, ResidualStepEnv) else SensedResidualEnv
+        return kind(
             env.robot,
             env.config,
             controller=SensingController(env.controller),

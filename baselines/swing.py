@@ -64,6 +64,7 @@ class Swing:
         self.reference = np.zeros((3, 3))  # position, velocity, acceleration
         self.reference[0] = point
         self.foothold = np.array(point[:2])
+        self.shift = 0.0  # of the duration, by a policy [s]
 
     @property
     def remaining(self) -> float:
