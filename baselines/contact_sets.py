@@ -62,9 +62,11 @@ class ContactSets:
     """Solves the momentum QP for whichever soles are in contact; remembers torques between ticks.
 
     `tick` gives torques; after a call `workspace` holds the solution of the set that was used.
+    No torque changes by more than `jump` of its limit from one tick to the next, whatever the
+    contacts do: the QP knows this bound, and where it has no solution within, the torques are cut.
     """
 
-    def __init__(self, robot: Robot, config: MomentumQPConfig):
+    def __init__(self, robot: Robot, config: MomentumQPConfig, jump: float = np.inf):
         self.robot, self.config, self.period = robot, config, config.period
         self.arrays = robot_arrays(robot)
         self.parameters = parameters = qp_parameters(robot, self.arrays, config)
@@ -74,6 +76,8 @@ class ContactSets:
             subsets.append(tuple(range(count)))
         self.sets = {soles: ContactSet(self.arrays, parameters, soles) for soles in subsets}
         self.memory = allocate_memory(parameters.torque_limit)
+        self._jump = np.where(parameters.torque_limit > 0.0, jump * parameters.torque_limit, np.inf)
+        self._applied: np.ndarray | None = None  # (nv−6,) torques of the last tick
         self._motor_joints = self.arrays.motor_dofs - 6
         self.active: tuple[int, ...] | None = None
 
@@ -85,7 +89,12 @@ class ContactSets:
     def reset(self) -> None:
         """Forget the last trial."""
         forget(self.memory)
-        self.active = None
+        self.active = self._applied = None
+
+    def follow(self, torques: np.ndarray) -> None:
+        """Go on from the joint `torques` (nv−6,) of another controller's last tick."""
+        self._applied = torques.copy()
+        self.memory.torques[:] = torques
 
     def problem(
         self,
@@ -120,7 +129,23 @@ class ContactSets:
                 row = (i + 1) * rows - 1
                 ws.C[row] = ws.E[6 * i + 2]
                 ws.u[row] = limit - ws.w0[6 * i + 2]
+        if self._applied is not None:
+            self._bound_torques(ws, self._applied, self._jump)
         return QP(ws.H, ws.g, ws.C, ws.l, ws.u)
+
+    @staticmethod
+    def _bound_torques(ws: Workspace, middle: np.ndarray, width: np.ndarray) -> None:
+        """Keep τ = τ₀ + T x within `width` of `middle` as well: rows before the joint limits."""
+        nj = len(middle)
+        rows = slice(len(ws.l) - 2 * nj, len(ws.l) - nj)
+        ws.l[rows] = np.maximum(ws.l[rows], middle - width - ws.tau0)
+        ws.u[rows] = np.minimum(ws.u[rows], middle + width - ws.tau0)
+
+    def _free_torques(self, ws: Workspace) -> None:
+        """Take the bound on changes away again."""
+        nj, limit = len(self._jump), self.parameters.torque_limit
+        rows = slice(len(ws.l) - 2 * nj, len(ws.l) - nj)
+        ws.l[rows], ws.u[rows] = -limit - ws.tau0, limit - ws.tau0
 
     def tick(
         self,
@@ -134,7 +159,14 @@ class ContactSets:
         self.problem(state, targets, soles, tasks, load_limits)
         chosen = self.sets[soles]
         ws, p = chosen.workspace, chosen.parameters
-        accept(state.arrays, p, solve(ws), ws, self.memory)
+        status = solve(ws)
+        if status != 0 and self._applied is not None:
+            self._free_torques(ws)
+            status = solve(ws)
+        accept(state.arrays, p, status, ws, self.memory)
+        if self._applied is not None:
+            ws.tau[:] = np.clip(ws.tau, self._applied - self._jump, self._applied + self._jump)
+        self._applied = ws.tau.copy()
         return ws.tau[self._motor_joints].copy()
 
     @property
