@@ -17,7 +17,7 @@ from poise.envs.state import RobotState
 from .controller import Targets
 from .momentum_qp import MomentumQPConfig, accept, allocate_memory, forget, solve
 from .parameters import qp_parameters
-from .reduced_qp import QPParameters, Workspace, allocate_workspace, assemble
+from .reduced_qp import Assembly, QPParameters, Workspace, allocate_workspace, assemble
 from .solvers import QP
 from .task_rows import Rows
 
@@ -116,7 +116,11 @@ class ContactSets:
             ws.cop_prev[:] = np.nan
             ws.iscratch[:] = 0
             self.active = soles
-        assemble(chosen.arrays, chosen.state(state.arrays), p, targets.arrays(), self.period, ws)
+        assemble(
+            Assembly(
+                chosen.arrays, chosen.state(state.arrays), p, targets.arrays(), self.period, ws
+            )
+        )
         for task in tasks:
             A = task.A @ ws.V
             offset = task.A @ ws.vdot0 - task.b
@@ -159,11 +163,11 @@ class ContactSets:
         self.problem(state, targets, soles, tasks, load_limits)
         chosen = self.sets[soles]
         ws, p = chosen.workspace, chosen.parameters
-        status = solve(ws)
-        if status != 0 and self._applied is not None:
+        solve(ws)
+        if ws.status[0] != 0 and self._applied is not None:
             self._free_torques(ws)
-            status = solve(ws)
-        accept(state.arrays, p, status, ws, self.memory)
+            solve(ws)
+        accept(state.arrays, p, ws, self.memory)
         if self._applied is not None:
             ws.tau[:] = np.clip(ws.tau, self._applied - self._jump, self._applied + self._jump)
         self._applied = ws.tau.copy()

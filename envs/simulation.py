@@ -49,7 +49,7 @@ class Simulation:
         self.clock = apart(1, dtype=np.int64)
         self._warnings = self.data.warning.number  # a view
         self.pushes: tuple[Push | Kick, ...] = ()
-        self.push_table = np.zeros((0, TABLE_COLUMNS))
+        self.push_table = apart((0, TABLE_COLUMNS))
         self.reset()
 
     @property
@@ -91,7 +91,10 @@ class Simulation:
     def set_pushes(self, pushes: Sequence[Push | Kick]) -> None:
         """Replace the schedule; starts are seconds since the reset."""
         self.pushes = tuple(pushes)
-        self.push_table = pack(self.pushes, self.robot, self.state.heading_yaw)
+        table = pack(self.pushes, self.robot, self.state.heading_yaw)
+        if table.shape != self.push_table.shape:
+            self.push_table = apart(table.shape)
+        self.push_table[:] = table  # in place: compiled code may be bound to it
 
     def step(self, torques: np.ndarray, count: int = 1) -> RobotState:
         """Apply joint torques (nu,) [N·m] for `count` physics steps."""

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from poise.envs.block import Block
+from poise.envs.block import Block, address_of, call
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +100,37 @@ def test_copies_have_memory_of_their_own(duplicate):
     other = duplicate(block)
     write(other, 4.0)
     assert read(other)[3] == 4.0 and read(block)[3] == 0.25
+
+
+@numba.njit
+def halve(block):
+    """An exception if there is nothing to halve."""
+    if block.count == 0:
+        raise ZeroDivisionError("nothing to halve")
+    block.vector[:] = block.vector / 2.0
+
+
+@numba.njit
+def halve_by_address(address, block):
+    """`halve` of the inner block, then of it once more."""
+    call(address, block.inner)
+    call(address, block.inner)
+    return block.inner.vector[0]
+
+
+def test_kernels_are_called_by_address():
+    """As if they were called by name."""
+    block = outer()
+    assert halve_by_address(address_of(halve, block.inner), block) == 0.125
+    assert block.inner.vector.tolist() == [0.125, 0.0625]
+
+
+def test_exceptions_pass_a_call_by_address():
+    """What a kernel raises ends its caller as well, and nothing after it runs."""
+    block = outer(count=0)
+    with pytest.raises(ZeroDivisionError, match="nothing to halve"):
+        halve_by_address(address_of(halve, block.inner), block)
+    assert block.inner.vector.tolist() == [0.5, 0.25]
 
 
 def test_blocks_of_one_kind_share_their_code():
