@@ -43,6 +43,7 @@ class CaptureStepConfig:
     stretch: float = field(default=0.96, metadata={"above": 0.0})
     ramp: float = field(default=0.1, metadata={"min": 0.0})
     pause: float = field(default=0.15, metadata={"min": 0.0})
+    jump: float = field(default=0.3, metadata={"above": 0.0})
     root_accel: float = field(default=100.0, metadata={"above": 0.0})
     joint_accel: float = field(default=100.0, metadata={"above": 0.0})
     limits: StepLimits = field(default_factory=StepLimits)
@@ -68,7 +69,7 @@ class CaptureStep(AroundQP):
             )
         self.config = config or CaptureStepConfig()
         super().__init__(robot, self.config.qp)
-        self.sets = ContactSets(robot, self.config.step_qp)
+        self.sets = ContactSets(robot, self.config.step_qp, self.config.jump)
         self.reach = Reach(robot, self.config.share)
         self.planner = StepPlanner(robot, self.reach, self.config.limits, self.config.foothold)
         self.h, self.rate = self.planner.h, self.planner.rate
@@ -134,6 +135,8 @@ class CaptureStep(AroundQP):
         return self._yaw if self.stepped else state.heading_yaw
 
     def _begin(self, state: RobotState) -> None:
+        if not self.stepped:
+            self.sets.follow(self.qp.workspace.tau)
         self._yaw = self._heading(state)
         plan: Plan = self.planner.plan(state, self._yaw)
         self.steps += 1

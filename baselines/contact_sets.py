@@ -4,13 +4,13 @@ One reduced problem for each subset (see `reduced_qp.py`), built on arrays that 
 contact only; what else is asked of v̇, such as the way of a swing foot, comes as further rows.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from poise.envs.arrays import RobotArrays, apart, robot_arrays
-from poise.envs.block import Block, bound
+from poise.envs.block import Block, address_of, call
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy
 from poise.envs.robot import Robot
@@ -19,7 +19,14 @@ from poise.envs.state import RobotState
 from .controller import Targets
 from .momentum_qp import Memory, MomentumQPConfig, accept, allocate_memory, forget, solve
 from .parameters import qp_parameters
-from .reduced_qp import QPParameters, TargetArrays, Workspace, allocate_workspace, assemble
+from .reduced_qp import (
+    Assembly,
+    QPParameters,
+    TargetArrays,
+    Workspace,
+    allocate_workspace,
+    assemble,
+)
 from .solvers import QP
 from .task_rows import Rows
 
@@ -29,13 +36,8 @@ class ContactTick(Block):
     """What a tick of one subset works on; k further rows in v̇, n unknowns."""
 
     source: StateArrays  # of all soles
-    state: StateArrays  # of the subset
-    pick: np.ndarray  # (nc,) int: its soles
-    robot: RobotArrays
-    parameters: QPParameters
-    targets: TargetArrays
-    period: float  # [s]
-    workspace: Workspace
+    pick: np.ndarray  # (nc,) int: soles of the subset
+    problem: Assembly  # of these
     memory: Memory
     A: np.ndarray  # (k, nv)
     b: np.ndarray  # (k,)
@@ -44,6 +46,11 @@ class ContactTick(Block):
     weighted: np.ndarray  # (k, n) scratch
     load_limits: np.ndarray  # (nc,) [N]
     limited: np.ndarray  # (1,) int: whether they count
+    applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
+    jump: np.ndarray  # (nv−6,) the most that they may change [N·m]
+    follows: np.ndarray  # (1,) int: whether there was a last tick
+    assemble: int  # addresses of kernels that are compiled already
+    solve: int
 
 
 @compiled
@@ -69,7 +76,7 @@ def pick_soles(source: StateArrays, pick: np.ndarray, own: StateArrays):
 @compiled
 def add_rows(t: ContactTick):
     """Add ½ Σ weights (A v̇ − b)², v̇ = v̇₀ + V x, to the objective."""
-    ws, A, AV = t.workspace, t.A, t.AV
+    ws, A, AV = t.problem.workspace, t.A, t.AV
     np.dot(A, ws.V, AV)
     for r in range(A.shape[0]):
         offset = -t.b[r]
@@ -87,11 +94,12 @@ def add_rows(t: ContactTick):
             ws.H[i, j] += total
 
 
-def assemble_contacts(t: ContactTick) -> None:
-    """The reduced QP of a subset; to be called by its address, as the next one."""
-    ws, cone = t.workspace, t.parameters.cone
-    pick_soles(t.source, t.pick, t.state)
-    assemble(t.robot, t.state, t.parameters, t.targets, t.period, ws)
+@compiled
+def assemble_contacts(t: ContactTick):
+    """The reduced QP of a subset."""
+    ws, cone = t.problem.workspace, t.problem.parameters.cone
+    pick_soles(t.source, t.pick, t.problem.state)
+    call(t.assemble, t.problem)
     if t.A.shape[0] > 0:
         add_rows(t)
     if t.limited[0]:
@@ -99,11 +107,37 @@ def assemble_contacts(t: ContactTick) -> None:
             row = (i + 1) * cone.shape[1] - 1
             copy(ws.E[6 * i + 2], ws.C[row])
             ws.u[row] = t.load_limits[i] - ws.w0[6 * i + 2]
+    if t.follows[0]:
+        bound_torques(t, True)
 
 
-def solve_contacts(t: ContactTick) -> None:
-    """Torques from the assembled problem."""
-    accept(t.source, t.parameters, solve(t.workspace), t.workspace, t.memory)
+@compiled
+def bound_torques(t: ContactTick, jumps: bool):
+    """Keep τ = τ₀ + T x within its limits, and within `jump` of the last tick's or not."""
+    ws, limit = t.problem.workspace, t.problem.parameters.torque_limit
+    nj = limit.shape[0]
+    first = ws.l.shape[0] - 2 * nj  # rows before the joint limits
+    for a in range(nj):
+        low, high = -limit[a], limit[a]
+        if jumps:
+            low, high = max(low, t.applied[a] - t.jump[a]), min(high, t.applied[a] + t.jump[a])
+        ws.l[first + a], ws.u[first + a] = low - ws.tau0[a], high - ws.tau0[a]
+
+
+@compiled
+def solve_contacts(t: ContactTick):
+    """Torques from the assembled problem, none of which changes by more than `jump`."""
+    ws = t.problem.workspace
+    call(t.solve, ws)
+    if ws.status[0] != 0 and t.follows[0]:
+        bound_torques(t, False)
+        call(t.solve, ws)
+    accept(t.source, t.problem.parameters, ws, t.memory)
+    for a in range(ws.tau.shape[0]):
+        if t.follows[0]:
+            ws.tau[a] = min(max(ws.tau[a], t.applied[a] - t.jump[a]), t.applied[a] + t.jump[a])
+        t.applied[a] = ws.tau[a]
+    t.follows[0] = 1
 
 
 class ContactSet:
@@ -136,30 +170,32 @@ class ContactSet:
         return own
 
     def bind(
-        self, s: StateArrays, targets: TargetArrays, rows: int, period: float, memory: Memory
+        self, s: StateArrays, targets: TargetArrays, rows: int, sets: "ContactSets"
     ) -> ContactTick:
-        """What a tick from `s` with so many further rows works on; `assemble` and `solve` do it."""
+        """What a tick from `s` with so many further rows works on; `block` from then on."""
         if (s, targets, rows) != self._bound_to:  # blocks are equal where they are the same
-            nv, n = self.arrays.q_standing.size + 6, self.workspace.g.size
-            self._tick = ContactTick(
-                s, replace(s, **self._own), self.pick, self.arrays, self.parameters, targets,
-                period, self.workspace, memory, apart((rows, nv)), apart(rows), apart(rows),
+            ws, nv, n = self.workspace, len(s.qvel), len(self.workspace.g)
+            own = replace(s, **self._own)
+            problem = Assembly(self.arrays, own, self.parameters, targets, sets.period, ws)
+            self.block = ContactTick(
+                s, self.pick, problem, sets.memory, apart((rows, nv)), apart(rows), apart(rows),
                 apart((rows, n)), apart((rows, n)), apart(len(self.soles)),
-                apart(1, dtype=np.int64),
+                apart(1, dtype=np.int64), sets.applied, sets.jump, sets.follows,
+                address_of(assemble, problem), address_of(solve, ws),
             )  # fmt: skip
-            self.assemble: Callable[[], None] = bound(assemble_contacts, self._tick)
-            self.solve: Callable[[], None] = bound(solve_contacts, self._tick)
             self._bound_to = (s, targets, rows)
-        return self._tick
+        return self.block
 
 
 class ContactSets:
     """Solves the momentum QP for whichever soles are in contact; remembers torques between ticks.
 
     `tick` gives torques; after a call `workspace` holds the solution of the set that was used.
+    No torque changes by more than `jump` of its limit from one tick to the next, whatever the
+    contacts do: the QP knows this bound, and where it has no solution within, the torques are cut.
     """
 
-    def __init__(self, robot: Robot, config: MomentumQPConfig):
+    def __init__(self, robot: Robot, config: MomentumQPConfig, jump: float = np.inf):
         self.robot, self.config, self.period = robot, config, config.period
         self.arrays = robot_arrays(robot)
         self.parameters = parameters = qp_parameters(robot, self.arrays, config)
@@ -169,6 +205,10 @@ class ContactSets:
             subsets.append(tuple(range(count)))
         self.sets = {soles: ContactSet(self.arrays, parameters, soles) for soles in subsets}
         self.memory = allocate_memory(parameters.torque_limit)
+        limit = parameters.torque_limit
+        self.jump = np.where(limit > 0.0, jump * limit, np.inf)
+        self.applied = apart(len(limit))  # torques of the last tick, if
+        self.follows = apart(1, dtype=np.int64)  # there was one
         self._motor_joints = self.arrays.motor_dofs - 6
         self.active: tuple[int, ...] | None = None
 
@@ -180,7 +220,12 @@ class ContactSets:
     def reset(self) -> None:
         """Forget the last trial."""
         forget(self.memory)
-        self.active = None
+        self.active, self.follows[0] = None, 0
+
+    def follow(self, torques: np.ndarray) -> None:
+        """Go on from the joint `torques` (nv−6,) of another controller's last tick."""
+        self.applied[:] = self.memory.torques[:] = torques
+        self.follows[0] = 1
 
     def problem(
         self,
@@ -203,7 +248,7 @@ class ContactSets:
             ws.iscratch[:] = 0
             self.active = soles
         rows = sum(len(task.b) for task in tasks)
-        block = chosen.bind(state.arrays, targets.arrays(), rows, self.period, self.memory)
+        block = chosen.bind(state.arrays, targets.arrays(), rows, self)
         first = 0
         for task in tasks:
             last = first + len(task.b)
@@ -213,7 +258,7 @@ class ContactSets:
         block.limited[0] = load_limits is not None
         if load_limits is not None:
             block.load_limits[:] = load_limits
-        chosen.assemble()
+        assemble_contacts(block)
         return QP(ws.H, ws.g, ws.C, ws.l, ws.u)
 
     def tick(
@@ -227,7 +272,7 @@ class ContactSets:
         """Joint torques (nu,) [N·m]; arguments as of `problem`."""
         self.problem(state, targets, soles, tasks, load_limits)
         chosen = self.sets[soles]
-        chosen.solve()
+        solve_contacts(chosen.block)
         return chosen.workspace.tau[self._motor_joints].copy()
 
     @property

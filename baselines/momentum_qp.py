@@ -1,12 +1,12 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from poise.envs.arrays import RobotArrays, apart, robot_arrays
-from poise.envs.block import Block, address_of
+from poise.envs.arrays import apart, robot_arrays
+from poise.envs.block import Block, address_of, call
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy
 from poise.envs.robot import Robot
@@ -15,8 +15,8 @@ from poise.envs.state import RobotState
 from .controller import Targets
 from .parameters import qp_parameters
 from .reduced_qp import (
+    Assembly,
     QPParameters,
-    TargetArrays,
     Workspace,
     allocate_workspace,
     assemble,
@@ -84,9 +84,30 @@ FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the who
 
 
 @compiled
-def accept(s: StateArrays, p: QPParameters, status: int, ws: Workspace, memory: Memory):
+def release_joints(ws: Workspace):
+    """Take away the joint limits, the last rows of the problem."""
+    first = ws.l.shape[0] - ws.tau.shape[0]
+    ws.l[first:] = -np.inf
+    ws.u[first:] = np.inf
+
+
+@compiled
+def solve(ws: Workspace):
+    """Solve the assembled problem, starting from the last tick's active rows."""
+    for _ in range(2):
+        ws.status[0] = solve_dual(
+            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS,
+            True,
+        )  # fmt: skip
+        if ws.status[0] != INFEASIBLE:
+            return
+        release_joints(ws)  # always their fault, and the joints hold their limits by themselves
+
+
+@compiled
+def accept(s: StateArrays, p: QPParameters, ws: Workspace, memory: Memory):
     """Torques from a solved QP; otherwise the last good ones, blended into damping."""
-    if status == 0:
+    if ws.status[0] == 0:
         recover(p, ws)
         if np.all(np.isfinite(ws.tau)):
             copy(ws.tau, memory.torques)
@@ -102,63 +123,23 @@ def accept(s: StateArrays, p: QPParameters, status: int, ws: Workspace, memory: 
         ws.tau[a] = min(max(torque, -p.torque_limit[a]), p.torque_limit[a])
 
 
-@compiled
-def release_joints(ws: Workspace):
-    """Take away the joint limits, the last rows of the problem."""
-    first = ws.l.shape[0] - ws.tau.shape[0]
-    ws.l[first:] = -np.inf
-    ws.u[first:] = np.inf
-
-
-@compiled
-def solve(ws: Workspace) -> int:
-    """Solve the assembled problem, starting from the last tick's active rows; the status."""
-    status = solve_dual(
-        ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS, True
-    )
-    if status == INFEASIBLE:  # always because of joint limits, which the joints hold by themselves
-        release_joints(ws)
-        status = solve_dual(
-            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS,
-            True,
-        )  # fmt: skip
-    return status
-
-
-@compiled
-def momentum_tick(
-    robot: RobotArrays,
-    s: StateArrays,
-    p: QPParameters,
-    t: TargetArrays,
-    period: float,
-    ws: Workspace,
-    memory: Memory,
-):
-    """One control tick with the compiled solver: `ws.tau` (nj,) holds the torques."""
-    assemble(robot, s, p, t, period, ws)
-    accept(s, p, solve(ws), ws, memory)
-
-
 @dataclass(frozen=True, eq=False)
 class Tick(Block):
-    """What a control tick works on."""
+    """What a control tick works on; the kernels of its stages, by address, are compiled once."""
 
-    robot: RobotArrays
-    state: StateArrays
-    parameters: QPParameters
-    targets: TargetArrays
-    period: float  # [s]
-    workspace: Workspace
+    problem: Assembly
     memory: Memory
+    assemble: int
+    solve: int
 
 
-def tick(block: Tick) -> None:
-    """`momentum_tick` of a block, to be called by its address."""
-    momentum_tick(
-        block.robot, block.state, block.parameters, block.targets, block.period,
-        block.workspace, block.memory,
-    )  # fmt: skip
+@compiled
+def momentum_tick(t: Tick):
+    """One control tick with the compiled solver: `tau` (nj,) of the workspace holds torques."""
+    a = t.problem
+    call(t.assemble, a)
+    call(t.solve, a.workspace)
+    accept(a.state, a.parameters, a.workspace, t.memory)
 
 
 class MomentumQP:
@@ -184,6 +165,11 @@ class MomentumQP:
         if self.config.solver != COMPILED_SOLVER or self.config.solver_options:
             self.solver = make_solver(self.config.solver, **self.config.solver_options)
         self._motor_joints = self.arrays.motor_dofs - 6
+        self._assembly: Assembly | None = None
+        self._tick: Tick | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.robot, self.config)  # a copy has memory and addresses of its own
 
     @property
     def failures(self) -> int:
@@ -217,33 +203,49 @@ class MomentumQP:
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Tick]:
         """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""
-        block = Tick(
-            self.arrays, state.arrays, self.parameters, targets.arrays(), self.period,
-            self.workspace, self.memory,
-        )  # fmt: skip
-        return address_of(tick, block), block
+        tick = self.tick(state, targets)
+        return address_of(momentum_tick, tick), tick
+
+    def assembly(self, state: RobotState, targets: Targets) -> Assembly:
+        """What `assemble` fills the workspace from."""
+        s, t, known = state.arrays, targets.arrays(), self._assembly
+        if (
+            known is None or known.state is not s or known.targets is not t
+            or known.parameters is not self.parameters
+        ):  # fmt: skip
+            known = Assembly(self.arrays, s, self.parameters, t, self.period, self.workspace)
+            self._assembly = known
+        return known
+
+    def tick(self, state: RobotState, targets: Targets) -> Tick:
+        """What `momentum_tick` works on."""
+        problem = self.assembly(state, targets)
+        if self._tick is None or self._tick.problem is not problem:
+            stages = address_of(assemble, problem), address_of(solve, self.workspace)
+            self._tick = Tick(problem, self.memory, *stages)
+        return self._tick
 
     def problem(self, state: RobotState, targets: Targets) -> QP:
         """The reduced QP of this state: pure, nothing is solved or remembered."""
         ws = self.workspace
         before = ws.cop_prev.copy()
-        assemble(self.arrays, state.arrays, self.parameters, targets.arrays(), self.period, ws)
+        assemble(self.assembly(state, targets))
         ws.cop_prev[:] = before
         return QP(ws.H.copy(), ws.g.copy(), ws.C.copy(), ws.l.copy(), ws.u.copy())
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
-        arguments = (self.arrays, state.arrays, self.parameters, targets.arrays(), self.period)
         ws = self.workspace
         if self.solver is None:
-            momentum_tick(*arguments, ws, self.memory)
+            momentum_tick(self.tick(state, targets))
         else:
-            assemble(*arguments, ws)
+            assemble(self.assembly(state, targets))
             solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
             if solution.status is Status.INFEASIBLE:
                 release_joints(ws)
                 solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
             if solution.solved:
                 ws.x[:] = solution.x
-            accept(state.arrays, self.parameters, 0 if solution.solved else 1, ws, self.memory)
+            ws.status[0] = 0 if solution.solved else 1
+            accept(state.arrays, self.parameters, ws, self.memory)
         return ws.tau[self._motor_joints].copy()

@@ -115,6 +115,7 @@ class Workspace(Block):
     lam: np.ndarray  # (m,)
     scratch: np.ndarray
     iscratch: np.ndarray
+    status: np.ndarray  # (1,) int: how the solution ended, see `solvers/rows.py`; 0: solved
     vdot: np.ndarray  # (nv,) solution, a view of `values` like the next one
     wrenches: np.ndarray  # (k,) solution
     tau: np.ndarray  # (nj,) solution
@@ -146,24 +147,31 @@ def allocate_workspace(robot: RobotArrays, cone_rows: int, soft_root: bool) -> W
         BBt=z((6, 6)), JtE=z((nv, n)), local=z((6, n)), local0=z(6),
         H=z((n, n)), g=z(n), C=z((m, n)), l=z(m), u=z(m), x=z(n), lam=z(m),
         scratch=z(scratch_size(n, m)), iscratch=z(iscratch_size(n, m), dtype=np.int64),
+        status=z(1, dtype=np.int64),
         vdot=values[V], wrenches=values[E], tau=z(nj), root_wrench=z(6),
     )  # fmt: skip
     ws.cop_prev[:] = np.nan
     return ws
 
 
+@dataclass(frozen=True, eq=False)
+class Assembly(Block):
+    """What the reduced problem of a tick is made from, and where it is put."""
+
+    robot: RobotArrays
+    state: StateArrays
+    parameters: QPParameters
+    targets: TargetArrays
+    period: float  # [s] between two ticks
+    workspace: Workspace
+
+
 @compiled
-def assemble(
-    robot: RobotArrays,
-    s: StateArrays,
-    p: QPParameters,
-    t: TargetArrays,
-    tick: float,
-    ws: Workspace,
-):
-    """Fill `H, g, C, l, u` of `ws` with min ½xᵀHx + gᵀx, l ≤ Cx ≤ u for this tick."""
+def assemble(a: Assembly):
+    """Fill `H, g, C, l, u` of the workspace: min ½xᵀHx + gᵀx, l ≤ Cx ≤ u for this tick."""
+    robot, s, p, t, ws = a.robot, a.state, a.parameters, a.targets, a.workspace
     desired_accelerations(s, p, t, ws)
-    desired_momentum_rate(robot, s, p, t, tick, ws)
+    desired_momentum_rate(robot, s, p, t, a.period, ws)
     _eliminate_soles(s, p, ws)
     _share_wrench(s, p, ws)
     _carry_momentum(p, t, ws)

@@ -10,7 +10,7 @@ import numpy as np
 
 from poise.envs.arrays import apart
 from poise.envs.balance import BalanceEnv, EnvConfig
-from poise.envs.block import bound
+from poise.envs.block import Block
 from poise.envs.config import build, to_dict
 from poise.envs.episode import ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.errors import ConfigError
@@ -21,7 +21,7 @@ from .controller import Controller, Targets
 from .momentum_qp import MomentumQP, MomentumQPConfig
 from .motions import ReferenceMotion, load_motion
 from .registry import CONTROLLERS, load_controller
-from .residual_step import ResidualStep, residual_step, soft_root_force
+from .residual_step import Residual, ResidualStep, residual_step, set_offsets, soft_root_force
 from .targets import Motion
 from .tick_parts import Aim, Record, aim, record
 from .warmup import prepare
@@ -220,7 +220,6 @@ class ResidualBalanceEnv(BalanceEnv):
         self.residual = build(self.scales_class, given, "residual")
         scale = np.array(list(self.residual.entries().values()))
         self._moved = np.flatnonzero(scale)
-        self._offsets = apart(len(scale))
         if len(self._moved) == 0:
             raise ConfigError("at least one scale must be above 0", field="residual")
         super().__init__(robot, config, render_mode=render_mode, **overrides)
@@ -231,9 +230,11 @@ class ResidualBalanceEnv(BalanceEnv):
         self.smoothing, self.gate = float(smoothing), float(gate)
         # share of the way that the residual goes to the action in one policy step
         share = 1.0 if smoothing == 0.0 else -np.expm1(-self.config.policy_period / smoothing)
-        self._share = float(share)
         scale[7:9] *= 10.0 * self.scales.momentum
-        self._scale = scale[self._moved]
+        self._offsets = apart(len(scale))
+        self._residual = Residual(
+            self._moved, scale[self._moved], float(share), self.gate, self._offsets
+        )
         self.controller = load_controller(controller, self.robot)
         self.motion = (
             motion if isinstance(motion, ReferenceMotion) else load_motion(motion, self.robot)
@@ -273,8 +274,8 @@ class ResidualBalanceEnv(BalanceEnv):
         self._com_offset = float(getattr(controller, "com_offset", 0.0))
         self._step: ResidualStep | None = None
         self._gains: Any = None  # with which it was made
-        self._aim: tuple[Any, Any] = (None, None)  # what was bound, and to which state
-        self._record: tuple[Any, Any] = (None, None)
+        self._aim: Aim | None = None
+        self._record: Record | None = None
 
     def arguments(self) -> dict[str, Any]:
         """What makes another environment like this one; robot and motion are shared.
@@ -308,75 +309,66 @@ class ResidualBalanceEnv(BalanceEnv):
         self._update_targets()
 
     def _update_targets(self) -> None:
-        update, state = self._aim
-        sim = self.simulation
-        if state is not sim.state_arrays:
-            parts = Aim(
+        sim, known = self.simulation, self._aim
+        if known is None or known.state is not sim.state_arrays:
+            known = self._aim = Aim(
                 self.arrays, sim.state_arrays, sim.clock, self._motion, self._com_offset,
                 self._offsets, self._targets,
             )  # fmt: skip
-            update = bound(aim, parts)
-            self._aim = update, sim.state_arrays
-        update()
+        aim(known)
 
-    def _advance(self) -> float:
-        residual, e = self._offsets, self.episode
-        if self._share < 1.0:
-            e.action[:] = e.last_action + self._share * (e.action - e.last_action)
-        residual[self._moved] = self._openness() * self._scale * e.action
-        if not self._compiled:
-            return self._advance_in_python()
-        gains = self.controller.parameters
-        if self._step is None or self._step.episode is not e or self._gains is not gains:
-            self._step, self._gains = self._bind(), gains
-        return residual_step(self._step, self.simulation.push_table)
+    def compiled_step(self) -> tuple[Any, Block] | None:
+        """See `BalanceEnv`: the momentum QP's with its own solver."""
+        return (residual_step, self._bound()) if self._compiled else None
 
-    def _bind(self) -> ResidualStep:
-        sim, controller, ws = self.simulation, self.controller, self.controller.workspace
-        address, tick = controller.compiled_tick(sim.state, self.targets)
-        return ResidualStep(
-            self.arrays, sim.plant, sim.state_arrays, sim.clock,
-            address, tick, ws.tau, ws.root_wrench, controller.parameters.soft_root,
-            self._targets, self._motion, self._com_offset, self._offsets,
-            self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
-        )  # fmt: skip
+    def _bound(self) -> ResidualStep:
+        step, gains, pushes = self._step, self.controller.parameters, self.simulation.push_table
+        if (
+            step is None or step.episode is not self.episode
+            or self._gains is not gains or step.pushes is not pushes
+        ):  # fmt: skip
+            sim, controller, ws = self.simulation, self.controller, self.controller.workspace
+            address, tick = controller.compiled_tick(sim.state, self.targets)
+            step = self._step = ResidualStep(
+                self.arrays, sim.plant, sim.state_arrays, sim.clock,
+                address, tick, ws.tau, ws.root_wrench, gains.soft_root,
+                self._targets, self._motion, self._com_offset, self._residual, pushes,
+                self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
+            )  # fmt: skip
+            self._gains = gains
+        return step
 
-    def _openness(self) -> float:
-        """1 − exp(−(d/gate)²), d the capture point's distance from that of the reference [m]."""
-        if self.gate == 0.0:
-            return 1.0
-        s, samples, nj = self.simulation.state_arrays, self._motion.samples, self.targets.q_ref.size
-        omega = float(s.omega[0])
-        x = samples[0, nj] + self._com_offset + samples[1, nj] / omega
-        y = samples[0, nj + 1] + samples[1, nj + 1] / omega
-        cos, sin = s.heading
-        dx = s.capture_point[0] - s.origin[0] - (cos * x - sin * y)
-        dy = s.capture_point[1] - s.origin[1] - (sin * x + cos * y)
-        return float(-np.expm1(-(dx * dx + dy * dy) / self.gate**2))
+    def advance(self) -> None:
+        if self._compiled:
+            residual_step(self._bound())
+        else:
+            self._advance_in_python()
 
-    def _advance_in_python(self) -> float:
+    def _set_offsets(self) -> None:
+        s = self.simulation.state_arrays
+        set_offsets(self._residual, s, self._motion, self._com_offset, self.episode)
+
+    def _advance_in_python(self) -> None:
         """What `residual_step` does, for any controller."""
         sim, e = self.simulation, self.episode
         s, ctrl = sim.state_arrays, sim.plant.ctrl
-        count = self._recorder()
+        self._set_offsets()
+        accounts = self._accounts()
         for _ in range(self.ticks):
             self._update_targets()
             ctrl[:] = self.controller.torques(sim.state, self.targets)
             self._push_root(s, sim.plant.qfrc_applied)
-            count()
+            record(accounts)
             sim.step(ctrl, self.control_substeps)
-        return judge_step(
-            self.arrays, s, self.scales, self.judge, self.targets.q_ref, ctrl, sim.time, e
-        )
+        judge_step(self.arrays, s, self.scales, self.judge, self.targets.q_ref, ctrl, sim.time, e)
+        self._observe()
 
-    def _recorder(self) -> Any:
-        count, bound_to = self._record
-        sim, e = self.simulation, self.episode
-        if bound_to is None or bound_to[0] is not sim or bound_to[1] is not e:
-            parts = Record(self.arrays, sim.state_arrays, sim.plant, self.controller.period, e)
-            count = bound(record, parts)
-            self._record = count, (sim, e)
-        return count
+    def _accounts(self) -> Record:
+        sim, e, known = self.simulation, self.episode, self._record
+        if known is None or known.plant is not sim.plant or known.episode is not e:
+            period = self.controller.period
+            known = self._record = Record(self.arrays, sim.state_arrays, sim.plant, period, e)
+        return known
 
     def _push_root(self, s: Any, qfrc_applied: np.ndarray) -> None:
         """Apply a soft root's wrench, and take away the last one."""

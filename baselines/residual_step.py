@@ -16,7 +16,7 @@ from poise.envs.episode import (
 )
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, update_state
-from poise.envs.observation import Scales
+from poise.envs.observation import Scales, observe
 from poise.envs.simulation import advance
 
 from .reduced_qp import TargetArrays
@@ -40,6 +40,41 @@ def soft_root_force(s: StateArrays, wrench: np.ndarray, qfrc_applied: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
+class Residual(Block):
+    """How an action becomes offsets of the controller's targets."""
+
+    moved: np.ndarray  # (na,) int: the offset that each entry of the action moves
+    scale: np.ndarray  # (na,) the offset that it moves by 1
+    share: float  # of the way that a policy step goes from the last action to the next
+    gate: float  # [m] see `openness`
+    offsets: np.ndarray  # (9,) see `update_targets`
+
+
+@compiled
+def openness(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> float:
+    """1 − exp(−(d/gate)²), d the capture point's distance from that of the reference [m]."""
+    if r.gate == 0.0:
+        return 1.0
+    nj = motion.samples.shape[1] - 6
+    x = motion.samples[0, nj] + com_offset + motion.samples[1, nj] / s.omega[0]
+    y = motion.samples[0, nj + 1] + motion.samples[1, nj + 1] / s.omega[0]
+    cos, sin = s.heading[0], s.heading[1]
+    dx = s.capture_point[0] - s.origin[0] - (cos * x - sin * y)
+    dy = s.capture_point[1] - s.origin[1] - (sin * x + cos * y)
+    return -np.expm1(-(dx * dx + dy * dy) / (r.gate * r.gate))
+
+
+@compiled
+def set_offsets(r: Residual, s: StateArrays, motion: Motion, com_offset: float, e: EpisodeArrays):
+    """Offsets from the episode's action, which is smoothed first."""
+    opened = openness(r, s, motion, com_offset)
+    for a in range(r.moved.shape[0]):
+        if r.share < 1.0:
+            e.action[a] = e.last_action[a] + r.share * (e.action[a] - e.last_action[a])
+        r.offsets[r.moved[a]] = opened * r.scale[a] * e.action[a]
+
+
+@dataclass(frozen=True, eq=False)
 class ResidualStep(Block):
     """All that a policy step works on."""
 
@@ -47,7 +82,7 @@ class ResidualStep(Block):
     plant: Plant
     state: StateArrays
     clock: np.ndarray  # (1,) int
-    address: int  # of the controller's tick
+    kernel: int  # the address of the controller's tick
     tick: Block  # what it works on
     tau: np.ndarray  # (nj,) what it finds [N·m]
     root_wrench: np.ndarray  # (6,) of a soft root
@@ -55,7 +90,8 @@ class ResidualStep(Block):
     targets: TargetArrays
     motion: Motion
     com_offset: float  # [m]
-    residual: np.ndarray  # (9,) see `update_targets`
+    residual: Residual
+    pushes: np.ndarray  # see `apply_pushes`
     scales: Scales
     judge: Judge
     ticks: int
@@ -64,16 +100,17 @@ class ResidualStep(Block):
 
 
 @compiled
-def residual_step(step: ResidualStep, pushes: np.ndarray) -> float:
+def residual_step(step: ResidualStep):
     """One policy step: `ticks` times the controller, each held for `substeps` physics steps."""
     robot, plant, s, clock, motion = step.robot, step.plant, step.state, step.clock, step.motion
     t, e, tau, w = step.targets, step.episode, step.tau, step.root_wrench
     period = step.substeps * robot.timestep
+    set_offsets(step.residual, s, motion, step.com_offset, e)
     for _ in range(step.ticks):
         update_targets(
-            robot, s, motion, clock[0] * robot.timestep, step.com_offset, step.residual, t
+            robot, s, motion, clock[0] * robot.timestep, step.com_offset, step.residual.offsets, t
         )
-        call(step.address, step.tick)
+        call(step.kernel, step.tick)
         for i in range(plant.ctrl.shape[0]):
             plant.ctrl[i] = tau[robot.motor_dofs[i] - 6]
         if step.soft_root:
@@ -83,7 +120,8 @@ def residual_step(step: ResidualStep, pushes: np.ndarray) -> float:
             m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
         record_tick(robot, s, plant.ctrl, period, e)
         for _ in range(step.substeps):
-            advance(robot, plant, pushes, clock)
+            advance(robot, plant, step.pushes, clock)
         update_state(robot, plant, s)
     now = clock[0] * robot.timestep
-    return judge_step(robot, s, step.scales, step.judge, t.q_ref, plant.ctrl, now, e)
+    judge_step(robot, s, step.scales, step.judge, t.q_ref, plant.ctrl, now, e)
+    observe(robot, s, step.scales, t.q_ref, t.v_ref, e.action, e.observation)

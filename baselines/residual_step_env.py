@@ -143,13 +143,13 @@ class ResidualStepEnv(ResidualBalanceEnv):
         added = np.array(swing + times + local(feet[0] - feet[1]) + moving)
         self.episode.observation[-len(added) :] = np.clip(added, -10.0, 10.0)
 
-    def _advance_in_python(self) -> float:
+    def _set_offsets(self) -> None:
+        super()._set_offsets()
         offsets, shift = self._offsets, self.controller.shift
         shift.com, shift.cop = offsets[0:2].copy(), offsets[2:4].copy()
         shift.height, shift.lean = float(offsets[4]), offsets[5:7].copy()
         shift.foothold = offsets[9:11].copy()
         shift.time, shift.trigger = float(offsets[11]), float(offsets[12])
-        return super()._advance_in_python()
 
     def info(self) -> dict[str, Any]:
         """As of `ResidualBalanceEnv`, and the number of steps."""

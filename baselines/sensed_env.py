@@ -78,9 +78,9 @@ class SensedResidualEnv(Sensed, ResidualBalanceEnv):
         with self._through_sensors():
             super()._update_targets()
 
-    def _openness(self) -> float:
+    def _set_offsets(self) -> None:
         with self._through_sensors():
-            return super()._openness()
+            super()._set_offsets()
 
 
 class SensedStepEnv(SensedResidualEnv, ResidualStepEnv):
@@ -90,16 +90,20 @@ class SensedStepEnv(SensedResidualEnv, ResidualStepEnv):
 class SensedTorqueEnv(Sensed, TorqueBalanceEnv):
     """`TorqueBalanceEnv`, where the policy goes by the believed state."""
 
-    def _advance(self) -> float:
+    def compiled_step(self) -> None:
+        """Sensors are late in Python only."""
+
+    def advance(self) -> None:
         sim, e = self.simulation, self.episode
         ctrl = sim.plant.ctrl
         ctrl[:] = e.action * self.arrays.torque_limit
         s, period = sim.state_arrays, self.config.policy_period
         record_tick(self.arrays, s, ctrl, period, e)
         sim.step(ctrl, self.substeps)
-        return judge_step(
+        judge_step(
             self.arrays, s, self.scales, self.judge, self.arrays.q_standing, ctrl, sim.time, e
         )
+        self._observe()
 
 
 def sensed_env(env: BalanceEnv) -> SensedResidualEnv | SensedTorqueEnv:

@@ -1,4 +1,7 @@
-"""The compiled parts of a tick around a controller that is called from Python."""
+"""The compiled parts of a tick around a controller that is called from Python.
+
+Each takes one block: looking up the type of a block costs a call some 5 µs.
+"""
 
 from dataclasses import dataclass
 
@@ -7,6 +10,7 @@ import numpy as np
 from poise.envs.arrays import Plant, RobotArrays
 from poise.envs.block import Block
 from poise.envs.episode import EpisodeArrays, record_tick
+from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
 
 from .reduced_qp import TargetArrays
@@ -22,12 +26,13 @@ class Aim(Block):
     clock: np.ndarray  # (1,) int
     motion: Motion
     com_offset: float  # [m]
-    residual: np.ndarray  # (9,)
+    residual: np.ndarray  # (≥ 9,)
     targets: TargetArrays
 
 
-def aim(block: Aim) -> None:
-    """Targets of this tick; to be called by its address, as the next one."""
+@compiled
+def aim(block: Aim):
+    """Targets of this tick."""
     update_targets(
         block.robot, block.state, block.motion, block.clock[0] * block.robot.timestep,
         block.com_offset, block.residual, block.targets,
@@ -45,6 +50,7 @@ class Record(Block):
     episode: EpisodeArrays
 
 
-def record(block: Record) -> None:
+@compiled
+def record(block: Record):
     """Account for the torques in `plant.ctrl`."""
     record_tick(block.robot, block.state, block.plant.ctrl, block.period, block.episode)

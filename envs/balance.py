@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 
 from .arrays import RobotArrays
+from .block import Block
 from .env_config import EnvConfig as EnvConfig
 from .env_config import env_config
 from .episode import (
@@ -119,9 +120,13 @@ class BalanceEnv(gymnasium.Env):
     def _begin(self) -> None:
         """Prepare the subclass for a new episode; the simulation has just been reset."""
 
-    def _advance(self) -> float:
-        """One policy step with `episode.action`; returns the reward."""
+    def advance(self) -> None:
+        """One policy step with `episode.action`: reward, metrics and observation of the record."""
         raise NotImplementedError
+
+    def compiled_step(self) -> tuple[Any, Block] | None:
+        """A kernel and its block that do what `advance` does, if there are any."""
+        return None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -233,25 +238,31 @@ class BalanceEnv(gymnasium.Env):
 
     def apply_action(self) -> tuple[float, bool, bool]:
         """What `step_in_place` does with an action that has been set."""
+        self.expect_running()
+        self.advance()
+        return self.conclude_step()
+
+    def expect_running(self) -> None:
+        """Raises PoiseError if there is no episode that could go on."""
         if self._needs_reset:
             raise PoiseError("step() after the episode's end: call reset() first")
-        reward = self._advance()
+
+    def conclude_step(self) -> tuple[float, bool, bool]:
+        """Reward, terminated and truncated of the policy step that has been taken."""
         if self.simulation.diverged:
-            reward = self._diverged()
-        self._observe()
+            self._diverged()
         self.steps += 1
         terminated = self.fallen
         truncated = self.steps >= self.max_steps and not terminated
         self._needs_reset = terminated or truncated
-        return reward, terminated, truncated
+        return float(self.episode.reward[0]), terminated, truncated
 
-    def _diverged(self) -> float:
+    def _diverged(self) -> None:
         """A simulation that went to infinity, and that MuJoCo started anew, is a fall."""
-        terms, metrics = self.episode.reward_terms, self.episode.metrics
-        metrics[FALLEN], metrics[QUIET_STEPS] = 1.0, 0.0
-        terms[:] = 0.0
-        terms[REWARD_TERMS.index("fall")] = -self.config.reward.fall
-        return float(terms.sum())
+        e = self.episode
+        e.metrics[FALLEN], e.metrics[QUIET_STEPS] = 1.0, 0.0
+        e.reward_terms[:] = 0.0
+        e.reward_terms[REWARD_TERMS.index("fall")] = e.reward[0] = -self.config.reward.fall
 
     def _observe(self) -> None:
         q_ref, v_ref = self._references()

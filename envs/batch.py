@@ -9,12 +9,41 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
+import llvmlite.ir
 import numpy as np
+from numba.core import types
+from numba.extending import intrinsic
 
 from .arrays import apart
 from .balance import BalanceEnv
+from .block import address_of, call
 from .episode import EpisodeArrays
 from .errors import ConfigError
+from .jit import compiled
+
+
+@intrinsic
+def take_turn(typing: Any, turn: Any) -> Any:
+    """The number in `turn` (1,) int, which is one more for whoever comes next in any thread."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        numbers = context.make_array(turn)(context, builder, args[0])
+        one = llvmlite.ir.Constant(llvmlite.ir.IntType(64), 1)
+        return builder.atomic_rmw("add", numbers.data, one, "monotonic")
+
+    return types.int64(turn), generate
+
+
+@compiled
+def play(kernel: int, blocks: np.ndarray, turn: np.ndarray):
+    """Call `kernel` with each block, all by address, until the threads have had their turns."""
+    k = take_turn(turn)
+    while k < blocks.shape[0]:
+        call(kernel, blocks[k])
+        k = take_turn(turn)
+
+
+NOBODY = np.zeros(0, dtype=np.int64)
 
 
 def replicate(env: BalanceEnv, count: int) -> list[BalanceEnv]:
@@ -64,6 +93,7 @@ class EnvBatch:
         self.infos: list[dict[str, Any]] = [{} for _ in range(n)]
         self._wants_infos = infos
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+        self._kernel: tuple[Any, int] = None, 0  # the environments' step and its address
 
     @property
     def ended(self) -> np.ndarray:
@@ -122,8 +152,35 @@ class EnvBatch:
         live = np.ones(len(self.envs), dtype=bool) if restart is None else ~restart
         self._set_actions(actions, live)
         self._forget(~live)
-        self._share(lambda i: self._play(i) if live[i] else self._restart(i), range(len(live)))
+        played = np.flatnonzero(live).tolist()
+        kernel, blocks = self._compiled_steps(played)
+        if kernel:
+            self._share(self._restart, np.flatnonzero(~live).tolist(), kernel, blocks)
+        else:
+            everyone = range(len(live))
+            self._share(lambda i: self._play(i) if live[i] else self._restart(i), everyone)
+        for i in played:
+            env = self.envs[i]
+            self.rewards[i], self.terminated[i], self.truncated[i] = env.conclude_step()
+            if self._wants_infos:
+                self.infos[i] = env.info()
         self.observations[:] = self.episodes.observation
+
+    def _compiled_steps(self, played: Sequence[int]) -> tuple[int, np.ndarray]:
+        """Addresses of a kernel and of the blocks of `played`; 0 if Python has to step them."""
+        steps = []
+        for i in played:
+            self.envs[i].expect_running()
+            step = self.envs[i].compiled_step()
+            if step is None:
+                return 0, NOBODY
+            steps.append(step)
+        if len({block.numba_type for _, block in steps}) != 1:
+            return 0, NOBODY
+        kernel, block = steps[0]
+        if self._kernel[0] is not kernel:
+            self._kernel = kernel, address_of(kernel, block)
+        return self._kernel[1], np.array([block.address for _, block in steps])
 
     def _set_actions(self, actions: np.ndarray, live: np.ndarray) -> None:
         """What `BalanceEnv.set_action` does, for all rows at once."""
@@ -143,10 +200,7 @@ class EnvBatch:
         record.action[live] = np.clip(vectors[live], -1.0, 1.0)
 
     def _play(self, i: int) -> None:
-        env = self.envs[i]
-        self.rewards[i], self.terminated[i], self.truncated[i] = env.apply_action()
-        if self._wants_infos:
-            self.infos[i] = env.info()
+        self.envs[i].advance()
 
     def _restart(
         self, i: int, seed: int | None = None, options: dict[str, Any] | None = None
@@ -158,19 +212,31 @@ class EnvBatch:
         self.rewards[rows] = 0.0
         self.terminated[rows] = self.truncated[rows] = False
 
-    def _share(self, work: Callable[[int], None], indices: Iterable[int]) -> None:
-        """Call `work` with every index, in all threads: whoever is free takes the next.
+    def _share(
+        self,
+        work: Callable[[int], None],
+        indices: Iterable[int],
+        kernel: int = 0,
+        blocks: np.ndarray = NOBODY,
+    ) -> None:
+        """Call `work` with every index and `kernel` with every block, in all threads.
 
-        They take from both ends, so that most environments stay with a thread and in its cache.
+        Whoever is free takes the next. Of the indices they take from both ends, so that most
+        environments stay with a thread and in its cache.
         """
-        todo = deque(indices)
+        todo, turn = deque(indices), np.zeros(1, dtype=np.int64)
+
+        def take_part(take: Callable[[], int]) -> None:
+            _work_off(work, take)
+            play(kernel, blocks, turn)
+
         jobs = []
         if self._pool is not None:
             ends = todo.pop, todo.popleft
-            others = min(self.threads, len(todo)) - 1
-            jobs = [self._pool.submit(_work_off, work, ends[k % 2]) for k in range(others)]
+            others = min(self.threads, len(todo) + len(blocks)) - 1
+            jobs = [self._pool.submit(take_part, ends[k % 2]) for k in range(others)]
         try:
-            _work_off(work, todo.popleft)
+            take_part(todo.popleft)
         finally:
             wait(jobs)
         for job in jobs:

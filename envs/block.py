@@ -5,8 +5,6 @@ compiles all of them. A `Block` is handed over as a pointer: its arrays' address
 its numbers, lie one after the other in memory, and only what a function uses is read.
 """
 
-import ctypes
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -25,8 +23,6 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
-
-from .jit import OPTIONS
 
 WORD = 8  # bytes
 
@@ -48,8 +44,18 @@ class Block:
             words += content
         memory = np.array(words, dtype=np.int64)
         object.__setattr__(self, "_memory", memory)
-        object.__setattr__(self, "address", memory.ctypes.data)
-        object.__setattr__(self, "numba_type", BlockType(type(self).__name__, tuple(members)))
+        object.__setattr__(self, "_address", memory.ctypes.data)
+        object.__setattr__(self, "_type", BlockType(type(self).__name__, tuple(members)))
+
+    @property
+    def address(self) -> int:
+        """Where compiled code finds the members."""
+        return self._address  # type: ignore[attr-defined]
+
+    @property
+    def numba_type(self) -> "BlockType":
+        """Numba's type: two blocks of one type are read by the same code."""
+        return self._type  # type: ignore[attr-defined]
 
     def members(self) -> tuple[Any, ...]:
         """The fields' values, in order."""
@@ -62,7 +68,7 @@ class Block:
 def _words(value: Any) -> tuple[types.Type, list[int]]:
     """Numba's type of a field, and its 64-bit words."""
     if isinstance(value, Block):
-        return value.numba_type, [value.address]  # type: ignore[attr-defined]
+        return value.numba_type, [value.address]
     if isinstance(value, np.ndarray):
         if not value.flags.c_contiguous or not value.flags.aligned:
             raise TypeError("a block holds contiguous arrays only")
@@ -157,46 +163,36 @@ def _array(context: Any, builder: Any, kind: types.Array, word: Any) -> Any:
     return array._getvalue()
 
 
-_functions: dict[tuple[Any, BlockType], Any] = {}
-
-
-def address_of(function: Any, block: Block) -> int:
-    """The address of `function(block)`, compiled for blocks of this kind, for `call`.
+def address_of(kernel: Any, block: Block) -> int:
+    """The address of the compiled function `kernel(block)`, which returns nothing, for `call`.
 
     A function called by its address is compiled apart from its caller: neither waits for the
-    other, and it is not optimised once more with all that it is called from.
+    other, and it is not optimised once more within all that it is called from.
     """
-    kind = block.numba_type  # type: ignore[attr-defined]
-    key = function, kind
-    if key not in _functions:
-        _functions[key] = numba.cfunc(types.void(kind), **OPTIONS)(function)
-    return int(_functions[key].address)
-
-
-_POINTER_IN = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
-
-
-def bound(function: Any, block: Block) -> Callable[[], None]:
-    """`function(block)`, compiled, for Python: a call costs 1 µs.
-
-    Numba's own way to call it looks up each block's type, which takes some 5 µs for each.
-    """
-    run, address = _POINTER_IN(address_of(function, block)), block.address  # type: ignore[attr-defined]
-
-    def run_bound(block: Block = block) -> None:  # holds the block, and with it the arrays
-        run(address)
-
-    return run_bound
+    arguments = (block.numba_type,)
+    kernel.compile(arguments)
+    result = kernel.overloads[arguments]
+    return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
 
 
 @intrinsic
 def call(typing: Any, address: Any, block: Any) -> Any:
-    """`function(block)` by the address of the function."""
+    """`kernel(block)` by the address of the compiled function; its exceptions go on.
+
+    The block may also be given by its address.
+    """
+    kind = block if isinstance(block, BlockType) else types.voidptr
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        pointer = args[1].type
-        function = llvmlite.ir.FunctionType(llvmlite.ir.VoidType(), [pointer]).as_pointer()
-        builder.call(builder.inttoptr(args[0], function), [args[1]])
+        convention = context.call_conv
+        function = convention.get_function_type(types.none, (kind,))
+        kernel = builder.inttoptr(args[0], function.as_pointer())
+        pointer = args[1]
+        if kind is types.voidptr:
+            pointer = builder.inttoptr(pointer, context.get_value_type(kind))
+        status, _ = convention.call_function(builder, kernel, types.none, (kind,), [pointer])
+        with cgutils.if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
         return context.get_dummy_value()
 
     return types.void(address, block), generate

@@ -67,7 +67,8 @@ class EpisodeArrays(Block):
     action: np.ndarray  # (na,)
     last_action: np.ndarray  # (na,)
     observation: np.ndarray  # (no,)
-    reward_terms: np.ndarray  # (terms,) weighted
+    reward: np.ndarray  # (1,) of the last policy step
+    reward_terms: np.ndarray  # (terms,) weighted; their sum is the reward
     metrics: np.ndarray  # (METRICS,)
     sole_start: np.ndarray  # (nc, 2)
 
@@ -102,6 +103,7 @@ def allocate_episode(actions: int, observations: int, nc: int) -> EpisodeArrays:
         action=apart(actions),
         last_action=apart(actions),
         observation=apart(observations),
+        reward=apart(1),
         reward_terms=apart(len(REWARD_TERMS)),
         metrics=apart(METRICS),
         sole_start=apart((nc, 2)),
@@ -113,6 +115,7 @@ def begin_episode(s: StateArrays, e: EpisodeArrays):
     """Clear the record; feet are where they should stay."""
     e.action[:] = 0.0
     e.last_action[:] = 0.0
+    e.reward[0] = 0.0
     e.reward_terms[:] = 0.0
     e.metrics[:] = 0.0
     e.metrics[MIN_COP_MARGIN] = np.inf
@@ -166,8 +169,8 @@ def judge_step(
     tau: np.ndarray,
     time: float,
     e: EpisodeArrays,
-) -> float:
-    """Metrics and reward of one policy step that ended at `time`; returns the reward."""
+):
+    """Metrics and reward of one policy step that ended at `time`."""
     m = e.metrics
     update_support(robot, s)
     fallen = has_fallen(robot, s, j)
@@ -223,4 +226,4 @@ def judge_step(
     for i in range(terms.shape[0]):
         terms[i] *= j.weights[i]
         total += terms[i]
-    return total
+    e.reward[0] = total

@@ -5,19 +5,18 @@ import hashlib
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numba
 from numba.core import event
 
-#: Cached on disk, NumPy's rules for division by zero. Sums may be reordered (SIMD), but NaN and
-#: infinity keep their meaning: checks rely on them.
-OPTIONS: dict[str, Any] = {
-    "cache": True,
-    "error_model": "numpy",
-    "fastmath": {"contract", "reassoc", "nsz", "arcp"},
-}
-compiled = numba.njit(nogil=True, **OPTIONS)
+#: Cached on disk, without the GIL, NumPy's rules for division by zero. Sums may be reordered
+#: (SIMD), but NaN and infinity keep their meaning: checks rely on them.
+compiled = numba.njit(
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+    fastmath={"contract", "reassoc", "nsz", "arcp"},
+)
 
 PATIENCE = 1.0  # [s] of compilation before the user is told
 MESSAGE = "poise: compiling for the first use; this takes some twenty seconds, once"

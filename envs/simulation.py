@@ -1,13 +1,13 @@
 """One simulated robot: MuJoCo data, its compiled views, its pushes and its clock."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from .arrays import Plant, RobotArrays, apart, plant_views, robot_arrays
-from .block import Block, bound
+from .block import Block
 from .jit import compiled
 from .kinematics import StateArrays, allocate_state, update_state
 from .native import mj_step1, mj_step2
@@ -45,8 +45,9 @@ class World(Block):
     count: np.ndarray  # (1,) int: physics steps
 
 
-def advance_world(world: World) -> None:
-    """`count` physics steps, then the state; to be called by its address."""
+@compiled
+def advance_world(world: World):
+    """`count` physics steps, then the state."""
     for _ in range(world.count[0]):
         advance(world.robot, world.plant, world.pushes, world.clock)
     update_state(world.robot, world.plant, world.state)
@@ -71,8 +72,8 @@ class Simulation:
         self._count = apart(1, dtype=np.int64)
         self._warnings = self.data.warning.number  # a view
         self.pushes: tuple[Push | Kick, ...] = ()
-        self.push_table = np.zeros((0, TABLE_COLUMNS))
-        self._advance: Callable[[], None] | None = None  # bound to the pushes
+        self.push_table = apart((0, TABLE_COLUMNS))
+        self._world: World | None = None
         self.reset()
 
     @property
@@ -114,17 +115,18 @@ class Simulation:
     def set_pushes(self, pushes: Sequence[Push | Kick]) -> None:
         """Replace the schedule; starts are seconds since the reset."""
         self.pushes = tuple(pushes)
-        self.push_table = pack(self.pushes, self.robot, self.state.heading_yaw)
-        self._advance = None
+        table = pack(self.pushes, self.robot, self.state.heading_yaw)
+        if table.shape != self.push_table.shape:
+            self.push_table = apart(table.shape)
+        self.push_table[:] = table  # in place: compiled code may be bound to it
 
     def step(self, torques: np.ndarray, count: int = 1) -> RobotState:
         """Apply joint torques (nu,) [N·m] for `count` physics steps."""
-        if self._advance is None:
-            world = World(
+        if self._world is None or self._world.pushes is not self.push_table:
+            self._world = World(
                 self.arrays, self.plant, self.state_arrays, self.clock, self.push_table, self._count
             )
-            self._advance = bound(advance_world, world)
         self.plant.ctrl[:] = torques
         self._count[0] = count
-        self._advance()
+        advance_world(self._world)
         return self.state

@@ -14,7 +14,7 @@ from .block import Block
 from .episode import EpisodeArrays, Judge, judge_step, record_tick
 from .jit import compiled
 from .kinematics import StateArrays, update_state
-from .observation import Scales
+from .observation import Scales, observe
 from .robot import Robot
 from .simulation import advance
 from .vector import make_vector_env
@@ -31,21 +31,24 @@ class TorqueStep(Block):
     scales: Scales
     judge: Judge
     substeps: int
+    still: np.ndarray  # (nj,) zeros: velocities of the reference
+    pushes: np.ndarray  # see `apply_pushes`
     episode: EpisodeArrays
 
 
 @compiled
-def torque_step(step: TorqueStep, pushes: np.ndarray) -> float:
-    """One policy step: torques are held for `substeps` physics steps; returns the reward."""
+def torque_step(step: TorqueStep):
+    """One policy step: torques are held for `substeps` physics steps."""
     robot, plant, s, clock, e = step.robot, step.plant, step.state, step.clock, step.episode
     for i in range(plant.ctrl.shape[0]):
         plant.ctrl[i] = e.action[i] * robot.torque_limit[i]
     record_tick(robot, s, plant.ctrl, step.substeps * robot.timestep, e)
     for _ in range(step.substeps):
-        advance(robot, plant, pushes, clock)
+        advance(robot, plant, step.pushes, clock)
     update_state(robot, plant, s)
     now = clock[0] * robot.timestep
-    return judge_step(robot, s, step.scales, step.judge, robot.q_standing, plant.ctrl, now, e)
+    judge_step(robot, s, step.scales, step.judge, robot.q_standing, plant.ctrl, now, e)
+    observe(robot, s, step.scales, robot.q_standing, step.still, e.action, e.observation)
 
 
 class TorqueBalanceEnv(BalanceEnv):
@@ -236,14 +239,21 @@ class TorqueBalanceEnv(BalanceEnv):
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self.arrays.q_standing, self._still
 
-    def _advance(self) -> float:
-        sim, e = self.simulation, self.episode
-        if self._step is None or self._step.episode is not e:
-            self._step = TorqueStep(
-                self.arrays, sim.plant, sim.state_arrays, sim.clock,
-                self.scales, self.judge, self.substeps, e,
+    def advance(self) -> None:
+        torque_step(self._bound())
+
+    def compiled_step(self) -> tuple[Any, Block] | None:
+        """See `BalanceEnv`."""
+        return torque_step, self._bound()
+
+    def _bound(self) -> TorqueStep:
+        sim, e, step = self.simulation, self.episode, self._step
+        if step is None or step.episode is not e or step.pushes is not sim.push_table:
+            step = self._step = TorqueStep(
+                self.arrays, sim.plant, sim.state_arrays, sim.clock, self.scales, self.judge,
+                self.substeps, self._still, sim.push_table, e,
             )  # fmt: skip
-        return torque_step(self._step, sim.push_table)
+        return step
 
 
 vector_env = partial(make_vector_env, TorqueBalanceEnv)  # for gymnasium.make_vec

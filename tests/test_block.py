@@ -1,7 +1,6 @@
 """Blocks: what compiled code reads through an address is what Python holds."""
 
 import copy
-import gc
 import pickle
 from dataclasses import dataclass
 
@@ -9,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from poise.envs.block import Block, bound
+from poise.envs.block import Block, address_of, call
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +102,37 @@ def test_copies_have_memory_of_their_own(duplicate):
     assert read(other)[3] == 4.0 and read(block)[3] == 0.25
 
 
+@numba.njit
+def halve(block):
+    """An exception if there is nothing to halve."""
+    if block.count == 0:
+        raise ZeroDivisionError("nothing to halve")
+    block.vector[:] = block.vector / 2.0
+
+
+@numba.njit
+def halve_by_address(address, block):
+    """`halve` of the inner block, then of it once more."""
+    call(address, block.inner)
+    call(address, block.inner)
+    return block.inner.vector[0]
+
+
+def test_kernels_are_called_by_address():
+    """As if they were called by name."""
+    block = outer()
+    assert halve_by_address(address_of(halve, block.inner), block) == 0.125
+    assert block.inner.vector.tolist() == [0.125, 0.0625]
+
+
+def test_exceptions_pass_a_call_by_address():
+    """What a kernel raises ends its caller as well, and nothing after it runs."""
+    block = outer(count=0)
+    with pytest.raises(ZeroDivisionError, match="nothing to halve"):
+        halve_by_address(address_of(halve, block.inner), block)
+    assert block.inner.vector.tolist() == [0.5, 0.25]
+
+
 def test_blocks_of_one_kind_share_their_code():
     """Other sizes and values do not compile anew."""
     read(outer())
@@ -128,22 +158,3 @@ def test_an_unknown_member_is_a_typing_error():
 
     with pytest.raises(numba.TypingError, match="nothing"):
         wrong(outer())
-
-
-def double_inner(block):
-    """For `bound`, which compiles plain functions."""
-    for i in range(block.inner.vector.shape[0]):
-        block.inner.vector[i] *= 2.0
-
-
-def test_a_bound_function_works_on_its_block():
-    """Called without arguments it changes what the block holds, which it keeps alive."""
-    first, second = outer(), outer()
-    vector = second.inner.vector
-    double = bound(double_inner, second)
-    del second
-    gc.collect()
-    double()
-    double()
-    np.testing.assert_array_equal(vector, [2.0, 1.0])
-    np.testing.assert_array_equal(first.inner.vector, [0.5, 0.25])

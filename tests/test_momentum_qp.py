@@ -1,5 +1,7 @@
 """The baseline controller: solvers, root modes, limits, symmetry and what it predicts."""
 
+import copy
+import pickle
 from dataclasses import replace
 
 import mujoco
@@ -238,3 +240,16 @@ def test_reset_forgets_where_the_solver_stopped(robot):
         np.testing.assert_array_equal(
             used.torques(tick.state, tick.targets), new.torques(tick.state, tick.targets)
         )
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda qp: pickle.loads(pickle.dumps(qp))])
+def test_a_copy_is_a_controller_of_its_own(robot, duplicate):
+    """It finds the same torques, whatever has become of the one that it was copied from."""
+    simulation = Simulation(robot)
+    state = simulation.reset(seed=2)
+    qp = MomentumQP(robot)
+    targets = Targets.standing(robot, state)
+    torques = qp.torques(state, targets)
+    twin = duplicate(qp)
+    qp.workspace.rows[:] = np.nan
+    assert np.array_equal(twin.torques(state, targets), torques)

@@ -11,6 +11,7 @@ from poise.baselines.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.baselines.motions import load_motion
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
+from poise.baselines.residual_step import openness
 from poise.baselines.targets import Motion, update_targets
 from poise.baselines.tasks import CoMTask
 from poise.envs.balance import EnvConfig
@@ -118,7 +119,7 @@ def test_scales_come_from_the_arguments():
     for residual in ({"com": 0.1, "cop": 0.3}, ResidualScales(com=0.1, cop=0.3)):
         env = ResidualBalanceEnv(robot(), residual=residual)
         assert env.residual.com == 0.1 and env.residual.cop == 0.3
-        assert list(env._scale[:4]) == [0.1, 0.1, 0.3, 0.3]
+        assert list(env._residual.scale[:4]) == [0.1, 0.1, 0.3, 0.3]
     for wrong, named in (({"com": -0.1}, "com"), ({"zmp": 0.1}, "zmp"), (0.1, "residual")):
         with pytest.raises(ConfigError, match=named):
             ResidualBalanceEnv(robot(), residual=wrong)
@@ -242,7 +243,7 @@ def test_the_class_docstring_is_the_specification(env):
     """Its tables are those that the code builds for the default robot."""
     text = inspect.getdoc(ResidualBalanceEnv)
     assert observation_table(env.terms) in text, observation_table(env.terms)
-    for i, (name, scale) in enumerate(zip(env.action_names, env._scale, strict=True)):
+    for i, (name, scale) in enumerate(zip(env.action_names, env._residual.scale, strict=True)):
         field = name.split("_")[0]
         assert f"| {i} | {name} | `residual.{field}`, {scale:g} m |" in text
 
@@ -285,7 +286,8 @@ def test_the_gate_opens_with_the_capture_point():
     reference = s.origin[:2] + env._com_offset * s.heading
     for distance, share in ((0.0, 0.0), (0.04, 1.0 - np.exp(-1.0)), (0.4, 1.0)):
         s.capture_point[:] = reference + distance * np.array([0.6, -0.8])
-        assert env._openness() == pytest.approx(share, abs=1e-9)
+        opened = openness(env._residual, s, env._motion, env._com_offset)
+        assert opened == pytest.approx(share, abs=1e-9)
 
 
 @pytest.mark.parametrize("changes", [{"smoothing": 0.05}, {"gate": 0.04}, {"controller": "abe07"}])

@@ -182,6 +182,6 @@ def test_the_class_docstring_is_the_specification():
     table = observation_table(env.terms).splitlines()
     added = next(i for i, row in enumerate(table) if "| swing | left |" in row)
     assert "\n".join([*table[:2], *table[added:]]) in text, "\n".join(table[added:])
-    for i, (name, scale) in enumerate(zip(env.action_names, env._scale, strict=True)):
+    for i, (name, scale) in enumerate(zip(env.action_names, env._residual.scale, strict=True)):
         field, unit = name.split("_")[0], "s" if name == "time" else "m"
         assert f"| {i} | {name} | `residual.{field}`, {scale:g} {unit} |" in text

@@ -70,10 +70,11 @@ class Rig:
     def tick(self) -> np.ndarray:
         """Torques of every motor; what it took is remembered."""
         c, ws = self.controller, self.controller.workspace
-        arguments = (c.arrays, self.s, c.parameters, self.targets.arrays(), c.period, ws, c.memory)
-        spent = _timed(lambda: momentum_tick(*arguments))
+        tick = c.tick(self.state, self.targets)
+        spent = _timed(lambda: momentum_tick(tick))
         torques = ws.tau[c.arrays.motor_dofs - 6].copy()
-        call = _timed(lambda: accept(self.s, c.parameters, 1, ws, c.memory))
+        ws.status[0] = 1
+        call = _timed(lambda: accept(self.s, c.parameters, ws, c.memory))
         c.memory.failures[0] -= 1
         c.memory.streak[0] -= 1
         self.times["tick"].append(spent - call)

@@ -41,13 +41,13 @@ def _now(buffer):
 
 
 @numba.njit(nogil=True)
-def _timed_tick(robot, plant, s, recorded, p, t, period, ws, memory, buffer, times):
+def _timed_tick(robot, plant, s, tick, buffer, times):
     start = _now(buffer)
     mj_step1(plant.model_address, plant.data_address)
     kinematics = _now(buffer)
     update_state(robot, plant, s)
     state = _now(buffer)
-    momentum_tick(robot, recorded, p, t, period, ws, memory)  # with the ground's forces
+    momentum_tick(tick)  # with the ground's forces, which are recorded
     times[0], times[1] = kinematics - start, state - kinematics
     times[2] = _now(buffer) - state
 
@@ -69,8 +69,7 @@ class TickClock:
         self.data.qpos[:] = tick.state.qpos
         self.data.qvel[:] = tick.state.qvel
         _timed_tick(
-            controller.arrays, self.plant, self.state, tick.state.arrays, controller.parameters,
-            tick.targets.arrays(), controller.period, controller.workspace, controller.memory,
-            self._buffer, times,
+            controller.arrays, self.plant, self.state,
+            controller.tick(tick.state, tick.targets), self._buffer, times,
         )  # fmt: skip
         return TickTimes(*times.tolist())
