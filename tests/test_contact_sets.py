@@ -104,3 +104,20 @@ def test_load_limits_bind(sets):
     assert sets.failures == 0
     assert wrenches[2] == pytest.approx(0.2 * free, rel=1e-6)
     assert wrenches[8] > free
+
+
+def test_torques_change_by_no_more_than_the_jump():
+    """From a controller's torques far away, and on to another set of soles: within the bound."""
+    state, targets, rows = situation()
+    sets = ContactSets(robot(), MomentumQPConfig(), jump=0.05)
+    limit = sets.parameters.torque_limit
+    last = 0.5 * limit
+    sets.follow(last)
+    for soles in ((0, 1), (1,), (1,), (0, 1)):
+        sets.tick(state, targets, soles, [rows] if 0 not in soles else [])
+        tau = sets.workspace.tau.copy()
+        assert np.all(np.abs(tau - last) <= 0.05 * limit + 1e-9)
+        last = tau
+    sets.reset()
+    sets.tick(state, targets, (0, 1))
+    assert np.any(np.abs(sets.workspace.tau - 0.5 * limit) > 0.3 * limit)  # free again
