@@ -30,10 +30,11 @@ class CaptureStepConfig:
 
     `trigger`, `again`: how far ξ leaves the reach of both soles before the first step and before
     further ones; to the first `spin` · ω L/(m g) is added, L the angular momentum in the sense of
-    the fall, because the hips of one that turns already have given what they can. `gain` k of p = ξ + k (ξ − ξ_ref); `hips`: how far beyond its reach p may be
-    asked for, which costs angular momentum. `share` of the reach that counts. `stretch`: length
-    of the legs at touchdown, which sets the CoM's height, `sink` lower in a swing. `unload` and
-    `ramp`: time in which a foot gives its load away and takes it up; `pause` between two steps.
+    the fall: hips that turn the trunk already have given what they can. `gain` k of
+    p = ξ + k (ξ − ξ_ref); `hips`: how far beyond its reach p may be asked for, which costs angular
+    momentum. `share` of the reach that counts. `stretch`: length of the legs at touchdown, which
+    sets the CoM's height, `sink` lower in a swing. `unload`, `ramp`: time in which a foot gives its
+    load away, and takes it up; `pause` between two steps.
     `jump`: largest change of a torque from tick to tick, share of its limit. `root_accel` (in a
     swing `swing_accel`), `joint_accel`: most that the posture asks for [ω²].
     """
@@ -50,7 +51,7 @@ class CaptureStepConfig:
     ramp: float = field(default=0.1, metadata={"min": 0.0})
     unload: float = field(default=0.04, metadata={"min": 0.0})
     pause: float = field(default=0.15, metadata={"min": 0.0})
-    jump: float = field(default=0.3, metadata={"above": 0.0})
+    jump: float = field(default=0.6, metadata={"above": 0.0})
     root_accel: float = field(default=100.0, metadata={"above": 0.0})
     swing_accel: float = field(default=100.0, metadata={"above": 0.0})
     joint_accel: float = field(default=100.0, metadata={"above": 0.0})
