@@ -4,11 +4,13 @@ import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from poise.envs.jit import compiled
 from poise.envs.robot import Robot
 
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
+_SHARES = np.array(SHARES)
 
 
 def turn(yaw: float) -> np.ndarray:
@@ -87,6 +89,25 @@ def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.nd
     return np.reshape(normals, (-1, 2)), np.array(offsets), np.array(bounds)
 
 
+@compiled
+def outside_reach(first, second, yaw, xi, support, directions, shares, out):
+    """What `Reach.beyond` gives, for rows of `first`, `second`, `xi`; one row stands for all."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    for i in range(out.shape[0]):
+        f, s, x = first[i % first.shape[0]], second[i % second.shape[0]], xi[i % xi.shape[0]]
+        worst = -np.inf
+        for d in range(directions.shape[0]):
+            # the direction, turned
+            dx = cos * directions[d, 0] - sin * directions[d, 1]
+            dy = sin * directions[d, 0] + cos * directions[d, 1]
+            a, b = f[0] * dx + f[1] * dy, s[0] * dx + s[1] * dy
+            reach = -np.inf
+            for k in range(shares.shape[0]):
+                reach = max(reach, support[k, d] + shares[k] * a + (1.0 - shares[k]) * b)
+            worst = max(worst, x[0] * dx + x[1] * dy - reach)
+        out[i] = worst
+
+
 class Reach:
     """Where soles can put the centre of pressure, with the torques that their ankles have.
 
@@ -137,8 +158,7 @@ class Reach:
         Soles at `first` and `second`, (n, 2) or (2,). Measured along 48 DIRECTIONS only, which
         lets corners reach some millimetres further.
         """
-        R = turn(yaw)
-        a, b, x = (np.asarray(v) @ R @ DIRECTIONS.T for v in (first, second, xi))
-        shares = np.array(SHARES)[:, None]
-        reach = self._support + shares * a[..., None, :] + (1.0 - shares) * b[..., None, :]
-        return (x - reach.max(axis=-2)).max(axis=-1)
+        rows = [np.array(v, dtype=float, ndmin=2) for v in (first, second, xi)]
+        out = np.empty(max(len(points) for points in rows))
+        outside_reach(rows[0], rows[1], yaw, rows[2], self._support, DIRECTIONS, _SHARES, out)
+        return out if max(np.ndim(v) for v in (first, second, xi)) > 1 else out[0]

@@ -1,6 +1,6 @@
 """Feet in place as long as that holds; then steps to where the capture point can be stopped."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -15,10 +15,12 @@ from .contact_sets import ContactSets
 from .controller import Targets
 from .momentum_qp import MomentumQPConfig
 from .step_plan import Foothold, Plan, StepLimits, StepPlanner
+from .step_shift import STANDING, Stepping, lean_matrix
 from .support import nearest_inside
-from .swing import Swing, SwingTask, swing_rows
+from .swing import Swing, SwingTask, rotation_error, swing_rows
 
 LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
+LOW = 0.04  # [h] above the ground: a foot that touches it higher up stands on its edge
 FIRST_LOAD = 0.3  # [m g] that a foot may bear at touchdown; then the limit rises by m g a ramp
 
 
@@ -27,22 +29,31 @@ class CaptureStepConfig:
     """`qp` holds the feet in place, `step_qp` and `swing` move them; lengths in h, times in 1/ω.
 
     `trigger`, `again`: how far ξ leaves the reach of both soles before the first step and before
-    further ones. `gain` k of p = ξ + k (ξ − ξ_ref); `hips`: how far beyond its reach p may be
-    asked for, which costs angular momentum. `share` of the reach that counts. `stretch`: length
-    of the legs at touchdown, which sets the CoM's height. `ramp` of a landed foot's load;
-    `pause` between two steps. `root_accel`, `joint_accel`: most that the posture asks for [ω²].
+    further ones; to the first `spin` · ω L/(m g) is added, L the angular momentum in the sense of
+    the fall: hips that turn the trunk already have given what they can. `gain` k of
+    p = ξ + k (ξ − ξ_ref); `hips`: how far beyond its reach p may be asked for, which costs angular
+    momentum. `share` of the reach that counts. `stretch`: length of the legs at touchdown, which
+    sets the CoM's height, `sink` lower in a swing. `unload`, `ramp`: time in which a foot gives its
+    load away, and takes it up; `pause` between two steps.
+    `jump`: largest change of a torque from tick to tick, share of its limit. `root_accel` (in a
+    swing `swing_accel`), `joint_accel`: most that the posture asks for [ω²].
     """
 
     kind: Literal["capture-step"] = "capture-step"
     trigger: float = 0.0
+    spin: float = field(default=0.0, metadata={"min": 0.0})
     again: float = 0.01
     gain: float = field(default=1.0, metadata={"above": 0.0})
     hips: float = field(default=0.0, metadata={"min": 0.0})
     share: float = field(default=0.95, metadata={"above": 0.0, "max": 1.0})
     stretch: float = field(default=0.96, metadata={"above": 0.0})
+    sink: float = field(default=0.0, metadata={"min": 0.0})
     ramp: float = field(default=0.1, metadata={"min": 0.0})
+    unload: float = field(default=0.04, metadata={"min": 0.0})
     pause: float = field(default=0.15, metadata={"min": 0.0})
+    jump: float = field(default=0.6, metadata={"above": 0.0})
     root_accel: float = field(default=100.0, metadata={"above": 0.0})
+    swing_accel: float = field(default=100.0, metadata={"above": 0.0})
     joint_accel: float = field(default=100.0, metadata={"above": 0.0})
     limits: StepLimits = field(default_factory=StepLimits)
     foothold: Foothold = field(default_factory=Foothold)
@@ -67,10 +78,11 @@ class CaptureStep(AroundQP):
             )
         self.config = config or CaptureStepConfig()
         super().__init__(robot, self.config.qp)
-        self.sets = ContactSets(robot, self.config.step_qp)
+        self.sets = ContactSets(robot, self.config.step_qp, self.config.jump)
         self.reach = Reach(robot, self.config.share)
         self.planner = StepPlanner(robot, self.reach, self.config.limits, self.config.foothold)
         self.h, self.rate = self.planner.h, self.planner.rate
+        self.shift = self.planner.shift  #: what a policy adds
         self._guided: Targets | None = None
         self.reset()
 
@@ -83,10 +95,12 @@ class CaptureStep(AroundQP):
         """Forget the last trial."""
         super().reset(state)
         self.sets.reset()
+        self.shift.clear()
         self.steps = 0  #: begun since the reset
         self.swing: Swing | None = None  #: of the running step
         self.foot = -1  #: that stepped last
         self._yaw = 0.0  # heading at the first step
+        self._load, self._left = 0.0, 0.0  # of the foot that lifts off: [N], share still borne
         self._clock = 0.0  # since the last touchdown [s]
         self._region: np.ndarray | None = None
 
@@ -94,6 +108,16 @@ class CaptureStep(AroundQP):
     def stepped(self) -> bool:
         """Whether a step has begun since the reset."""
         return self.steps > 0
+
+    def stepping(self) -> Stepping:
+        """Where it is in its steps."""
+        if self.swing is None:
+            return STANDING._replace(steps=self.steps, since=self._clock)
+        swing = self.swing
+        phase = swing.time / swing.duration
+        return Stepping(
+            self.steps, self.foot, swing.reference[0], swing.foothold, phase, swing.remaining, 0.0
+        )
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
@@ -114,13 +138,24 @@ class CaptureStep(AroundQP):
             return False
         feet, yaw = state.sole_points[:, :2], self._heading(state)
         away = self.reach.beyond(feet[0], feet[1], yaw, state.capture_point)
-        limit = self.config.again if self.stepped else self.config.trigger
-        return bool(away > limit * self.h)
+        if self.stepped:
+            return bool(away > self.config.again * self.h + self.shift.trigger)
+        away += self.config.spin * self._spent(state)
+        return bool(away > self.config.trigger * self.h + self.shift.trigger)
+
+    def _spent(self, state: RobotState) -> float:
+        """ω L/(m g) [m] of the angular momentum in the sense of the fall: hips already used."""
+        way = state.capture_point - state.origin[:2]
+        L = state.angular_momentum
+        turning = (way[0] * L[1] - way[1] * L[0]) / max(float(np.linalg.norm(way)), 1e-9)
+        return float(turning * self.rate / (state.mass * state.robot.gravity))
 
     def _heading(self, state: RobotState) -> float:
         return self._yaw if self.stepped else state.heading_yaw
 
     def _begin(self, state: RobotState) -> None:
+        if not self.stepped:
+            self.sets.follow(self.qp.workspace.tau)
         self._yaw = self._heading(state)
         plan: Plan = self.planner.plan(state, self._yaw)
         self.steps += 1
@@ -128,9 +163,14 @@ class CaptureStep(AroundQP):
         self.swing = Swing(state.sole_points[plan.foot], plan.time, self.config.swing, self.h)
         self.swing.ground = float(state.sole_points[1 - plan.foot, 2])
         self.swing.aim(plan.foothold)
+        self.swing.shift = plan.shift
+        before = self.qp.workspace if self.steps == 1 else self.sets.workspace
+        self._load, self._left = float(before.wrenches[6 * plan.foot + 2]), 1.0
 
     def _landed(self, state: RobotState, swing: Swing) -> bool:
-        return bool(state.contacts[self.foot] > 0.5 and swing.time > LANDING * swing.duration)
+        low = state.sole_points[self.foot, 2] - swing.ground < LOW * self.h
+        late = swing.time > LANDING * swing.duration
+        return bool(state.contacts[self.foot] > 0.5 and late and low)
 
     def _swing(self, state: RobotState, t: Targets, swing: Swing) -> np.ndarray:
         """A tick on one foot."""
@@ -138,9 +178,15 @@ class CaptureStep(AroundQP):
         if swing.remaining > Swing.FROZEN:
             plan = self.planner.replan(state, self.foot, self._yaw, swing)
             swing.aim(plan.foothold, swing.time + plan.time)
+            swing.shift = plan.shift
         under = self.reach.under(stance, state.sole_points[stance], self._yaw)
         way = swing.foothold - state.sole_points[stance, :2]
         self._guide(state, t, under, 0.0, state.sole_points[stance, 2], way)
+        self._left -= self.period * self.rate / max(self.config.unload, 1e-9)
+        if self._left > 0.0:  # the foot that will leave gives its load to the other one
+            limits = np.full(2, np.inf)
+            limits[self.foot] = self._left * max(self._load, 0.0)
+            return self.sets.tick(state, t, (0, 1), (), limits)
         rows = swing_rows(
             state, self.foot, swing.advance(self.period), self._level(), self.config.swing
         )
@@ -171,9 +217,9 @@ class CaptureStep(AroundQP):
         """Targets of our own: those given, but upright at rest along the heading."""
         if self._guided is None:
             self._guided = Targets.standing(self.robot, state)
-        for item in fields(Targets):
-            getattr(self._guided, item.name)[:] = getattr(targets, item.name)
-        self._guided.root_axes[:] = self._level() @ self.qp.arrays.root_standing
+        self._guided.take(targets)
+        upright = self._level() @ lean_matrix(self.shift.lean)
+        self._guided.root_axes[:] = upright @ self.qp.arrays.root_standing
         self._guided.root_vel[:] = 0.0
         return self._guided
 
@@ -187,16 +233,20 @@ class CaptureStep(AroundQP):
         way: np.ndarray,
     ) -> None:
         """c̈_ref = ω² (c − p) in the plane; a height that legs reach with the feet `way` apart."""
-        xi = state.capture_point
-        wanted = xi + self.config.gain * (xi - region.mean(axis=0))
+        xi, R = state.capture_point, turn(self._yaw)
+        wanted = xi + self.config.gain * (xi - region.mean(axis=0) - R @ self.shift.com)
         p = nearest_inside(region, wanted)
         over = wanted - p
         p = p + over * min(1.0, hips * self.h / max(float(np.linalg.norm(over)), 1e-9))
+        p = p + R @ self.shift.cop
         t.com[:2], t.com_vel[:2] = state.com[:2], state.com_vel[:2]
         t.com_acc[:2] = state.omega**2 * (state.com[:2] - p)
         t.cop[:] = p
         leg = self.config.stretch * self.h
-        t.com[2] = ground + min(self.h, np.sqrt(max(leg**2 - 0.25 * (way @ way), 0.0)))
+        reach = np.sqrt(max(leg**2 - 0.25 * (way @ way), 0.0))
+        t.com[2] = ground + min(self.h, reach) + self.shift.height
+        if self.swing is not None:
+            t.com[2] -= self.config.sink * self.h
         t.com_vel[2] = t.com_acc[2] = 0.0
         self._limit_posture(state, t)
 
@@ -211,7 +261,8 @@ class CaptureStep(AroundQP):
         bound = self.config.joint_accel * rate2
         t.a_ref[:] = np.clip(asked, -bound, bound) - asked
         R = state.root_axes
-        error = 0.5 * sum(np.cross(R[:, i], t.root_axes[:, i]) for i in range(3))
+        error = rotation_error(R, t.root_axes)
         asked = p.stiffness[3:6] * (R.T @ error) - p.damping[3:6] * state.qvel[3:6]
-        bound = self.config.root_accel * rate2 / max(float(np.linalg.norm(asked)), 1e-9)
+        most = self.config.root_accel if self.swing is None else self.config.swing_accel
+        bound = most * rate2 / max(float(np.linalg.norm(asked)), 1e-9)
         t.root_acc[:] = asked * (min(1.0, bound) - 1.0)

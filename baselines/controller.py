@@ -58,12 +58,20 @@ class Targets:
             setattr(self, item.name, array)
         self._arrays: tuple[np.ndarray, ...] = ()
 
-    def arrays(self) -> TargetArrays:
-        """The same arrays, not copies, for compiled code."""
-        arrays = (
+    def take(self, other: "Targets") -> None:
+        """Copy the values of others."""
+        for own, array in zip(self._own(), other._own(), strict=True):
+            own[:] = array
+
+    def _own(self) -> tuple[np.ndarray, ...]:
+        return (
             self.q_ref, self.v_ref, self.a_ref, self.root_axes, self.root_vel, self.root_acc,
             self.com, self.com_vel, self.com_acc, self.cop, self.angular_momentum,
         )  # fmt: skip
+
+    def arrays(self) -> TargetArrays:
+        """The same arrays, not copies, for compiled code."""
+        arrays = self._own()
         if not self._arrays or any(map(is_not, arrays, self._arrays)):
             self._arrays = arrays
             self._block = TargetArrays(*arrays)

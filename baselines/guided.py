@@ -1,7 +1,6 @@
 """A momentum QP whose horizontal CoM acceleration and CoP come from a pendulum model."""
 
 from abc import ABC, abstractmethod
-from dataclasses import fields
 
 import numpy as np
 
@@ -34,8 +33,7 @@ class Guided(AroundQP, ABC):
         if self._guided is None:
             self._guided = Targets.standing(self.robot, state)
         guided = self._guided
-        for item in fields(Targets):
-            getattr(guided, item.name)[:] = getattr(targets, item.name)
+        guided.take(targets)
         p = self.cop(state, targets)
         gains = self.qp.parameters
         guided.com_acc[:2] += (

@@ -12,7 +12,7 @@ from poise.envs.arrays import apart
 from poise.envs.balance import BalanceEnv, EnvConfig
 from poise.envs.block import Block
 from poise.envs.config import build, to_dict
-from poise.envs.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step, record_tick
+from poise.envs.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 from poise.envs.vector import make_vector_env
@@ -22,7 +22,8 @@ from .momentum_qp import MomentumQP, MomentumQPConfig
 from .motions import ReferenceMotion, load_motion
 from .registry import CONTROLLERS, load_controller
 from .residual_step import Residual, ResidualStep, residual_step, set_offsets, soft_root_force
-from .targets import Motion, update_targets
+from .targets import Motion
+from .tick_parts import Aim, Record, aim, record
 from .warmup import prepare
 
 
@@ -199,6 +200,8 @@ class ResidualBalanceEnv(BalanceEnv):
     Version history: v0, first release.
     """
 
+    scales_class: type[ResidualScales] = ResidualScales  #: whose fields `residual` has
+
     def __init__(
         self,
         robot: str | Path | Robot = "humanoid",
@@ -214,7 +217,7 @@ class ResidualBalanceEnv(BalanceEnv):
     ):
         prepare()
         given = {} if residual is None else to_dict(residual)
-        self.residual = build(ResidualScales, given, "residual")
+        self.residual = build(self.scales_class, given, "residual")
         scale = np.array(list(self.residual.entries().values()))
         self._moved = np.flatnonzero(scale)
         if len(self._moved) == 0:
@@ -227,7 +230,7 @@ class ResidualBalanceEnv(BalanceEnv):
         self.smoothing, self.gate = float(smoothing), float(gate)
         # share of the way that the residual goes to the action in one policy step
         share = 1.0 if smoothing == 0.0 else -np.expm1(-self.config.policy_period / smoothing)
-        scale[7:] *= 10.0 * self.scales.momentum
+        scale[7:9] *= 10.0 * self.scales.momentum
         self._offsets = apart(len(scale))
         self._residual = Residual(
             self._moved, scale[self._moved], float(share), self.gate, self._offsets
@@ -271,6 +274,8 @@ class ResidualBalanceEnv(BalanceEnv):
         self._com_offset = float(getattr(controller, "com_offset", 0.0))
         self._step: ResidualStep | None = None
         self._gains: Any = None  # with which it was made
+        self._aim: Aim | None = None
+        self._record: Record | None = None
 
     def arguments(self) -> dict[str, Any]:
         """What makes another environment like this one; robot and motion are shared.
@@ -301,13 +306,16 @@ class ResidualBalanceEnv(BalanceEnv):
     def _begin(self) -> None:
         self.controller.reset(self.simulation.state)
         self._offsets[:] = 0.0
-        self._update_targets(self._offsets)
+        self._update_targets()
 
-    def _update_targets(self, residual: np.ndarray) -> None:
-        update_targets(
-            self.arrays, self.simulation.state_arrays, self._motion, self.simulation.time,
-            self._com_offset, residual, self._targets,
-        )  # fmt: skip
+    def _update_targets(self) -> None:
+        sim, known = self.simulation, self._aim
+        if known is None or known.state is not sim.state_arrays:
+            known = self._aim = Aim(
+                self.arrays, sim.state_arrays, sim.clock, self._motion, self._com_offset,
+                self._offsets, self._targets,
+            )  # fmt: skip
+        aim(known)
 
     def compiled_step(self) -> tuple[Any, Block] | None:
         """See `BalanceEnv`: the momentum QP's with its own solver."""
@@ -350,18 +358,34 @@ class ResidualBalanceEnv(BalanceEnv):
         sim, e = self.simulation, self.episode
         s, ctrl, wrench = sim.state_arrays, sim.plant.ctrl, e.root_wrench
         self._set_offsets()
+        accounts = self._accounts()
         for _ in range(self.ticks):
-            self._update_targets(self._offsets)
+            self._update_targets()
             ctrl[:] = self.controller.torques(sim.state, self.targets)
             wrench[:] = getattr(self.controller, "root_wrench", 0.0)
-            soft_root_force(s, wrench, sim.plant.qfrc_applied)
-            for metric, part in ((ROOT_FORCE, wrench[:3]), (ROOT_MOMENT, wrench[3:])):
-                e.metrics[metric] = max(e.metrics[metric], float(np.linalg.norm(part)))
-            record_tick(self.arrays, s, ctrl, self.controller.period, e)
+            self._push_root(wrench)
+            record(accounts)
             sim.step(ctrl, self.control_substeps)
         e.metrics[FAILURES] = getattr(self.controller, "failures", 0)
         judge_step(self.arrays, s, self.scales, self.judge, self.targets.q_ref, ctrl, sim.time, e)
         self._observe()
+
+    def _accounts(self) -> Record:
+        sim, e, known = self.simulation, self.episode, self._record
+        if known is None or known.plant is not sim.plant or known.episode is not e:
+            period = self.controller.period
+            known = self._record = Record(self.arrays, sim.state_arrays, sim.plant, period, e)
+        return known
+
+    def _push_root(self, wrench: np.ndarray) -> None:
+        """Apply a soft root's wrench, and take away the last one."""
+        qfrc_applied = self.simulation.plant.qfrc_applied
+        if not (wrench.any() or qfrc_applied[:6].any()):
+            return
+        soft_root_force(self.simulation.state_arrays, wrench, qfrc_applied)
+        metrics = self.episode.metrics
+        for metric, part in ((ROOT_FORCE, wrench[:3]), (ROOT_MOMENT, wrench[3:])):
+            metrics[metric] = max(metrics[metric], float(np.linalg.norm(part)))
 
 
 vector_env = partial(make_vector_env, ResidualBalanceEnv)  # for gymnasium.make_vec

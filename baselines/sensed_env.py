@@ -17,6 +17,7 @@ from poise.envs.torque_balance import TorqueBalanceEnv
 
 from .controller import Targets
 from .residual_balance import ResidualBalanceEnv
+from .residual_step_env import ResidualStepEnv
 
 
 class SensingController:
@@ -73,13 +74,17 @@ class SensedResidualEnv(Sensed, ResidualBalanceEnv):
         assert isinstance(self.controller, SensingController)
         self.controller.simulation = self.simulation  # type: ignore[assignment]
 
-    def _update_targets(self, residual: np.ndarray) -> None:
+    def _update_targets(self) -> None:
         with self._through_sensors():
-            super()._update_targets(residual)
+            super()._update_targets()
 
     def _set_offsets(self) -> None:
         with self._through_sensors():
             super()._set_offsets()
+
+
+class SensedStepEnv(SensedResidualEnv, ResidualStepEnv):
+    """The same of a stepping controller."""
 
 
 class SensedTorqueEnv(Sensed, TorqueBalanceEnv):
@@ -104,7 +109,8 @@ class SensedTorqueEnv(Sensed, TorqueBalanceEnv):
 def sensed_env(env: BalanceEnv) -> SensedResidualEnv | SensedTorqueEnv:
     """An environment like `env` with sensors; it shares `env`'s controller. Call `set_plant`."""
     if isinstance(env, ResidualBalanceEnv):
-        return SensedResidualEnv(
+        kind = SensedStepEnv if isinstance(env, ResidualStepEnv) else SensedResidualEnv
+        return kind(
             env.robot,
             env.config,
             controller=SensingController(env.controller),

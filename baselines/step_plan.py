@@ -9,6 +9,7 @@ from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .capturability import Reach, drifted, sides, turn
+from .step_shift import StepShift
 from .support import nearest_inside
 from .swing import Swing
 
@@ -62,6 +63,7 @@ class Plan(NamedTuple):
     foothold: np.ndarray  # (2,)
     time: float
     cost: float
+    shift: float = 0.0  # of the time, by a policy [s]
 
 
 class StepPlanner:
@@ -72,23 +74,36 @@ class StepPlanner:
         self.h = robot.height_com
         self.rate = float(np.sqrt(-robot.model.opt.gravity[2] / self.h))  # ω
         self.sides = sides(robot)
+        self.shift = StepShift()  #: what a policy adds
 
     def plan(self, state: RobotState, yaw: float) -> Plan:
         """The best step of either foot from where they stand."""
         limits = self.limits
         times = np.linspace(limits.time_min, limits.time_max, TIMES) / self.rate
         plans = [self._best(state, foot, yaw, times) for foot in range(2)]
-        return min(plans, key=lambda plan: plan.cost)
+        return self._shifted(state, yaw, min(plans, key=lambda plan: plan.cost))
 
     def replan(self, state: RobotState, foot: int, yaw: float, swing: Swing) -> Plan:
         """Foothold and time left of a running step."""
         low = max(self.limits.time_min / self.rate - swing.time, Swing.FROZEN)
         high = max(self.limits.time_max / self.rate - swing.time, low)
-        left = max(swing.remaining, Swing.FROZEN)
+        left = max(swing.remaining - swing.shift, Swing.FROZEN)
         times = np.append(np.linspace(low, high, TIMES), left)
         position, velocity = swing.reference[0, :2], swing.reference[1, :2]
         start = position + 0.5 * velocity * min(left, 0.1)  # what its speed carries it anyway
-        return self._best(state, foot, yaw, times, start, CHANGE * np.abs(times - left))
+        best = self._best(state, foot, yaw, times, start, CHANGE * np.abs(times - left))
+        return self._shifted(state, yaw, best, start)
+
+    def _shifted(
+        self, state: RobotState, yaw: float, plan: Plan, start: np.ndarray | None = None
+    ) -> Plan:
+        """The same step, but that it lands earlier or later, as a policy wants."""
+        if self.shift.time == 0.0:
+            return plan
+        time = max(plan.time + self.shift.time, Swing.FROZEN)
+        start = state.sole_points[plan.foot, :2] if start is None else start
+        footholds, _ = self.footholds(state, plan.foot, yaw, np.array([time]), start)
+        return Plan(plan.foot, footholds[0], time, plan.cost, time - plan.time)
 
     def _best(
         self,
@@ -124,6 +139,7 @@ class StepPlanner:
         local = (end - stance) @ R - self.reach.middle[foot]
         local[:, 0] += choice.overshoot * h * np.tanh(local[:, 0] / (0.1 * h))
         local[:, 1] += side * choice.outward * h
+        local += self.shift.foothold
         local = self.allowed(local, (start - stance) @ R, foot, times)
         footholds = stance + local @ R.T
         first, second = (footholds, stance) if foot == 0 else (stance, footholds)

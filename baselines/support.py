@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from poise.envs.jit import compiled
 from poise.envs.state import RobotState
 
 #: Lever [m per m of CoM height] that makes a sole's moment as dear as a force.
@@ -35,16 +36,32 @@ def joint_torques(state: RobotState, wrenches: np.ndarray) -> np.ndarray:
     return (state.h - state.J.T @ wrenches)[6:]
 
 
+@compiled
+def find_nearest(polygon: np.ndarray, point: np.ndarray, out: np.ndarray):
+    """What `nearest_inside` gives, into `out` (2,)."""
+    x, y = point[0], point[1]
+    out[0], out[1] = x, y
+    n, least, outside = polygon.shape[0], np.inf, False
+    for i in range(n):
+        ax, ay = polygon[i, 0], polygon[i, 1]
+        ex, ey = polygon[(i + 1) % n, 0] - ax, polygon[(i + 1) % n, 1] - ay
+        outside = outside or ex * (y - ay) - ey * (x - ax) < 0.0
+        along = ((x - ax) * ex + (y - ay) * ey) / max(ex * ex + ey * ey, 1e-18)
+        share = min(max(along, 0.0), 1.0)
+        px, py = ax + share * ex, ay + share * ey
+        distance = (px - x) ** 2 + (py - y) ** 2
+        if distance < least:
+            least = distance
+            out[0], out[1] = px, py
+    if not outside:
+        out[0], out[1] = x, y
+
+
 def nearest_inside(polygon: np.ndarray, point: np.ndarray) -> np.ndarray:
     """The point of a convex counter-clockwise `polygon` (k, 2) that is nearest to `point` (2,)."""
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    outside = edges[:, 0] * (point - polygon)[:, 1] - edges[:, 1] * (point - polygon)[:, 0] < 0.0
-    if not outside.any():
-        return point.copy()
-    length = np.maximum(np.einsum("ij,ij->i", edges, edges), 1e-18)
-    share = np.clip(np.einsum("ij,ij->i", point - polygon, edges) / length, 0.0, 1.0)
-    candidates = polygon + share[:, None] * edges
-    return candidates[np.argmin(np.sum((candidates - point) ** 2, axis=1))]
+    out = np.empty(2)
+    find_nearest(np.array(polygon), np.array(point, dtype=float), out)
+    return out
 
 
 def shrunk(polygon: np.ndarray, share: float) -> np.ndarray:

@@ -1,6 +1,8 @@
 """The way of a swing foot: C² from wherever it is to a foothold that may move on the way."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +29,9 @@ class SwingTask:
     landing_speed: float = field(default=0.1, metadata={"min": 0.0})  # downwards [h ω]
 
 
-def quintic(start: np.ndarray, end: np.ndarray, duration: float, t: float) -> np.ndarray:
-    """(3, k) position, velocity, acceleration at `t` of the polynomial of degree five that leads
-    from `start` (3, k) to `end` (3, k) in `duration`: the way of least jerk [Flash85]."""
+def quintic(start: Sequence, end: Sequence, duration: float, t: float) -> tuple[Any, Any, Any]:
+    """Position, velocity, acceleration at `t` of the polynomial of degree five that leads from
+    `start` to `end` (each the three of them) in `duration`: the way of least jerk [Flash85]."""
     T = max(duration, 1e-6)
     p0, v0, a0 = start[0], start[1] * T, start[2] * T * T
     p1, v1, a1 = end[0], end[1] * T, end[2] * T * T
@@ -41,7 +43,7 @@ def quintic(start: np.ndarray, end: np.ndarray, duration: float, t: float) -> np
     position = p0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
     velocity = v0 + s * (a0 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
     acceleration = a0 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5))
-    return np.array([position, velocity / T, acceleration / (T * T)])
+    return position, velocity / T, acceleration / (T * T)
 
 
 class Swing:
@@ -62,6 +64,7 @@ class Swing:
         self.reference = np.zeros((3, 3))  # position, velocity, acceleration
         self.reference[0] = point
         self.foothold = np.array(point[:2])
+        self.shift = 0.0  # of the duration, by a policy [s]
 
     @property
     def remaining(self) -> float:
@@ -77,22 +80,29 @@ class Swing:
 
     def advance(self, dt: float) -> np.ndarray:
         """(3, 3) position, velocity and acceleration [m, s] after `dt` more seconds."""
-        now, rest = self.reference, self.remaining
-        new = np.zeros((3, 3))
-        aim = np.zeros((3, 2))
-        aim[0] = self.foothold
-        new[:, :2] = quintic(now[:, :2], aim, rest, dt) if rest > dt else aim
+        rest, speed = self.remaining, self.landing_speed
+        x, y, z = zip(*self.reference.tolist(), strict=True)  # numbers: faster than small arrays
+        aim = [(float(self.foothold[0]), 0.0, 0.0), (float(self.foothold[1]), 0.0, 0.0)]
+        if rest > dt:
+            ways = [quintic(now, end, rest, dt) for now, end in zip((x, y), aim, strict=True)]
+        else:
+            ways = aim
         lift = self.task.lift * self.duration
         if self.time + dt < lift:
-            top = np.array([[self.ground + self.apex], [0.0], [0.0]])
-            new[:, 2:] = quintic(now[:, 2:], top, lift - self.time, dt)
+            ways.append(quintic(z, (self.ground + self.apex, 0.0, 0.0), lift - self.time, dt))
         elif rest > dt:
-            down = np.array([[self.ground], [-self.landing_speed], [0.0]])
-            new[:, 2:] = quintic(now[:, 2:], down, rest, dt)
+            ways.append(quintic(z, (self.ground, -speed, 0.0), rest, dt))
         else:
-            new[:, 2] = [now[0, 2] - self.landing_speed * dt, -self.landing_speed, 0.0]
-        self.reference, self.time = new, self.time + dt
-        return new
+            ways.append((z[0] - speed * dt, -speed, 0.0))
+        self.reference, self.time = np.array(ways).T.copy(), self.time + dt
+        return self.reference
+
+
+def rotation_error(axes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """(3,) ½ Σ aᵢ × bᵢ of the columns of two frames: sine times axis of the turn from one to the
+    other."""
+    S = wanted @ axes.T
+    return 0.5 * np.array([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]])
 
 
 def swing_rows(
@@ -105,8 +115,7 @@ def swing_rows(
     d = 2.0 * task.damping_ratio * np.sqrt(k)
     rows = slice(6 * sole, 6 * sole + 6)
     J, velocity, bias = state.J[rows], state.J_v[rows], state.Jdot_v[rows]
-    R = state.sole_axes[sole]
-    turn = 0.5 * sum(np.cross(R[:, i], axes[:, i]) for i in range(3))
+    turn = rotation_error(state.sole_axes[sole], axes)
     wanted = np.concatenate(
         [
             reference[2]
@@ -115,5 +124,6 @@ def swing_rows(
             k * turn - d * velocity[3:],
         ]
     )
-    weights = np.repeat([task.weight / g**2, task.turn_weight / rate2**2], 3)
+    weights = np.empty(6)
+    weights[:3], weights[3:] = task.weight / g**2, task.turn_weight / rate2**2
     return Rows(J, wanted - bias, weights)

@@ -25,7 +25,7 @@ from .episode import (
     judge,
 )
 from .errors import ConfigError, PoiseError
-from .observation import observation_terms, observe, scales
+from .observation import Term, observation_terms, observe, scales
 from .push_info import push_info
 from .push_options import parse_pushes
 from .robot import Robot, load_robot
@@ -74,7 +74,7 @@ class BalanceEnv(gymnasium.Env):
         self.judge = judge(self.config.fall, self.config.reward, self.robot.height_com)
         self.action_names = self._action_names()
         soles = [sole.name for sole in self.robot.soles]
-        self.terms = observation_terms(self.robot.joint_names, soles, self.action_names)
+        self.terms = self._observation_terms(soles)
         size = sum(term.size for term in self.terms)
         self.episode = allocate_episode(len(self.action_names), size, len(soles))
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
@@ -113,6 +113,10 @@ class BalanceEnv(gymnasium.Env):
     def _action_names(self) -> tuple[str, ...]:
         """One name for each entry of the action."""
         raise NotImplementedError
+
+    def _observation_terms(self, soles: list[str]) -> list[Term]:
+        """Parts of the observation: those that `observe` fills, then a subclass's own."""
+        return observation_terms(self.robot.joint_names, soles, self.action_names)
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         """Joint positions and velocities (nj,) that the observation is relative to."""

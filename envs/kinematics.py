@@ -262,13 +262,22 @@ def _contact(robot, plant, s):
     s.other_contacts[0] = plant.sensordata[robot.ground_sensor] - feet
 
 
+AIRBORNE = 0.02  # [h]: a sole without contact that is this far above the lowest one is in the air
+
+
 @compiled
 def update_support(robot: RobotArrays, s: StateArrays):
-    """Convex hull of all soles' vertices on the ground (counter-clockwise, monotone chain)."""
-    n = 0
+    """Convex hull of the vertices of all soles that are not in the air (counter-clockwise,
+    monotone chain). A foot that rocks on its edge still counts; one that steps does not."""
+    n, lowest = 0, np.inf
+    for i in range(s.sole_point.shape[0]):
+        lowest = min(lowest, s.sole_point[i, 2])
+    ceiling = lowest + AIRBORNE * robot.height_com
     corners = robot.sole_polygon.shape[0] * robot.sole_polygon.shape[1]
     points = np.empty((corners + 2 * GAP, 2))[GAP:]
     for i in range(robot.sole_vertices.shape[0]):
+        if s.sole_point[i, 2] > ceiling and s.contacts[i] < 0.5:
+            continue
         axes = s.sole_axes[i]
         for k in range(robot.sole_vertices[i]):
             u, v = robot.sole_polygon[i, k, 0], robot.sole_polygon[i, k, 1]

@@ -1,13 +1,15 @@
 """One simulated robot: MuJoCo data, its compiled views, its pushes and its clock."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from .arrays import Plant, RobotArrays, apart, plant_views, robot_arrays
+from .block import Block
 from .jit import compiled
-from .kinematics import allocate_state, update_state
+from .kinematics import StateArrays, allocate_state, update_state
 from .native import mj_step1, mj_step2
 from .pushes import TABLE_COLUMNS, Kick, Push, apply_kicks, apply_pushes, pack
 from .robot import Robot
@@ -31,6 +33,26 @@ def advance(robot: RobotArrays, plant: Plant, pushes: np.ndarray, clock: np.ndar
     mj_step1(plant.model_address, plant.data_address)
 
 
+@dataclass(frozen=True, eq=False)
+class World(Block):
+    """What `Simulation.step` works on."""
+
+    robot: RobotArrays
+    plant: Plant
+    state: StateArrays
+    clock: np.ndarray  # (1,) int
+    pushes: np.ndarray
+    count: np.ndarray  # (1,) int: physics steps
+
+
+@compiled
+def advance_world(world: World):
+    """`count` physics steps, then the state."""
+    for _ in range(world.count[0]):
+        advance(world.robot, world.plant, world.pushes, world.clock)
+    update_state(world.robot, world.plant, world.state)
+
+
 BAD_STATE = [
     int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{name}")) for name in ("QPOS", "QVEL", "QACC")
 ]
@@ -47,9 +69,11 @@ class Simulation:
         self.plant = plant_views(robot.model, self.data)
         self.state_arrays = allocate_state(robot.model.nv, len(robot.soles))
         self.clock = apart(1, dtype=np.int64)
+        self._count = apart(1, dtype=np.int64)
         self._warnings = self.data.warning.number  # a view
         self.pushes: tuple[Push | Kick, ...] = ()
         self.push_table = apart((0, TABLE_COLUMNS))
+        self._world: World | None = None
         self.reset()
 
     @property
@@ -98,8 +122,11 @@ class Simulation:
 
     def step(self, torques: np.ndarray, count: int = 1) -> RobotState:
         """Apply joint torques (nu,) [N·m] for `count` physics steps."""
+        if self._world is None or self._world.pushes is not self.push_table:
+            self._world = World(
+                self.arrays, self.plant, self.state_arrays, self.clock, self.push_table, self._count
+            )
         self.plant.ctrl[:] = torques
-        for _ in range(count):
-            advance(self.arrays, self.plant, self.push_table, self.clock)
-        update_state(self.arrays, self.plant, self.state_arrays)
+        self._count[0] = count
+        advance_world(self._world)
         return self.state

@@ -165,7 +165,7 @@ class RobotState:
 
     @property
     def support_polygon(self) -> np.ndarray:
-        """(k, 2) counter-clockwise hull of the soles on the ground [m]."""
+        """(k, 2) counter-clockwise hull of the soles that are not in the air [m]."""
         update_support(self.robot, self.arrays)
         return self.arrays.support[: self.arrays.support_size[0]].copy()
 

@@ -6,6 +6,7 @@ import pytest
 from poise.baselines.capture_step import CaptureStep, CaptureStepConfig
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
 
 from .shared import robot
@@ -58,6 +59,58 @@ def test_feet_do_not_cross():
     trial("capture-step", 22.0, 0.0, watch=watch)
     assert widths
     assert min(widths) > 0.1
+
+
+def watched(controller, impulse, direction, look, duration=1.5):
+    """What `look(controller, state, torques)` says of each tick of a trial."""
+    seen, torques = [], controller.torques
+
+    def watch(state, targets):
+        tau = torques(state, targets)
+        seen.append(look(controller, state, tau))
+        return tau
+
+    controller.torques = watch
+    trial(controller, impulse, direction, duration=duration)
+    return seen
+
+
+@pytest.mark.parametrize("direction", [0.0, 90.0])
+def test_torques_do_not_jump_at_a_switch(direction):
+    """From the tick before the first step on, torques change by at most `jump` of their limits."""
+    controller = load_controller("capture-step", robot())
+    ticks = watched(controller, 24.0, direction, lambda c, state, tau: (c.steps, tau.copy()))
+    first = next(i for i, (steps, _) in enumerate(ticks) if steps > 0)
+    torques = np.array([tau for _, tau in ticks[first - 1 :]])
+    changes = np.abs(np.diff(torques, axis=0)) / robot().torque_limit
+    assert len(changes) > 50
+    assert controller.config.jump <= 0.6
+    assert changes.max() <= controller.config.jump + 1e-9
+
+
+def test_a_foot_gives_its_load_away_before_it_lifts_off():
+    """While it unloads, its part of the planned force falls; then the foot is no contact."""
+
+    def look(c, state, tau):
+        unloading = c.swing is not None and c.swing.time == 0.0
+        return c.sets.workspace.wrenches[6 * c.foot + 2] if unloading else np.nan
+
+    controller = load_controller("capture-step", robot())
+    loads = np.array(watched(controller, 24.0, 0.0, look, duration=0.6))
+    loads = loads[np.isfinite(loads)]
+    assert len(loads) >= 2
+    assert np.all(np.diff(loads) < 0.0)
+    assert loads[-1] < 0.5 * robot().mass * 9.81
+
+
+def test_hips_that_are_used_up_bring_the_step_forward():
+    """Angular momentum in the sense of the fall counts: with it the first step begins earlier."""
+    begun = []
+    for spin in (0.0, 0.5):
+        settings = {**to_dict(controller_config("capture-step")), "spin": spin}
+        controller = load_controller(settings, robot())
+        begun.append(watched(controller, 24.0, 0.0, lambda c, s, t: c.stepped, 0.6).index(True))
+    assert begun[1] < begun[0]
 
 
 def test_replicas_start_anew():

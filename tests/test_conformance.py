@@ -1,4 +1,4 @@
-"""Both environments in the libraries that people use them with, unchanged."""
+"""The environments in the libraries that people use them with, unchanged."""
 
 import json
 import subprocess
@@ -14,10 +14,12 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import poise  # noqa: F401  (registers the environments)
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.baselines.residual_step_env import ResidualStepEnv
 from poise.envs.torque_balance import TorqueBalanceEnv
 
 IDS = {
     "poise/ResidualBalance-v0": ResidualBalanceEnv,
+    "poise/ResidualStep-v0": ResidualStepEnv,
     "poise/TorqueBalance-v0": TorqueBalanceEnv,
 }
 EACH = pytest.mark.parametrize("name", IDS)
@@ -150,7 +152,7 @@ def test_observations_change(name):
     """No entry is constant over a few random episodes, but for feet that stay on the ground."""
     env = gymnasium.make(name, **{**SMALL, "pushes": {**PUSHES, "magnitude": [0.5, 1.0]}})
     seen = []
-    for seed in range(3):
+    for seed in range(6):
         seen.append(env.reset(seed=seed)[0])
         env.action_space.seed(seed)
         done = False

@@ -104,3 +104,22 @@ def test_load_limits_bind(sets):
     assert sets.failures == 0
     assert wrenches[2] == pytest.approx(0.2 * free, rel=1e-6)
     assert wrenches[8] > free
+
+
+def test_torques_follow_those_of_before():
+    """With a bound on jumps the torques stay near those followed, and the plan knows of it."""
+    limit = robot().torque_limit
+    bounded = ContactSets(robot(), MomentumQPConfig(), jump=0.3)
+    state, targets, rows = situation()
+    joints = bounded.arrays.motor_dofs - 6
+    before = np.zeros(len(bounded.parameters.torque_limit))
+    free = bounded.tick(state, targets, (1,), [rows])
+    assert np.abs(free / limit).max() > 0.3
+    bounded.reset()
+    bounded.follow(before)
+    torques = bounded.tick(state, targets, (1,), [rows])
+    assert np.abs(torques / limit).max() <= 0.3 + 1e-9
+    ws = bounded.workspace
+    planned = state.M @ ws.vdot + state.h - state.J[6:].T @ ws.wrenches
+    assert bounded.failures == 0
+    np.testing.assert_allclose(planned[6:][joints], torques, atol=1e-5)

@@ -1,5 +1,7 @@
 """What a controller is given and what it must not know."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,19 @@ def test_targets_are_shared_with_compiled_code(robot):
     moved = qp.torques(state, first)
     qp.reset(state)
     assert np.abs(moved - qp.torques(state, second)).max() > 1.0
+
+
+def test_targets_take_the_values_of_others(robot):
+    """Every field, into arrays of their own."""
+    state = Simulation(robot).state
+    ours, theirs = (Targets.standing(robot, state) for _ in range(2))
+    for i, item in enumerate(fields(Targets)):
+        getattr(theirs, item.name)[:] = i + 1.0
+    ours.take(theirs)
+    for item in fields(Targets):
+        own, other = getattr(ours, item.name), getattr(theirs, item.name)
+        np.testing.assert_array_equal(own, other)
+        assert own is not other
 
 
 def test_momentum_qp_is_a_controller(robot):

@@ -73,6 +73,24 @@ def test_support_polygon_is_the_hull_of_the_soles(pushed):
     assert state.support_distance(inside + [1.0, 0.0]) < -0.5
 
 
+def test_a_foot_in_the_air_bears_nothing():
+    """A sole 5 cm above the other one is no part of the polygon; one 5 mm above it still is."""
+    robot = robot_named("humanoid")
+    simulation, hips = Simulation(robot), robot.joint_names.index("left_hip_y")
+    areas = []
+    for bend in (0.0, 0.06, 0.6):  # hip and knee, so that the left sole rises
+        qpos = robot.standing_qpos.copy()
+        qpos[7 + hips] -= bend
+        qpos[7 + robot.joint_names.index("left_knee")] -= bend
+        state = simulation.reset(qpos)
+        areas.append(ConvexHull(state.support_polygon).volume)
+        rise = state.sole_points[0, 2] - state.sole_points[1, 2]
+    assert rise > 0.05
+    assert areas[1] > 0.9 * areas[0]
+    assert areas[2] == pytest.approx(ConvexHull(robot.soles[1].polygon).volume, rel=1e-6)
+    assert state.support_distance(state.sole_points[0, :2]) < 0.0
+
+
 @pytest.mark.parametrize("direction", [0.0, 33.0, 90.0, 180.0, 271.0])
 def test_support_margin_reaches_the_edge(pushed, direction):
     """From the CoM's projection, δ(θ) along θ leads exactly to the edge of the polygon."""

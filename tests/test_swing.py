@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from poise.baselines.swing import Swing, SwingTask, quintic, swing_rows
+from poise.baselines.swing import Swing, SwingTask, quintic, rotation_error, swing_rows
 from poise.envs.simulation import Simulation
 
 from .shared import generic_state, robot
@@ -36,8 +36,7 @@ def test_quintic_is_its_own_derivative():
     rng = np.random.default_rng(1)
     start, end = rng.normal(size=(2, 3, 4))
     step = 1e-6
-    low, high = (quintic(start, end, 0.7, 0.3 + s) for s in (-step, step))
-    now = quintic(start, end, 0.7, 0.3)
+    low, high, now = (np.array(quintic(start, end, 0.7, 0.3 + s)) for s in (-step, step, 0.0))
     np.testing.assert_allclose((high[:2] - low[:2]) / (2 * step), now[1:], rtol=1e-6, atol=1e-6)
 
 
@@ -103,3 +102,13 @@ def test_rows_turn_the_sole_back():
     rows = swing_rows(state, 0, reference, wanted, task)
     k = task.stiffness * state.robot.gravity / state.robot.height_com
     np.testing.assert_allclose(rows.b[3:], [k * angle, 0.0, 0.0], rtol=1e-3, atol=1e-6)
+
+
+def test_rotation_error_is_the_mean_cross_product():
+    """½ Σ aᵢ × bᵢ of the columns; for a turn by an angle about an axis, sin(angle) · axis."""
+    rng = np.random.default_rng(3)
+    a, b = rng.normal(size=(2, 3, 3))
+    expected = 0.5 * sum(np.cross(a[:, i], b[:, i]) for i in range(3))
+    np.testing.assert_allclose(rotation_error(a, b), expected, atol=1e-12)
+    turned = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(rotation_error(np.eye(3), turned), [0.0, 0.0, 0.6], atol=1e-12)

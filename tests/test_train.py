@@ -14,16 +14,19 @@ import numpy as np
 import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from poise.baselines.capture_step import CaptureStep
+from poise.baselines.residual_step_env import ResidualStepEnv
 from poise.envs.batch import EnvBatch
 from poise.envs.config import build, read_yaml
 from poise.envs.errors import ConfigError
 from poise.training import callbacks, schedules
 from poise.training.checkpoints import FILES, POLICY, STATE
-from poise.training.config import Curriculum, PPOConfig, TrainConfig
+from poise.training.config import Curriculum, PPOConfig, TrainConfig, train_config
+from poise.training.players import load_player
 from poise.training.policy import load_policy
 from poise.training.train import _env_seed, train
 
-from .shared import finished_run, tiny_config
+from .shared import finished_run, robot, tiny_config
 
 ROOT = Path(__file__).parents[1]
 ROLLOUT = 64  # steps of the tiny configuration
@@ -279,3 +282,19 @@ def test_exploration_narrows_on_a_schedule(tmp_path, monkeypatch):
     train(replace(config, evaluation=replace(config.evaluation, trials=1)), tmp_path, False, False)
     np.testing.assert_allclose([values.mean() for values in seen], [-1.0, -2.0], atol=1e-6)
     assert all(np.ptp(values) == 0.0 for values in seen)
+
+
+def test_steps_are_trained_by_a_word_in_the_configuration(tmp_path):
+    """`action: step` trains in `ResidualStepEnv` around `capture-step`, with its own scales."""
+    config = train_config("residual-step")
+    env = config.make_env()
+    assert type(env) is ResidualStepEnv and type(env.controller) is CaptureStep
+    assert env.residual == config.step_residual and env.residual.foothold > 0.0
+    small = tiny_config(
+        action="step", controller="capture-step", step_residual=config.step_residual, steps=128
+    )
+    train(small, tmp_path / "run", progress=False)
+    player = load_player(str(tmp_path / "run"), robot(), duration=0.5)
+    assert type(player.env) is ResidualStepEnv
+    action = player.act(player.env.reset(seed=0)[0])
+    assert action.shape == (len(player.env.action_names),)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
+from poise.baselines.residual_step_env import ResidualStepEnv, StepScales
 from poise.envs.balance import BalanceEnv, EnvConfig
 from poise.envs.config import build, read_yaml, resolve
 from poise.envs.push_schedule import PushSampler
@@ -61,14 +62,15 @@ class EvaluationConfig:
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """A policy that moves a controller's targets, or one that gives the torques itself.
+    """A policy that moves a controller's targets, its steps too, or gives the torques itself.
 
-    With `action` "torque" the environment is `poise/TorqueBalance-v0`, and controller, motion,
-    residual, smoothing and gate are not used.
+    With `action` "step" the environment is `poise/ResidualStep-v0`, and `step_residual` is what an
+    action adds instead of `residual`. With "torque" it is `poise/TorqueBalance-v0`, and controller,
+    motion, both residuals, smoothing and gate are not used.
     """
 
     robot: str = "humanoid"
-    action: Literal["residual", "torque"] = "residual"
+    action: Literal["residual", "step", "torque"] = "residual"
     controller: str = "momentum-qp"
     motion: str = "standing"
     seed: int = 0
@@ -76,6 +78,7 @@ class TrainConfig:
     threads: int = field(default=2, metadata={"min": 1})
     env: EnvConfig = field(default_factory=EnvConfig)
     residual: ResidualScales = field(default_factory=ResidualScales)
+    step_residual: StepScales = field(default_factory=StepScales)
     smoothing: float = field(default=0.0, metadata={"min": 0.0})  # of the action [s]
     gate: float = field(default=0.0, metadata={"min": 0.0})  # of the residual [m]
     ppo: PPOConfig = field(default_factory=PPOConfig)
@@ -89,15 +92,17 @@ class TrainConfig:
         """
         if self.action == "torque":
             return TorqueBalanceEnv(robot or self.robot, self.env, **overrides)
+        steps = self.action == "step"
         arguments = {
             "controller": self.controller,
             "motion": self.motion,
-            "residual": self.residual,
+            "residual": self.step_residual if steps else self.residual,
             "smoothing": self.smoothing,
             "gate": self.gate,
             **overrides,
         }
-        return ResidualBalanceEnv(robot or self.robot, self.env, **arguments)
+        kind = ResidualStepEnv if steps else ResidualBalanceEnv
+        return kind(robot or self.robot, self.env, **arguments)
 
 
 def train_config(name_or_path: str | Path) -> TrainConfig:

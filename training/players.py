@@ -11,6 +11,7 @@ import numpy as np
 from poise.baselines.outside import find_outside, is_outside, make_outside, outside_config
 from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.baselines.residual_step_env import ResidualStepEnv
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import packaged, to_yaml
 from poise.envs.errors import ConfigError
@@ -95,7 +96,11 @@ def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
     return Player(name, env, policy.act, _hash(to_yaml(policy.config).encode(), *weights))
 
 
-ENVIRONMENTS = {"residual": ResidualBalanceEnv, "torque": TorqueBalanceEnv}
+ENVIRONMENTS = {
+    "residual": ResidualBalanceEnv,
+    "step": ResidualStepEnv,
+    "torque": TorqueBalanceEnv,
+}
 
 
 def _is_controller(name: str, robot: Robot) -> bool:

@@ -1,7 +1,7 @@
 """Poise keeps a simulated humanoid on its feet while it is pushed.
 
-Importing it registers the environments ``poise/TorqueBalance-v0`` and ``poise/ResidualBalance-v0``
-with Gymnasium, and loads neither torch nor numba nor MuJoCo.
+Importing it registers the environments ``poise/TorqueBalance-v0``, ``poise/ResidualBalance-v0`` and
+``poise/ResidualStep-v0`` with Gymnasium, and loads neither torch nor numba nor MuJoCo.
 """
 
 from __future__ import annotations
@@ -26,6 +26,11 @@ register(
     "poise/ResidualBalance-v0",
     entry_point="poise.baselines.residual_balance:ResidualBalanceEnv",
     vector_entry_point="poise.baselines.residual_balance:vector_env",
+)
+register(
+    "poise/ResidualStep-v0",
+    entry_point="poise.baselines.residual_step_env:ResidualStepEnv",
+    vector_entry_point="poise.baselines.residual_step_env:vector_env",
 )
 
 

@@ -8,9 +8,20 @@ from . import (
     solvers,
     startup,
     step,
+    stepping,
     vector,
 )
 
-for benchmark in (step, vector, momentum_qp, solvers, qp_set, scaling, startup, flywheel_limit):
+for benchmark in (
+    step,
+    stepping,
+    vector,
+    momentum_qp,
+    solvers,
+    qp_set,
+    scaling,
+    startup,
+    flywheel_limit,
+):
     print(f"\n{benchmark.__name__.rsplit('.', 1)[-1]}")
     benchmark.main()

@@ -1,0 +1,159 @@
+"""`poise/ResidualStep-v0`: the action moves the targets and the steps of a stepping controller."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from poise.envs.env_config import EnvConfig
+from poise.envs.errors import ConfigError
+from poise.envs.observation import Term
+from poise.envs.robot import Robot
+from poise.envs.vector import make_vector_env
+
+from .residual_balance import ResidualBalanceEnv, ResidualScales
+
+
+@dataclass(frozen=True)
+class StepScales(ResidualScales):
+    """What an action of 1 adds, heading frame; a scale of 0 takes it away."""
+
+    com: float = field(default=0.1, metadata={"min": 0.0})  # Δc_ref x, y [m]
+    cop: float = field(default=0.05, metadata={"min": 0.0})  # Δp_ref x, y [m]
+    foothold: float = field(default=0.15, metadata={"min": 0.0})  # x, y [m]
+    time: float = field(default=0.08, metadata={"min": 0.0})  # of a step [s]
+    trigger: float = field(default=0.0, metadata={"min": 0.0})  # of a step [m]
+
+    def entries(self) -> dict[str, float]:
+        """Scale of each target that can be moved: those of the base class first."""
+        return {
+            **super().entries(),
+            "foothold_x": self.foothold,
+            "foothold_y": self.foothold,
+            "time": self.time,
+            "trigger": self.trigger,
+        }
+
+
+class ResidualStepEnv(ResidualBalanceEnv):
+    """Keep a pushed robot on its feet by moving the targets and the steps of a planner.
+
+    `ResidualBalanceEnv` around a controller that steps: rewards, start, end and arguments are the
+    same. Zero is the controller alone, bit for bit.
+
+    Action: Box(−1, 1, (7,)), heading frame.
+
+    | index | name | 1 adds | to |
+    | --- | --- | --- | --- |
+    | 0 | com_x | `residual.com`, 0.1 m | CoM target, after a step where ξ is to rest: forward |
+    | 1 | com_y | `residual.com`, 0.1 m | the same, left |
+    | 2 | cop_x | `residual.cop`, 0.05 m | CoP target, forward |
+    | 3 | cop_y | `residual.cop`, 0.05 m | CoP target, left |
+    | 4 | foothold_x | `residual.foothold`, 0.15 m | foothold, forward, within the step's limits |
+    | 5 | foothold_y | `residual.foothold`, 0.15 m | foothold, left, within the step's limits |
+    | 6 | time | `residual.time`, 0.08 s | time from lift-off to touchdown |
+
+    A scale `residual.trigger` [m] above 0 appends `trigger`: how much further ξ may leave the reach
+    of the feet before a step is taken. `height`, `lean` and `momentum` come before `foothold_x`.
+
+    Observation: that of `ResidualBalanceEnv` with these actions (0 to 70), then
+
+    | index | term | entry | unit | meaning |
+    | --- | --- | --- | --- | --- |
+    | 71 | swing | left | 1 | 1 where the foot swings, else 0 |
+    | 72 | swing | right | 1 | 1 where the foot swings, else 0 |
+    | 73 | phase | share | 1 | share of the swing that is over |
+    | 74 | time_left | t | 1/ω | until touchdown is planned |
+    | 75 | since | t | 1/ω | since the last touchdown |
+    | 76 | steps | count | 1 | steps begun |
+    | 77 | feet | x | 0.5 h | first sole from the second |
+    | 78 | feet | y | 0.5 h | first sole from the second |
+    | 79 | swing_foot | x | 0.5 h | swinging sole from the stance sole, 0 if both are down |
+    | 80 | swing_foot | y | 0.5 h | swinging sole from the stance sole, 0 if both are down |
+    | 81 | swing_foot | z | 0.5 h | swinging sole from the stance sole, 0 if both are down |
+    | 82 | foothold | x | 0.5 h | foothold from the stance sole, 0 if both are down |
+    | 83 | foothold | y | 0.5 h | foothold from the stance sole, 0 if both are down |
+    | 84 | stance_capture_point | x | 0.5 h | ξ from the stance sole, 0 if both are down |
+    | 85 | stance_capture_point | y | 0.5 h | ξ from the stance sole, 0 if both are down |
+
+    Info: besides those of `ResidualBalanceEnv`, "steps", begun in this episode.
+
+    Arguments: as of `ResidualBalanceEnv`; `controller` must be one that steps, with a `shift` and
+    `stepping` as in `step_shift.py`; `residual` is a `StepScales`.
+
+    Version history: v0, first release.
+    """
+
+    scales_class = StepScales
+
+    def __init__(
+        self,
+        robot: str | Path | Robot = "humanoid",
+        config: EnvConfig | str | Path | Mapping | None = None,
+        *,
+        controller: Any = "capture-step",
+        **arguments: Any,
+    ):
+        super().__init__(robot, config, controller=controller, **arguments)
+
+    @ResidualBalanceEnv.controller.setter  # type: ignore[attr-defined]
+    def controller(self, controller: Any) -> None:
+        """As of `ResidualBalanceEnv`; raises ConfigError for one that does not step."""
+        if not hasattr(controller, "shift") or not hasattr(controller, "stepping"):
+            raise ConfigError("does not step, so that no step can be moved", field="controller")
+        ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
+
+    def _observation_terms(self, soles: list[str]) -> list[Term]:
+        ground, stance = ("x", "y"), "the stance sole, 0 if both are down"
+        return [
+            *super()._observation_terms(soles),
+            Term("swing", tuple(soles), "1", "1 where the foot swings, else 0"),
+            Term("phase", ("share",), "1", "share of the swing that is over"),
+            Term("time_left", ("t",), "1/ω", "until touchdown is planned"),
+            Term("since", ("t",), "1/ω", "since the last touchdown"),
+            Term("steps", ("count",), "1", "steps begun"),
+            Term("feet", ground, "0.5 h", "first sole from the second"),
+            Term("swing_foot", (*ground, "z"), "0.5 h", f"swinging sole from {stance}"),
+            Term("foothold", ground, "0.5 h", f"foothold from {stance}"),
+            Term("stance_capture_point", ground, "0.5 h", f"ξ from {stance}"),
+        ]
+
+    def _observe(self) -> None:
+        super()._observe()
+        s, step = self.simulation.state_arrays, self.controller.stepping()
+        cos, sin = s.heading
+        half, omega = 0.5 * self.scales.height, self.scales.omega
+
+        def local(way: np.ndarray) -> list[float]:
+            x, y = way[0] / half, way[1] / half
+            return [cos * x + sin * y, cos * y - sin * x]
+
+        feet = s.sole_point
+        moving = [0.0] * 7
+        if step.foot >= 0:
+            stance = feet[1 - step.foot]
+            moving = local(feet[step.foot] - stance)
+            moving.append((feet[step.foot, 2] - stance[2]) / half)
+            moving += local(step.foothold - stance[:2]) + local(s.capture_point - stance[:2])
+        swing = [float(step.foot == i) for i in range(2)]
+        times = [step.phase, omega * step.remaining, omega * step.since, float(step.steps)]
+        added = np.array(swing + times + local(feet[0] - feet[1]) + moving)
+        self.episode.observation[-len(added) :] = np.clip(added, -10.0, 10.0)
+
+    def _set_offsets(self) -> None:
+        super()._set_offsets()
+        offsets, shift = self._offsets, self.controller.shift
+        shift.com, shift.cop = offsets[0:2].copy(), offsets[2:4].copy()
+        shift.height, shift.lean = float(offsets[4]), offsets[5:7].copy()
+        shift.foothold = offsets[9:11].copy()
+        shift.time, shift.trigger = float(offsets[11]), float(offsets[12])
+
+    def info(self) -> dict[str, Any]:
+        """As of `ResidualBalanceEnv`, and the number of steps."""
+        return {**super().info(), "steps": self.controller.stepping().steps}
+
+
+vector_env = partial(make_vector_env, ResidualStepEnv)  # for gymnasium.make_vec
