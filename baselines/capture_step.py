@@ -18,6 +18,7 @@ from .step_plan import Foothold, Plan, StepLimits, StepPlanner
 from .step_shift import STANDING, Stepping, lean_matrix
 from .support import nearest_inside
 from .swing import Swing, SwingTask, rotation_error, swing_rows
+from .warmup import prepare
 
 LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
 LOW = 0.04  # [h] above the ground: a foot that touches it higher up stands on its edge
@@ -76,6 +77,7 @@ class CaptureStep(AroundQP):
             raise ConfigError(
                 f"needs two feet, {robot.name!r} has {len(robot.soles)}", field="controller"
             )
+        prepare("contacts")
         self.config = config or CaptureStepConfig()
         super().__init__(robot, self.config.qp)
         self.sets = ContactSets(robot, self.config.step_qp, self.config.jump)

@@ -13,7 +13,7 @@ from .residual_balance import ResidualBalanceEnv
 from .residual_step import residual_step
 from .warmup import begin
 
-__all__ = ["assembly", "begin", "solver", "steps"]
+__all__ = ["assembly", "begin", "contacts", "solver", "steps"]
 
 
 def _standing() -> tuple[MomentumQP, RobotState, Targets]:
@@ -50,3 +50,14 @@ def steps() -> None:
     momentum_tick.compile((step.tick.numba_type,))
     accept(problem.state, problem.parameters, problem.workspace, qp.memory)
     batch.play(0, batch.NOBODY, np.zeros(1, dtype=np.int64))
+
+
+def contacts() -> None:
+    """What controllers that step need besides: a push that takes a step."""
+    env = ResidualBalanceEnv(controller="capture-step", duration=2.0)
+    push = {"impulse": 0.55 * env.robot.mass, "start": 0.0}
+    env.reset(seed=0, options={"push": push})
+    over = False
+    while not over:
+        *_, fallen, truncated, _ = env.step(np.zeros(env.action_space.shape or ()))
+        over = fallen or truncated

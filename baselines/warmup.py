@@ -7,35 +7,44 @@ same compiled code, so results do not depend on which process came first.
 
 import subprocess
 import sys
+from collections.abc import Sequence
 
 from poise.envs import jit
 from poise.envs.config import write_atomic
 
-_READY = jit.CACHE_STAMP.with_name("kernels.ready")
-_SHARES = ("assembly", "solver", "steps")  # one process for each
+_READY = jit.CACHE_STAMP.with_name("kernels.ready")  # the digest of the sources, then shares
+_SHARES = ("assembly", "solver", "steps")  # of `compilation.py`, one process for each
 _compiling = False  # whether this is one of them
 
 
-def prepare() -> None:
-    """Fill the cache of compiled kernels if it is cold: some fifteen seconds on two cores, once."""
+def prepare(*further: str) -> None:
+    """Fill the cache of compiled kernels if it is cold: some fifteen seconds on two cores, once.
+
+    `further` shares of `compilation.py` follow; they may use the kernels of the first.
+    """
     if _compiling:
         return
     try:
         sources = jit.CACHE_STAMP.read_text()
-        if _READY.is_file() and _READY.read_text() == sources:
-            return
-        print(jit.MESSAGE, file=sys.stderr, flush=True)
-        if _compile_apart():
-            write_atomic(_READY, sources)
+        for shares in (_SHARES, further):
+            digest, *done = _READY.read_text().split() if _READY.is_file() else [""]
+            done = done if digest == sources else []
+            missing = [share for share in shares if share not in done]
+            if not missing:
+                continue
+            print(jit.MESSAGE, file=sys.stderr, flush=True)
+            if not _compile_apart(missing):
+                return
+            write_atomic(_READY, "\n".join([sources, *done, *missing]))
     except OSError:
         return  # a folder that cannot be written has no cache: nothing to share
 
 
-def _compile_apart() -> bool:
-    """Whether all processes have finished without an error."""
+def _compile_apart(shares: Sequence[str]) -> bool:
+    """Whether the processes have all finished without an error."""
     jobs = []
     try:
-        for share in _SHARES:
+        for share in shares:
             code = f"from poise.baselines.compilation import *; begin(); {share}()"
             jobs.append(subprocess.Popen([sys.executable, "-c", code]))
         return all([job.wait() == 0 for job in jobs])
