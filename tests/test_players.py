@@ -87,17 +87,20 @@ def test_a_packaged_policy_is_known_by_its_folder(
     assert player.fingerprint == load_player(str(finished_run() / "last"), robot).fingerprint
     assert player.fingerprint != load_player("residual", robot).fingerprint
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
-    assert packaged("policies") == ["residual", "residual-pd"]
-    assert default_controllers()[-2:] == ("residual", "residual-pd")
-    with pytest.raises(ConfigError, match="residual, residual-pd, zero"):
+    assert packaged("policies") == ["ppo-torque", "residual", "residual-pd"]
+    assert default_controllers()[-3:] == ("ppo-torque", "residual", "residual-pd")
+    with pytest.raises(ConfigError, match="ppo-torque, residual, residual-pd, zero"):
         load_player("residual-abe07", robot)
 
 
 @pytest.mark.parametrize("name", packaged("policies"))
 def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
     """residual on the baseline, residual-CONTROLLER on another; no larger than need be."""
-    found = load_policy(name)
-    controller = found.config.controller
-    assert name == ("residual" if controller == "momentum-qp" else f"residual-{controller}")
+    found = load_policy(name).config
+    if found.action == "torque":
+        assert name == "ppo-torque"
+    else:
+        on_baseline = found.controller == "momentum-qp"
+        assert name == ("residual" if on_baseline else f"residual-{found.controller}")
     files = list((config.packaged_folder("policies") / name).iterdir())
     assert sum(path.stat().st_size for path in files) < 1_000_000

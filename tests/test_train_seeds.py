@@ -185,6 +185,11 @@ def test_the_command_takes_seeds(
     assert len(given) == 4 and all(run.resume for run in given[2:])
 
 
+def heed_interrupts() -> None:
+    """A shell that starts its tests in the background has them, and their children, ignore it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_ctrl_c_ends_all_processes_at_once_and_loses_nothing(tmp_path: Path) -> None:
     """The command ends with 130 in seconds, though its runs have hours to go; --resume goes on."""
     config = tmp_path / "tiny.yaml"
@@ -194,7 +199,7 @@ def test_ctrl_c_ends_all_processes_at_once_and_loses_nothing(tmp_path: Path) -> 
                "--out", str(out), "--seeds", "0", "1", "--workers", "2"]  # fmt: skip
     process = subprocess.Popen(
         command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        start_new_session=True,
+        start_new_session=True, preexec_fn=heed_interrupts,
     )  # fmt: skip
     deadline = time.monotonic() + 300.0
     folders = [out / f"seed-{seed}" / "last" for seed in (0, 1)]
