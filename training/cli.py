@@ -90,7 +90,7 @@ def evaluate(
         controllers: a name of `poise list`, such as residual (a shipped policy), zero (no torque),
             a .yaml file of a controller, a folder written by poise train, with --seeds too, or
             module:Class.
-        suite: random, envelope, grid, quiet, or a .yaml file.
+        suite: random, envelope, grid, quiet, repeated, in-step, or a .yaml file.
         out: folder to write to; out/SUITE if not given.
         robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the trials.
