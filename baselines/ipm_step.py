@@ -68,8 +68,9 @@ class EnergyPlanner(StepPlanner):
             wanted[k] = c + away * velocity / max(speed, 1e-9)
         wanted = (wanted - stance) @ R - self.reach.middle[foot]
         wanted[:, 1] += self.sides[foot] * self.choice.outward * self.h
-        local = self.allowed(wanted, (start - stance) @ R, foot, times)
-        return stance + local @ R.T, np.linalg.norm(local - wanted, axis=1)
+        shifted = wanted + self.shift.foothold
+        local = self.allowed(shifted, (start - stance) @ R, foot, times)
+        return stance + local @ R.T, np.linalg.norm(local - shifted, axis=1)
 
 
 class IPMStep(CaptureStep):
@@ -85,3 +86,4 @@ class IPMStep(CaptureStep):
         reach = Reach(robot, config.share)
         self.planner = EnergyPlanner(robot, reach, config.limits, config.foothold)
         self.planner.arc = config.arc
+        self.planner.shift = self.shift

@@ -11,10 +11,12 @@ from collections.abc import Sequence
 
 from poise.envs import jit
 from poise.envs.config import write_atomic
+from poise.envs.errors import PoiseError
 
 _READY = jit.CACHE_STAMP.with_name("kernels.ready")  # the digest of the sources, then shares
 _SHARES = ("assembly", "solver", "steps")  # of `compilation.py`, one process for each
 _compiling = False  # whether this is one of them
+_tried: set[str] = set()  # shares that this process has had compiled, or could not have
 
 
 def prepare(*further: str) -> None:
@@ -29,14 +31,15 @@ def prepare(*further: str) -> None:
         for shares in (_SHARES, further):
             digest, *done = _READY.read_text().split() if _READY.is_file() else [""]
             done = done if digest == sources else []
-            missing = [share for share in shares if share not in done]
+            missing = [share for share in shares if share not in done and share not in _tried]
             if not missing:
                 continue
+            _tried.update(missing)
             print(jit.MESSAGE, file=sys.stderr, flush=True)
             if not _compile_apart(missing):
                 return
             write_atomic(_READY, "\n".join([sources, *done, *missing]))
-    except OSError:
+    except (OSError, PoiseError):
         return  # a folder that cannot be written has no cache: nothing to share
 
 

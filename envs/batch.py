@@ -144,9 +144,11 @@ class EnvBatch:
         reset. Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
         """
         live = np.ones(len(self.envs), dtype=bool) if restart is None else ~restart
+        played = np.flatnonzero(live).tolist()
+        for i in played:
+            self.envs[i].expect_running()
         self._set_actions(actions, live)
         self._forget(~live)
-        played = np.flatnonzero(live).tolist()
         kernel, blocks = self._compiled_steps(played)
         if kernel:
             self._share(self._restart, np.flatnonzero(~live).tolist(), kernel, blocks)
@@ -162,16 +164,15 @@ class EnvBatch:
         """Addresses of a kernel and of the blocks of `played`; 0 if Python has to step them."""
         steps = []
         for i in played:
-            self.envs[i].expect_running()
             step = self.envs[i].compiled_step()
             if step is None:
                 return 0, NOBODY
             steps.append(step)
-        if len({block.numba_type for _, block in steps}) != 1:
+        if len({(kernel, block.numba_type) for kernel, block in steps}) != 1:
             return 0, NOBODY
         kernel, block = steps[0]
-        if self._kernel[0] is not kernel:
-            self._kernel = kernel, address_of(kernel, block)
+        if self._kernel[0] != (kernel, block.numba_type):
+            self._kernel = (kernel, block.numba_type), address_of(kernel, block)
         blocks = np.array([block.address for _, block in steps])
         # turns from either half, so that threads do not write to neighbouring rows at a time
         half = len(blocks) // 2

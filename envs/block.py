@@ -24,8 +24,6 @@ from numba.extending import (
     unbox,
 )
 
-WORD = 8  # bytes
-
 
 @dataclass(frozen=True, eq=False)
 class Block:

@@ -196,3 +196,15 @@ def test_the_class_docstring_is_the_specification():
     for i, (name, scale) in enumerate(zip(env.action_names, env._residual.scale, strict=True)):
         field, unit = name.split("_")[0], "s" if name == "time" else "m"
         assert f"| {i} | {name} | `residual.{field}`, {scale:g} {unit} |" in text
+
+
+@pytest.mark.parametrize("controller", ["capture-step", "ipm-step"])
+def test_footholds_move_whatever_plans_them(controller):
+    """Pulled to either side, the first step ends elsewhere."""
+    env = ResidualStepEnv(robot(), controller=controller, pushes=None, duration=1.2)
+    ends = []
+    for pull in (-1.0, 0.0, 1.0):
+        play(env, {"foothold_x": pull})
+        assert env.controller.steps >= 1
+        ends.append(env.simulation.data.qpos.copy())
+    assert not np.array_equal(ends[0], ends[1]) and not np.array_equal(ends[1], ends[2])

@@ -11,6 +11,7 @@ from poise.baselines.momentum_qp import MomentumQP
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.batch import replicate
 from poise.envs.errors import ConfigError, PoiseError
+from poise.envs.vector import BalanceVectorEnv
 
 from .shared import robot
 
@@ -164,6 +165,20 @@ def test_a_disabled_reset_is_the_callers():
     assert "reset_mask" in options  # the caller's own is left as it was
     same(ours.step(zeros), theirs.step(zeros))
     ours.close()
+
+
+def test_an_ended_environment_is_not_stepped_on():
+    """Not by Python either, where only one of them has ended; then nothing has moved."""
+    pairs = [ResidualBalanceEnv(robot(), controller="pd", duration=d) for d in (1.0, 0.02)]
+    env = BalanceVectorEnv(pairs, threads=2, autoreset_mode="Disabled")
+    env.reset(seed=0)
+    zeros = np.zeros(env.action_space.shape)
+    assert env.step(zeros)[3].tolist() == [False, True]
+    before = [other.simulation.time for other in env.envs]
+    with pytest.raises(PoiseError, match="call reset"):
+        env.step(zeros)
+    assert [other.simulation.time for other in env.envs] == before
+    env.close()
 
 
 def test_wrappers_of_gymnasium():

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from poise.baselines.warmup import prepare
 from poise.envs.config import to_yaml, write_atomic
 from poise.envs.errors import ConfigError, PoiseError
 
@@ -65,7 +64,7 @@ def train_seeds(
         ConfigError: as `train`, before any run starts and anything is written.
         PoiseError: a run has failed, after the others are done; or a process has died.
     """
-    console, out, started = console or Console(quiet=True), Path(out), time.perf_counter()
+    console, out, started = console or Console(quiet=True), Path(out).resolve(), time.perf_counter()
     check_backend(backend)
     if workers is not None and workers < 1:
         raise ConfigError(f"must be at least 1, not {workers}", field="workers")
@@ -74,7 +73,7 @@ def train_seeds(
     missing = [run for run in runs if not _finished(run)]
     write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
     write_atomic(out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n")
-    prepare()
+    config.make_env().close()  # compiles all that the runs need, once
     failed: list[str] = []
     with SeedProgress(runs, console), Crew(backend, workers) as crew:
         for run, error in crew.each(train_run, missing):
@@ -130,6 +129,8 @@ def _all_seeds(seeds: Sequence[int], out: Path, resume: bool) -> list[int]:
                           "folder", source=out, field="out")  # fmt: skip
     if resume and not there:
         raise ConfigError("holds no runs to resume", source=out, field="resume")
+    if not (there or seeds):
+        raise ConfigError("give at least one", field="seeds")
     return there + [seed for seed in seeds if seed not in there]
 
 
@@ -150,7 +151,8 @@ def _entry(run: SeedRun) -> dict[str, Any]:
     checkpoint = find_checkpoint(run.folder / LAST)
     state: dict[str, Any] = read_state(checkpoint / STATE) if checkpoint else {"timesteps": 0}
     rows = state.get("evaluations") or [None]
-    best = max(rows, key=lambda row: row["score"] if row else 0.0)  # the first of equals
+    trained = [row for row in rows if row and row["timesteps"] > 0] or rows
+    best = max(trained, key=lambda row: row["score"] if row else 0.0)  # the first of equals
     return {
         "seed": run.config.seed,
         "folder": run.folder.name,

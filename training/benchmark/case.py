@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from poise.envs.pushes import Push
-
 from ..trials import OUTCOMES, PUSH_COLUMNS, Outcome, Trial, row
 
 Part = Literal["envelope", "margin", "factors", "mix"]
@@ -86,9 +84,3 @@ def case_row(case: Case, controller: str, result: Result) -> dict[str, Any]:
     del line["later"]  # `pushes` and `interval` say how a case goes on
     line |= {name: getattr(case, name) for name in (*CASE_COLUMNS, *FACTOR_COLUMNS)}
     return line | {name: getattr(result, name) for name in RESULT_COLUMNS}
-
-
-def last_start(case: Case) -> float:
-    """When the last push starts [s]."""
-    assert isinstance(case.push, Push)
-    return float(case.push.start + (case.pushes - 1) * case.interval)
