@@ -1,4 +1,4 @@
-"""What both environments share: a pushed robot, its observation, reward, fall and record."""
+"""What all environments share: a pushed robot, its observation, reward, fall and record."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -143,8 +143,8 @@ def benchmark(
 
     Args:
         out: folder to write to.
-        controllers: names as poise evaluate takes them; all packaged controllers and policies if
-            not given.
+        controllers: names as poise evaluate takes them; all packaged ones that can rest if not
+            given.
         suite: quick (minutes), standard (an hour), full (many hours), or a .yaml file.
         robot: a packaged robot or a .yaml description.
         seed: of the cases.

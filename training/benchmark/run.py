@@ -59,7 +59,7 @@ def benchmark(
 
     Args:
         controllers: names as `load_player` takes them, or folders of several training seeds;
-            none: all packaged controllers and policies.
+            none: `default_controllers`.
         suite: a packaged suite (`configs/benchmarks`) or a path to a ``.yaml`` of one.
         out: the folder to write to.
         robot: a packaged robot or a path to its description.
