@@ -87,9 +87,10 @@ def test_a_packaged_policy_is_known_by_its_folder(
     assert player.fingerprint == load_player(str(finished_run() / "last"), robot).fingerprint
     assert player.fingerprint != load_player("residual", robot).fingerprint
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
-    assert packaged("policies") == ["ppo-torque", "residual", "residual-pd"]
-    assert default_controllers()[-3:] == ("ppo-torque", "residual", "residual-pd")
-    with pytest.raises(ConfigError, match="ppo-torque, residual, residual-pd, zero"):
+    names = ["ppo-torque", "residual", "residual-pd", "residual-step"]
+    assert packaged("policies") == names
+    assert default_controllers()[-4:] == tuple(names)
+    with pytest.raises(ConfigError, match="ppo-torque, residual, residual-pd, residual-step, zero"):
         load_player("residual-abe07", robot)
 
 
@@ -97,8 +98,8 @@ def test_a_packaged_policy_is_known_by_its_folder(
 def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
     """residual on the baseline, residual-CONTROLLER on another; no larger than need be."""
     found = load_policy(name).config
-    if found.action == "torque":
-        assert name == "ppo-torque"
+    if found.action != "residual":
+        assert name == {"torque": "ppo-torque", "step": "residual-step"}[found.action]
     else:
         on_baseline = found.controller == "momentum-qp"
         assert name == ("residual" if on_baseline else f"residual-{found.controller}")

@@ -172,7 +172,7 @@ def test_an_ended_environment_is_not_stepped_on():
     pairs = [ResidualBalanceEnv(robot(), controller="pd", duration=d) for d in (1.0, 0.02)]
     env = BalanceVectorEnv(pairs, threads=2, autoreset_mode="Disabled")
     env.reset(seed=0)
-    zeros = np.zeros(env.action_space.shape)
+    zeros = np.zeros(env.action_space.shape or ())
     assert env.step(zeros)[3].tolist() == [False, True]
     before = [other.simulation.time for other in env.envs]
     with pytest.raises(PoiseError, match="call reset"):
