@@ -59,7 +59,7 @@ def test_a_controllers_file_is_played_and_told_apart(robot: Robot, tmp_path: Pat
 @pytest.mark.parametrize("name", ["momentum", "missing.yaml", "nowhere/run"])
 def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: str) -> None:
     """The text names what was asked for and what there is."""
-    with pytest.raises(ConfigError, match="momentum-qp, .*residual, zero") as error:
+    with pytest.raises(ConfigError, match="momentum-qp, .*residual, residual-step, zero") as error:
         load_player(name, robot)
     assert name in str(error.value)
 
