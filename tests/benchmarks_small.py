@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 
+from poise.training.benchmark import run
 from poise.training.benchmark.case import Result
 from poise.training.benchmark.play import Job
 
@@ -31,6 +33,14 @@ def write_small(folder: Path, **changes: Any) -> Path:
     path = folder / "small.yaml"
     path.write_text(yaml.safe_dump({**SMALL, **changes}))
     return path
+
+
+def play_in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
+    """Trials are played in this process, and ticks are not timed."""
+    monkeypatch.setattr(run, "Crew", InProcessCrew)
+    monkeypatch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+    InProcessCrew.played, InProcessCrew.stop_after = 0, None
+    return InProcessCrew
 
 
 class InProcessCrew:

@@ -26,7 +26,7 @@ from poise.training.players import load_player
 from poise.training.replay import replay
 from poise.training.trials import Trial, run_trial
 
-from .benchmarks_small import TRIALS, InProcessCrew, write_small
+from .benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small
 from .shared import robot
 
 BOTH = ("momentum-qp", "zero")
@@ -46,10 +46,7 @@ class Flaky:
 @pytest.fixture(autouse=True)
 def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
     """Trials are played in this process, and ticks are not timed."""
-    monkeypatch.setattr(run, "Crew", InProcessCrew)
-    monkeypatch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
-    InProcessCrew.played, InProcessCrew.stop_after = 0, None
-    return InProcessCrew
+    return play_in_process(monkeypatch)
 
 
 @pytest.fixture(scope="module")

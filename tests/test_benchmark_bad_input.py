@@ -13,11 +13,10 @@ from pathlib import Path
 import pytest
 
 from poise.training import trial_log
-from poise.training.benchmark import run
 from poise.training.benchmark.run import benchmark
 from poise.training.cli import main
 
-from .benchmarks_small import TRIALS, InProcessCrew, write_small
+from .benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small
 
 ROOT = Path(__file__).parents[1]
 BOTH = ("momentum-qp", "zero")
@@ -38,10 +37,7 @@ benchmark({both!r}, {suite!r}, out={out!r}, workers=2)
 @pytest.fixture(autouse=True)
 def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
     """Trials are played in this process, and ticks are not timed."""
-    monkeypatch.setattr(run, "Crew", InProcessCrew)
-    monkeypatch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
-    InProcessCrew.played, InProcessCrew.stop_after = 0, None
-    return InProcessCrew
+    return play_in_process(monkeypatch)
 
 
 def lines(folder: Path) -> int:
@@ -74,6 +70,13 @@ def test_a_kill_in_the_middle_loses_no_finished_trial(
     assert (out / "trials.csv").read_bytes() == (tmp_path / "whole/trials.csv").read_bytes()
 
 
+def short_command(folder: Path) -> list[str]:
+    """`poise benchmark` of the envelope alone, to `folder`/out."""
+    suite = write_small(folder, mix=None, factors=None)
+    command = ["benchmark", "--suite", str(suite), "--out", str(folder / "out"), "--no-report"]
+    return [*command, "--controllers", "zero"]
+
+
 def test_a_full_disk_loses_no_finished_trial(
     tmp_path: Path,
     in_process: type[InProcessCrew],
@@ -81,9 +84,7 @@ def test_a_full_disk_loses_no_finished_trial(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """One line that names the file and exit code 2; the same command goes on."""
-    suite, out = write_small(tmp_path, mix=None, factors=None), tmp_path / "out"
-    command = ["benchmark", "--suite", str(suite), "--out", str(out), "--no-report"]
-    command += ["--controllers", "zero"]
+    out, command = tmp_path / "out", short_command(tmp_path)
     written = 0
 
     def full(file: int) -> None:
@@ -111,9 +112,7 @@ def test_a_disk_that_is_full_at_the_end(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """The table of trials does not fit: no half file, and nothing is played again."""
-    suite, out = write_small(tmp_path, mix=None, factors=None), tmp_path / "out"
-    command = ["benchmark", "--suite", str(suite), "--out", str(out), "--no-report"]
-    command += ["--controllers", "zero"]
+    out, command = tmp_path / "out", short_command(tmp_path)
     real = os.replace
 
     def full(source: Path, target: Path) -> None:

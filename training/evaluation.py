@@ -1,7 +1,5 @@
 """Evaluating controllers on the same trials."""
 
-import shlex
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +18,7 @@ from .evaluation_folder import SUMMARY, TRIALS, EvaluationFolder, Settings
 from .limits import PushLimits, load_limits, write_limits
 from .players import Player, load_player
 from .progress import progress_bar
-from .provenance import commit, machine, usable_cores, versions
+from .provenance import circumstances, usable_cores, versions
 from .report import draw_plots, print_paths, print_summary
 from .seed_groups import expand_seeds, seed_groups
 from .suite import Suite
@@ -111,12 +109,7 @@ def evaluate(
             "robot": loaded.name,
             **figures,
             "seeds": seed_groups(controllers, figures["controllers"]),
-            "command": shlex.join(sys.argv),
-            "versions": versions(),
-            "machine": machine(),
-            "workers": count,
-            "commit": commit(),
-            "seconds": round(time.perf_counter() - started, 1),
+            **circumstances(started, count),
         }
     )
     plots = draw_plots(Path(out), chosen, done, outcomes, pushed)

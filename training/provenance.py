@@ -1,15 +1,31 @@
-"""Where a result comes from: versions, machine and commit."""
+"""Where a result comes from: command, versions, machine, commit and time."""
 
 import importlib.metadata
 import os
 import platform
+import shlex
 import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
 import poise
 
 LIBRARIES = ("mujoco", "numpy", "numba", "torch", "stable-baselines3", "gymnasium", "scipy")
+
+
+def circumstances(started: float, workers: int, **more: Any) -> dict[str, Any]:
+    """What a result says of how it was made; `started` is of `time.perf_counter`."""
+    return {
+        "command": shlex.join(sys.argv),
+        "versions": versions(),
+        "machine": machine(),
+        "workers": workers,
+        **more,
+        "commit": commit(),
+        "seconds": round(time.perf_counter() - started, 1),
+    }
 
 
 def versions(names: tuple[str, ...] = LIBRARIES) -> dict[str, str]:

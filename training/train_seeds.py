@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +18,7 @@ from poise.envs.errors import ConfigError, PoiseError
 from .backends import Crew, check_backend
 from .checkpoints import CONFIG, STATE, find_checkpoint, read_state
 from .config import TrainConfig
-from .provenance import commit, machine, versions
+from .provenance import circumstances
 from .seed_groups import SEEDS, read_seeds, seed_figures, seed_folder
 from .seed_progress import SeedProgress, print_seeds
 from .train import LAST, check_folder, train
@@ -90,13 +88,7 @@ def train_seeds(
     summary = {
         "runs": entries,
         "recovered": recovered,
-        "command": shlex.join(sys.argv),
-        "versions": versions(),
-        "machine": machine(),
-        "workers": crew.workers,
-        "backend": backend,
-        "commit": commit(),
-        "seconds": round(time.perf_counter() - started, 1),
+        **circumstances(started, crew.workers, backend=backend),
     }
     write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
     print_seeds(summary, console)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import closing
@@ -21,7 +19,7 @@ from ..backends import Crew, check_backend
 from ..evaluation_folder import SUMMARY, TRIALS
 from ..players import Player, load_player
 from ..progress import progress_bar
-from ..provenance import commit, machine, versions
+from ..provenance import circumstances, versions
 from ..report import print_paths
 from ..seed_groups import expand_seeds, seed_groups
 from ..summary import plain
@@ -128,13 +126,7 @@ def benchmark(
                     if name != reference
                 ],
                 "seeds": seed_groups(names, entries),
-                "command": shlex.join(sys.argv),
-                "versions": versions(),
-                "machine": machine(),
-                "workers": crew.workers,
-                "backend": backend,
-                "commit": commit(),
-                "seconds": round(time.perf_counter() - started, 1),
+                **circumstances(started, crew.workers, backend=backend),
             }
         )
         rows = [case_row(case, name, result) for name in names for case, result in played[name]]
