@@ -35,7 +35,7 @@ def prepare(*further: str) -> None:
             if not missing:
                 continue
             _tried.update(missing)
-            print(jit.MESSAGE, file=sys.stderr, flush=True)
+            jit.tell()
             if not _compile_apart(missing):
                 return
             write_atomic(_READY, "\n".join([sources, *done, *missing]))

@@ -36,7 +36,11 @@ class Patience(event.Listener):
             self.begun = time.perf_counter()
         self.depth += 1
         ours = event.data["dispatcher"].py_func.__module__.startswith("poise.")
-        if ours and not self.told and time.perf_counter() - self.begun > PATIENCE:
+        if ours and time.perf_counter() - self.begun > PATIENCE:
+            self.tell()
+
+    def tell(self) -> None:
+        if not self.told:
             self.told = True
             print(MESSAGE, file=sys.stderr, flush=True)
 
@@ -46,6 +50,11 @@ class Patience(event.Listener):
 
 _patience = Patience()
 event.register("numba:compile", _patience)
+
+
+def tell() -> None:
+    """The message, once in a process."""
+    _patience.tell()
 
 
 def quiet() -> None:
