@@ -63,6 +63,14 @@ def test_seeds_of_one_configuration_are_taken_together(
     assert low < 0.7 < high
 
 
+def test_checkpoints_of_one_run_are_no_seeds(tmp_path: Path, configurations: None) -> None:
+    """The best and the last policy of seed 0 are not taken together."""
+    names = [str(tmp_path / run / "a0") for run in ("best", "last")]
+    for name in names:
+        Path(name).mkdir(parents=True)
+    assert seed_groups(names, {name: {"j50_mean": 20.0} for name in names}) == []
+
+
 def test_a_folder_of_seeds_stands_for_its_runs(tmp_path: Path, configurations: None) -> None:
     """In their order, among other names; the group bears the folder's name."""
     out = write_seeds(tmp_path / "five", a0=True, a1=True)

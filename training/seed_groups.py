@@ -62,7 +62,8 @@ def seed_groups(names: Sequence[str], entries: Mapping[str, Any]) -> list[dict[s
 
     `entries` are those of a summary, of `poise evaluate` or `poise benchmark`. The scores of η are
     those of every direction (the tasks); J50's mean and the recovered rates are one task each.
-    The seeds are drawn anew for every task [Agarwal21].
+    The seeds are drawn anew for every task [Agarwal21]. Checkpoints of one run, which share a seed,
+    are no sample of seeds: a configuration with two of the same is left out.
     """
     groups: dict[str, list[tuple[str, int]]] = {}
     for name in names:
@@ -72,7 +73,7 @@ def seed_groups(names: Sequence[str], entries: Mapping[str, Any]) -> list[dict[s
     return [
         _aggregate([name for name, _ in group], [seed for _, seed in group], entries)
         for group in groups.values()
-        if len(group) > 1
+        if len(group) > 1 and len({seed for _, seed in group}) == len(group)
     ]
 
 
