@@ -50,7 +50,9 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def demo(out: Path = Path("out/demo"), workers: int | None = None, seed: int = 0) -> None:
-    """Push the baseline and the shipped residual policy, and compare them, in a few minutes.
+    """Push two controllers and the shipped policy of each, and compare, in a few minutes.
+
+    momentum-qp, whose feet stay in place, and residual; capture-step and residual-step.
 
     Args:
         out: folder to write to; an earlier demo there is replaced.
