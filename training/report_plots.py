@@ -67,7 +67,7 @@ def step_lines(results: Results) -> dict[str, tuple[list[float], list[float]]]:
     whose, lines = [], {}
     for k, entry in enumerate(found):
         names = entry.get("controllers") if isinstance(entry, dict) else None
-        if not names or any(name not in results.controllers for name in names):
+        if not isinstance(names, list) or not names or not set(names) <= set(results.controllers):
             raise ConfigError("must name controllers", source=where, field=f"step_limits.{k}")
         whose.append(names)
     for name in DRAWN if found else ():
