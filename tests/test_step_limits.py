@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from poise.baselines.capturability import drifted
 from poise.baselines.registry import controller_config
 from poise.baselines.step_plan import StepLimits
 from poise.envs.pushes import duration_factor
+from poise.training import evaluation, report
 from poise.training.benchmark.case import Result
 from poise.training.benchmark.figures import controller_figures
+from poise.training.evaluation import evaluate
 from poise.training.limits import PushLimits
 from poise.training.players import Player, load_player
 from poise.training.report import _step_lines
@@ -27,6 +33,7 @@ from poise.training.step_limits import (
 )
 from poise.training.trials import Outcome
 
+from .evaluations import ENVELOPE, InProcess, write_suite
 from .shared import robot
 from .test_benchmark_cases import small
 from .test_evaluation_folder import OUTCOME
@@ -170,3 +177,23 @@ def test_the_envelope_of_one_that_steps_is_measured_by_the_step_limits() -> None
         assert d["step_share_1"] == d["j50"] / d["step_limit_1"]
         assert {key: d[key] for key in before} == before and len(d) == len(before) + 9
     assert "step_share_1_mean" in entry and not any("step" in key for key in plain)
+
+
+def test_an_evaluation_draws_and_prints_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The PNG gets the lines of the planner's limits, the table the mean shares."""
+    drawn: dict[str, Any] = {}
+    monkeypatch.setattr(evaluation, "Workers", InProcess)
+    monkeypatch.setattr(InProcess, "stop_after", None)
+    monkeypatch.setattr(report, "polar_envelope", lambda *_, **given: drawn.update(given))
+    text, names = io.StringIO(), ["capture-step", "zero"]
+    suite, console = write_suite(tmp_path, ENVELOPE), Console(file=text, width=200)
+    summary = evaluate(names, suite, out=tmp_path / "out", console=console)
+    angles, limit = drawn["step_limits"]["one-step limit"]
+    (curve,) = summary["step_limits"]
+    assert limit[list(angles).index(40.0)] == curve["curves"]["1"][8]
+    entry = summary["controllers"]["capture-step"]
+    shares = ", ".join(f"{entry[f'step_share_{name}_mean']:.2f}" for name in COUNTS)
+    rows = [line for line in text.getvalue().splitlines() if "│ capture-step " in line]
+    assert shares in rows[0] and "step_share_1_mean" not in summary["controllers"]["zero"]
