@@ -112,9 +112,8 @@ def polar(
     if limit is not None:
         svg.path(*place(*limit), "limit", close=True)
     for k, (angles, values) in enumerate((steps or {}).values(), 1):
-        inside = np.where(np.asarray(values) <= top, values, np.nan)
-        x, y = place(np.r_[angles, angles[:1]], np.r_[inside, inside[:1]])
-        svg.path(x, y, f"steps n{k}")
+        x, y = place(angles, np.where(np.asarray(values) <= top, values, np.nan))
+        svg.path(np.append(x, x[0]), np.append(y, y[0]), f"steps n{k}")
     for s in series:
         x, y = place(s.x, s.y)
         if marked is not None and s.name != marked.name:
