@@ -25,12 +25,14 @@ def finished(kind: str) -> Path:
     """A finished result of a controller's file and of no control; do not write into it.
 
     Args:
-        kind: "random" or "envelope" of `poise evaluate`, or "benchmark".
+        kind: "random" or "envelope" of `poise evaluate`, or "benchmark"; "envelope-steps" and
+            "benchmark-steps" with a controller that steps instead of no control.
     """
     _folders.append(tempfile.TemporaryDirectory(prefix="poise-report-"))
     path = Path(_folders[-1].name)
     (path / SOFT).write_text("kind: momentum-qp\ncom: {stiffness: 5.0}\n")
-    names = [str(path / SOFT), "zero"]
+    kind, _, steps = kind.partition("-")
+    names = [str(path / SOFT), "capture-step" if steps else "zero"]
     if kind == "benchmark":
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(run, "Crew", InProcessCrew)

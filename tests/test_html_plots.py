@@ -64,6 +64,21 @@ def test_one_of_many_stands_out() -> None:
     assert [g.get("data-series") for g in of_class(root, "series")] == ["0"]
 
 
+def test_limits_of_steps_are_drawn_as_far_as_there_is_room() -> None:
+    """A line for each, on the scale of the rest; where one is far out it is cut, not bent."""
+    series = [one("a", 0, 10.0, 8.0, 10.0, 8.0)]
+    near = {"one": (ANGLES, [16.0] * 4), "two": (ANGLES, [20.0, 900.0, 20.0, 20.0])}
+    root = ElementTree.fromstring(polar(series, "N·s", (ANGLES, [5.0] * 4), steps=near))
+    first, second = (of_class(root, f"n{k}")[0] for k in (1, 2))
+    line = points(of_class(root, "line")[0]) - np.array(MIDDLE)
+    corners = points(first) - np.array(MIDDLE)
+    assert corners[:4] == pytest.approx(line * 1.6 * np.array([[1], [1.25], [1], [1.25]]), abs=0.3)
+    assert len(corners) == 5 and corners[4] == pytest.approx(corners[0])  # closed
+    assert len(points(second)) == 4 and np.abs(points(second) - MIDDLE).max() < RADIUS
+    assert abs(line[0, 1]) > 0.3 * RADIUS  # the far one did not squash it
+    assert not of_class(ElementTree.fromstring(polar(series, "N·s")), "steps")
+
+
 def test_every_series_is_in_a_group_of_its_own() -> None:
     """What the page shows and hides; bands and bars are details."""
     x = np.linspace(0.1, 1.0, 40)

@@ -89,12 +89,19 @@ def test_envelope_shows_what_steps_can_stop(tmp_path, figures):
     """A line for each number of steps, inside the rings."""
     lines = {
         "one": (ANGLES, np.full(len(ANGLES), 30.0)),
-        "two": (ANGLES, np.full(len(ANGLES), 50.0)),
+        "two": (ANGLES, np.full(len(ANGLES), 38.0)),
     }
     polar_envelope(tmp_path / "a.png", {"a": circle(15)}, step_limits=lines)
     ax = figures[0].axes[0]
     assert {x.get_label() for x in ax.lines} >= {"a", "one", "two"}
-    assert ax.get_ylim()[1] >= 50
+    assert ax.get_ylim()[1] >= 38
+
+
+def test_limits_far_out_do_not_squash_the_envelope(tmp_path, figures):
+    """What is many times as far out as all else is cut off."""
+    far = {"two": (ANGLES, np.full(len(ANGLES), 400.0))}
+    polar_envelope(tmp_path / "a.png", {"a": circle(15)}, step_limits=far)
+    assert 2.0 * 15 < figures[0].axes[0].get_ylim()[1] < 4.0 * 15
 
 
 def test_envelope_with_a_missing_direction(tmp_path):

@@ -2,19 +2,40 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from poise.baselines.capturability import drifted
+from poise.baselines.registry import controller_config
 from poise.baselines.step_plan import StepLimits
 from poise.envs.pushes import duration_factor
+from poise.training import evaluation, report
+from poise.training.benchmark.case import Result
+from poise.training.benchmark.figures import controller_figures
+from poise.training.evaluation import evaluate
 from poise.training.limits import PushLimits
-from poise.training.report import _step_limits
-from poise.training.step_limits import NStepLimit
+from poise.training.players import Player, load_player
+from poise.training.report import _step_lines
+from poise.training.step_limits import (
+    COUNTS,
+    ROOM,
+    NStepLimit,
+    curves,
+    shown_out_to,
+    stepping_limits,
+)
+from poise.training.trials import Outcome
 
+from .evaluations import ENVELOPE, InProcess, write_suite
 from .shared import robot
+from .test_benchmark_cases import small
 from .test_evaluation_folder import OUTCOME
 
 
@@ -61,9 +82,118 @@ def test_length_is_within_the_box_and_the_speeds(limit: NStepLimit) -> None:
     assert NStepLimit(limit.limits, slow).length(90.0) / h == pytest.approx(0.1)
 
 
-def test_only_controllers_that_step_bring_the_limits_into_the_plot(limit: NStepLimit) -> None:
-    """One step in twenty recoveries is none; one in two is."""
-    fine = np.array([0.0, 90.0])
-    for stepping, names in ((1, set()), (10, {"one-step limit", "two-step limit"})):
-        results = [replace(OUTCOME, steps=int(k < stepping)) for k in range(20)]
-        assert set(_step_limits({"a": results}, limit.limits, fine, 0.1)) == names
+def stander(name: str, count: int, elsewhere: bool = True) -> tuple[Player, list[Outcome]]:
+    """A controller without a planner; in `count` of 20 recoveries a foot landed."""
+    env = SimpleNamespace(controller=SimpleNamespace())
+    landed = replace(OUTCOME, steps=1, stepped=elsewhere)
+    return Player(name, env, np.asarray, ""), [landed] * count + [OUTCOME] * (20 - count)
+
+
+def test_the_limits_are_those_of_the_planner() -> None:
+    """Of the controller itself, and of the one under a policy; feet in place have none."""
+    names = ["zero", "momentum-qp", "ipm-step", "capture-step", "residual-step"]
+    players = [load_player(name, robot()) for name in names]
+    nothing = {name: [replace(OUTCOME, recovered=False)] for name in names}
+    found = stepping_limits(players, nothing, PushLimits(robot()))
+    assert list(found) == names[2:]
+    for name in ("capture-step", "ipm-step"):
+        assert found[name].steps == controller_config(name).limits
+    assert found["residual-step"].steps == found["capture-step"].steps
+    assert found["ipm-step"].steps != found["capture-step"].steps
+
+
+def test_without_a_planner_it_is_who_steps_that_counts(limit: NStepLimit) -> None:
+    """One step in twenty recoveries is none, nor is a foot that lands where it was; the defaults
+    come after what a planner says."""
+    own = StepLimits(speed=0.4)
+    planner = SimpleNamespace(controller=SimpleNamespace(planner=SimpleNamespace(limits=own)))
+    cases = [stander("often", 10), stander("rare", 1), stander("tilts", 10, False)]
+    cases.append((Player("planned", planner, np.asarray, ""), []))
+    outcomes = {player.name: results for player, results in cases}
+    found = stepping_limits([player for player, _ in cases], outcomes, limit.limits)
+    assert [(name, one.steps) for name, one in found.items()] == [
+        ("planned", own), ("often", StepLimits()),
+    ]  # fmt: skip
+
+
+def test_shares_are_of_the_formula() -> None:
+    """r, l and T_s of a direction, written out, give the limits and what J50 is of them."""
+    pushed, steps = PushLimits(robot()), StepLimits(speed=0.61, side_speed=0.43, time_min=0.83)
+    limit = NStepLimit(pushed, steps)
+    figures = {"directions": [{"direction": a, "j50": j} for a, j in ((37.0, 21.5), (250.0, 14.0))]}
+    limit.add_to(figures, 0.17)
+    omega, mass = pushed.omega, robot().mass
+    for entry in figures["directions"]:
+        r, length, time = (entry[f"step_{name}"] for name in ("reach", "length", "time"))
+        assert (r, length) == (limit.reach(entry["direction"]), limit.length(entry["direction"]))
+        assert time == pytest.approx(0.83 / omega)
+        a = np.exp(-omega * time)
+        longer = mass * omega * duration_factor(omega, 0.17)
+        for name, d in (
+            ("1", r + length * a),
+            ("2", r + length * (a + a * a)),
+            ("inf", r + length * a / (1.0 - a)),
+        ):
+            assert entry[f"step_limit_{name}"] == pytest.approx(longer * d, rel=1e-12)
+            share = entry["j50"] / (longer * d)
+            assert entry[f"step_share_{name}"] == pytest.approx(share, rel=1e-12)
+    means = [np.mean([e[f"step_share_{n}"] for e in figures["directions"]]) for n in COUNTS]
+    assert [figures[f"step_share_{n}_mean"] for n in COUNTS] == pytest.approx(means)
+
+
+def test_curves_are_one_for_all_that_step_alike(limit: NStepLimit) -> None:
+    """Equal limits share an entry; with several, the lines of a plot say whose they are."""
+    slow = NStepLimit(limit.limits, StepLimits(speed=0.2))
+    alike, other = curves({"a": limit, "b": slow, "c": limit}, 0.1)
+    assert (alike["controllers"], other["controllers"]) == (["a", "c"], ["b"])
+    assert StepLimits(**other["steps"]) == slow.steps
+    columns = other["curves"]
+    assert columns["directions"][7] == 35.0 and len(columns["inf"]) == 72
+    assert columns["2"][7] == slow(35.0, 0.1, 2) < alike["curves"]["2"][7]
+    assert list(_step_lines({"b": slow}, np.array([35.0]), 0.1)) == [
+        "one-step limit", "two-step limit",
+    ]  # fmt: skip
+    lines = _step_lines({"b": slow, "a": limit}, np.array([35.0]), 0.1)
+    assert lines["two-step limit of b"][1] == [columns["2"][7]] and len(lines) == 2
+    assert _step_lines({}, np.array([35.0]), 0.1) == {}
+
+
+def test_a_plot_has_room_for_limits_but_not_for_any() -> None:
+    """Limits widen it up to a factor; nearer ones do not narrow it."""
+    assert shown_out_to(20.0, [30.0, 42.0]) == 42.0
+    assert shown_out_to(20.0, [30.0, 420.0]) == 20.0 * ROOM
+    assert shown_out_to(20.0, [12.0]) == shown_out_to(20.0, []) == 20.0
+
+
+def test_the_envelope_of_one_that_steps_is_measured_by_the_step_limits() -> None:
+    """Every direction has limits and shares; without a limit of steps it has neither."""
+    cases = small()
+    second = cases.second(dict.fromkeys(range(4), True))
+    played = [(case, Result(OUTCOME)) for case in [*cases.first, *second, *cases.others]]
+    own = NStepLimit(cases.limits, StepLimits(speed=0.55))
+    entry, plain = controller_figures(played, cases, own), controller_figures(played, cases)
+    for d, before in zip(entry["directions"], plain["directions"], strict=True):
+        assert d["step_limit_1"] == own(d["direction"], cases.suite.push_duration, 1)
+        assert d["step_share_1"] == d["j50"] / d["step_limit_1"]
+        assert {key: d[key] for key in before} == before and len(d) == len(before) + 9
+    assert "step_share_1_mean" in entry and not any("step" in key for key in plain)
+
+
+def test_an_evaluation_draws_and_prints_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The PNG gets the lines of the planner's limits, the table the mean shares."""
+    drawn: dict[str, Any] = {}
+    monkeypatch.setattr(evaluation, "Workers", InProcess)
+    monkeypatch.setattr(InProcess, "stop_after", None)
+    monkeypatch.setattr(report, "polar_envelope", lambda *_, **given: drawn.update(given))
+    text, names = io.StringIO(), ["capture-step", "zero"]
+    suite, console = write_suite(tmp_path, ENVELOPE), Console(file=text, width=200)
+    summary = evaluate(names, suite, out=tmp_path / "out", console=console)
+    angles, limit = drawn["step_limits"]["one-step limit"]
+    (curve,) = summary["step_limits"]
+    assert limit[list(angles).index(40.0)] == curve["curves"]["1"][8]
+    entry = summary["controllers"]["capture-step"]
+    shares = ", ".join(f"{entry[f'step_share_{name}_mean']:.2f}" for name in COUNTS)
+    rows = [line for line in text.getvalue().splitlines() if "│ capture-step " in line]
+    assert shares in rows[0] and "step_share_1_mean" not in summary["controllers"]["zero"]

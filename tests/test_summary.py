@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from poise.baselines.step_plan import StepLimits
 from poise.envs.pushes import Push
 from poise.envs.robot import load_robot
 from poise.training.limits import PushLimits
 from poise.training.sequence_suite import SequenceSuite
+from poise.training.step_limits import NStepLimit
 from poise.training.suites import EnvelopeSuite, QuietSuite, RandomSuite
 from poise.training.summary import plain, summarise
 from poise.training.trials import Outcome, Trial
@@ -77,6 +79,32 @@ def test_the_envelope_finds_the_impulse_that_was_put_in(limits: PushLimits) -> N
     assert pair["j50_gain"] == pytest.approx(0.25, abs=0.03)
     assert pair["j50_gain_ci95"][0] < 0.25 < pair["j50_gain_ci95"][1]
     assert [d["direction"] for d in pair["directions"]] == [0.0, 180.0]
+
+
+def test_shares_of_the_step_limits_are_added_and_nothing_else_changes(limits: PushLimits) -> None:
+    """Only for controllers that step; all other figures keep their bits."""
+    impulses, angles = np.tile(np.linspace(8.0, 30.0, 12), 2), np.repeat([0.0, 112.5], 12)
+    some = trials(limits, impulses.tolist(), angles.tolist())
+    results = {name: outcomes((impulses < at).tolist()) for name, at in (("a", 15.0), ("b", 21.0))}
+    own = NStepLimit(limits, StepLimits(speed=0.55))
+    before = summarise(EnvelopeSuite(), some, results, limits)
+    found = summarise(EnvelopeSuite(), some, results, limits, {"b": own})
+    entry = found["controllers"]["b"]
+    for d in entry["directions"]:
+        assert d["step_limit_2"] == own(d["direction"], 0.1, 2)
+        assert d["step_share_2"] == d["j50"] / d["step_limit_2"]
+    assert entry["step_share_1_mean"] > entry["step_share_inf_mean"] > 0.0
+    (curve,) = found.pop("step_limits")
+    assert curve["controllers"] == ["b"] and curve["steps"]["speed"] == 0.55
+
+    def less(value):
+        if isinstance(value, dict):
+            return {k: less(v) for k, v in value.items() if not k.startswith("step_")}
+        return [less(v) for v in value] if isinstance(value, list) else value
+
+    assert less(found) == before and found["controllers"]["a"] == before["controllers"]["a"]
+    random = summarise(RandomSuite(), some, results, limits, {"b": own})
+    assert random == summarise(RandomSuite(), some, results, limits)
 
 
 def test_without_pushes_there_is_no_j50(limits: PushLimits) -> None:

@@ -21,6 +21,7 @@ from .progress import progress_bar
 from .provenance import circumstances, usable_cores, versions
 from .report import draw_plots, print_paths, print_summary
 from .seed_groups import expand_seeds, seed_groups
+from .step_limits import stepping_limits
 from .suite import Suite
 from .suites import load_suite
 from .summary import plain, summarise
@@ -101,7 +102,8 @@ def evaluate(
         name: [folder.finished[trial.number][i] for trial in done]
         for i, name in enumerate(controllers)
     }
-    figures = summarise(chosen, done, outcomes, pushed)
+    steps = stepping_limits(players, outcomes, pushed)
+    figures = summarise(chosen, done, outcomes, pushed, steps)
     summary = plain(
         {
             "suite": str(suite),
@@ -112,7 +114,7 @@ def evaluate(
             **circumstances(started, count),
         }
     )
-    plots = draw_plots(Path(out), chosen, done, outcomes, pushed)
+    plots = draw_plots(Path(out), chosen, done, outcomes, pushed, steps)
     rows = [row(trial, name, outcomes[name][k])
             for k, trial in enumerate(done) for name in controllers]  # fmt: skip
     folder.finish(rows, summary)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from .fits import LogisticFit
 from .statistics import wilson_interval
+from .step_limits import shown_out_to
 from .svg import Chart, Svg, colour, dash, ticks
 
 RADIUS, MIDDLE = 150.0, (200.0, 196.0)  # of the polar plot
@@ -68,6 +69,7 @@ def polar(
     unit: str,
     limit: tuple[ArrayLike, ArrayLike] | None = None,
     marked: Series | None = None,
+    steps: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
 ) -> Markup:
     """Values around the robot seen from above: forward is up, left is left.
 
@@ -76,6 +78,7 @@ def polar(
         unit: of the values.
         limit: (directions [deg], value) of the ankle limit.
         marked: for a small picture of this one, in which the others are faint.
+        steps: the same as `limit`, for what some steps can stop; far out it is cut off.
     """
     what = f"Recovered impulse [{unit}] by push direction"
     shown = [marked] if marked else series
@@ -87,8 +90,10 @@ def polar(
         tops += [np.nanmax(np.r_[s.high, s.y]) for s in series]
     if limit is not None:
         tops.append(float(np.max(np.asarray(limit[1]))))
-    rings = [tick for tick in ticks(0.0, 1.02 * max(tops), 4) if tick > 0]
-    top = max(1.02 * max(tops), rings[-1])
+    far = [float(np.max(np.asarray(values))) for _, values in (steps or {}).values()]
+    most = shown_out_to(max(tops), far)
+    rings = [tick for tick in ticks(0.0, 1.02 * most, 4) if tick > 0]
+    top = max(1.02 * most, rings[-1])
 
     def place(directions: ArrayLike, values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         angle = np.radians(np.asarray(directions, dtype=float))
@@ -106,6 +111,9 @@ def polar(
             svg.text(float(x), float(y) + 4, NAMES.get(angle, f"{angle}°"), f"tick {side}")
     if limit is not None:
         svg.path(*place(*limit), "limit", close=True)
+    for k, (angles, values) in enumerate((steps or {}).values(), 1):
+        x, y = place(angles, np.where(np.asarray(values) <= top, values, np.nan))
+        svg.path(np.append(x, x[0]), np.append(y, y[0]), f"steps n{k}")
     for s in series:
         x, y = place(s.x, s.y)
         if marked is not None and s.name != marked.name:

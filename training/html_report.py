@@ -103,6 +103,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         forests=report_plots.forests(results),
         envelope=envelope,
         own_envelopes=own_envelopes,
+        step_lines=list(report_plots.step_lines(results)) if envelope else [],
         falls=falls,
         curves=curves,
         factors=factor_tables.factor_plots(results, order),

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from .fits import LogisticFit, check_trials, trial_bins
 from .plot_style import GREY, INK, legend_below, look, saved_figure
 from .statistics import wilson_interval
+from .step_limits import shown_out_to
 
 Unit = Literal["N·s", "N·s/kg", "fraction"]
 IMPULSE_LABEL = {
@@ -42,7 +43,7 @@ def polar_envelope(
         envelopes: name → (directions [°], j50, low, high), four arrays of shape (n,). Directions
             count counter-clockwise from forward, in any order; [low, high] is drawn as a band.
         ankle_limit: (directions [°], limit), the impulse that the ankles alone can hold.
-        step_limits: name → the same for what a number of steps can stop.
+        step_limits: name → the same for what a number of steps can stop; far out it is cut off.
         title: above the plot.
         unit: of j50 and limit.
 
@@ -54,7 +55,7 @@ def polar_envelope(
         ax = cast(PolarAxes, figure.add_subplot(projection="polar"))
         ax.set_theta_zero_location("N")
         ax.set_theta_direction(1)
-        top = 0.0
+        top, far = 0.0, [0.0]
         if ankle_limit is not None:
             theta, (limit,) = _closed(*ankle_limit)
             ax.plot(theta, limit, color=INK, lw=1.3, ls=(0, (5, 3)), label="ankle limit", zorder=2)
@@ -63,7 +64,7 @@ def polar_envelope(
             theta, (limit,) = _closed(*bound)
             dots = (0, (1, 1.5 + 1.5 * k))
             ax.plot(theta, limit, color=GREY, lw=1.3, ls=dots, label=name, zorder=2)
-            top = max(top, float(np.nanmax(limit)))
+            far.append(float(np.nanmax(limit)))
         for k, (name, (directions, *values)) in enumerate(envelopes.items()):
             theta, (j50, low, high) = _closed(directions, *values)
             style = look(k)
@@ -78,6 +79,7 @@ def polar_envelope(
                 zorder=4,
             )
             top = max(top, float(np.nanmax([np.nanmax(j50), np.nanmax(high)])))
+        top = shown_out_to(top, far)
         names = {0: "forward", 90: "left", 180: "backward", 270: "right"}
         angles = range(0, 360, 45)
         ax.set_thetagrids(angles, [f"{names.get(a, '')}\n{a}°".lstrip() for a in angles])

@@ -15,18 +15,24 @@ from .fits import fit_logistic
 from .limits import PushLimits
 from .plots import fall_probability, polar_envelope
 from .seed_groups import seed_lines
-from .step_limits import NStepLimit
+from .step_limits import COUNTS, DRAWN, NStepLimit, groups, line_name
 from .suite import Suite
 from .summary import Outcomes, fractions, pushes, sectors, won
 from .trials import Trial
 
-STEPPING = 0.1  # share of recoveries with a step, from which a controller is one that steps
-
 
 def draw_plots(
-    folder: Path, suite: Suite, trials: Sequence[Trial], outcomes: Outcomes, limits: PushLimits
+    folder: Path,
+    suite: Suite,
+    trials: Sequence[Trial],
+    outcomes: Outcomes,
+    limits: PushLimits,
+    steps: Mapping[str, NStepLimit] | None = None,
 ) -> list[Path]:
-    """Write the plots of an evaluation; returns their paths, none without pushes."""
+    """Write the plots of an evaluation; returns their paths, none without pushes.
+
+    Suites by direction show what `steps` of the first controller that steps could stop.
+    """
     if trials[0].push is None or trials[0].later:
         return []
     polar, fall = (folder / name for name in PLOTS)
@@ -39,8 +45,8 @@ def draw_plots(
         }
         fine = np.arange(0.0, 360.0, 2.0)
         limit = [limits.ankle(d, float(duration[0])) for d in fine]
-        steps = _step_limits(outcomes, limits, fine, float(duration[0]))
-        polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit), step_limits=steps)
+        lines = _step_lines(steps or {}, fine, float(duration[0]))
+        polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit), step_limits=lines)
         share, label = impulse / ankle, None
     else:
         fits = {name: sectors(trials, results) for name, results in outcomes.items()}
@@ -58,18 +64,17 @@ def draw_plots(
     return [polar, fall]
 
 
-def _step_limits(
-    outcomes: Outcomes, limits: PushLimits, fine: np.ndarray, duration: float
+def _step_lines(
+    steps: Mapping[str, NStepLimit], fine: np.ndarray, duration: float
 ) -> dict[str, Any]:
-    """What one and two steps could stop, if a controller stepped in a tenth of its recoveries."""
-    standing = [[o.steps > 0 for o in results if o.recovered] for results in outcomes.values()]
-    if not any(stepped and np.mean(stepped) > STEPPING for stepped in standing):
-        return {}
-    limit = NStepLimit(limits)
-    names = {1: "one-step limit", 2: "two-step limit"}
+    """Limits of one and two steps, as `polar_envelope` takes them."""
+    whose = list(groups(steps).values())
     return {
-        name: (fine, [limit(angle, duration, count) for angle in fine])
-        for count, name in names.items()
+        line_name(name, whose): (
+            fine,
+            [steps[whose[0][0]](angle, duration, COUNTS[name]) for angle in fine],
+        )
+        for name in (DRAWN if steps else ())
     }
 
 
@@ -120,6 +125,8 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
         columns.append(("CoM drift [mm]", lambda e: _milli(e["com_drift_max"])))
     if any(entry["steps_max"] for entry in entries.values()):
         columns.append(("steps, mean", lambda e: _number(e["steps_mean"], ".1f")))
+    if any("step_share_1_mean" in entry for entry in entries.values()):
+        columns.append(("of 1-, 2-, ∞-step limit", _step_shares))
     columns += [
         ("solver failures", lambda e: f"{e['solver_failures']}"),
         ("mean |action|", lambda e: _number(e["mean_abs_action"], ".3f")),
@@ -145,6 +152,13 @@ def _pairs(summary: Mapping[str, Any]) -> Table:
             cells.append(_with_range(pair, "j50_gain", "j50_gain_ci95", "+.1%"))
         table.add_row(escape(f"{pair['b']} against {pair['a']}"), *cells)
     return table
+
+
+def _step_shares(entry: Mapping[str, Any]) -> str:
+    """J50 over the limits, means over the directions."""
+    if "step_share_1_mean" not in entry:
+        return "–"
+    return ", ".join(f"{entry[f'step_share_{name}_mean']:.2f}" for name in COUNTS)
 
 
 def _half(entry: Mapping[str, Any]) -> str:

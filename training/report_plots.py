@@ -7,13 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
+from poise.envs.errors import ConfigError
+
 from .fits import fit_logistic, trial_bins
 from .html_plots import Series, fall_curves, forest, polar, rate_series
 from .html_table import Download, csv_text, download
 from .report_tables import per_direction, ranked
 from .results import Record, Results
 from .statistics import wilson_interval
-from .values import interval, number
+from .step_limits import DRAWN, line_name
+from .values import interval, number, numbers
 
 BINS = 8
 PARTS = {"envelope": "Standard pushes", "mix": "Random mix"}
@@ -44,10 +47,37 @@ def envelopes(results: Results) -> tuple[Markup | None, list[tuple[str, Markup]]
     None and nothing where no suite measured directions.
     """
     unit, series, limit = _envelopes(results)
+    steps = step_lines(results)
     if not series:
         return None, []
     alone = series if len(series) > 1 else []
-    return polar(series, unit, limit), [(s.name, polar(series, unit, limit, s)) for s in alone]
+    picture = polar(series, unit, limit, steps=steps)
+    return picture, [(s.name, polar(series, unit, limit, s)) for s in alone]
+
+
+def step_lines(results: Results) -> dict[str, tuple[list[float], list[float]]]:
+    """name → (directions, limit [N·s]) of what steps can stop; nothing where nobody steps.
+
+    Those of the first controller that steps. Raises ConfigError for a summary of another form.
+    """
+    where = f"{results.folder}: summary.json"
+    found = results.source.get("step_limits", [])
+    if not isinstance(found, list):
+        raise ConfigError("must be a list", source=where, field="step_limits")
+    whose, lines = [], {}
+    for k, entry in enumerate(found):
+        names = entry.get("controllers") if isinstance(entry, dict) else None
+        if not isinstance(names, list) or not names or not set(names) <= set(results.controllers):
+            raise ConfigError("must name controllers", source=where, field=f"step_limits.{k}")
+        whose.append(names)
+    for name in DRAWN if found else ():
+        curves, place = found[0].get("curves"), f"{where}: step_limits.0.curves"
+        curves = curves if isinstance(curves, dict) else {}
+        angles, limit = numbers(curves, "directions", place), numbers(curves, name, place)
+        if not angles or len(angles) != len(limit):
+            raise ConfigError("must be as long as directions", source=place, field=name)
+        lines[line_name(name, whose)] = (angles, limit)
+    return lines
 
 
 def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:

@@ -16,6 +16,7 @@ from .worst_trials import smallest_lost
 
 SMALLEST = 3  # pushes listed for each controller
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
+STEP_LIMITS = {"1": "1-step limit", "2": "2-step limit", "inf": "∞-step limit"}
 BOUNDS = {None: "", "lower": "≥ ", "upper": "≤ "}
 
 
@@ -141,6 +142,9 @@ def directions(results: Results) -> Table | None:
         Column("ankle_limit", "Ankle limit [N·s]"),
         Column("eta", "η"),
     ]
+    for name, title in STEP_LIMITS.items():
+        columns.append(Column(f"step_limit_{name}", title, "of a pendulum that steps [N·s]"))
+        columns.append(Column(f"step_share_{name}", "of it", "share of that limit that J50 is"))
     rows: list[list[Cell]] = []
     for name, index, entry, where in per_direction(results):
         bound = BOUNDS.get(entry.get("j50_bound", entry.get("fraction50_bound")), "")
@@ -163,6 +167,9 @@ def directions(results: Results) -> Table | None:
             shown("ankle_limit", ".1f"),
             shown("eta", ".2f"),
         ])  # fmt: skip
+        for key in STEP_LIMITS:
+            share = shown(f"step_share_{key}", ".2f", sign=bound)
+            rows[-1] += [shown(f"step_limit_{key}", ".1f"), share]
     if not rows:
         return None
     return Table("directions", "Every direction.", columns, rows).without_empty()

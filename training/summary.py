@@ -12,6 +12,7 @@ from .bootstrap import EnvelopeFit, j50_gain, mean_over_directions
 from .fits import fit_logistic
 from .limits import PushLimits
 from .statistics import eta, mcnemar, wilson_interval
+from .step_limits import NStepLimit, curves
 from .suite import Suite
 from .trials import Outcome, Trial
 
@@ -20,25 +21,34 @@ SECTOR = 45.0  # [deg] in which random directions are counted together
 
 
 def summarise(
-    suite: Suite, trials: Sequence[Trial], outcomes: Outcomes, limits: PushLimits
+    suite: Suite,
+    trials: Sequence[Trial],
+    outcomes: Outcomes,
+    limits: PushLimits,
+    steps: Mapping[str, NStepLimit] | None = None,
 ) -> dict[str, Any]:
     """The figures of every controller and every pair.
 
-    Suites by direction give J50 [N·s], J90 and η; others with pushes give `fraction50`, the share
-    of the limit at which half of the trials are recovered, over all and in sectors of 45°.
+    Suites by direction give J50 [N·s], J90, η and, of controllers that have one in `steps`, the
+    share of the N-step limits; others with pushes give `fraction50`, the share of the limit at
+    which half of the trials are recovered, over all and in sectors of 45°.
     """
+    steps = steps or {}
     controllers = {}
     for name, results in outcomes.items():
         entry = counts(results)
         if suite.by_direction:
-            entry |= envelope(trials, results, limits)
+            entry |= envelope(trials, results, limits, steps.get(name))
         elif trials[0].push is not None and not trials[0].later:
             entry |= _fractions(trials, results, limits)
         controllers[name] = entry
     pairs = [
         _pair(a, b, suite, trials, outcomes[a], outcomes[b]) for a, b in combinations(outcomes, 2)
     ]
-    return {"controllers": controllers, "pairs": pairs}
+    figures = {"controllers": controllers, "pairs": pairs}
+    if suite.by_direction and steps:
+        figures["step_limits"] = curves(steps, float(pushes(trials)[2][0]))
+    return figures
 
 
 def pushes(trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -104,15 +114,18 @@ def counts(results: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def envelope(
-    trials: Sequence[Trial], results: Sequence[Outcome], limits: PushLimits
+    trials: Sequence[Trial],
+    results: Sequence[Outcome],
+    limits: PushLimits,
+    steps: NStepLimit | None = None,
 ) -> dict[str, Any]:
-    """J50 [N·s], J90 and η of each direction, and their means."""
+    """J50 [N·s], J90, η and the share of the limit of `steps` in each direction; their means."""
     direction, impulse, duration = pushes(trials)
     fit = mean_over_directions(direction, impulse, won(results))
     ankle = [limits.ankle(angle, float(duration[0])) for angle in fit.directions]
     mass = limits.robot.mass
     etas = eta([f.fit.j50 for f in fit.fits], mass, np.array(ankle) / mass)
-    return {
+    figures = {
         "j50_mean": fit.j50_mean,
         "j50_mean_ci95": fit.j50_mean_ci,
         "j50_mean_per_mass": fit.j50_mean / mass,
@@ -138,6 +151,9 @@ def envelope(
             for angle, f, limit, value in zip(fit.directions, fit.fits, ankle, etas, strict=True)
         ],
     }
+    if steps is not None:
+        steps.add_to(figures, float(duration[0]))
+    return figures
 
 
 def _fractions(

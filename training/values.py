@@ -20,6 +20,16 @@ def number(entry: Mapping[str, Any], key: str, where: str, needed: bool = False)
     return value
 
 
+def numbers(entry: Mapping[str, Any], key: str, where: str) -> list[float]:
+    """A list of finite numbers of the summary; raises ConfigError for anything else."""
+    values = entry.get(key)
+    if not isinstance(values, list):
+        raise ConfigError(f"must be a list of numbers, not {values!r}", source=where, field=key)
+    for value in values:
+        number({key: value}, key, where, needed=True)
+    return values
+
+
 def interval(entry: Mapping[str, Any], key: str, where: str) -> tuple[float, float] | None:
     """[low, high] of the summary, or None where it has none; raises ConfigError for others."""
     value = entry.get(key)

@@ -22,6 +22,7 @@ from ..eurobench import (
 )
 from ..limits import PushLimits
 from ..statistics import mcnemar, wilson_interval
+from ..step_limits import NStepLimit
 from ..summary import counts, envelope, pushes, won
 from .case import Case, Result
 from .cases import STANDARD, Cases
@@ -29,15 +30,17 @@ from .cases import STANDARD, Cases
 Played = Sequence[tuple[Case, Result]]  # by one controller, in the order of the numbers
 
 
-def controller_figures(played: Played, cases: Cases) -> dict[str, Any]:
-    """All figures of one controller."""
+def controller_figures(
+    played: Played, cases: Cases, steps: NStepLimit | None = None
+) -> dict[str, Any]:
+    """All figures of one controller; `steps` is the limit of one that steps."""
     limits = cases.limits
     mix, factors = part(played, "mix"), part(played, "factors")
     return {
         "trials": len(played),
         "errors": sum(result.error is not None for _, result in played),
         "root_force_max": max((result.outcome.root_force or 0.0) for _, result in played),
-        **_envelope(part(played, "envelope"), limits),
+        **_envelope(part(played, "envelope"), limits, steps),
         "mix": counts([result.outcome for _, result in mix]) if mix else None,
         "factors": _factors(factors, cases.standard),
         "eurobench": _eurobench(played, limits),
@@ -49,11 +52,11 @@ def part(played: Played, name: str) -> Played:
     return [(case, result) for case, result in played if case.part == name]
 
 
-def _envelope(played: Played, limits: PushLimits) -> dict[str, Any]:
+def _envelope(played: Played, limits: PushLimits, steps: NStepLimit | None) -> dict[str, Any]:
     """J50, J90 and η per direction, with intervals; η's mean with its own."""
     trials = [case for case, _ in played]
     outcomes = [result.outcome for _, result in played]
-    figures = envelope(trials, outcomes, limits)
+    figures = envelope(trials, outcomes, limits, steps)
     direction, impulse, duration = pushes(trials)
     ankle = np.array([limits.ankle(d, t) for d, t in zip(direction, duration, strict=True)])
     fit = mean_over_directions(direction, impulse / ankle, won(outcomes))

@@ -22,6 +22,7 @@ from ..progress import progress_bar
 from ..provenance import circumstances, versions
 from ..report import print_paths
 from ..seed_groups import expand_seeds, seed_groups
+from ..step_limits import curves, stepping_limits
 from ..summary import plain
 from .case import Case, case_row
 from .cases import Cases
@@ -105,7 +106,9 @@ def benchmark(
         crew = Crew(backend, workers)
         _play(folder, cases, names, stage, crew, console)
         played = {name: _played(folder, cases, name) for name in names}
-        entries = {name: controller_figures(played[name], cases) for name in names}
+        outcomes = {name: [result.outcome for _, result in played[name]] for name in names}
+        steps = stepping_limits([players[name] for name in names], outcomes, cases.limits)
+        entries = {name: controller_figures(played[name], cases, steps.get(name)) for name in names}
         ticks = tick_times(players)
         for name, entry in entries.items():
             entry["tick_us"] = ticks[name]
@@ -125,6 +128,7 @@ def benchmark(
                     for name in names
                     if name != reference
                 ],
+                **({"step_limits": curves(steps, chosen.push_duration)} if steps else {}),
                 "seeds": seed_groups(names, entries),
                 **circumstances(started, crew.workers, backend=backend),
             }
