@@ -59,7 +59,9 @@ def test_a_controllers_file_is_played_and_told_apart(robot: Robot, tmp_path: Pat
 @pytest.mark.parametrize("name", ["momentum", "missing.yaml", "nowhere/run"])
 def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: str) -> None:
     """The text names what was asked for and what there is."""
-    with pytest.raises(ConfigError, match="momentum-qp, .*residual, residual-step, zero") as error:
+    with pytest.raises(
+        ConfigError, match="momentum-qp, .*residual, residual-lqr-lip, residual-step, zero"
+    ) as error:
         load_player(name, robot)
     assert name in str(error.value)
 
@@ -87,10 +89,10 @@ def test_a_packaged_policy_is_known_by_its_folder(
     assert player.fingerprint == load_player(str(finished_run() / "last"), robot).fingerprint
     assert player.fingerprint != load_player("residual", robot).fingerprint
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
-    names = ["ppo-torque", "residual", "residual-pd", "residual-step"]
+    names = ["ppo-torque", "residual", "residual-lqr-lip", "residual-pd", "residual-step"]
     assert packaged("policies") == names
-    assert default_controllers()[-4:] == tuple(names)
-    with pytest.raises(ConfigError, match="ppo-torque, residual, residual-pd, residual-step, zero"):
+    assert default_controllers()[-5:] == tuple(names)
+    with pytest.raises(ConfigError, match=", ".join([*names, "zero"])):
         load_player("residual-abe07", robot)
 
 
