@@ -1,6 +1,6 @@
 """An evaluation for people: plots, and tables in the terminal."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +105,7 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
     entries = summary["controllers"]
     first = next(iter(entries.values()))
     table = Table(title=title, title_justify="left")
-    table.add_column("controller", overflow="fold", min_width=11)
+    table.add_column("controller", overflow="fold", min_width=_room(entries, 16))
     columns: list[tuple[str, Any]] = [
         ("recovered", lambda e: f"{e['recovered']}/{e['trials']}"),
         ("rate [95 %]", lambda e: _with_range(e, "recovered_rate", "recovered_ci95", ".1%")),
@@ -126,7 +126,7 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
     if any(entry["steps_max"] for entry in entries.values()):
         columns.append(("steps, mean", lambda e: _number(e["steps_mean"], ".1f")))
     if any("step_share_1_mean" in entry for entry in entries.values()):
-        columns.append(("of 1-, 2-, ∞-step limit", _step_shares))
+        columns.append(("of one-step limit", _step_share))
     columns += [
         ("solver failures", lambda e: f"{e['solver_failures']}"),
         ("mean |action|", lambda e: _number(e["mean_abs_action"], ".3f")),
@@ -140,25 +140,29 @@ def _controllers(summary: Mapping[str, Any], title: str) -> Table:
 
 def _pairs(summary: Mapping[str, Any]) -> Table:
     table = Table()
-    table.add_column("b against a", overflow="fold", min_width=11)
+    titles = [f"{pair['b']} against {pair['a']}" for pair in summary["pairs"]]
+    table.add_column("b against a", overflow="fold", min_width=_room(titles, 34))
     names = ["both", "only a (lost)", "only b (won)", "neither", "McNemar p"]
     gain = "j50_gain" in summary["pairs"][0]
     for name in names + (["J50 gain [95 %]"] if gain else []):
         table.add_column(name, justify="right")
-    for pair in summary["pairs"]:
+    for title, pair in zip(titles, summary["pairs"], strict=True):
         cells = [str(pair[key]) for key in ("both", "only_a", "only_b", "neither")]
         cells.append(f"{pair['p_mcnemar']:.2g}")
         if gain:
             cells.append(_with_range(pair, "j50_gain", "j50_gain_ci95", "+.1%"))
-        table.add_row(escape(f"{pair['b']} against {pair['a']}"), *cells)
+        table.add_row(escape(title), *cells)
     return table
 
 
-def _step_shares(entry: Mapping[str, Any]) -> str:
-    """J50 over the limits, means over the directions."""
-    if "step_share_1_mean" not in entry:
-        return "–"
-    return ", ".join(f"{entry[f'step_share_{name}_mean']:.2f}" for name in COUNTS)
+def _room(names: Iterable[str], most: int) -> int:
+    """Width of a column of names that are not to be cut, but for those longer than `most`."""
+    return min(max(len(name) for name in names), most)
+
+
+def _step_share(entry: Mapping[str, Any]) -> str:
+    """J50 over the one-step limit, mean over the directions; others are in summary.json."""
+    return _number(entry.get("step_share_1_mean"), ".2f")
 
 
 def _half(entry: Mapping[str, Any]) -> str:
