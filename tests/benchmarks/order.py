@@ -35,10 +35,10 @@ def play(name: str) -> tuple[Course, bool]:
         heel = float(s.support_polygon[:, 0].min()) if len(s.support_polygon) else np.nan
         torque = np.abs(env.simulation.plant.ctrl) / env.robot.torque_limit
         rows.append(
-            (s.time, heel - s.capture_point[0], heel - s.com[0], s.cop[0] - heel,
-             s.angular_momentum[1], torque.max())
+            (s.time, heel - s.capture_point[0], s.cop[0] - heel, s.angular_momentum[1],
+             torque.max())
         )  # fmt: skip
-    columns = ("time", "capture", "com", "cop", "momentum", "torque")
+    columns = ("time", "capture", "cop", "momentum", "torque")
     return dict(zip(columns, np.array(rows).T, strict=True)), env.recovered
 
 
@@ -55,9 +55,9 @@ def picture(path: str, courses: Mapping[str, tuple[Course, bool]]) -> None:
             for k, (name, (course, recovered)) in enumerate(courses.items()):
                 seen = course["time"] <= SECONDS
                 values = course[key][seen] * (1.0 if key == "momentum" else 100.0)
-                title = name if recovered else f"{name} (falls)"
+                title, style = name if recovered else f"{name} (falls)", look(k)
                 ax.plot(
-                    course["time"][seen], values, label=title, color=look(k).colour, ls=look(k).line
+                    course["time"][seen], values, label=title, color=style.colour, ls=style.line
                 )
             ax.axvspan(0.5, 0.6, color=AMBER, alpha=0.35, lw=0)
             ax.set_ylabel(label)
