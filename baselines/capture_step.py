@@ -77,11 +77,12 @@ def step_gains(robot: Robot, config: CaptureStepConfig, period: float) -> StepGa
 
 def allocate_step_memory(reach: ReachArrays) -> StepMemory:
     """No step yet."""
-    corners = reach.sums.shape[0] * reach.sums.shape[1]
-    whole = [apart(1, dtype=np.int64) for _ in range(3)]
-    numbers = [apart(1) for _ in range(3)]
-    region = apart((2 * corners + 1, 2))
-    return StepMemory(*whole, apart((3, 3)), *numbers, region, apart(1, dtype=np.int64))
+    corners, whole = reach.sums.shape[0] * reach.sums.shape[1], np.int64
+    return StepMemory(
+        steps=apart(1, whole), foot=apart(1, whole), swinging=apart(1, whole),
+        level=apart((3, 3)), clock=apart(1), load=apart(1), left=apart(1),
+        region=apart((2 * corners + 1, 2)), corners=apart(1, whole),
+    )  # fmt: skip
 
 
 class CaptureStep(AroundQP):

@@ -338,10 +338,10 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def bind(self, tick: Block, kernel: int) -> ResidualStep:
         """All that a step works on, with the controller's tick and the address of its kernel."""
-        sim = self.simulation
+        sim, found = self.simulation, self.controller.outputs()
         return ResidualStep(
             self.arrays, sim.plant, sim.state_arrays, sim.clock,
-            kernel, Erased(tick), *self.controller.outputs(),
+            kernel, Erased(tick), found.tau, found.root_wrench, found.failures, found.soft_root,
             self._targets, self._motion, self._com_offset, self._residual, sim.push_table,
             self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
         )  # fmt: skip

@@ -181,7 +181,8 @@ class ResidualStepEnv(ResidualBalanceEnv):
         known = super().compiled_step()
         if known is None:
             return None
-        residual, steps = known[1], self._steps
+        steps = self._steps
+        residual: Any = known[1]
         if steps is None or steps.residual.inner is not residual:
             tick, scales = residual.tick.inner, self.scales
             sight = StepSight(

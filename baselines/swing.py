@@ -127,7 +127,7 @@ class Swing:
         speed = task.landing_speed * height * np.sqrt(GRAVITY / height)
         self.task = task
         self.arrays = SwingArrays(
-            apart((3, 3)), apart(2), *(apart(1) for _ in range(4)),
+            apart((3, 3)), apart(2), apart(1), apart(1), apart(1), apart(1),
             task.clearance * height, task.lift, float(speed),
         )  # fmt: skip
         start_swing(self.arrays, np.array(point, dtype=float), float(point[2]), float(duration))
@@ -201,8 +201,10 @@ def swing_gains(robot: RobotArrays, task: SwingTask) -> SwingGains:
     g, rate2 = robot.gravity, robot.gravity / robot.height_com
     k = task.stiffness * rate2
     d = 2.0 * task.damping_ratio * np.sqrt(k)
-    weights = task.weight / g**2, task.turn_weight / rate2**2
-    return SwingGains(float(k), float(d), *map(float, weights), apart(3))
+    return SwingGains(
+        stiffness=float(k), damping=float(d), weight=float(task.weight / g**2),
+        turn_weight=float(task.turn_weight / rate2**2), error=apart(3),
+    )  # fmt: skip
 
 
 @compiled
