@@ -1,16 +1,20 @@
 """Where a linear inverted pendulum can be stopped: capture regions and CoP reach [Koolen12]."""
 
+from dataclasses import dataclass
+
 import mujoco
 import numpy as np
-from scipy.spatial import ConvexHull
 
+from poise.envs.arrays import apart
+from poise.envs.block import Block
 from poise.envs.jit import compiled
 from poise.envs.robot import Robot
+
+from .support import convex_hull
 
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
-_SHARES = np.array(SHARES)
 
 
 def turn(yaw: float) -> np.ndarray:
@@ -89,23 +93,74 @@ def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.nd
     return np.reshape(normals, (-1, 2)), np.array(offsets), np.array(bounds)
 
 
+@dataclass(frozen=True, eq=False)
+class ReachArrays(Block):
+    """A `Reach` as compiled code reads it; ns soles, sole frames."""
+
+    alone: np.ndarray  # (ns, k, 2) corners of what each reaches alone [m]
+    corners: np.ndarray  # (ns,) int: how many of them count
+    middle: np.ndarray  # (ns, 2) their mean
+    sums: np.ndarray  # (5, n, 2) corners of what two reach, beside λ p_0 + (1 − λ) p_1
+    support: np.ndarray  # (5, 48) how far these go along each direction
+    directions: np.ndarray  # (48, 2)
+    shares: np.ndarray  # (5,) λ
+
+
 @compiled
-def outside_reach(first, second, yaw, xi, support, directions, shares, out):
+def distance_beyond(r, fx, fy, sx, sy, cos, sin, x, y):
+    """How far (x, y) lies outside what soles at f and s reach, see `Reach.beyond`."""
+    worst = -np.inf
+    for d in range(r.directions.shape[0]):
+        # the direction, turned
+        dx = cos * r.directions[d, 0] - sin * r.directions[d, 1]
+        dy = sin * r.directions[d, 0] + cos * r.directions[d, 1]
+        a, b = fx * dx + fy * dy, sx * dx + sy * dy
+        reach = -np.inf
+        for k in range(r.shares.shape[0]):
+            reach = max(reach, r.support[k, d] + r.shares[k] * a + (1.0 - r.shares[k]) * b)
+        worst = max(worst, x * dx + y * dy - reach)
+    return worst
+
+
+@compiled
+def outside_reach(r, first, second, yaw, xi, out):
     """What `Reach.beyond` gives, for rows of `first`, `second`, `xi`; one row stands for all."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     for i in range(out.shape[0]):
         f, s, x = first[i % first.shape[0]], second[i % second.shape[0]], xi[i % xi.shape[0]]
-        worst = -np.inf
-        for d in range(directions.shape[0]):
-            # the direction, turned
-            dx = cos * directions[d, 0] - sin * directions[d, 1]
-            dy = sin * directions[d, 0] + cos * directions[d, 1]
-            a, b = f[0] * dx + f[1] * dy, s[0] * dx + s[1] * dy
-            reach = -np.inf
-            for k in range(shares.shape[0]):
-                reach = max(reach, support[k, d] + shares[k] * a + (1.0 - shares[k]) * b)
-            worst = max(worst, x[0] * dx + x[1] * dy - reach)
-        out[i] = worst
+        out[i] = distance_beyond(r, f[0], f[1], s[0], s[1], cos, sin, x[0], x[1])
+
+
+@compiled
+def reach_of_one(r, sole, point, cos, sin, out):
+    """What `Reach.under` gives, into rows of `out` (≥ k, 2), and how many they are."""
+    for i in range(r.corners[sole]):
+        u, v = r.alone[sole, i, 0], r.alone[sole, i, 1]
+        out[i, 0], out[i, 1] = point[0] + cos * u - sin * v, point[1] + sin * u + cos * v
+    return r.corners[sole]
+
+
+@compiled
+def reach_of_two(r, points, cos, sin, cloud, out):
+    """What `Reach.both` gives, into rows of `out` (10 n + 1, 2), and how many they are.
+
+    `cloud` (5 n, 2) is scratch.
+    """
+    n = 0
+    for k in range(r.shares.shape[0]):
+        a, b = r.shares[k], 1.0 - r.shares[k]
+        x, y = a * points[0, 0] + b * points[1, 0], a * points[0, 1] + b * points[1, 1]
+        for i in range(r.sums.shape[1]):
+            u, v = r.sums[k, i, 0], r.sums[k, i, 1]
+            cloud[n, 0], cloud[n, 1] = x + cos * u - sin * v, y + sin * u + cos * v
+            n += 1
+    return convex_hull(cloud, out)
+
+
+def stacked(polygons: list[np.ndarray]) -> np.ndarray:
+    """(n, k, 2) polygons of up to k corners, the last one repeated where there are fewer."""
+    most = max(len(polygon) for polygon in polygons)
+    return np.array([np.pad(p, ((0, most - len(p)), (0, 0)), "edge") for p in polygons])
 
 
 class Reach:
@@ -122,8 +177,16 @@ class Reach:
         self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
         self.middle = [polygon.mean(axis=0) for polygon in self.alone]
         if len(robot.soles) == 2:
-            self._sums = [self._sum(load) for load in SHARES]
-            self._support = np.array([(sums @ DIRECTIONS.T).max(axis=0) for sums in self._sums])
+            sums = [self._sum(load) for load in SHARES]
+            self.arrays = ReachArrays(
+                stacked(self.alone),
+                np.array([len(corners) for corners in self.alone]),
+                np.array(self.middle),
+                stacked(sums),
+                np.array([(corners @ DIRECTIONS.T).max(axis=0) for corners in sums]),
+                DIRECTIONS,
+                np.array(SHARES),
+            )
 
     def _under(self, sole: int, load: float) -> np.ndarray:
         polygon = self.polygons[sole]
@@ -143,12 +206,10 @@ class Reach:
 
     def both(self, points: np.ndarray, yaw: float) -> np.ndarray:
         """(k, 2) hull of what two soles at `points` (2, ≥ 2) reach, for all shares of the load."""
-        cloud = [
-            load * points[0, :2] + (1.0 - load) * points[1, :2] + sums @ turn(yaw).T
-            for load, sums in zip(SHARES, self._sums, strict=True)
-        ]
-        corners = np.vstack(cloud)
-        return corners[ConvexHull(corners).vertices]
+        r = self.arrays
+        cloud = apart((r.sums.shape[0] * r.sums.shape[1], 2))
+        out = apart((2 * len(cloud) + 1, 2))
+        return out[: reach_of_two(r, np.array(points), np.cos(yaw), np.sin(yaw), cloud, out)]
 
     def beyond(
         self, first: np.ndarray, second: np.ndarray, yaw: float, xi: np.ndarray
@@ -160,5 +221,5 @@ class Reach:
         """
         rows = [np.array(v, dtype=float, ndmin=2) for v in (first, second, xi)]
         out = np.empty(max(len(points) for points in rows))
-        outside_reach(rows[0], rows[1], yaw, rows[2], self._support, DIRECTIONS, _SHARES, out)
+        outside_reach(self.arrays, rows[0], rows[1], yaw, rows[2], out)
         return out if max(np.ndim(v) for v in (first, second, xi)) > 1 else out[0]

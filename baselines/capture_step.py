@@ -1,28 +1,27 @@
 """Feet in place as long as that holds; then steps to where the capture point can be stopped."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from poise.envs.arrays import apart
+from poise.envs.block import address_of
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .around_qp import AroundQP
-from .capturability import Reach, turn
-from .contact_sets import ContactSets
+from .capturability import Reach, ReachArrays
+from .capture_tick import CaptureTick, StepGains, StepMemory, capture_tick
+from .contact_sets import ContactSets, contact_tick
 from .controller import Targets
-from .momentum_qp import MomentumQPConfig
-from .step_plan import Foothold, Plan, StepLimits, StepPlanner
-from .step_shift import STANDING, Stepping, lean_matrix
-from .support import nearest_inside
-from .swing import Swing, SwingTask, rotation_error, swing_rows
+from .momentum_qp import MomentumQPConfig, Outputs, momentum_tick
+from .reduced_qp import QPParameters
+from .step_plan import Foothold, StepLimits, StepPlanner
+from .step_shift import STANDING, Stepping
+from .swing import Swing, SwingTask, swing_gains
 from .warmup import prepare
-
-LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
-LOW = 0.04  # [h] above the ground: a foot that touches it higher up stands on its edge
-FIRST_LOAD = 0.3  # [m g] that a foot may bear at touchdown; then the limit rises by m g a ramp
 
 
 @dataclass(frozen=True)
@@ -63,13 +62,37 @@ class CaptureStepConfig:
     step_qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
 
 
+def step_gains(robot: Robot, config: CaptureStepConfig, period: float) -> StepGains:
+    """`config` in m and s, for one robot."""
+    c, h, g = config, robot.height_com, -robot.model.opt.gravity[2]
+    rate = float(np.sqrt(g / h))
+    return StepGains(
+        rate=rate, trigger=c.trigger * h, spin=float(c.spin * rate / (robot.mass * g)),
+        again=c.again * h, gain=c.gain, hips=c.hips * h, leg=c.stretch * h, sink=c.sink * h,
+        ramp=c.ramp / rate, unload=c.unload / rate, pause=c.pause / rate,
+        root_accel=c.root_accel * rate**2, swing_accel=c.swing_accel * rate**2,
+        joint_accel=c.joint_accel * rate**2, period=period,
+    )  # fmt: skip
+
+
+def allocate_step_memory(reach: ReachArrays) -> StepMemory:
+    """No step yet."""
+    corners, whole = reach.sums.shape[0] * reach.sums.shape[1], np.int64
+    return StepMemory(
+        steps=apart(1, whole), foot=apart(1, whole), swinging=apart(1, whole),
+        level=apart((3, 3)), clock=apart(1), load=apart(1), left=apart(1),
+        region=apart((2 * corners + 1, 2)), corners=apart(1, whole),
+    )  # fmt: skip
+
+
 class CaptureStep(AroundQP):
     """The momentum QP with feet in place, and steps by capturability where those cannot hold.
 
     Stands by `qp`, bit for bit, until the capture point ξ leaves what the CoP can reach; then
     steps until it is inside again, and stays where it came to rest. In a step the CoM follows
     c̈ = ω² (c − p), p = ξ + k (ξ − ξ_ref) at most at the edge of the soles in contact [Koolen12,
-    Englsberger11], and the foothold follows ξ. Raises ConfigError unless there are two soles.
+    Englsberger11], and the foothold follows ξ. The ticks are those of `capture_tick.py`. Raises
+    ConfigError unless there are two soles.
     """
 
     def __init__(self, robot: Robot, config: CaptureStepConfig | None = None):
@@ -82,189 +105,121 @@ class CaptureStep(AroundQP):
         super().__init__(robot, self.config.qp)
         self.sets = ContactSets(robot, self.config.step_qp, self.config.jump)
         self.reach = Reach(robot, self.config.share)
-        self.planner = StepPlanner(robot, self.reach, self.config.limits, self.config.foothold)
+        self.planner = self._planner(self.reach)
         self.h, self.rate = self.planner.h, self.planner.rate
         self.shift = self.planner.shift  #: what a policy adds
+        self._swing = Swing(np.zeros(3), 0.0, self.config.swing, self.h)
+        self.memory = allocate_step_memory(self.reach.arrays)
+        self.tau = apart(len(self.qp.parameters.torque_limit))  #: (nv−6,) of the last tick [N·m]
+        self._failures = apart(1, dtype=np.int64)
+        self._motors = self.qp.arrays.motor_dofs - 6
         self._guided: Targets | None = None
+        self._tick: CaptureTick | None = None
         self.reset()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.robot, self.config)  # a copy has memory and addresses of its own
+
+    def _planner(self, reach: Reach) -> StepPlanner:
+        return StepPlanner(self.robot, reach, self.config.limits, self.config.foothold)
 
     @property
     def failures(self) -> int:
         """Ticks since the reset at which a QP was not solved."""
         return self.qp.failures + self.sets.failures
 
+    @property
+    def solver(self) -> Any:
+        """Of the QP with feet in place, where it is not the compiled one."""
+        return self.qp.solver
+
+    @property
+    def parameters(self) -> QPParameters:
+        """Of the QP with feet in place."""
+        return self.qp.parameters
+
+    def outputs(self) -> Outputs:
+        """See `Outputs`."""
+        qp = self.qp
+        return Outputs(self.tau, qp.workspace.root_wrench, self._failures, qp.parameters.soft_root)
+
     def reset(self, state: RobotState | None = None) -> None:
         """Forget the last trial."""
         super().reset(state)
         self.sets.reset()
         self.shift.clear()
-        self.steps = 0  #: begun since the reset
-        self.swing: Swing | None = None  #: of the running step
-        self.foot = -1  #: that stepped last
-        self._yaw = 0.0  # heading at the first step
-        self._load, self._left = 0.0, 0.0  # of the foot that lifts off: [N], share still borne
-        self._clock = 0.0  # since the last touchdown [s]
-        self._region: np.ndarray | None = None
+        for array in self.memory.members():
+            array[...] = 0
+        self.memory.foot[0] = -1
+        self.memory.level[:] = np.eye(3)
+        self._failures[0] = 0
+
+    @property
+    def steps(self) -> int:
+        """Begun since the reset."""
+        return int(self.memory.steps[0])
 
     @property
     def stepped(self) -> bool:
         """Whether a step has begun since the reset."""
         return self.steps > 0
 
+    @property
+    def foot(self) -> int:
+        """That stepped last; −1: none."""
+        return int(self.memory.foot[0])
+
+    @property
+    def swing(self) -> Swing | None:
+        """Of the running step."""
+        return self._swing if self.memory.swinging[0] else None
+
     def stepping(self) -> Stepping:
         """Where it is in its steps."""
-        if self.swing is None:
-            return STANDING._replace(steps=self.steps, since=self._clock)
         swing = self.swing
+        if swing is None:
+            return STANDING._replace(steps=self.steps, since=float(self.memory.clock[0]))
+        point, foothold = swing.reference[0].copy(), swing.foothold.copy()
         phase = swing.time / swing.duration
-        return Stepping(
-            self.steps, self.foot, swing.reference[0], swing.foothold, phase, swing.remaining, 0.0
-        )
+        return Stepping(self.steps, self.foot, point, foothold, phase, swing.remaining, 0.0)
+
+    def tick(self, state: RobotState, targets: Targets) -> CaptureTick:
+        """What `capture_tick` works on."""
+        s, given = state.arrays, targets.arrays()
+        known = self._tick
+        if (
+            known is None or known.state is not s or known.given is not given
+            or known.place.problem.parameters is not self.qp.parameters
+        ):  # fmt: skip
+            if self._guided is None:
+                self._guided = Targets.standing(self.robot, state)
+            guided, sets, reach = self._guided.arrays(), self.sets, self.reach.arrays
+            place = self.qp.tick(state, targets)
+            one, two, both = (
+                sets.sets[soles].bind(s, guided, 6 * (len(soles) == 1), sets)
+                for soles in ((0,), (1,), (0, 1))
+            )
+            known = self._tick = CaptureTick(
+                self.qp.arrays, s, given, guided, step_gains(self.robot, self.config, self.period),
+                self.planner.search(state), self._swing.arrays,
+                swing_gains(self.qp.arrays, self.config.swing), self.memory, self.shift.values,
+                one, two, both, place, self.tau, self._failures, apart(1, dtype=np.int64),
+                apart(reach.alone.shape[1:]), apart((len(self.memory.region) // 2, 2)),
+                apart(2), apart(3),
+                address_of(momentum_tick, place) if self.solver is None else 0,
+                address_of(contact_tick, both),
+            )  # fmt: skip
+        return known
+
+    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, CaptureTick]:
+        """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""
+        tick = self.tick(state, targets)
+        return address_of(capture_tick, tick), tick
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
-        if self.swing is None:
-            if self._must_step(state):
-                self._begin(state)
-            elif not self.stepped:
-                return self.qp.torques(state, targets)
-        guided = self._copy(state, targets)
-        if self.swing is not None and self._landed(state, self.swing):
-            self.swing, self._clock, self._region = None, 0.0, None
-        if self.swing is not None:
-            return self._swing(state, guided, self.swing)
-        return self._stand(state, guided)
-
-    def _must_step(self, state: RobotState) -> bool:
-        if self.stepped and self._clock < self.config.pause / self.rate:
-            return False
-        feet, yaw = state.sole_points[:, :2], self._heading(state)
-        away = self.reach.beyond(feet[0], feet[1], yaw, state.capture_point)
-        if self.stepped:
-            return bool(away > self.config.again * self.h + self.shift.trigger)
-        away += self.config.spin * self._spent(state)
-        return bool(away > self.config.trigger * self.h + self.shift.trigger)
-
-    def _spent(self, state: RobotState) -> float:
-        """ω L/(m g) [m] of the angular momentum in the sense of the fall: hips already used."""
-        way = state.capture_point - state.origin[:2]
-        L = state.angular_momentum
-        turning = (way[0] * L[1] - way[1] * L[0]) / max(float(np.linalg.norm(way)), 1e-9)
-        return float(turning * self.rate / (state.mass * state.robot.gravity))
-
-    def _heading(self, state: RobotState) -> float:
-        return self._yaw if self.stepped else state.heading_yaw
-
-    def _begin(self, state: RobotState) -> None:
-        if not self.stepped:
-            self.sets.follow(self.qp.workspace.tau)
-        self._yaw = self._heading(state)
-        plan: Plan = self.planner.plan(state, self._yaw)
-        self.steps += 1
-        self.foot = plan.foot
-        self.swing = Swing(state.sole_points[plan.foot], plan.time, self.config.swing, self.h)
-        self.swing.ground = float(state.sole_points[1 - plan.foot, 2])
-        self.swing.aim(plan.foothold)
-        self.swing.shift = plan.shift
-        before = self.qp.workspace if self.steps == 1 else self.sets.workspace
-        self._load, self._left = float(before.wrenches[6 * plan.foot + 2]), 1.0
-
-    def _landed(self, state: RobotState, swing: Swing) -> bool:
-        low = state.sole_points[self.foot, 2] - swing.ground < LOW * self.h
-        late = swing.time > LANDING * swing.duration
-        return bool(state.contacts[self.foot] > 0.5 and late and low)
-
-    def _swing(self, state: RobotState, t: Targets, swing: Swing) -> np.ndarray:
-        """A tick on one foot."""
-        stance = 1 - self.foot
-        if swing.remaining > Swing.FROZEN:
-            plan = self.planner.replan(state, self.foot, self._yaw, swing)
-            swing.aim(plan.foothold, swing.time + plan.time)
-            swing.shift = plan.shift
-        under = self.reach.under(stance, state.sole_points[stance], self._yaw)
-        way = swing.foothold - state.sole_points[stance, :2]
-        self._guide(state, t, under, 0.0, state.sole_points[stance, 2], way)
-        self._left -= self.period * self.rate / max(self.config.unload, 1e-9)
-        if self._left > 0.0:  # the foot that will leave gives its load to the other one
-            limits = np.full(2, np.inf)
-            limits[self.foot] = self._left * max(self._load, 0.0)
-            return self.sets.tick(state, t, (0, 1), (), limits)
-        rows = swing_rows(
-            state, self.foot, swing.advance(self.period), self._level(), self.config.swing
-        )
-        return self.sets.tick(state, t, (stance,), [rows])
-
-    def _stand(self, state: RobotState, t: Targets) -> np.ndarray:
-        """A tick on both feet, wherever they are."""
-        feet = state.sole_points
-        if self._region is None:  # feet have just come to rest
-            self._region = self.reach.both(feet, self._yaw)
-        way = feet[0, :2] - feet[1, :2]
-        self._guide(state, t, self._region, self.config.hips, float(feet[:, 2].mean()), way)
-        limits, ramp = None, self.config.ramp / self.rate
-        if self._clock < ramp:
-            weight = state.mass * state.robot.gravity
-            limits = np.full(2, np.inf)
-            limits[self.foot] = weight * (FIRST_LOAD + self._clock / ramp)
-        self._clock += self.period
-        return self.sets.tick(state, t, (0, 1), (), limits)
-
-    def _level(self) -> np.ndarray:
-        """(3, 3) axes of a level sole along the heading."""
-        axes = np.eye(3)
-        axes[:2, :2] = turn(self._yaw)
-        return axes
-
-    def _copy(self, state: RobotState, targets: Targets) -> Targets:
-        """Targets of our own: those given, but upright at rest along the heading."""
-        if self._guided is None:
-            self._guided = Targets.standing(self.robot, state)
-        self._guided.take(targets)
-        upright = self._level() @ lean_matrix(self.shift.lean)
-        self._guided.root_axes[:] = upright @ self.qp.arrays.root_standing
-        self._guided.root_vel[:] = 0.0
-        return self._guided
-
-    def _guide(
-        self,
-        state: RobotState,
-        t: Targets,
-        region: np.ndarray,
-        hips: float,
-        ground: float,
-        way: np.ndarray,
-    ) -> None:
-        """c̈_ref = ω² (c − p) in the plane; a height that legs reach with the feet `way` apart."""
-        xi, R = state.capture_point, turn(self._yaw)
-        wanted = xi + self.config.gain * (xi - region.mean(axis=0) - R @ self.shift.com)
-        p = nearest_inside(region, wanted)
-        over = wanted - p
-        p = p + over * min(1.0, hips * self.h / max(float(np.linalg.norm(over)), 1e-9))
-        p = p + R @ self.shift.cop
-        t.com[:2], t.com_vel[:2] = state.com[:2], state.com_vel[:2]
-        t.com_acc[:2] = state.omega**2 * (state.com[:2] - p)
-        t.cop[:] = p
-        leg = self.config.stretch * self.h
-        reach = np.sqrt(max(leg**2 - 0.25 * (way @ way), 0.0))
-        t.com[2] = ground + min(self.h, reach) + self.shift.height
-        if self.swing is not None:
-            t.com[2] -= self.config.sink * self.h
-        t.com_vel[2] = t.com_acc[2] = 0.0
-        self._limit_posture(state, t)
-
-    def _limit_posture(self, state: RobotState, t: Targets) -> None:
-        """Feed-forward that caps what the posture's PD law asks for.
-
-        A push leaves the trunk turning at some rad/s. To stop that at once would cost CoM
-        acceleration, L̇ = (p − c) × f, which no foothold makes good.
-        """
-        p, rate2 = self.sets.parameters, self.rate**2
-        asked = p.stiffness[6:] * (t.q_ref - state.q) + p.damping[6:] * (t.v_ref - state.qvel[6:])
-        bound = self.config.joint_accel * rate2
-        t.a_ref[:] = np.clip(asked, -bound, bound) - asked
-        R = state.root_axes
-        error = rotation_error(R, t.root_axes)
-        asked = p.stiffness[3:6] * (R.T @ error) - p.damping[3:6] * state.qvel[3:6]
-        most = self.config.root_accel if self.swing is None else self.config.swing_accel
-        bound = most * rate2 / max(float(np.linalg.norm(asked)), 1e-9)
-        t.root_acc[:] = asked * (min(1.0, bound) - 1.0)
+        tick = self.tick(state, targets)
+        capture_tick(tick)
+        if tick.passed[0]:
+            return self.qp.torques(state, targets)
+        return self.tau[self._motors]

@@ -11,6 +11,7 @@ from .controller import Targets
 from .momentum_qp import MomentumQP, Tick, accept, momentum_tick, solve
 from .residual_balance import ResidualBalanceEnv
 from .residual_step import residual_step
+from .residual_step_env import ResidualStepEnv
 from .warmup import begin
 
 __all__ = ["assembly", "begin", "contacts", "solver", "steps"]
@@ -45,16 +46,16 @@ def steps() -> None:
     # for its type alone: what is called by these addresses, other processes compile
     qp = env.controller
     problem = qp.assembly(env.simulation.state, env.targets)
-    step = env.bind(Tick(problem, qp.memory, 0, 0), 0)
-    residual_step.compile((step.numba_type,))
-    momentum_tick.compile((step.tick.numba_type,))
+    tick = Tick(problem, qp.memory, 0, 0)
+    residual_step.compile((env.bind(tick, 0).numba_type,))
+    momentum_tick.compile((tick.numba_type,))
     accept(problem.state, problem.parameters, problem.workspace, qp.memory)
     batch.play(0, batch.NOBODY, np.zeros(1, dtype=np.int64))
 
 
 def contacts() -> None:
     """What controllers that step need besides: a push that takes a step."""
-    env = ResidualBalanceEnv(controller="capture-step", duration=2.0)
+    env = ResidualStepEnv(duration=2.0)
     push = {"impulse": 0.55 * env.robot.mass, "start": 0.0}
     env.reset(seed=0, options={"push": push})
     over = False

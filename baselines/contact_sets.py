@@ -49,6 +49,8 @@ class ContactTick(Block):
     applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
     jump: np.ndarray  # (nv−6,) the most that they may change [N·m]
     follows: np.ndarray  # (1,) int: whether there was a last tick
+    chosen: np.ndarray  # (1,) int: the subset of the last tick, −1: none
+    index: int  # of this one
     assemble: int  # addresses of kernels that are compiled already
     solve: int
 
@@ -95,9 +97,20 @@ def add_rows(t: ContactTick):
 
 
 @compiled
+def choose_set(t: ContactTick):
+    """Forget what this subset remembers of earlier ticks, if the last one was another's."""
+    if t.chosen[0] != t.index:
+        ws, t.chosen[0] = t.problem.workspace, t.index
+        ws.cop_prev[0] = ws.cop_prev[1] = np.nan
+        for i in range(ws.iscratch.shape[0]):
+            ws.iscratch[i] = 0
+
+
+@compiled
 def assemble_contacts(t: ContactTick):
     """The reduced QP of a subset."""
     ws, cone = t.problem.workspace, t.problem.parameters.cone
+    choose_set(t)
     pick_soles(t.source, t.pick, t.problem.state)
     call(t.assemble, t.problem)
     if t.A.shape[0] > 0:
@@ -140,11 +153,20 @@ def solve_contacts(t: ContactTick):
     t.follows[0] = 1
 
 
+@compiled
+def contact_tick(t: ContactTick):
+    """One tick with a subset: its workspace's `tau` (nv−6,) holds torques."""
+    assemble_contacts(t)
+    solve_contacts(t)
+
+
 class ContactSet:
     """Arrays, parameters and scratch for one subset of the soles (its indices, in order)."""
 
-    def __init__(self, arrays: RobotArrays, parameters: QPParameters, soles: tuple[int, ...]):
-        pick = np.array(soles)
+    def __init__(
+        self, arrays: RobotArrays, parameters: QPParameters, soles: tuple[int, ...], index: int
+    ):
+        pick, self.index = np.array(soles), index
         self.soles, self.pick = soles, pick
         self.rows = (6 * pick[:, None] + np.arange(6)).ravel()
         names = [item.name for item in fields(RobotArrays)]
@@ -180,8 +202,8 @@ class ContactSet:
             self.block = ContactTick(
                 s, self.pick, problem, sets.memory, apart((rows, nv)), apart(rows), apart(rows),
                 apart((rows, n)), apart((rows, n)), apart(len(self.soles)),
-                apart(1, dtype=np.int64), sets.applied, sets.jump, sets.follows,
-                address_of(assemble, problem), address_of(solve, ws),
+                apart(1, dtype=np.int64), sets.applied, sets.jump, sets.follows, sets.chosen,
+                self.index, address_of(assemble, problem), address_of(solve, ws),
             )  # fmt: skip
             self._bound_to = (s, targets, rows)
         return self.block
@@ -203,14 +225,23 @@ class ContactSets:
         subsets: list[tuple[int, ...]] = [(i,) for i in range(count)]
         if count > 1:
             subsets.append(tuple(range(count)))
-        self.sets = {soles: ContactSet(self.arrays, parameters, soles) for soles in subsets}
+        self.sets = {
+            soles: ContactSet(self.arrays, parameters, soles, index)
+            for index, soles in enumerate(subsets)
+        }
         self.memory = allocate_memory(parameters.torque_limit)
         limit = parameters.torque_limit
         self.jump = np.where(limit > 0.0, jump * limit, np.inf)
         self.applied = apart(len(limit))  # torques of the last tick, if
         self.follows = apart(1, dtype=np.int64)  # there was one
+        self.chosen = apart(1, dtype=np.int64)  # index of the subset of the last tick, −1: none
+        self.chosen[0] = -1
         self._motor_joints = self.arrays.motor_dofs - 6
-        self.active: tuple[int, ...] | None = None
+
+    @property
+    def active(self) -> tuple[int, ...] | None:
+        """The soles of the last tick, if there was one."""
+        return None if self.chosen[0] < 0 else list(self.sets)[self.chosen[0]]
 
     @property
     def failures(self) -> int:
@@ -220,7 +251,7 @@ class ContactSets:
     def reset(self) -> None:
         """Forget the last trial."""
         forget(self.memory)
-        self.active, self.follows[0] = None, 0
+        self.chosen[0], self.follows[0] = -1, 0
 
     def follow(self, torques: np.ndarray) -> None:
         """Go on from the joint `torques` (nv−6,) of another controller's last tick."""
@@ -243,10 +274,6 @@ class ContactSets:
         """
         chosen = self.sets[soles]
         ws = chosen.workspace
-        if soles != self.active:
-            ws.cop_prev[:] = np.nan
-            ws.iscratch[:] = 0
-            self.active = soles
         rows = sum(len(task.b) for task in tasks)
         block = chosen.bind(state.arrays, targets.arrays(), rows, self)
         first = 0

@@ -5,13 +5,14 @@ from typing import Literal
 
 import numpy as np
 
+from poise.envs.jit import compiled
 from poise.envs.robot import Robot
-from poise.envs.state import RobotState
 
-from .capturability import Reach, turn
+from .capturability import Reach
 from .capture_step import CaptureStep, CaptureStepConfig
-from .step_plan import StepPlanner
-from .support import nearest_inside
+from .step_plan import Foothold, StepLimits, StepPlanner
+from .step_search import Search, allowed, put_foothold, to_local
+from .step_shift import FOOTHOLD
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class IPMStepConfig(CaptureStepConfig):
     arc: float = field(default=1.0, metadata={"min": 0.0, "max": 1.0})
 
 
-def rest_distance(speed: float, omega: float, height: float, arc: float = 0.0) -> float:
+@compiled
+def rest_distance(speed: float, omega: float, height: float, arc: float) -> float:
     """How far ahead of the CoM a foot stops it [m]: the energy left over the foot is 0.
 
     Linear pendulum, orbital energy E = ½ ẋ² − ½ ω² x² = 0:      x = ẋ/ω
@@ -33,44 +35,46 @@ def rest_distance(speed: float, omega: float, height: float, arc: float = 0.0) -
 
     `arc` leads from the first (0) to the second (1); g = ω² z.
     """
-    return speed / omega * float(np.sqrt(1.0 + arc * (0.5 * speed / (omega * height)) ** 2))
+    return speed / omega * np.sqrt(1.0 + arc * (0.5 * speed / (omega * height)) ** 2)
 
 
-def pendulum(
-    c: np.ndarray, velocity: np.ndarray, p: np.ndarray, omega: float, t: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """(2,) position and velocity after `t` of c̈ = ω² (c − p), p at rest."""
+@compiled
+def pendulum(c: float, velocity: float, p: float, omega: float, t: float) -> tuple[float, float]:
+    """Position and velocity along one axis after `t` of c̈ = ω² (c − p), p at rest."""
     cosh, sinh = np.cosh(omega * t), np.sinh(omega * t)
-    away = c - p
-    return p + away * cosh + velocity / omega * sinh, away * omega * sinh + velocity * cosh
+    return p + (c - p) * cosh + velocity / omega * sinh, (c - p) * omega * sinh + velocity * cosh
+
+
+@compiled
+def energy_law(q: Search):
+    """The foothold over which the pendulum stands still, see `EnergyPlanner.footholds`."""
+    s, foot, omega, t = q.state, q.foot[0], q.state.omega[0], q.time[0]
+    x, vx = pendulum(s.com[0], s.com_vel[0], q.p[0], omega, t)
+    y, vy = pendulum(s.com[1], s.com_vel[1], q.p[1], omega, t)
+    speed = np.sqrt(vx * vx + vy * vy)
+    away = rest_distance(speed, omega, q.height, q.arc) / max(speed, 1e-9)
+    x, y = to_local(q, x + away * vx, y + away * vy)
+    x += q.shift[FOOTHOLD] - q.reach.middle[foot, 0]
+    y += q.shift[FOOTHOLD + 1] - q.reach.middle[foot, 1] + q.sides[foot] * q.outward
+    near_x, near_y = allowed(q, x, y)
+    put_foothold(q, near_x, near_y)
+    q.left[0] = np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
 
 
 class EnergyPlanner(StepPlanner):
-    """The foothold over which the pendulum stands still, from where it is at touchdown."""
+    """The foothold over which the pendulum stands still, from where it is at touchdown.
 
-    arc = 0.0
+    Until then the CoP is taken to stay at p, where the stance sole brakes most; the cost is how
+    far limits keep the foothold from the one wanted [m].
+    """
 
-    def footholds(
-        self, state: RobotState, foot: int, yaw: float, times: np.ndarray, start: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Footholds (n, 2) of steps of `foot` that land after `times` (n,) [s], and how far limits
-        keep each from the one wanted [m].
+    law = staticmethod(energy_law)
 
-        Until touchdown the CoP is taken to stay at p, where the stance sole brakes most.
-        """
-        R, stance = turn(yaw), state.sole_points[1 - foot, :2]
-        p = nearest_inside(self.reach.under(1 - foot, stance, yaw), state.capture_point)
-        wanted = np.empty((len(times), 2))
-        for k, t in enumerate(times):
-            c, velocity = pendulum(state.com[:2], state.com_vel[:2], p, state.omega, t)
-            speed = float(np.linalg.norm(velocity))
-            away = rest_distance(speed, state.omega, self.h, self.arc)
-            wanted[k] = c + away * velocity / max(speed, 1e-9)
-        wanted = (wanted - stance) @ R - self.reach.middle[foot]
-        wanted[:, 1] += self.sides[foot] * self.choice.outward * self.h
-        shifted = wanted + self.shift.foothold
-        local = self.allowed(shifted, (start - stance) @ R, foot, times)
-        return stance + local @ R.T, np.linalg.norm(local - shifted, axis=1)
+    def __init__(
+        self, robot: Robot, reach: Reach, limits: StepLimits, choice: Foothold, arc: float = 0.0
+    ):
+        super().__init__(robot, reach, limits, choice)
+        self.arc = arc
 
 
 class IPMStep(CaptureStep):
@@ -81,9 +85,9 @@ class IPMStep(CaptureStep):
     """
 
     def __init__(self, robot: Robot, config: IPMStepConfig | None = None):
-        config = config or IPMStepConfig()
-        super().__init__(robot, config)
-        reach = Reach(robot, config.share)
-        self.planner = EnergyPlanner(robot, reach, config.limits, config.foothold)
-        self.planner.arc = config.arc
-        self.planner.shift = self.shift
+        super().__init__(robot, config or IPMStepConfig())
+
+    def _planner(self, reach: Reach) -> StepPlanner:
+        config = self.config
+        assert isinstance(config, IPMStepConfig)
+        return EnergyPlanner(self.robot, reach, config.limits, config.foothold, config.arc)

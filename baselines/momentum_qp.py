@@ -1,7 +1,7 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -77,6 +77,15 @@ def forget(memory: Memory) -> None:
     """As before the first tick."""
     memory.torques[:] = 0.0
     memory.streak[0] = memory.failures[0] = 0
+
+
+class Outputs(NamedTuple):
+    """Where compiled code finds what a controller's tick gave."""
+
+    tau: np.ndarray  # (nv−6,) joint torques [N·m]
+    root_wrench: np.ndarray  # (6,) of a soft root
+    failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
+    soft_root: bool
 
 
 FALLBACK_DECAY = 0.8  # per tick: share that the last good torques keep
@@ -205,6 +214,11 @@ class MomentumQP:
         """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""
         tick = self.tick(state, targets)
         return address_of(momentum_tick, tick), tick
+
+    def outputs(self) -> Outputs:
+        """See `Outputs`."""
+        ws, p = self.workspace, self.parameters
+        return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root)
 
     def assembly(self, state: RobotState, targets: Targets) -> Assembly:
         """What `assemble` fills the workspace from."""

@@ -10,14 +10,16 @@ import numpy as np
 
 from poise.envs.arrays import apart
 from poise.envs.balance import BalanceEnv, EnvConfig
-from poise.envs.block import Block
+from poise.envs.block import Block, Erased
 from poise.envs.config import build, to_dict
 from poise.envs.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 from poise.envs.vector import make_vector_env
 
+from .capture_step import CaptureStep
 from .controller import Controller, Targets
+from .ipm_step import IPMStep
 from .momentum_qp import MomentumQP, MomentumQPConfig
 from .motions import ReferenceMotion, load_motion
 from .registry import CONTROLLERS, load_controller
@@ -25,6 +27,8 @@ from .residual_step import Residual, ResidualStep, residual_step, set_offsets, s
 from .targets import Motion
 from .tick_parts import Aim, Record, aim, record
 from .warmup import prepare
+
+COMPILED = (MomentumQP, CaptureStep, IPMStep)  # controllers with a `compiled_tick`
 
 
 @dataclass(frozen=True)
@@ -270,7 +274,7 @@ class ResidualBalanceEnv(BalanceEnv):
         self.ticks = self._whole(self.config.policy_period, period, "policy_period")
         self._controller = controller
         # other solvers and controllers are called from Python, tick by tick
-        self._compiled = type(controller) is MomentumQP and controller.solver is None
+        self._compiled = type(controller) in COMPILED and controller.solver is None
         self._com_offset = float(getattr(controller, "com_offset", 0.0))
         self._step: ResidualStep | None = None
         self._gains: Any = None  # with which it was made
@@ -318,7 +322,7 @@ class ResidualBalanceEnv(BalanceEnv):
         aim(known)
 
     def compiled_step(self) -> tuple[Any, Block] | None:
-        """See `BalanceEnv`: the momentum QP's with its own solver."""
+        """See `BalanceEnv`: controllers with a compiled tick and solver."""
         return (residual_step, self._bound()) if self._compiled else None
 
     def _bound(self) -> ResidualStep:
@@ -334,18 +338,19 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def bind(self, tick: Block, kernel: int) -> ResidualStep:
         """All that a step works on, with the controller's tick and the address of its kernel."""
-        sim, controller, ws = self.simulation, self.controller, self.controller.workspace
+        sim, found = self.simulation, self.controller.outputs()
         return ResidualStep(
             self.arrays, sim.plant, sim.state_arrays, sim.clock,
-            kernel, tick, ws.tau, ws.root_wrench, controller.memory.failures,
-            controller.parameters.soft_root,
+            kernel, Erased(tick), found.tau, found.root_wrench, found.failures, found.soft_root,
             self._targets, self._motion, self._com_offset, self._residual, sim.push_table,
             self.scales, self.judge, self.ticks, self.control_substeps, self.episode,
         )  # fmt: skip
 
     def advance(self) -> None:
-        if self._compiled:
-            residual_step(self._bound())
+        known = self.compiled_step()
+        if known is not None:
+            kernel, block = known
+            kernel(block)
         else:
             self._advance_in_python()
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.envs.arrays import Plant, RobotArrays
-from poise.envs.block import Block, call
+from poise.envs.block import Block, Erased, call
 from poise.envs.episode import (
     FAILURES,
     ROOT_FORCE,
@@ -84,7 +84,7 @@ class ResidualStep(Block):
     state: StateArrays
     clock: np.ndarray  # (1,) int
     kernel: int  # the address of the controller's tick
-    tick: Block  # what it works on
+    tick: Erased  # what it works on
     tau: np.ndarray  # (nj,) what it finds [N·m]
     root_wrench: np.ndarray  # (6,) of a soft root
     failures: np.ndarray  # (1,) int: ticks that it could not solve

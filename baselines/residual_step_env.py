@@ -1,20 +1,27 @@
 """`poise/ResidualStep-v0`: the action moves the targets and the steps of a stepping controller."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from poise.envs.arrays import apart
+from poise.envs.block import Block, Erased, address_of, call
 from poise.envs.env_config import EnvConfig
 from poise.envs.errors import ConfigError
+from poise.envs.jit import compiled
 from poise.envs.observation import Term
 from poise.envs.robot import Robot
 from poise.envs.vector import make_vector_env
 
+from .capture_tick import StepMemory
 from .residual_balance import ResidualBalanceEnv, ResidualScales
+from .residual_step import residual_step
+from .step_shift import StepShift, StepSight, observe_step
+from .swing import SwingArrays, time_left
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,30 @@ class StepScales(ResidualScales):
             "time": self.time,
             "trigger": self.trigger,
         }
+
+
+@dataclass(frozen=True, eq=False)
+class SteppingStep(Block):
+    """A policy step of a compiled controller that steps."""
+
+    residual: Erased  # a `ResidualStep`
+    kernel: int  # address of `residual_step`
+    memory: StepMemory
+    swing: SwingArrays
+    sight: StepSight
+
+
+@compiled
+def stepping_step(step: SteppingStep):
+    """`residual_step`, and what the policy sees of the steps."""
+    call(step.kernel, step.residual)
+    m, w, told = step.memory, step.swing, step.sight.told
+    told[0], told[1] = m.steps[0], -1.0
+    told[4], told[5], told[6] = 0.0, 0.0, m.clock[0]
+    if m.swinging[0]:
+        told[1], told[2], told[3] = m.foot[0], w.foothold[0], w.foothold[1]
+        told[4], told[5], told[6] = w.time[0] / w.duration[0], time_left(w), 0.0
+    observe_step(step.sight)
 
 
 class ResidualStepEnv(ResidualBalanceEnv):
@@ -105,6 +136,10 @@ class ResidualStepEnv(ResidualBalanceEnv):
         if not hasattr(controller, "shift") or not hasattr(controller, "stepping"):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
         ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
+        self._steps: SteppingStep | None = None
+        if isinstance(controller.shift, StepShift):  # one array is both
+            self._offsets = controller.shift.values
+            self._residual = replace(self._residual, offsets=self._offsets)
 
     def _observation_terms(self, soles: list[str]) -> list[Term]:
         ground, stance = ("x", "y"), "the stance sole, 0 if both are down"
@@ -123,33 +158,41 @@ class ResidualStepEnv(ResidualBalanceEnv):
 
     def _observe(self) -> None:
         super()._observe()
-        s, step = self.simulation.state_arrays, self.controller.stepping()
-        cos, sin = s.heading
-        half, omega = 0.5 * self.scales.height, self.scales.omega
-
-        def local(way: np.ndarray) -> list[float]:
-            x, y = way[0] / half, way[1] / half
-            return [cos * x + sin * y, cos * y - sin * x]
-
-        feet = s.sole_point
-        moving = [0.0] * 7
-        if step.foot >= 0:
-            stance = feet[1 - step.foot]
-            moving = local(feet[step.foot] - stance)
-            moving.append((feet[step.foot, 2] - stance[2]) / half)
-            moving += local(step.foothold - stance[:2]) + local(s.capture_point - stance[:2])
-        swing = [float(step.foot == i) for i in range(2)]
-        times = [step.phase, omega * step.remaining, omega * step.since, float(step.steps)]
-        added = np.array(swing + times + local(feet[0] - feet[1]) + moving)
-        self.episode.observation[-len(added) :] = np.clip(added, -10.0, 10.0)
+        told, sight = np.array(self.controller.stepping().told()), self.scales
+        observe_step(
+            StepSight(
+                self.simulation.state_arrays, told, sight.height, sight.omega,
+                self.episode.observation,
+            )
+        )  # fmt: skip
 
     def _set_offsets(self) -> None:
         super()._set_offsets()
         offsets, shift = self._offsets, self.controller.shift
+        if getattr(shift, "values", None) is offsets:
+            return
         shift.com, shift.cop = offsets[0:2].copy(), offsets[2:4].copy()
         shift.height, shift.lean = float(offsets[4]), offsets[5:7].copy()
         shift.foothold = offsets[9:11].copy()
         shift.time, shift.trigger = float(offsets[11]), float(offsets[12])
+
+    def compiled_step(self) -> tuple[Any, Block] | None:
+        """See `ResidualBalanceEnv`."""
+        known = super().compiled_step()
+        if known is None:
+            return None
+        steps = self._steps
+        residual: Any = known[1]
+        if steps is None or steps.residual.inner is not residual:
+            tick, scales = residual.tick.inner, self.scales
+            sight = StepSight(
+                residual.state, apart(7), scales.height, scales.omega, self.episode.observation
+            )
+            address = address_of(residual_step, residual)
+            steps = self._steps = SteppingStep(
+                Erased(residual), address, tick.memory, tick.swing, sight
+            )
+        return stepping_step, steps
 
     def info(self) -> dict[str, Any]:
         """As of `ResidualBalanceEnv`, and the number of steps."""

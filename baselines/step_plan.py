@@ -1,20 +1,19 @@
 """Which foot steps, where to and how fast: footholds from which the fall can be stopped."""
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from poise.envs.arrays import apart
+from poise.envs.block import address_of
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
-from .capturability import Reach, drifted, sides, turn
+from .capturability import Reach, sides
+from .step_search import Search, capture_law, plan_step, replan_step, take_foot
 from .step_shift import StepShift
-from .support import nearest_inside
 from .swing import Swing
-
-TIMES = 8  # step times that are weighed against each other
-CHANGE = 0.02  # [m/s] price of another step time while the foot swings
 
 
 @dataclass(frozen=True)
@@ -69,56 +68,51 @@ class Plan(NamedTuple):
 class StepPlanner:
     """Weighs steps of both feet, of several durations, by what of the fall they leave."""
 
+    law: Any = staticmethod(capture_law)  #: compiled: finds the foothold of one foot and time
+    arc = 0.0
+
     def __init__(self, robot: Robot, reach: Reach, limits: StepLimits, choice: Foothold):
         self.reach, self.limits, self.choice = reach, limits, choice
         self.h = robot.height_com
         self.rate = float(np.sqrt(-robot.model.opt.gravity[2] / self.h))  # ω
         self.sides = sides(robot)
         self.shift = StepShift()  #: what a policy adds
+        self._search: Search | None = None
+
+    def search(self, state: RobotState) -> Search:
+        """What the kernels of `step_search.py` work on."""
+        if self._search is None or self._search.state is not state.arrays:
+            limits, choice, h, rate = self.limits, self.choice, self.h, self.rate
+            search = Search(
+                state.arrays, self.reach.arrays, self.shift.values, apart(2), self.sides, h,
+                limits.ahead * h, limits.behind * h, limits.width_min * h, limits.width_max * h,
+                limits.speed * h * rate, limits.side_speed * h * rate,
+                limits.time_min / rate, limits.time_max / rate,
+                choice.overshoot * h, choice.outward * h, choice.margin * h,
+                choice.haste * h * rate, self.arc,
+                apart(self.reach.arrays.alone.shape[1:]), apart(2), apart(2),
+                apart(1, dtype=np.int64), apart(1), apart(2), apart(1), apart(5),
+                apart(1, dtype=np.int64), 0,
+            )  # fmt: skip
+            self._search = replace(search, law=address_of(self.law, search))
+        return self._search
+
+    def _along(self, state: RobotState, yaw: float) -> Search:
+        search = self.search(state)
+        search.heading[:] = np.cos(yaw), np.sin(yaw)
+        return search
 
     def plan(self, state: RobotState, yaw: float) -> Plan:
         """The best step of either foot from where they stand."""
-        limits = self.limits
-        times = np.linspace(limits.time_min, limits.time_max, TIMES) / self.rate
-        plans = [self._best(state, foot, yaw, times) for foot in range(2)]
-        return self._shifted(state, yaw, min(plans, key=lambda plan: plan.cost))
+        search = self._along(state, yaw)
+        plan_step(search)
+        return found(search)
 
     def replan(self, state: RobotState, foot: int, yaw: float, swing: Swing) -> Plan:
         """Foothold and time left of a running step."""
-        low = max(self.limits.time_min / self.rate - swing.time, Swing.FROZEN)
-        high = max(self.limits.time_max / self.rate - swing.time, low)
-        left = max(swing.remaining - swing.shift, Swing.FROZEN)
-        times = np.append(np.linspace(low, high, TIMES), left)
-        position, velocity = swing.reference[0, :2], swing.reference[1, :2]
-        start = position + 0.5 * velocity * min(left, 0.1)  # what its speed carries it anyway
-        best = self._best(state, foot, yaw, times, start, CHANGE * np.abs(times - left))
-        return self._shifted(state, yaw, best, start)
-
-    def _shifted(
-        self, state: RobotState, yaw: float, plan: Plan, start: np.ndarray | None = None
-    ) -> Plan:
-        """The same step, but that it lands earlier or later, as a policy wants."""
-        if self.shift.time == 0.0:
-            return plan
-        time = max(plan.time + self.shift.time, Swing.FROZEN)
-        start = state.sole_points[plan.foot, :2] if start is None else start
-        footholds, _ = self.footholds(state, plan.foot, yaw, np.array([time]), start)
-        return Plan(plan.foot, footholds[0], time, plan.cost, time - plan.time)
-
-    def _best(
-        self,
-        state: RobotState,
-        foot: int,
-        yaw: float,
-        times: np.ndarray,
-        start: np.ndarray | None = None,
-        extra: float | np.ndarray = 0.0,
-    ) -> Plan:
-        start = state.sole_points[foot, :2] if start is None else start
-        footholds, left = self.footholds(state, foot, yaw, times, start)
-        cost = left + self.choice.haste * times * self.h * self.rate + extra
-        k = int(np.argmin(cost))
-        return Plan(foot, footholds[k], float(times[k]), float(cost[k]))
+        search = self._along(state, yaw)
+        replan_step(search, foot, swing.arrays)
+        return found(search)
 
     def footholds(
         self, state: RobotState, foot: int, yaw: float, times: np.ndarray, start: np.ndarray
@@ -130,32 +124,18 @@ class StepPlanner:
         p + (ξ − p) e^(ωt) [Koolen12]; the foothold is what limits of place and speed allow of the
         one wanted there.
         """
-        choice, h = self.choice, self.h
-        R, side = turn(yaw), self.sides[foot]
-        stance = state.sole_points[1 - foot, :2]
-        xi = state.capture_point
-        p = nearest_inside(self.reach.under(1 - foot, stance, yaw), xi)
-        end = drifted(xi, p, state.omega, times[:, None])
-        local = (end - stance) @ R - self.reach.middle[foot]
-        local[:, 0] += choice.overshoot * h * np.tanh(local[:, 0] / (0.1 * h))
-        local[:, 1] += side * choice.outward * h
-        local += self.shift.foothold
-        local = self.allowed(local, (start - stance) @ R, foot, times)
-        footholds = stance + local @ R.T
-        first, second = (footholds, stance) if foot == 0 else (stance, footholds)
-        outside = self.reach.beyond(first, second, yaw, end)
-        return footholds, np.maximum(outside, -choice.margin * h)
+        search = self._along(state, yaw)
+        take_foot(search, foot)
+        search.start[:] = start
+        footholds, left = np.empty((len(times), 2)), np.empty(len(times))
+        for k, time in enumerate(times):
+            search.time[0] = time
+            self.law(search)
+            footholds[k], left[k] = search.foothold, search.left[0]
+        return footholds, left
 
-    def allowed(
-        self, local: np.ndarray, start: np.ndarray, foot: int, times: np.ndarray
-    ) -> np.ndarray:
-        """(n, 2) what limits of place and speed leave of footholds `local` (n, 2), both from the
-        stance foot along the heading, for a foot that is at `start` (2,)."""
-        limits, h, side = self.limits, self.h, self.sides[foot]
-        local = local.copy()
-        local[:, 0] = np.clip(local[:, 0], -limits.behind * h, limits.ahead * h)
-        local[:, 1] = side * np.clip(side * local[:, 1], limits.width_min * h, limits.width_max * h)
-        gap = local - start
-        span = np.array([limits.speed, limits.side_speed]) * h * self.rate * times[:, None]
-        excess = np.maximum(np.linalg.norm(gap / span, axis=1), 1.0)
-        return local - gap * (1.0 - 1.0 / excess)[:, None]
+
+def found(search: Search) -> Plan:
+    """The best step of a search."""
+    x, y, time, cost, shift = search.best.tolist()
+    return Plan(int(search.best_foot[0]), np.array([x, y]), time, cost, shift)

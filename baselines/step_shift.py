@@ -3,32 +3,58 @@
 A controller with a `shift` and a method `stepping` can be used by `residual_step_env.py`.
 """
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from poise.envs.arrays import apart
+from poise.envs.block import Block
+from poise.envs.jit import compiled
+from poise.envs.kinematics import StateArrays
 
-def _pair() -> np.ndarray:
-    return np.zeros(2)
+# entries of `StepShift.values`: the order of `StepScales.entries`
+COM, COP, HEIGHT, LEAN, FOOTHOLD, TIME, TRIGGER = 0, 2, 4, 5, 9, 11, 12
+SHIFTS = 13
 
 
-@dataclass
+def _entry(first: int, doc: str) -> property:
+    def get(shift: "StepShift") -> float:
+        return float(shift.values[first])
+
+    def put(shift: "StepShift", value: float) -> None:
+        shift.values[first] = value
+
+    return property(get, put, doc=doc)
+
+
+def _pair(first: int, doc: str) -> property:
+    def get(shift: "StepShift") -> np.ndarray:
+        return shift.values[first : first + 2]
+
+    def put(shift: "StepShift", value: np.ndarray) -> None:
+        shift.values[first : first + 2] = value
+
+    return property(get, put, doc=doc)
+
+
 class StepShift:
     """Added to a stepping controller's own choices; axes of the step's heading. Zero: nothing."""
 
-    com: np.ndarray = field(default_factory=_pair)  # where the capture point is to rest [m]
-    cop: np.ndarray = field(default_factory=_pair)  # the CoP [m]
-    height: float = 0.0  # of the CoM [m]
-    lean: np.ndarray = field(default_factory=_pair)  # of the root, about x and y [rad]
-    foothold: np.ndarray = field(default_factory=_pair)  # [m]
-    time: float = 0.0  # from lift-off to touchdown [s]
-    trigger: float = 0.0  # how much further the capture point may leave before a step [m]
+    com = _pair(COM, "(2,) where the capture point is to rest [m]")
+    cop = _pair(COP, "(2,) the CoP [m]")
+    height = _entry(HEIGHT, "of the CoM [m]")
+    lean = _pair(LEAN, "(2,) of the root, about x and y [rad]")
+    foothold = _pair(FOOTHOLD, "(2,) [m]")
+    time = _entry(TIME, "from lift-off to touchdown [s]")
+    trigger = _entry(TRIGGER, "how much further the capture point may leave before a step [m]")
+
+    def __init__(self) -> None:
+        self.values = apart(SHIFTS)  #: all of them, for compiled code
 
     def clear(self) -> None:
         """As before the first tick."""
-        for item in fields(self):
-            setattr(self, item.name, 0.0 * getattr(self, item.name))
+        self.values[:] = 0.0
 
 
 class Stepping(NamedTuple):
@@ -42,15 +68,51 @@ class Stepping(NamedTuple):
     remaining: float  #: until touchdown [s]
     since: float  #: since the last touchdown [s]
 
+    def told(self) -> list[float]:
+        """(7,) for `observe_step`."""
+        x, y = self.foothold
+        return [self.steps, self.foot, x, y, self.phase, self.remaining, self.since]
+
 
 STANDING = Stepping(0, -1, np.zeros(3), np.zeros(2), 0.0, 0.0, 0.0)
 
 
-def lean_matrix(lean: np.ndarray) -> np.ndarray:
-    """(3, 3) turn by the rotation vector (lean_x, lean_y, 0): Rodrigues' formula."""
-    angle = float(np.hypot(lean[0], lean[1]))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y = lean / angle
-    K = np.array([[0.0, 0.0, y], [0.0, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
+@dataclass(frozen=True, eq=False)
+class StepSight(Block):
+    """What a policy sees of the steps."""
+
+    state: StateArrays
+    told: np.ndarray  # (7,) `Stepping.told`
+    height: float  # h [m]
+    omega: float  # [1/s]
+    observation: np.ndarray  # (≥ 15,) of which the last are filled
+
+
+@compiled
+def _put_local(sight: StepSight, first: int, x: float, y: float):
+    """(x, y) in the heading frame, in 0.5 h."""
+    cos, sin, half = sight.state.heading[0], sight.state.heading[1], 0.5 * sight.height
+    sight.observation[first] = (cos * x + sin * y) / half
+    sight.observation[first + 1] = (cos * y - sin * x) / half
+
+
+@compiled
+def observe_step(sight: StepSight):
+    """The terms `swing` to `stance_capture_point` of `ResidualStepEnv`, clipped to ±10."""
+    s, told, out = sight.state, sight.told, sight.observation
+    first, foot, feet = out.shape[0] - 15, int(told[1]), s.sole_point
+    for i in range(2):
+        out[first + i] = 1.0 if foot == i else 0.0
+    out[first + 2], out[first + 5] = told[4], told[0]
+    out[first + 3], out[first + 4] = sight.omega * told[5], sight.omega * told[6]
+    _put_local(sight, first + 6, feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1])
+    for i in range(first + 8, first + 15):
+        out[i] = 0.0
+    if foot >= 0:
+        stance, moving, xi = feet[1 - foot], feet[foot], s.capture_point
+        _put_local(sight, first + 8, moving[0] - stance[0], moving[1] - stance[1])
+        out[first + 10] = (moving[2] - stance[2]) / (0.5 * sight.height)
+        _put_local(sight, first + 11, told[2] - stance[0], told[3] - stance[1])
+        _put_local(sight, first + 13, xi[0] - stance[0], xi[1] - stance[1])
+    for i in range(first, first + 15):
+        out[i] = min(max(out[i], -10.0), 10.0)

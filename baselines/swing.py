@@ -1,16 +1,19 @@
 """The way of a swing foot: C² from wherever it is to a foothold that may move on the way."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
+from poise.envs.arrays import RobotArrays, apart
+from poise.envs.block import Block
+from poise.envs.jit import compiled
+from poise.envs.kinematics import copy
 from poise.envs.state import RobotState
 
 from .task_rows import Rows
 
 GRAVITY = 9.81  # [m/s²] of the landing speed's unit
+FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
 
 
 @dataclass(frozen=True)
@@ -29,12 +32,12 @@ class SwingTask:
     landing_speed: float = field(default=0.1, metadata={"min": 0.0})  # downwards [h ω]
 
 
-def quintic(start: Sequence, end: Sequence, duration: float, t: float) -> tuple[Any, Any, Any]:
+@compiled
+def quintic(p0, v0, a0, p1, v1, a1, duration, t):
     """Position, velocity, acceleration at `t` of the polynomial of degree five that leads from
-    `start` to `end` (each the three of them) in `duration`: the way of least jerk [Flash85]."""
+    (p0, v0, a0) to (p1, v1, a1) in `duration`: the way of least jerk [Flash85]."""
     T = max(duration, 1e-6)
-    p0, v0, a0 = start[0], start[1] * T, start[2] * T * T
-    p1, v1, a1 = end[0], end[1] * T, end[2] * T * T
+    v0, a0, v1, a1 = v0 * T, a0 * T * T, v1 * T, a1 * T * T
     d = p1 - p0
     c3 = 10.0 * d - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1
     c4 = -15.0 * d + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1
@@ -46,6 +49,71 @@ def quintic(start: Sequence, end: Sequence, duration: float, t: float) -> tuple[
     return position, velocity / T, acceleration / (T * T)
 
 
+@dataclass(frozen=True, eq=False)
+class SwingArrays(Block):
+    """A `Swing` as compiled code reads and writes it."""
+
+    reference: np.ndarray  # (3, 3) position, velocity, acceleration [m, s]
+    foothold: np.ndarray  # (2,)
+    time: np.ndarray  # (1,) since it began [s]
+    duration: np.ndarray  # (1,)
+    ground: np.ndarray  # (1,) height of the ground [m]
+    shift: np.ndarray  # (1,) of the duration, by a policy [s]
+    apex: float  # above the ground [m]
+    lift: float  # share of the time
+    landing_speed: float  # [m/s]
+
+
+@compiled
+def start_swing(w: SwingArrays, point: np.ndarray, ground: float, duration: float):
+    """At rest at `point` (3,)."""
+    for a in range(3):
+        w.reference[0, a], w.reference[1, a], w.reference[2, a] = point[a], 0.0, 0.0
+    w.foothold[0], w.foothold[1] = point[0], point[1]
+    w.time[0], w.duration[0], w.ground[0], w.shift[0] = 0.0, duration, ground, 0.0
+
+
+@compiled
+def time_left(w: SwingArrays) -> float:
+    """What `Swing.remaining` gives."""
+    return max(w.duration[0] - w.time[0], 0.0)
+
+
+@compiled
+def aim_swing(w: SwingArrays, x: float, y: float, duration: float):
+    """What `Swing.aim` does."""
+    if time_left(w) > FROZEN:
+        w.foothold[0], w.foothold[1] = x, y
+        w.duration[0] = max(duration, w.time[0] + FROZEN)
+
+
+@compiled
+def _lead(reference, a, position, velocity, duration, dt):
+    """Axis `a` of the reference, `dt` further on its way to a place and a speed."""
+    reference[0, a], reference[1, a], reference[2, a] = quintic(
+        reference[0, a], reference[1, a], reference[2, a], position, velocity, 0.0, duration, dt
+    )
+
+
+@compiled
+def advance_swing(w: SwingArrays, dt: float):
+    """What `Swing.advance` does."""
+    rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
+    for a in range(2):
+        if rest > dt:
+            _lead(now, a, w.foothold[a], 0.0, rest, dt)
+        else:
+            now[0, a], now[1, a], now[2, a] = w.foothold[a], 0.0, 0.0
+    lift = w.lift * w.duration[0]
+    if w.time[0] + dt < lift:
+        _lead(now, 2, ground + w.apex, 0.0, lift - w.time[0], dt)
+    elif rest > dt:
+        _lead(now, 2, ground, -speed, rest, dt)
+    else:
+        now[0, 2], now[1, 2], now[2, 2] = now[0, 2] - speed * dt, -speed, 0.0
+    w.time[0] += dt
+
+
 class Swing:
     """Reference of one swing foot, planned anew each tick from its own last value: C² always.
 
@@ -53,18 +121,41 @@ class Swing:
     ground is late, on at the landing speed.
     """
 
-    FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
+    FROZEN = FROZEN
 
     def __init__(self, point: np.ndarray, duration: float, task: SwingTask, height: float):
-        omega = np.sqrt(GRAVITY / height)
-        self.task, self.duration, self.time = task, duration, 0.0
-        self.apex = task.clearance * height
-        self.ground = float(point[2])
-        self.landing_speed = task.landing_speed * height * omega
-        self.reference = np.zeros((3, 3))  # position, velocity, acceleration
-        self.reference[0] = point
-        self.foothold = np.array(point[:2])
-        self.shift = 0.0  # of the duration, by a policy [s]
+        speed = task.landing_speed * height * np.sqrt(GRAVITY / height)
+        self.task = task
+        self.arrays = SwingArrays(
+            apart((3, 3)), apart(2), apart(1), apart(1), apart(1), apart(1),
+            task.clearance * height, task.lift, float(speed),
+        )  # fmt: skip
+        start_swing(self.arrays, np.array(point, dtype=float), float(point[2]), float(duration))
+
+    @property
+    def reference(self) -> np.ndarray:
+        """(3, 3) position, velocity and acceleration [m, s]."""
+        return self.arrays.reference
+
+    @property
+    def foothold(self) -> np.ndarray:
+        """(2,) where it is to land [m]."""
+        return self.arrays.foothold
+
+    @property
+    def time(self) -> float:
+        """Since it began [s]."""
+        return float(self.arrays.time[0])
+
+    @property
+    def duration(self) -> float:
+        """From lift-off to touchdown [s]."""
+        return float(self.arrays.duration[0])
+
+    @property
+    def landing_speed(self) -> float:
+        """[m/s]."""
+        return self.arrays.landing_speed
 
     @property
     def remaining(self) -> float:
@@ -73,57 +164,72 @@ class Swing:
 
     def aim(self, foothold: np.ndarray, duration: float | None = None) -> None:
         """Lead to another `foothold` (2,), or at another time."""
-        if self.remaining > self.FROZEN:
-            self.foothold = np.array(foothold, dtype=float)
-            if duration is not None:
-                self.duration = max(duration, self.time + self.FROZEN)
+        duration = self.duration if duration is None else duration
+        aim_swing(self.arrays, float(foothold[0]), float(foothold[1]), float(duration))
 
     def advance(self, dt: float) -> np.ndarray:
         """(3, 3) position, velocity and acceleration [m, s] after `dt` more seconds."""
-        rest, speed = self.remaining, self.landing_speed
-        x, y, z = zip(*self.reference.tolist(), strict=True)  # numbers: faster than small arrays
-        aim = [(float(self.foothold[0]), 0.0, 0.0), (float(self.foothold[1]), 0.0, 0.0)]
-        if rest > dt:
-            ways = [quintic(now, end, rest, dt) for now, end in zip((x, y), aim, strict=True)]
-        else:
-            ways = aim
-        lift = self.task.lift * self.duration
-        if self.time + dt < lift:
-            ways.append(quintic(z, (self.ground + self.apex, 0.0, 0.0), lift - self.time, dt))
-        elif rest > dt:
-            ways.append(quintic(z, (self.ground, -speed, 0.0), rest, dt))
-        else:
-            ways.append((z[0] - speed * dt, -speed, 0.0))
-        self.reference, self.time = np.array(ways).T.copy(), self.time + dt
-        return self.reference
+        advance_swing(self.arrays, dt)
+        return self.reference.copy()
 
 
-def rotation_error(axes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """(3,) ½ Σ aᵢ × bᵢ of the columns of two frames: sine times axis of the turn from one to the
-    other."""
-    S = wanted @ axes.T
-    return 0.5 * np.array([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]])
+@compiled
+def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray):
+    """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn from
+    one to the other."""
+    for a in range(3):
+        i, j = (a + 1) % 3, (a + 2) % 3
+        total = 0.0
+        for k in range(3):
+            total += wanted[j, k] * axes[i, k] - wanted[i, k] * axes[j, k]
+        out[a] = 0.5 * total
+
+
+@dataclass(frozen=True, eq=False)
+class SwingGains(Block):
+    """A `SwingTask` in SI units."""
+
+    stiffness: float
+    damping: float
+    weight: float
+    turn_weight: float
+    error: np.ndarray  # (3,) scratch
+
+
+def swing_gains(robot: RobotArrays, task: SwingTask) -> SwingGains:
+    """`task` for one robot."""
+    g, rate2 = robot.gravity, robot.gravity / robot.height_com
+    k = task.stiffness * rate2
+    d = 2.0 * task.damping_ratio * np.sqrt(k)
+    return SwingGains(
+        stiffness=float(k), damping=float(d), weight=float(task.weight / g**2),
+        turn_weight=float(task.turn_weight / rate2**2), error=apart(3),
+    )  # fmt: skip
+
+
+@compiled
+def fill_swing_rows(s, sole, reference, axes, gains, A, b, weights):
+    """What `swing_rows` gives, into `A` (6, nv), `b` and `weights` (6,)."""
+    k, d, turn = gains.stiffness, gains.damping, gains.error
+    rotation_error(s.sole_axes[sole], axes, turn)
+    for a in range(3):
+        r = 6 * sole + a
+        b[a] = (
+            reference[2, a] + k * (reference[0, a] - s.sole_point[sole, a])
+            + d * (reference[1, a] - s.J_v[r]) - s.Jdot_v[r]
+        )  # fmt: skip
+        b[3 + a] = k * turn[a] - d * s.J_v[3 + r] - s.Jdot_v[3 + r]
+        weights[a], weights[3 + a] = gains.weight, gains.turn_weight
+    for r in range(6):
+        copy(s.J[6 * sole + r], A[r])
 
 
 def swing_rows(
     state: RobotState, sole: int, reference: np.ndarray, axes: np.ndarray, task: SwingTask
 ) -> Rows:
     """Rows (6, nv) in v̇ of one sole's SE(3) task: `reference` (3, 3), sole `axes` (3, 3)."""
-    h, g = state.robot.height_com, state.robot.gravity
-    rate2 = g / h
-    k = task.stiffness * rate2
-    d = 2.0 * task.damping_ratio * np.sqrt(k)
-    rows = slice(6 * sole, 6 * sole + 6)
-    J, velocity, bias = state.J[rows], state.J_v[rows], state.Jdot_v[rows]
-    turn = rotation_error(state.sole_axes[sole], axes)
-    wanted = np.concatenate(
-        [
-            reference[2]
-            + k * (reference[0] - state.sole_points[sole])
-            + d * (reference[1] - velocity[:3]),
-            k * turn - d * velocity[3:],
-        ]
-    )
-    weights = np.empty(6)
-    weights[:3], weights[3:] = task.weight / g**2, task.turn_weight / rate2**2
-    return Rows(J, wanted - bias, weights)
+    A, b, weights = apart((6, len(state.qvel))), apart(6), apart(6)
+    frames = np.array(reference, dtype=float), np.array(axes, dtype=float)
+    gains = swing_gains(state.robot, task)
+    fill_swing_rows(state.arrays, sole, *frames, gains, A, b, weights)
+    return Rows(A, b, weights)

@@ -161,6 +161,20 @@ def _array(context: Any, builder: Any, kind: types.Array, word: Any) -> Any:
     return array._getvalue()
 
 
+@dataclass(frozen=True, eq=False)
+class Erased(Block):
+    """Another block, of which a caller by address knows no more than where it lies.
+
+    A kernel that calls others by address is compiled once, whatever they work on.
+    """
+
+    inner: Block
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_address", self.inner.address)
+        object.__setattr__(self, "_type", BlockType("Erased", ()))
+
+
 def address_of(kernel: Any, block: Block) -> int:
     """The address of the compiled function `kernel(block)`, which returns nothing, for `call`.
 

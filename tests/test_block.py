@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from poise.envs.block import Block, address_of, call
+from poise.envs.block import Block, Erased, address_of, call
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +91,28 @@ def test_loops_see_what_they_have_written():
         return block.inner.vector[0]
 
     assert doubled(outer()) == 0.5 * 2**10
+
+
+def test_a_caller_by_address_need_not_know_the_block():
+    """Blocks of two kinds look alike to it; each kernel finds its own."""
+
+    @numba.njit
+    def call_it(kernel, block):
+        call(kernel, block)
+
+    @numba.njit
+    def count_up(block):
+        block.indices[0] += 1
+
+    @numba.njit
+    def fill(block):
+        block.vector[0] = 7.0
+
+    block, inner = outer(), outer().inner
+    for kernel, what in ((count_up, block), (fill, inner)):
+        call_it(address_of(kernel, what), Erased(what))
+    assert block.indices[0] == 4 and inner.vector[0] == 7.0
+    assert len(call_it.signatures) == 1
 
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda b: pickle.loads(pickle.dumps(b))])

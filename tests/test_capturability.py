@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial import ConvexHull
 
 from poise.baselines.capturability import (
+    SHARES,
     Reach,
     ankle_limits,
     capture_distance,
@@ -14,6 +16,7 @@ from poise.baselines.capturability import (
 )
 from poise.envs.simulation import Simulation
 
+from . import stepping_reference as readable
 from .shared import robot
 
 OMEGA = 3.5
@@ -105,3 +108,38 @@ def test_distance_beyond_the_reach_agrees_with_its_hull():
         assert np.all(gaps < 1e-9) and np.all(gaps > -0.01)
         far = feet.mean(axis=0) + np.array([5.0, 0.0])
         assert reach.beyond(feet[0], feet[1], yaw, far) > 3.0
+
+
+def generic_feet(rng):
+    """Two soles somewhere, and their yaw."""
+    yaw = rng.uniform(-3, 3)
+    feet = rng.uniform(-0.2, 0.2, (2, 2)) + np.array([[0.0, 0.2], [0.0, -0.2]])
+    return feet @ turn(yaw).T + rng.normal(size=2), yaw
+
+
+def test_reach_of_two_soles_is_the_hull_of_all_shares():
+    """The corners that Qhull finds, no others: their mean is where the robot comes to rest."""
+    reach, rng = Reach(robot()), np.random.default_rng(5)
+    for _ in range(20):
+        feet, yaw = generic_feet(rng)
+        cloud = np.vstack([
+            share * feet[0] + (1.0 - share) * feet[1] + sums @ turn(yaw).T
+            for share, sums in zip(SHARES, reach.arrays.sums, strict=True)
+        ])  # fmt: skip
+        expected = cloud[ConvexHull(cloud).vertices]
+        corners = reach.both(feet, yaw)
+        order, other = np.lexsort(corners.T.round(9)), np.lexsort(expected.T.round(9))
+        np.testing.assert_allclose(corners[order], expected[other], atol=1e-9)
+        edges = np.roll(corners, -1, axis=0) - corners
+        ahead = np.roll(edges, -1, axis=0)
+        assert np.all(edges[:, 0] * ahead[:, 1] - edges[:, 1] * ahead[:, 0] > 0.0)
+
+
+def test_distance_beyond_the_reach_is_that_of_the_readable_form():
+    """At generic points, within and outside."""
+    reach, rng = Reach(robot()), np.random.default_rng(6)
+    for _ in range(20):
+        feet, yaw = generic_feet(rng)
+        xi = feet.mean(axis=0) + rng.uniform(-0.3, 0.3, 2)
+        found = reach.beyond(feet[0], feet[1], yaw, xi)
+        assert found == pytest.approx(readable.beyond(reach, *feet, yaw, xi), abs=1e-9)

@@ -1,5 +1,8 @@
 """Steps where feet in place are not enough; none where they are."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -9,6 +12,7 @@ from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
 
+from . import stepping_reference as readable
 from .shared import robot
 
 QUIET_STEPS = 0
@@ -61,25 +65,35 @@ def test_feet_do_not_cross():
     assert min(widths) > 0.1
 
 
-def watched(controller, impulse, direction, look, duration=1.5):
-    """What `look(controller, state, torques)` says of each tick of a trial."""
-    seen, torques = [], controller.torques
+class Watched:
+    """A controller of which `look(controller, state, targets, torques)` sees every tick."""
 
-    def watch(state, targets):
-        tau = torques(state, targets)
-        seen.append(look(controller, state, tau))
+    def __init__(self, inner, look):
+        self.inner, self.look, self.seen, self.period = inner, look, [], inner.period
+
+    def __getattr__(self, name):
+        return getattr(self.inner, name)
+
+    def torques(self, state, targets):
+        tau = self.inner.torques(state, targets)
+        self.seen.append(self.look(self.inner, state, targets, tau))
         return tau
 
-    controller.torques = watch
-    trial(controller, impulse, direction, duration=duration)
-    return seen
+
+def watched(controller, impulse, direction, look, duration=1.5):
+    """What `look` says of each tick of a trial."""
+    watch = Watched(controller, look)
+    trial(watch, impulse, direction, duration=duration)
+    return watch.seen
 
 
 @pytest.mark.parametrize("direction", [0.0, 90.0])
 def test_torques_do_not_jump_at_a_switch(direction):
     """From the tick before the first step on, torques change by at most `jump` of their limits."""
     controller = load_controller("capture-step", robot())
-    ticks = watched(controller, 24.0, direction, lambda c, state, tau: (c.steps, tau.copy()))
+    ticks = watched(
+        controller, 24.0, direction, lambda c, state, targets, tau: (c.steps, tau.copy())
+    )
     first = next(i for i, (steps, _) in enumerate(ticks) if steps > 0)
     torques = np.array([tau for _, tau in ticks[first - 1 :]])
     changes = np.abs(np.diff(torques, axis=0)) / robot().torque_limit
@@ -91,7 +105,7 @@ def test_torques_do_not_jump_at_a_switch(direction):
 def test_a_foot_gives_its_load_away_before_it_lifts_off():
     """While it unloads, its part of the planned force falls; then the foot is no contact."""
 
-    def look(c, state, tau):
+    def look(c, *_):
         unloading = c.swing is not None and c.swing.time == 0.0
         return c.sets.workspace.wrenches[6 * c.foot + 2] if unloading else np.nan
 
@@ -109,8 +123,60 @@ def test_hips_that_are_used_up_bring_the_step_forward():
     for spin in (0.0, 0.5):
         settings = {**to_dict(controller_config("capture-step")), "spin": spin}
         controller = load_controller(settings, robot())
-        begun.append(watched(controller, 24.0, 0.0, lambda c, s, t: c.stepped, 0.6).index(True))
+        begun.append(watched(controller, 24.0, 0.0, lambda c, *_: c.stepped, 0.6).index(True))
     assert begun[1] < begun[0]
+
+
+@pytest.mark.parametrize("direction", [10.0, 200.0])
+def test_targets_are_those_of_the_readable_form(direction):
+    """What the QPs are asked for at every tick of a recovery, in a swing and after it."""
+    controller, kinds = load_controller("capture-step", robot()), set()
+    reach, stood = controller.reach, []
+
+    def look(c, state, targets, tau):
+        if not c.stepped:
+            return
+        yaw, feet = np.arctan2(*c.memory.level[1::-1, 0]), state.sole_points
+        if c.swing is not None:
+            stood.clear()
+            stance = 1 - c.foot
+            region, hips = reach.under(stance, feet[stance], yaw), 0.0
+            ground, way = feet[stance, 2], c.swing.foothold - feet[stance, :2]
+        else:
+            stood.append(feet.copy())
+            region, hips = reach.both(stood[0], yaw), c.config.hips
+            ground, way = feet[:, 2].mean(), feet[0, :2] - feet[1, :2]
+        kinds.add(c.swing is not None)
+        expected = readable.guided(c, state, targets, region, hips, ground, way)
+        for name, value in expected.items():
+            np.testing.assert_allclose(getattr(c._guided, name), value, rtol=1e-9, atol=1e-9)
+
+    controller.shift.clear()
+    watched(controller, 22.0, direction, look)
+    assert kinds == {True, False}
+
+
+def test_a_copy_is_a_controller_of_its_own():
+    """Pickled or deep-copied in a swing it plays the same trial, and leaves the original alone."""
+    _, env = trial("capture-step", 22.0, 180.0, duration=0.6)
+    original, end = env.controller, env.simulation.data.qpos.copy()
+    assert original.stepped
+    memory = [array.copy() for array in original.memory.members()]
+    for twin in (copy.deepcopy(original), pickle.loads(pickle.dumps(original))):
+        assert not twin.stepped
+        _, other = trial(twin, 22.0, 180.0, duration=0.6)
+        np.testing.assert_array_equal(other.simulation.data.qpos, end)
+    for array, before in zip(original.memory.members(), memory, strict=True):
+        np.testing.assert_array_equal(array, before)
+
+
+def test_another_solver_holds_the_feet_in_place():
+    """Python calls it until the first step; then the compiled problem takes over."""
+    settings = to_dict(controller_config("capture-step"))
+    settings["qp"]["solver"] = "daqp"
+    fallen, env = trial(settings, 24.0, 0.0, seed=1, duration=2.0)
+    assert env.compiled_step() is None
+    assert not fallen and env.controller.steps >= 1 and env.controller.failures == 0
 
 
 def test_replicas_start_anew():

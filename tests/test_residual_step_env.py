@@ -5,11 +5,11 @@ import inspect
 import numpy as np
 import pytest
 
-from poise.baselines.capturability import turn
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.baselines.residual_step_env import ResidualStepEnv, StepScales
 from poise.baselines.sensed_env import sensed_env
-from poise.envs.batch import replicate
+from poise.baselines.step_targets import copy_targets, guide
+from poise.envs.batch import EnvBatch, replicate
 from poise.envs.errors import ConfigError
 from poise.envs.observation import observation_table
 
@@ -51,6 +51,43 @@ def test_action_zero_is_the_planner_bit_for_bit(env):
     np.testing.assert_array_equal(data.qpos, expected.qpos)
     np.testing.assert_array_equal(data.qvel, expected.qvel)
     assert env.info()["steps"] == plain.controller.steps
+
+
+@pytest.mark.parametrize("controller", ["capture-step", "ipm-step"])
+def test_compiled_steps_are_those_of_python(controller):
+    """The same trial under a policy, tick by tick from Python: observations, rewards, metrics."""
+    env, ends = ResidualStepEnv(robot(), controller=controller, duration=1.2, residual=ALL), []
+    assert env.compiled_step() is not None
+    for compiled in (True, False):
+        env._compiled = compiled
+        rows: list = []
+        action = {"com_x": 0.2, "foothold_y": 0.3, "time": -0.2, "lean_y": 0.1, "trigger": -0.1}
+        play(env, action, until=lambda env, r=rows: r.append(env.episode.observation.copy()))
+        e, qpos = env.episode, env.simulation.data.qpos.copy()
+        ends.append([np.array(rows), e.reward_terms.copy(), e.metrics.copy(), qpos])
+        assert env.controller.steps >= 1 and len(rows) > 10
+    for one, other in zip(*ends, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6)
+
+
+def test_threads_do_not_share_anything():
+    """Four environments in two threads end where each ends alone."""
+    first = ResidualStepEnv(robot(), duration=0.6, pushes=None)
+    batch = EnvBatch(replicate(first, 4), threads=2)
+    options = [{"push": {**PUSH, "direction": 90.0 * k}} for k in range(4)]
+    batch.reset([0, 1, 2, 3], options)
+    actions = np.full((4, *first.action_space.shape), 0.1)
+    for _ in range(29):
+        batch.step(actions)
+    ends = [env.simulation.data.qpos.copy() for env in batch.envs]
+    batch.close()
+    assert [env.controller.steps > 0 for env in batch.envs] == [True] * 4
+    alone = ResidualStepEnv(robot(), duration=0.6, pushes=None)
+    for k, end in enumerate(ends):
+        alone.reset(seed=k, options=options[k])
+        for _ in range(29):
+            alone.step_in_place(actions[k])
+        np.testing.assert_array_equal(alone.simulation.data.qpos, end)
 
 
 def test_the_foothold_moves_by_what_is_added(env):
@@ -126,12 +163,14 @@ def test_rest_after_a_step_is_moved(env):
     play(env, until=swinging)
     controller, state = env.controller, env.simulation.state
     anywhere = 9.0 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-    targets, seen = controller._copy(state, env.targets), []
+    tick, seen = controller.tick(state, env.targets), []
     for shift in ([0.0, 0.0], [0.1, -0.05]):
-        controller.shift.com[:] = shift
-        controller._guide(state, targets, anywhere, 0.0, 0.0, np.zeros(2))
-        seen.append(targets.com_acc[:2].copy())
-    expected = state.omega**2 * controller.config.gain * turn(controller._yaw) @ [0.1, -0.05]
+        controller.shift.com = shift
+        copy_targets(tick)
+        guide(tick, anywhere, 0.0, 0.0, 0.0, 0.0)
+        seen.append(tick.guided.com_acc[:2].copy())
+    R = controller.memory.level[:2, :2]
+    expected = state.omega**2 * controller.config.gain * R @ [0.1, -0.05]
     np.testing.assert_allclose(seen[1] - seen[0], expected, atol=1e-9)
 
 

@@ -6,6 +6,7 @@ import pytest
 from poise.baselines.swing import Swing, SwingTask, quintic, rotation_error, swing_rows
 from poise.envs.simulation import Simulation
 
+from . import stepping_reference as readable
 from .shared import generic_state, robot
 
 DT, HEIGHT = 0.004, 0.8
@@ -15,7 +16,7 @@ def way(moves=(), duration=0.3, after=0.05):
     """(n, 3, 3) reference of a step of 0.4 m; `moves` are (time, foothold, duration)."""
     swing = Swing(np.array([0.1, 0.2, 0.0]), duration, SwingTask(), HEIGHT)
     swing.aim(np.array([0.5, 0.2]))
-    rows, moves = [swing.reference], list(moves)
+    rows, moves = [swing.reference.copy()], list(moves)
     while swing.time < swing.duration + after:
         if moves and swing.time >= moves[0][0]:
             swing.aim(*moves.pop(0)[1:])
@@ -23,21 +24,33 @@ def way(moves=(), duration=0.3, after=0.05):
     return np.array(rows), swing
 
 
+def generic_ends(seed):
+    """Position, velocity and acceleration at 0 and at T."""
+    return np.random.default_rng(seed).normal(size=(2, 3))
+
+
 def test_quintic_meets_both_ends():
     """Position, velocity and acceleration at 0 and T are those asked for."""
-    rng = np.random.default_rng(0)
-    start, end = rng.normal(size=(2, 3, 4))
-    np.testing.assert_allclose(quintic(start, end, 0.7, 0.0), start, atol=1e-9)
-    np.testing.assert_allclose(quintic(start, end, 0.7, 0.7), end, atol=1e-9)
+    start, end = generic_ends(0)
+    np.testing.assert_allclose(quintic(*start, *end, 0.7, 0.0), start, atol=1e-9)
+    np.testing.assert_allclose(quintic(*start, *end, 0.7, 0.7), end, atol=1e-9)
 
 
 def test_quintic_is_its_own_derivative():
     """Velocity and acceleration are the derivatives of position and velocity."""
-    rng = np.random.default_rng(1)
-    start, end = rng.normal(size=(2, 3, 4))
+    start, end = generic_ends(1)
     step = 1e-6
-    low, high, now = (np.array(quintic(start, end, 0.7, 0.3 + s)) for s in (-step, step, 0.0))
+    low, high, now = (np.array(quintic(*start, *end, 0.7, 0.3 + s)) for s in (-step, step, 0.0))
     np.testing.assert_allclose((high[:2] - low[:2]) / (2 * step), now[1:], rtol=1e-6, atol=1e-6)
+
+
+def test_the_way_is_that_of_the_readable_form():
+    """Every tick's reference follows from the last one: to the apex, down, and on."""
+    swing = Swing(np.array([0.1, 0.2, 0.01]), 0.3, SwingTask(), HEIGHT)
+    swing.aim(np.array([0.5, 0.1]))
+    while swing.time < 0.34:
+        expected = readable.advanced(swing, DT)
+        np.testing.assert_allclose(swing.advance(DT), expected, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("moves", [(), ((0.1, np.array([0.45, 0.3]), 0.35),)])
@@ -104,11 +117,26 @@ def test_rows_turn_the_sole_back():
     np.testing.assert_allclose(rows.b[3:], [k * angle, 0.0, 0.0], rtol=1e-3, atol=1e-6)
 
 
+def test_rows_are_those_of_the_readable_form():
+    """Matrix, right side and weights at generic points, for either sole."""
+    rng = np.random.default_rng(4)
+    for sole in range(2):
+        state = generic_state(seed=sole).state
+        reference, axes = rng.normal(size=(3, 3)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        task = SwingTask(weight=3.0, turn_weight=2.0, damping_ratio=0.7)
+        found = swing_rows(state, sole, reference, axes, task)
+        for part, expected in zip(
+            found, readable.swing_rows(state, sole, reference, axes, task), strict=True
+        ):
+            np.testing.assert_allclose(part, expected, rtol=1e-12, atol=1e-9)
+
+
 def test_rotation_error_is_the_mean_cross_product():
     """½ Σ aᵢ × bᵢ of the columns; for a turn by an angle about an axis, sin(angle) · axis."""
-    rng = np.random.default_rng(3)
+    rng, found = np.random.default_rng(3), np.zeros(3)
     a, b = rng.normal(size=(2, 3, 3))
-    expected = 0.5 * sum(np.cross(a[:, i], b[:, i]) for i in range(3))
-    np.testing.assert_allclose(rotation_error(a, b), expected, atol=1e-12)
+    rotation_error(a, b, found)
+    np.testing.assert_allclose(found, readable.rotation_error(a, b), atol=1e-12)
     turned = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
-    np.testing.assert_allclose(rotation_error(np.eye(3), turned), [0.0, 0.0, 0.6], atol=1e-12)
+    rotation_error(np.eye(3), turned, found)
+    np.testing.assert_allclose(found, [0.0, 0.0, 0.6], atol=1e-12)
