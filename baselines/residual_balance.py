@@ -14,6 +14,8 @@ from poise.envs.block import Block, Erased
 from poise.envs.config import build, to_dict
 from poise.envs.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.errors import ConfigError
+from poise.envs.mirror import Mirror, mirror_terms
+from poise.envs.observation import Term
 from poise.envs.robot import Robot
 from poise.envs.vector import make_vector_env
 
@@ -54,6 +56,14 @@ class ResidualScales:
             "momentum_x": self.momentum,
             "momentum_y": self.momentum,
         }
+
+
+def _action_term(name: str) -> Term:
+    """What the action `name` is to a mirror."""
+    if name[-2:] not in ("_x", "_y", "_z"):
+        return Term(name, (name,), "1", "", "number")
+    turns = name.startswith(("lean", "momentum"))
+    return Term(name, (name,), "1", "", "turn" if turns else "vector")
 
 
 class ResidualBalanceEnv(BalanceEnv):
@@ -303,6 +313,9 @@ class ResidualBalanceEnv(BalanceEnv):
     def _action_names(self) -> tuple[str, ...]:
         names = list(self.residual.entries())
         return tuple(names[i] for i in self._moved)
+
+    def _mirror_actions(self, joints: Mirror) -> Mirror:
+        return mirror_terms([_action_term(name) for name in self.action_names], joints, joints)
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self.targets.q_ref, self.targets.v_ref

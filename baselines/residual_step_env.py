@@ -145,12 +145,12 @@ class ResidualStepEnv(ResidualBalanceEnv):
         ground, stance = ("x", "y"), "the stance sole, 0 if both are down"
         return [
             *super()._observation_terms(soles),
-            Term("swing", tuple(soles), "1", "1 where the foot swings, else 0"),
-            Term("phase", ("share",), "1", "share of the swing that is over"),
-            Term("time_left", ("t",), "1/ω", "until touchdown is planned"),
-            Term("since", ("t",), "1/ω", "since the last touchdown"),
-            Term("steps", ("count",), "1", "steps begun"),
-            Term("feet", ground, "0.5 h", "first sole from the second"),
+            Term("swing", tuple(soles), "1", "1 where the foot swings, else 0", "feet"),
+            Term("phase", ("share",), "1", "share of the swing that is over", "number"),
+            Term("time_left", ("t",), "1/ω", "until touchdown is planned", "number"),
+            Term("since", ("t",), "1/ω", "since the last touchdown", "number"),
+            Term("steps", ("count",), "1", "steps begun", "number"),
+            Term("feet", ground, "0.5 h", "first sole from the second", "between feet"),
             Term("swing_foot", (*ground, "z"), "0.5 h", f"swinging sole from {stance}"),
             Term("foothold", ground, "0.5 h", f"foothold from {stance}"),
             Term("stance_capture_point", ground, "0.5 h", f"ξ from {stance}"),

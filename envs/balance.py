@@ -25,6 +25,7 @@ from .episode import (
     judge,
 )
 from .errors import ConfigError, PoiseError
+from .mirror import Mirror, mirror_joints, mirror_terms
 from .observation import Term, observation_terms, observe, scales
 from .push_info import push_info
 from .push_options import parse_pushes
@@ -117,6 +118,18 @@ class BalanceEnv(gymnasium.Env):
     def _observation_terms(self, soles: list[str]) -> list[Term]:
         """Parts of the observation: those that `observe` fills, then a subclass's own."""
         return observation_terms(self.robot.joint_names, soles, self.action_names)
+
+    def mirrors(self) -> tuple[Mirror, Mirror]:
+        """Left and right exchanged, in an observation and in an action.
+
+        Raises ConfigError for a robot that is not its own mirror image.
+        """
+        joints = mirror_joints(self.robot)
+        actions = self._mirror_actions(joints)
+        return mirror_terms(self.terms, joints, actions), actions
+
+    def _mirror_actions(self, joints: Mirror) -> Mirror:
+        raise NotImplementedError
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         """Joint positions and velocities (nj,) that the observation is relative to."""

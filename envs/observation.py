@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -39,14 +40,22 @@ def scales(robot: RobotArrays, support: np.ndarray) -> Scales:
     )
 
 
+Image = Literal["vector", "turn", "number", "joints", "feet", "between feet", "actions"]
+
+
 @dataclass(frozen=True)
 class Term:
-    """One named part of the observation vector."""
+    """One named part of the observation vector.
+
+    `image` is what it is to a mirror that exchanges left and right: a vector and a turn (an axial
+    vector) have entries that end in x, y or z.
+    """
 
     name: str
     entries: tuple[str, ...]
     unit: str
     meaning: str
+    image: Image = "vector"
 
     @property
     def size(self) -> int:
@@ -66,14 +75,14 @@ def observation_terms(
         Term("capture_point", ground, "half support", "ξ from the middle of the soles"),
         Term("cop", ground, "half support", "CoP from the middle of the soles"),
         Term("com_vel", space, "0.2 ω h", "CoM velocity"),
-        Term("angular_momentum", space, "0.1 m h² ω", "angular momentum about the CoM"),
+        Term("angular_momentum", space, "0.1 m h² ω", "angular momentum about the CoM", "turn"),
         Term("gravity", space, "1", "direction of gravity, root axes"),
-        Term("root_rate", space, "ω", "angular velocity of the root, root axes"),
+        Term("root_rate", space, "ω", "angular velocity of the root, root axes", "turn"),
         Term("load", ("z",), "m g", "vertical force of the ground minus the weight"),
-        Term("joint_pos", joints, "rad", "joint position minus the reference"),
-        Term("joint_vel", joints, "3 ω", "joint velocity minus the reference's"),
-        Term("contacts", soles, "1", "1 where the foot touches the ground, else 0"),
-        Term("last_action", actions, "1", "action of the step before"),
+        Term("joint_pos", joints, "rad", "joint position minus the reference", "joints"),
+        Term("joint_vel", joints, "3 ω", "joint velocity minus the reference's", "joints"),
+        Term("contacts", soles, "1", "1 where the foot touches the ground, else 0", "feet"),
+        Term("last_action", actions, "1", "action of the step before", "actions"),
     ]
 
 

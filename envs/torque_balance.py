@@ -14,6 +14,7 @@ from .block import Block
 from .episode import EpisodeArrays, Judge, judge_step, record_tick
 from .jit import compiled
 from .kinematics import StateArrays, update_state
+from .mirror import Mirror
 from .observation import Scales, observe
 from .robot import Robot
 from .simulation import advance
@@ -235,6 +236,10 @@ class TorqueBalanceEnv(BalanceEnv):
     def _action_names(self) -> tuple[str, ...]:
         model = self.robot.model
         return tuple(model.actuator(i).name for i in range(model.nu))
+
+    def _mirror_actions(self, joints: Mirror) -> Mirror:
+        driven = self.robot.motor_dofs - 6
+        return Mirror(np.searchsorted(driven, joints.order[driven]), joints.sign[driven])
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self.arrays.q_standing, self._still

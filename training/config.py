@@ -34,8 +34,11 @@ class PPOConfig:
     log_std_final: float | None = None  # linear in time from log_std_init; None: learned
     use_sde: bool = False  # exploration that is smooth in the state
     sde_sample_freq: int = field(default=16, metadata={"min": -1})  # [steps]
+    symmetric: bool = False  # the policy is its own mirror image, see `symmetry.py`
 
     def __post_init__(self):
+        if self.symmetric and self.use_sde:
+            raise ValueError("symmetric: not with use_sde")
         if self.n_envs * self.n_steps < 2:
             raise ValueError("n_envs × n_steps must be at least 2")
         if any(width < 1 for width in self.net_arch):

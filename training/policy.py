@@ -12,6 +12,7 @@ import torch
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build, packaged, packaged_folder, read_yaml
 from poise.envs.errors import ConfigError
+from poise.envs.mirror import Mirror
 from poise.envs.robot import Robot, load_robot
 
 from .checkpoints import (
@@ -37,7 +38,8 @@ class Policy:
     """The mean of a Gaussian actor: a = clip(W₃ tanh(W₂ tanh(W₁ ô + b₁) + b₂) + b₃, −1, 1).
 
     ô = clip((o − mean)/√(var + ε), ±clip) is the normalised observation. `config` is the run's
-    configuration, `state` what its state.json says (steps, robot, evaluations).
+    configuration, `state` what its state.json says (steps, robot, evaluations). With `mirrors` a
+    is the mean of it and of its mirror image, see `symmetry.py`.
     """
 
     def __init__(
@@ -49,8 +51,10 @@ class Policy:
         clip: float,
         epsilon: float,
         state: dict[str, Any],
+        mirrors: tuple[Mirror, Mirror] | None = None,
     ):
         self.config, self.state = config, state
+        self._mirrors = mirrors
         self.layers = layers
         self._mean, self._scale = mean, 1.0 / np.sqrt(var + epsilon)
         self._clip = clip
@@ -60,12 +64,19 @@ class Policy:
 
         An observation gives the same bits alone as in a batch: each is a product of its own.
         """
+        mean = self._mean_action(observation)
+        if self._mirrors is not None:
+            seen, done = self._mirrors
+            mean = 0.5 * (mean + done(self._mean_action(seen(observation))))
+        return np.clip(mean, -1.0, 1.0)
+
+    def _mean_action(self, observation: np.ndarray) -> np.ndarray:
         x = np.clip((observation - self._mean) * self._scale, -self._clip, self._clip)
         x = x[..., None, :]
         for weight, bias in self.layers[:-1]:
             x = np.tanh(x @ weight + bias)
         weight, bias = self.layers[-1]
-        return np.clip(x @ weight + bias, -1.0, 1.0)[..., 0, :]
+        return (x @ weight + bias)[..., 0, :]
 
     def make_env(self, **overrides: Any) -> BalanceEnv:
         """The environment that the policy was trained in; `overrides` as in `EnvConfig`."""
@@ -100,7 +111,8 @@ def load_policy(folder: str | Path | None = None, robot: Robot | None = None) ->
             raise ConfigError(
                 f"is for {size} {what}, the environment has {expected}", source=path / name
             )
-    return Policy(config, layers, mean, var, clip, epsilon, state)
+    mirrors = env.mirrors() if config.ppo.symmetric else None
+    return Policy(config, layers, mean, var, clip, epsilon, state, mirrors)
 
 
 def _locate(folder: str | Path | None) -> Path:

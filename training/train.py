@@ -19,6 +19,7 @@ from .callbacks import Checkpoints, Progress, Throughput
 from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
 from .schedules import CurriculumCallback, ExplorationCallback
+from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
 
 LAST, BEST = "last", "best"
@@ -77,8 +78,15 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
     def learning_rate(remaining: float) -> float:
         return ppo.final_learning_rate + remaining * (ppo.learning_rate - ppo.final_learning_rate)
 
+    policy: dict[str, Any] = {
+        "net_arch": list(ppo.net_arch),
+        "activation_fn": torch.nn.Tanh,
+        "log_std_init": ppo.log_std_init,
+    }
+    if ppo.symmetric:
+        policy["mirrors"] = env.env_method("mirrors", indices=0)[0]
     model = PPO(
-        "MlpPolicy",
+        MirroredPolicy if ppo.symmetric else "MlpPolicy",
         env,
         n_steps=ppo.n_steps,
         batch_size=ppo.batch_size,
@@ -92,11 +100,7 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         max_grad_norm=ppo.max_grad_norm,
         use_sde=ppo.use_sde,
         sde_sample_freq=ppo.sde_sample_freq,
-        policy_kwargs={
-            "net_arch": list(ppo.net_arch),
-            "activation_fn": torch.nn.Tanh,
-            "log_std_init": ppo.log_std_init,
-        },
+        policy_kwargs=policy,
         seed=config.seed,
         device="cpu",
         stats_window_size=500,
@@ -112,7 +116,10 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
 def _training_envs(config: TrainConfig) -> VecNormalize:
     envs = replicate(config.make_env(), config.ppo.n_envs)
     vec = ThreadedVecEnv(envs, config.threads)
-    return VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
+    normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
+    if config.ppo.symmetric:
+        normalize.obs_rms = MirroredMeanStd(envs[0].mirrors()[0])
+    return normalize
 
 
 def _reseed(model: PPO, env: VecNormalize, seed: int) -> None:
