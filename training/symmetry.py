@@ -49,12 +49,9 @@ class MirroredPolicy(ActorCriticPolicy):
 
     def __init__(self, *arguments: Any, mirrors: tuple[Mirror, Mirror], **named: Any):
         seen, done = mirrors
-        super().__init__(
-            *arguments,
-            features_extractor_class=BothSides,
-            features_extractor_kwargs={"mirror": seen},
-            **named,
-        )
+        named["features_extractor_class"] = BothSides
+        named["features_extractor_kwargs"] = {"mirror": seen}
+        super().__init__(*arguments, **named)
         self.mirror = TorchMirror(done)
         self.value_net.register_forward_hook(lambda layer, given, values: values.mean(dim=0))
 

@@ -118,7 +118,8 @@ def _training_envs(config: TrainConfig) -> VecNormalize:
     vec = ThreadedVecEnv(envs, config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
     if config.ppo.symmetric:
-        normalize.obs_rms = MirroredMeanStd(envs[0].mirrors()[0])
+        moments: Any = MirroredMeanStd(envs[0].mirrors()[0])
+        normalize.obs_rms = moments
     return normalize
 
 
