@@ -30,8 +30,9 @@ def mirror_joints(robot: Robot) -> Mirror:
     """How joint positions, velocities and torques (nv − 6) look in the mirror plane y = 0.
 
     A slide's axis a becomes S a, a hinge's −S a, S = diag(1, −1, 1), in the standing posture.
+    Places, axes and masses are compared; springs, dampers and armature may differ.
 
-    Raises ConfigError naming the robot and the joint, body or foot that has no mirror image.
+    Raises ConfigError naming the robot and the joint or body that has no mirror image.
     """
     model, data = robot.model, mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing_qpos
