@@ -28,7 +28,7 @@ def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float | np.ndarray) 
     return p + (xi - p) * np.exp(omega * t)
 
 
-def capture_distance(steps: int, reach: float, length: float, omega: float, time: float) -> float:
+def capture_distance(steps: float, reach: float, length: float, omega: float, time: float) -> float:
     """d_N = r + l a (1 − a^N)/(1 − a), a = e^(−ω T_s): how far the capture point may be from the
     stance foot to come to rest in N steps of length l and time T_s [Koolen12]."""
     a = np.exp(-omega * time)

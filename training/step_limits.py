@@ -17,7 +17,7 @@ from .players import Player
 from .trials import Outcome
 
 STEPPING = 0.1  # share of recoveries with a step, from which a controller is one that steps
-COUNTS = {"1": 1, "2": 2, "inf": 1_000_000}  # steps, by their name in summary.json
+COUNTS: dict[str, float] = {"1": 1, "2": 2, "inf": np.inf}  # steps, by their name in summary.json
 DRAWN = {"1": "one-step limit", "2": "two-step limit"}
 ROOM = 2.5  # times all else in a plot: what lies further out is cut off
 
@@ -59,7 +59,7 @@ class NStepLimit:
         fast = steps.time_min / np.hypot(x / steps.speed, y / steps.side_speed)
         return float(min(box, fast) * self.limits.robot.height_com)
 
-    def __call__(self, direction: float, duration: float, count: int) -> float:
+    def __call__(self, direction: float, duration: float, count: float) -> float:
         """J [N·s] of a square push of `duration` that `count` steps can stop."""
         omega, mass = self.limits.omega, self.limits.robot.mass
         r, length = self.reach(direction), self.length(direction)
