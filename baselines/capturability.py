@@ -108,7 +108,10 @@ class ReachArrays(Block):
 
 @compiled
 def distance_beyond(r, fx, fy, sx, sy, cos, sin, x, y):
-    """How far (x, y) lies outside what soles at f and s reach, see `Reach.beyond`."""
+    """How far (x, y) lies outside what soles at f and s reach together [m]; < 0 inside.
+
+    Measured along 48 DIRECTIONS only, which lets corners reach some millimetres further.
+    """
     worst = -np.inf
     for d in range(r.directions.shape[0]):
         # the direction, turned
@@ -124,7 +127,7 @@ def distance_beyond(r, fx, fy, sx, sy, cos, sin, x, y):
 
 @compiled
 def outside_reach(r, first, second, yaw, xi, out):
-    """What `Reach.beyond` gives, for rows of `first`, `second`, `xi`; one row stands for all."""
+    """`distance_beyond` of rows of `first`, `second`, `xi` into `out`; one row stands for all."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     for i in range(out.shape[0]):
         f, s, x = first[i % first.shape[0]], second[i % second.shape[0]], xi[i % xi.shape[0]]
@@ -133,7 +136,7 @@ def outside_reach(r, first, second, yaw, xi, out):
 
 @compiled
 def reach_of_one(r, sole, point, cos, sin, out):
-    """What `Reach.under` gives, into rows of `out` (≥ k, 2), and how many they are."""
+    """What a sole at `point` reaches alone into rows of `out` (≥ k, 2); how many they are."""
     for i in range(r.corners[sole]):
         u, v = r.alone[sole, i, 0], r.alone[sole, i, 1]
         out[i, 0], out[i, 1] = point[0] + cos * u - sin * v, point[1] + sin * u + cos * v
@@ -142,7 +145,8 @@ def reach_of_one(r, sole, point, cos, sin, out):
 
 @compiled
 def reach_of_two(r, points, cos, sin, cloud, out):
-    """What `Reach.both` gives, into rows of `out` (10 n + 1, 2), and how many they are.
+    """Hull of what two soles at `points` (2, ≥ 2) reach, for all shares of the load, into rows of
+    `out` (10 n + 1, 2); how many they are.
 
     `cloud` (5 n, 2) is scratch.
     """
@@ -216,8 +220,7 @@ class Reach:
     ) -> np.ndarray:
         """(n,) how far points `xi` (n, 2) lie outside what two soles reach together; < 0 inside.
 
-        Soles at `first` and `second`, (n, 2) or (2,). Measured along 48 DIRECTIONS only, which
-        lets corners reach some millimetres further.
+        Soles at `first` and `second`, (n, 2) or (2,); see `distance_beyond`.
         """
         rows = [np.array(v, dtype=float, ndmin=2) for v in (first, second, xi)]
         out = np.empty(max(len(points) for points in rows))

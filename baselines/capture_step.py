@@ -16,7 +16,7 @@ from .capturability import Reach, ReachArrays
 from .capture_tick import CaptureTick, StepGains, StepMemory, capture_tick
 from .contact_sets import ContactSets, contact_tick
 from .controller import Targets
-from .momentum_qp import MomentumQPConfig, Outputs, momentum_tick
+from .momentum_qp import COMPILED_SOLVER, MomentumQPConfig, Outputs, momentum_tick
 from .reduced_qp import QPParameters
 from .step_plan import Foothold, StepLimits, StepPlanner
 from .step_shift import STANDING, Stepping
@@ -62,13 +62,29 @@ class CaptureStepConfig:
     step_qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
 
 
+def check_qps(config: CaptureStepConfig) -> None:
+    """Raises ConfigError for what the QPs of a controller that steps cannot be."""
+    for name, qp in (("qp", config.qp), ("step_qp", config.step_qp)):
+        if qp.root != "hard":
+            raise ConfigError(f"must be 'hard', not {qp.root!r}", field=f"{name}.root")
+    if config.step_qp.solver != COMPILED_SOLVER:
+        raise ConfigError(
+            f"must be {COMPILED_SOLVER!r}, not {config.step_qp.solver!r}", field="step_qp.solver"
+        )
+    if config.step_qp.period != config.qp.period:
+        raise ConfigError(
+            f"must be that of qp, {config.qp.period}, not {config.step_qp.period}",
+            field="step_qp.period",
+        )
+
+
 def step_gains(robot: Robot, config: CaptureStepConfig, period: float) -> StepGains:
     """`config` in m and s, for one robot."""
     c, h, g = config, robot.height_com, -robot.model.opt.gravity[2]
     rate = float(np.sqrt(g / h))
     return StepGains(
-        rate=rate, trigger=c.trigger * h, spin=float(c.spin * rate / (robot.mass * g)),
-        again=c.again * h, gain=c.gain, hips=c.hips * h, leg=c.stretch * h, sink=c.sink * h,
+        trigger=c.trigger * h, spin=float(c.spin * rate / (robot.mass * g)),
+        again=c.again * h, gain=float(c.gain), hips=c.hips * h, leg=c.stretch * h, sink=c.sink * h,
         ramp=c.ramp / rate, unload=c.unload / rate, pause=c.pause / rate,
         root_accel=c.root_accel * rate**2, swing_accel=c.swing_accel * rate**2,
         joint_accel=c.joint_accel * rate**2, period=period,
@@ -91,8 +107,9 @@ class CaptureStep(AroundQP):
     Stands by `qp`, bit for bit, until the capture point ξ leaves what the CoP can reach; then
     steps until it is inside again, and stays where it came to rest. In a step the CoM follows
     c̈ = ω² (c − p), p = ξ + k (ξ − ξ_ref) at most at the edge of the soles in contact [Koolen12,
-    Englsberger11], and the foothold follows ξ. The ticks are those of `capture_tick.py`. Raises
-    ConfigError unless there are two soles.
+    Englsberger11], and the foothold follows ξ. The ticks are those of `capture_tick.py`; they are
+    bound to `config` and `planner` when they are made. Raises ConfigError unless there are two
+    soles, and both QPs have a hard root and one period.
     """
 
     def __init__(self, robot: Robot, config: CaptureStepConfig | None = None):
@@ -102,6 +119,7 @@ class CaptureStep(AroundQP):
             )
         prepare("contacts")
         self.config = config or CaptureStepConfig()
+        check_qps(self.config)
         super().__init__(robot, self.config.qp)
         self.sets = ContactSets(robot, self.config.step_qp, self.config.jump)
         self.reach = Reach(robot, self.config.share)
@@ -220,6 +238,6 @@ class CaptureStep(AroundQP):
         """Joint torques (nu,) [N·m] for the next `period`."""
         tick = self.tick(state, targets)
         capture_tick(tick)
-        if tick.passed[0]:
+        if tick.to_python[0]:
             return self.qp.torques(state, targets)
         return self.tau[self._motors]

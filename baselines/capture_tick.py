@@ -36,7 +36,6 @@ FIRST_LOAD = 0.3  # [m g] that a foot may bear at touchdown; then the limit rise
 class StepGains(Block):
     """The numbers of a `CaptureStepConfig` in m and s."""
 
-    rate: float  # ω
     trigger: float
     spin: float  # [m per N·m·s]
     again: float
@@ -88,7 +87,7 @@ class CaptureTick(Block):
     place: Tick  # feet in place
     tau: np.ndarray  # (nv−6,) what is found [N·m]
     failures: np.ndarray  # (1,) int: ticks that could not be solved
-    passed: np.ndarray  # (1,) int: 1 where the QP of `place` is left to Python
+    to_python: np.ndarray  # (1,) int: 1 where the QP of `place` is left to Python
     points: np.ndarray  # (k, 2) scratch
     cloud: np.ndarray  # (n, 2) scratch
     pair: np.ndarray  # (2,) scratch
@@ -214,15 +213,15 @@ def stand_tick(t: CaptureTick):
 
 @compiled
 def capture_tick(t: CaptureTick):
-    """One tick of `CaptureStep`: `tau` holds torques, unless `passed` says that Python must."""
+    """One tick of `CaptureStep`: `tau` holds torques, unless `to_python` says that Python must."""
     m = t.memory
-    t.passed[0] = 0
+    t.to_python[0] = 0
     if not m.swinging[0]:
         if must_step(t):
             begin_step(t)
         elif m.steps[0] == 0:
             if t.place_kernel == 0:
-                t.passed[0] = 1
+                t.to_python[0] = 1
                 return
             call(t.place_kernel, t.place)
             copy(t.place.problem.workspace.tau, t.tau)

@@ -47,7 +47,7 @@ def pendulum(c: float, velocity: float, p: float, omega: float, t: float) -> tup
 
 @compiled
 def energy_law(q: Search):
-    """The foothold over which the pendulum stands still, see `EnergyPlanner.footholds`."""
+    """The foothold over which the pendulum stands still, see `EnergyPlanner`."""
     s, foot, omega, t = q.state, q.foot[0], q.state.omega[0], q.time[0]
     x, vx = pendulum(s.com[0], s.com_vel[0], q.p[0], omega, t)
     y, vy = pendulum(s.com[1], s.com_vel[1], q.p[1], omega, t)
@@ -89,5 +89,6 @@ class IPMStep(CaptureStep):
 
     def _planner(self, reach: Reach) -> StepPlanner:
         config = self.config
-        assert isinstance(config, IPMStepConfig)
+        if not isinstance(config, IPMStepConfig):
+            raise TypeError(f"config must be an IPMStepConfig, not {type(config).__name__}")
         return EnergyPlanner(self.robot, reach, config.limits, config.foothold, config.arc)

@@ -207,6 +207,7 @@ class MomentumQP:
         self.workspace.iscratch[:] = 0  # no row to start from
         self.workspace.tau[:] = 0.0
         self.workspace.root_wrench[:] = 0.0
+        self.workspace.wrenches[:] = 0.0
         if self.solver is not None:
             self.solver.reset()
 

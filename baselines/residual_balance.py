@@ -314,8 +314,8 @@ class ResidualBalanceEnv(BalanceEnv):
         names = list(self.residual.entries())
         return tuple(names[i] for i in self._moved)
 
-    def _mirror_actions(self, joints: Mirror) -> Mirror:
-        return mirror_terms([_action_term(name) for name in self.action_names], joints, joints)
+    def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
+        return mirror_terms([_action_term(name) for name in self.action_names], {})
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self.targets.q_ref, self.targets.v_ref

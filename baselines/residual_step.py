@@ -48,7 +48,7 @@ class Residual(Block):
     scale: np.ndarray  # (na,) the offset that it moves by 1
     share: float  # of the way that a policy step goes from the last action to the next
     gate: float  # [m] see `openness`
-    offsets: np.ndarray  # (9,) see `update_targets`
+    offsets: np.ndarray  # (9,), 13 with steps: see `update_targets`
 
 
 @compiled

@@ -20,7 +20,18 @@ from poise.envs.vector import make_vector_env
 from .capture_tick import StepMemory
 from .residual_balance import ResidualBalanceEnv, ResidualScales
 from .residual_step import residual_step
-from .step_shift import StepShift, StepSight, observe_step
+from .step_shift import (
+    COM,
+    COP,
+    FOOTHOLD,
+    HEIGHT,
+    LEAN,
+    TIME,
+    TRIGGER,
+    StepShift,
+    StepSight,
+    observe_step,
+)
 from .swing import SwingArrays, time_left
 
 
@@ -139,7 +150,9 @@ class ResidualStepEnv(ResidualBalanceEnv):
         self._steps: SteppingStep | None = None
         if isinstance(controller.shift, StepShift):  # one array is both
             self._offsets = controller.shift.values
-            self._residual = replace(self._residual, offsets=self._offsets)
+        else:
+            self._offsets = apart(len(self._offsets))
+        self._residual = replace(self._residual, offsets=self._offsets)
 
     def _observation_terms(self, soles: list[str]) -> list[Term]:
         ground, stance = ("x", "y"), "the stance sole, 0 if both are down"
@@ -151,9 +164,9 @@ class ResidualStepEnv(ResidualBalanceEnv):
             Term("since", ("t",), "1/ω", "since the last touchdown", "number"),
             Term("steps", ("count",), "1", "steps begun", "number"),
             Term("feet", ground, "0.5 h", "first sole from the second", "between feet"),
-            Term("swing_foot", (*ground, "z"), "0.5 h", f"swinging sole from {stance}"),
-            Term("foothold", ground, "0.5 h", f"foothold from {stance}"),
-            Term("stance_capture_point", ground, "0.5 h", f"ξ from {stance}"),
+            Term("swing_foot", (*ground, "z"), "0.5 h", f"swinging sole from {stance}", "vector"),
+            Term("foothold", ground, "0.5 h", f"foothold from {stance}", "vector"),
+            Term("stance_capture_point", ground, "0.5 h", f"ξ from {stance}", "vector"),
         ]
 
     def _observe(self) -> None:
@@ -171,10 +184,10 @@ class ResidualStepEnv(ResidualBalanceEnv):
         offsets, shift = self._offsets, self.controller.shift
         if getattr(shift, "values", None) is offsets:
             return
-        shift.com, shift.cop = offsets[0:2].copy(), offsets[2:4].copy()
-        shift.height, shift.lean = float(offsets[4]), offsets[5:7].copy()
-        shift.foothold = offsets[9:11].copy()
-        shift.time, shift.trigger = float(offsets[11]), float(offsets[12])
+        shift.com, shift.cop, shift.lean, shift.foothold = (
+            offsets[first : first + 2].copy() for first in (COM, COP, LEAN, FOOTHOLD)
+        )
+        shift.height, shift.time, shift.trigger = offsets[[HEIGHT, TIME, TRIGGER]].tolist()
 
     def compiled_step(self) -> tuple[Any, Block] | None:
         """See `ResidualBalanceEnv`."""

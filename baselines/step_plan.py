@@ -66,7 +66,10 @@ class Plan(NamedTuple):
 
 
 class StepPlanner:
-    """Weighs steps of both feet, of several durations, by what of the fall they leave."""
+    """Weighs steps of both feet, of several durations, by what of the fall they leave.
+
+    A subclass may have another `law`; limits and choice count as they are at the first search.
+    """
 
     law: Any = staticmethod(capture_law)  #: compiled: finds the foothold of one foot and time
     arc = 0.0
@@ -89,7 +92,7 @@ class StepPlanner:
                 limits.speed * h * rate, limits.side_speed * h * rate,
                 limits.time_min / rate, limits.time_max / rate,
                 choice.overshoot * h, choice.outward * h, choice.margin * h,
-                choice.haste * h * rate, self.arc,
+                choice.haste * h * rate, float(self.arc),
                 apart(self.reach.arrays.alone.shape[1:]), apart(2), apart(2),
                 apart(1, dtype=np.int64), apart(1), apart(2), apart(1), apart(5),
                 apart(1, dtype=np.int64), 0,

@@ -141,7 +141,7 @@ def _shift_best(q: Search):
 
 @compiled
 def plan_step(q: Search):
-    """What `StepPlanner.plan` finds, into `best` and `best_foot`."""
+    """The cheapest step of either foot from where they stand, into `best` and `best_foot`."""
     q.best_foot[0] = -1
     for foot in range(2):
         take_foot(q, foot)
@@ -156,7 +156,7 @@ def plan_step(q: Search):
 
 @compiled
 def replan_step(q: Search, foot: int, w: SwingArrays):
-    """What `StepPlanner.replan` finds, into `best`."""
+    """Foothold and time left of the running step `w` of `foot`, into `best`."""
     low = max(q.time_min - w.time[0], FROZEN)
     high = max(q.time_max - w.time[0], low)
     left = max(time_left(w) - w.shift[0], FROZEN)

@@ -38,7 +38,7 @@ def joint_torques(state: RobotState, wrenches: np.ndarray) -> np.ndarray:
 
 @compiled
 def find_nearest(polygon: np.ndarray, point: np.ndarray, out: np.ndarray):
-    """What `nearest_inside` gives, into `out` (2,)."""
+    """The point of a convex counter-clockwise `polygon` (k, 2) nearest to `point` into `out`."""
     x, y = point[0], point[1]
     out[0], out[1] = x, y
     n, least, outside = polygon.shape[0], np.inf, False

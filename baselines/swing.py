@@ -75,13 +75,13 @@ def start_swing(w: SwingArrays, point: np.ndarray, ground: float, duration: floa
 
 @compiled
 def time_left(w: SwingArrays) -> float:
-    """What `Swing.remaining` gives."""
+    """Until touchdown is planned [s]."""
     return max(w.duration[0] - w.time[0], 0.0)
 
 
 @compiled
 def aim_swing(w: SwingArrays, x: float, y: float, duration: float):
-    """What `Swing.aim` does."""
+    """Lead to another foothold, or at another time, but for the last `FROZEN` seconds."""
     if time_left(w) > FROZEN:
         w.foothold[0], w.foothold[1] = x, y
         w.duration[0] = max(duration, w.time[0] + FROZEN)
@@ -97,7 +97,7 @@ def _lead(reference, a, position, velocity, duration, dt):
 
 @compiled
 def advance_swing(w: SwingArrays, dt: float):
-    """What `Swing.advance` does."""
+    """`dt` [s] further: up to the apex, down to the ground, on at the landing speed."""
     rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
     for a in range(2):
         if rest > dt:
@@ -160,10 +160,10 @@ class Swing:
     @property
     def remaining(self) -> float:
         """Seconds until touchdown is planned."""
-        return max(self.duration - self.time, 0.0)
+        return time_left(self.arrays)
 
     def aim(self, foothold: np.ndarray, duration: float | None = None) -> None:
-        """Lead to another `foothold` (2,), or at another time."""
+        """Lead to another `foothold` (2,), or at another time, see `aim_swing`."""
         duration = self.duration if duration is None else duration
         aim_swing(self.arrays, float(foothold[0]), float(foothold[1]), float(duration))
 
@@ -209,7 +209,7 @@ def swing_gains(robot: RobotArrays, task: SwingTask) -> SwingGains:
 
 @compiled
 def fill_swing_rows(s, sole, reference, axes, gains, A, b, weights):
-    """What `swing_rows` gives, into `A` (6, nv), `b` and `weights` (6,)."""
+    """Rows of a sole's task, see `SwingTask`, into `A` (6, nv), `b` and `weights` (6,)."""
     k, d, turn = gains.stiffness, gains.damping, gains.error
     rotation_error(s.sole_axes[sole], axes, turn)
     for a in range(3):

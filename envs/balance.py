@@ -25,7 +25,7 @@ from .episode import (
     judge,
 )
 from .errors import ConfigError, PoiseError
-from .mirror import Mirror, mirror_joints, mirror_terms
+from .mirror import Mirror, mirror_robot, mirror_terms
 from .observation import Term, observation_terms, observe, scales
 from .push_info import push_info
 from .push_options import parse_pushes
@@ -124,11 +124,11 @@ class BalanceEnv(gymnasium.Env):
 
         Raises ConfigError for a robot that is not its own mirror image.
         """
-        joints = mirror_joints(self.robot)
-        actions = self._mirror_actions(joints)
-        return mirror_terms(self.terms, joints, actions), actions
+        parts = mirror_robot(self.robot)
+        actions = self._mirror_actions(parts)
+        return mirror_terms(self.terms, {**parts, "actions": actions}), actions
 
-    def _mirror_actions(self, joints: Mirror) -> Mirror:
+    def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
         raise NotImplementedError
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:

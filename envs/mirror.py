@@ -1,6 +1,6 @@
 """Left and right exchanged: what the mirror image of a robot observes, and does."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -26,30 +26,42 @@ class Mirror:
         return self.sign * values[..., self.order]
 
 
-def mirror_joints(robot: Robot) -> Mirror:
-    """How joint positions, velocities and torques (nv − 6) look in the mirror plane y = 0.
+def mirror_robot(robot: Robot) -> dict[str, Mirror]:
+    """How joints, motors and the axes of the root look in the mirror plane y = 0.
 
-    A slide's axis a becomes S a, a hinge's −S a, S = diag(1, −1, 1), in the standing posture.
-    Places, axes and masses are compared; springs, dampers and armature may differ.
+    In the standing posture, with S = diag(1, −1, 1): a slide's axis a becomes S a, a hinge's −S a;
+    with the root's axes R, a vector along them becomes Rᵀ S R u, a turn −Rᵀ S R u. Places, axes,
+    masses and torque limits are compared; inertia, joint ranges, springs, dampers and armature may
+    differ. "joints" (nv − 6), "motors" (nu), "root vector" and "root turn" (3).
 
-    Raises ConfigError naming the robot and the joint or body that has no mirror image.
+    Raises ConfigError naming the robot and the body, joint or motor that has no mirror image.
     """
-    model, data = robot.model, mujoco.MjData(robot.model)
+    data = mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing_qpos
-    mujoco.mj_kinematics(model, data)
-    near = TOLERANCE * robot.height_com
-    root = data.xmat[robot.root_body_id].reshape(3, 3)
-    if abs(root[:, 1] - [0.0, 1.0, 0.0]).max() > TOLERANCE:
-        raise _lopsided(robot, f"the root {robot.description.root!r} does not point to the front")
+    mujoco.mj_kinematics(robot.model, data)
+    _check_bodies(robot, data)
+    joints = _mirror_joints(robot, data)
+    vector = _mirror_root(robot, data)
+    return {
+        "joints": joints,
+        "motors": _mirror_motors(robot, joints),
+        "root vector": vector,
+        "root turn": Mirror(vector.order, -vector.sign),
+    }
+
+
+def _check_bodies(robot: Robot, data: mujoco.MjData) -> None:
+    model, near = robot.model, TOLERANCE * robot.height_com
     for body in range(1, model.nbody):
-        away = (
-            abs(data.xipos - SIDES * data.xipos[body]).max(axis=1)
-            + abs(model.body_mass - model.body_mass[body]) / robot.mass
-        )
-        if away.min() > near:
+        there = abs(data.xipos - SIDES * data.xipos[body]).max(axis=1) < near
+        same = abs(model.body_mass - model.body_mass[body]) < TOLERANCE * robot.mass
+        if not np.any(there & same):
             raise _lopsided(robot, f"the body {model.body(body).name!r} has no mirror image")
-    order, sign = [], []
-    kinds, places, axes = model.jnt_type[1:], data.xanchor[1:], data.xaxis[1:]
+
+
+def _mirror_joints(robot: Robot, data: mujoco.MjData) -> Mirror:
+    near, order, sign = TOLERANCE * robot.height_com, [], []
+    kinds, places, axes = robot.model.jnt_type[1:], data.xanchor[1:], data.xaxis[1:]
     for joint, name in enumerate(robot.joint_names):
         hinge = kinds[joint] == mujoco.mjtJoint.mjJNT_HINGE
         axis = (-SIDES if hinge else SIDES) * axes[joint]
@@ -63,16 +75,33 @@ def mirror_joints(robot: Robot) -> Mirror:
     return Mirror(np.array(order), np.array(sign))
 
 
-def mirror_terms(terms: Sequence[Term], joints: Mirror, actions: Mirror) -> Mirror:
-    """How an observation with these `terms` looks in the mirror, by their `image`."""
+def _mirror_motors(robot: Robot, joints: Mirror) -> Mirror:
+    driven, limit = robot.motor_dofs - 6, robot.torque_limit
+    motors = {int(joint): motor for motor, joint in enumerate(driven)}
+    images = [motors.get(int(joint), -1) for joint in joints.order[driven]]
+    for motor, image in enumerate(images):
+        if image < 0 or abs(limit[image] - limit[motor]) > TOLERANCE * limit[motor]:
+            name = robot.joint_names[driven[motor]]
+            raise _lopsided(robot, f"the motor of {name!r} has no mirror image of its strength")
+    return Mirror(np.array(images), joints.sign[driven])
+
+
+def _mirror_root(robot: Robot, data: mujoco.MjData) -> Mirror:
+    axes = data.xmat[robot.root_body_id].reshape(3, 3)
+    image = axes.T @ (SIDES[:, None] * axes)
+    order = abs(image).argmax(axis=1)
+    sign = image[np.arange(3), order]
+    if abs(sign).min() < 1.0 - TOLERANCE:
+        name = robot.description.root
+        raise _lopsided(robot, f"the axes of the root {name!r} are not each other's mirror images")
+    return Mirror(order, np.sign(sign))
+
+
+def mirror_terms(terms: Sequence[Term], parts: Mapping[str, Mirror]) -> Mirror:
+    """How values of these `terms` look in the mirror; `parts` by what their `image` names."""
     order, sign, first = [], [], 0
     for term in terms:
-        if term.image == "joints":
-            part = joints
-        elif term.image == "actions":
-            part = actions
-        else:
-            part = _plain(term)
+        part = parts[term.image] if term.image in parts else _plain(term)
         order.append(first + part.order)
         sign.append(part.sign)
         first += term.size

@@ -40,22 +40,27 @@ def scales(robot: RobotArrays, support: np.ndarray) -> Scales:
     )
 
 
-Image = Literal["vector", "turn", "number", "joints", "feet", "between feet", "actions"]
+# fmt: off
+Image = Literal[
+    "vector", "turn", "root vector", "root turn", "number", "joints", "feet", "between feet",
+    "actions",
+]
+# fmt: on
 
 
 @dataclass(frozen=True)
 class Term:
     """One named part of the observation vector.
 
-    `image` is what it is to a mirror that exchanges left and right: a vector and a turn (an axial
-    vector) have entries that end in x, y or z.
+    `image` is what it is to a mirror that exchanges left and right. Entries of a vector or a turn
+    (an axial vector) end in x, y or z; those along the root's axes have all three.
     """
 
     name: str
     entries: tuple[str, ...]
     unit: str
     meaning: str
-    image: Image = "vector"
+    image: Image
 
     @property
     def size(self) -> int:
@@ -70,15 +75,15 @@ def observation_terms(
     ground, space = ("x", "y"), ("x", "y", "z")
     joints, soles, actions = tuple(joints), tuple(soles), tuple(actions)
     return [
-        Term("com", ground, "half support", "CoM from the middle of the soles"),
-        Term("com_height", ("z",), "0.1 h", "CoM height minus its standing value"),
-        Term("capture_point", ground, "half support", "ξ from the middle of the soles"),
-        Term("cop", ground, "half support", "CoP from the middle of the soles"),
-        Term("com_vel", space, "0.2 ω h", "CoM velocity"),
+        Term("com", ground, "half support", "CoM from the middle of the soles", "vector"),
+        Term("com_height", ("z",), "0.1 h", "CoM height minus its standing value", "vector"),
+        Term("capture_point", ground, "half support", "ξ from the middle of the soles", "vector"),
+        Term("cop", ground, "half support", "CoP from the middle of the soles", "vector"),
+        Term("com_vel", space, "0.2 ω h", "CoM velocity", "vector"),
         Term("angular_momentum", space, "0.1 m h² ω", "angular momentum about the CoM", "turn"),
-        Term("gravity", space, "1", "direction of gravity, root axes"),
-        Term("root_rate", space, "ω", "angular velocity of the root, root axes", "turn"),
-        Term("load", ("z",), "m g", "vertical force of the ground minus the weight"),
+        Term("gravity", space, "1", "direction of gravity, root axes", "root vector"),
+        Term("root_rate", space, "ω", "angular velocity of the root, root axes", "root turn"),
+        Term("load", ("z",), "m g", "vertical force of the ground minus the weight", "vector"),
         Term("joint_pos", joints, "rad", "joint position minus the reference", "joints"),
         Term("joint_vel", joints, "3 ω", "joint velocity minus the reference's", "joints"),
         Term("contacts", soles, "1", "1 where the foot touches the ground, else 0", "feet"),

@@ -237,9 +237,8 @@ class TorqueBalanceEnv(BalanceEnv):
         model = self.robot.model
         return tuple(model.actuator(i).name for i in range(model.nu))
 
-    def _mirror_actions(self, joints: Mirror) -> Mirror:
-        driven = self.robot.motor_dofs - 6
-        return Mirror(np.searchsorted(driven, joints.order[driven]), joints.sign[driven])
+    def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
+        return parts["motors"]
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self.arrays.q_standing, self._still

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from poise.baselines.capture_step import CaptureStep, CaptureStepConfig
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.baselines.step_shift import COM, COP, HEIGHT, LEAN
 from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
 
@@ -151,13 +153,17 @@ def test_targets_are_those_of_the_readable_form(direction):
         for name, value in expected.items():
             np.testing.assert_allclose(getattr(c._guided, name), value, rtol=1e-9, atol=1e-9)
 
-    controller.shift.clear()
+    shift = controller.shift  # cleared by the reset, so it is set at every tick
+    shift.clear = lambda: shift.values.__setitem__(slice(None), moved)
+    moved = np.zeros(len(shift.values))
+    moved[[COM, COM + 1, COP, COP + 1, HEIGHT]] = 0.02, -0.01, 0.01, 0.005, -0.01
+    moved[[LEAN, LEAN + 1]] = 0.05, 0.08
     watched(controller, 22.0, direction, look)
-    assert kinds == {True, False}
+    assert kinds == {True, False} and np.array_equal(shift.values, moved)
 
 
 def test_a_copy_is_a_controller_of_its_own():
-    """Pickled or deep-copied in a swing it plays the same trial, and leaves the original alone."""
+    """Pickled or copied after a step it plays the same trial, and leaves the original alone."""
     _, env = trial("capture-step", 22.0, 180.0, duration=0.6)
     original, end = env.controller, env.simulation.data.qpos.copy()
     assert original.stepped
@@ -168,6 +174,39 @@ def test_a_copy_is_a_controller_of_its_own():
         np.testing.assert_array_equal(other.simulation.data.qpos, end)
     for array, before in zip(original.memory.members(), memory, strict=True):
         np.testing.assert_array_equal(array, before)
+
+
+def test_a_step_at_the_first_tick_does_not_know_the_trial_before():
+    """Thrown forward from the start, it ends as a new controller does."""
+    ends, old = [], load_controller("capture-step", robot())
+    trial(old, 20.0, 180.0, duration=0.6)
+    for controller in (load_controller("capture-step", robot()), old):
+        env = ResidualBalanceEnv(robot(), controller=controller, duration=0.5)
+        qvel = np.zeros(robot().model.nv)
+        qvel[0] = 1.3
+        env.reset(options={"push": [], "qpos": robot().standing_qpos, "qvel": qvel})
+        for _ in range(10):
+            env.step_in_place(np.zeros(4))
+        assert controller.steps >= 1
+        ends.append(env.simulation.data.qpos.copy())
+    np.testing.assert_array_equal(*ends)
+
+
+@pytest.mark.parametrize(
+    ("qp", "changes", "named"),
+    [
+        ("qp", {"root": "soft"}, r"qp\.root: must be 'hard'"),
+        ("step_qp", {"root": "soft"}, r"step_qp\.root: must be 'hard'"),
+        ("step_qp", {"solver": "daqp"}, r"step_qp\.solver: must be 'active-set'"),
+        ("step_qp", {"period": 0.002}, r"step_qp\.period: must be that of qp"),
+    ],
+)
+def test_qps_that_cannot_step_are_refused(qp, changes, named):
+    """A wrench on the root has no meaning in a step; the contact QPs have one solver and period."""
+    config = controller_config("capture-step")
+    config = replace(config, **{qp: replace(getattr(config, qp), **changes)})
+    with pytest.raises(ConfigError, match=named):
+        CaptureStep(robot(), config)
 
 
 def test_another_solver_holds_the_feet_in_place():

@@ -59,13 +59,34 @@ def test_the_pendulum_moves_by_its_equation():
     np.testing.assert_allclose(position + velocity / OMEGA, xi, atol=1e-12)
 
 
-def planner(arc, **limits):
-    """A planner with wide limits and no sideways offset."""
+def planner(arc, outward=0.0, **limits):
+    """A planner with wide limits."""
     wide = {"ahead": 9.0, "behind": 9.0, "width_min": 1e-3, "width_max": 9.0, "speed": 99.0}
     return EnergyPlanner(
         robot(), Reach(robot()), StepLimits(**{**wide, "side_speed": 99.0, **limits}),
-        Foothold(outward=0.0), arc,
+        Foothold(outward=outward), arc,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("foot", [0, 1])
+def test_a_policy_and_the_configuration_move_footholds(foot):
+    """`outward` [h] to the foot's own side, the policy's shift along the heading."""
+    state = generic_state().state.copy()
+    times, yaw, start = np.array([0.3]), state.heading_yaw, state.sole_points[foot, :2]
+    plain, moved = planner(0.5), planner(0.5, outward=0.05)
+    moved.shift.foothold[:] = 0.02, -0.01
+    (before,), _ = plain.footholds(state, foot, yaw, times, start)
+    (after,), _ = moved.footholds(state, foot, yaw, times, start)
+    side = 1.0 if foot == 0 else -1.0  # the left foot is the first
+    cos, sin = state.heading
+    local = np.array([[cos, sin], [-sin, cos]]) @ (after - before)
+    np.testing.assert_allclose(local, [0.02, side * 0.05 * robot().height_com - 0.01], atol=1e-12)
+
+
+def test_another_configuration_is_refused():
+    """The planner needs its `arc`."""
+    with pytest.raises(TypeError, match="must be an IPMStepConfig"):
+        IPMStep(robot(), controller_config("capture-step"))
 
 
 def test_without_limits_a_linear_pendulum_steps_onto_the_capture_point():

@@ -1,5 +1,6 @@
 """Left and right exchanged: the mirror image of a trial is the trial of the mirror image."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
 from poise.baselines.residual_step_env import ResidualStepEnv, StepScales
 from poise.envs.errors import ConfigError
-from poise.envs.mirror import mirror_joints
+from poise.envs.mirror import mirror_robot
 from poise.envs.robot import load_robot
 from poise.envs.torque_balance import TorqueBalanceEnv
 
@@ -21,9 +22,9 @@ BODY = {"height": 0.05, "lean": 0.2, "momentum": 0.05}
 def even():
     """The humanoid without what Gymnasium's file gives one side only."""
     even = load_robot()
-    model, joints = even.model, mirror_joints(even)
+    model, joints = even.model, mirror_robot(even)["joints"]
     for values in (model.jnt_stiffness[1:], model.dof_armature[6:]):
-        assert np.sum(values != values[joints.order]) == 2  # left knee's spring, right hip
+        assert np.sum(values != values[joints.order]) == 2  # the left knee's spring, the left hip
         values[:] = 0.5 * (values + values[joints.order])
     return even
 
@@ -37,7 +38,7 @@ ENVS = {
 
 def test_joints_of_the_humanoid():
     """Legs and arms change sides; of the trunk's joints, those about x and z change their sign."""
-    names, mirror = robot().joint_names, mirror_joints(robot())
+    names, mirror = robot().joint_names, mirror_robot(robot())["joints"]
     for name, image, sign in zip(names, mirror.order, mirror.sign, strict=True):
         sides = {"left": "right", "right": "left"}
         side, _, joint = name.partition("_")
@@ -70,13 +71,41 @@ def test_a_mirrored_trial(kind, even):
     assert env.info().get("steps", 1) == 1
 
 
+@pytest.mark.parametrize("name", ["compact", "tall", "toddler"])
+def test_other_robots_in_the_air(name):
+    """Falling with a twist under random torques: mirror images of each other to rounding.
+
+    `tall` has a root whose axes do not point to the front.
+    """
+    env = TorqueBalanceEnv(robot(name), duration=1.0, pushes=None)
+    seen, done = env.mirrors()
+    actions = np.random.default_rng(1).uniform(-0.3, 0.3, (5, *env.action_space.shape))
+    flip = mirror_robot(robot(name))
+    trials = []
+    for side in (1.0, -1.0):
+        qpos, qvel = robot(name).standing_qpos.copy(), np.zeros(robot(name).model.nv)
+        qpos[2] += 0.3
+        turn = np.array([0.5, 0.4, 0.6])
+        qvel[:3] = 0.3, 0.4 * side, 0.1
+        qvel[3:6] = turn if side > 0.0 else flip["root turn"](turn)
+        env.reset(options={"qpos": qpos, "qvel": qvel})
+        rows = []
+        for action in actions:
+            env.step_in_place(action if side > 0.0 else done(action))
+            rows.append(env.episode.observation.copy())
+        trials.append(np.array(rows))
+    one, other = trials
+    np.testing.assert_allclose(seen(one), other, atol=1e-9)
+    assert abs(one - other).max() > 0.1
+
+
 def test_a_robot_that_limps():
-    """One heavier foot has no mirror image: an error names it."""
-    one = robot()
-    before = one.model.body_mass.copy()
-    try:
-        one.model.body_mass[one.soles[0].body_id] *= 1.1
-        with pytest.raises(ConfigError, match="foot.*no mirror image"):
-            mirror_joints(one)
-    finally:
-        one.model.body_mass[:] = before
+    """One heavier foot has no mirror image, nor has one weaker motor: errors name them."""
+    one = load_robot()
+    limit = one.torque_limit.copy()
+    limit[list(one.motor_dofs - 6).index(one.joint_names.index("left_knee"))] *= 0.5
+    with pytest.raises(ConfigError, match="the motor of '.*knee' has no mirror image"):
+        mirror_robot(replace(one, torque_limit=limit))
+    one.model.body_mass[one.soles[0].body_id] *= 1.1
+    with pytest.raises(ConfigError, match="the body '.*foot' has no mirror image"):
+        mirror_robot(one)

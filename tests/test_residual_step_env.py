@@ -5,6 +5,7 @@ import inspect
 import numpy as np
 import pytest
 
+from poise.baselines import step_shift
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.baselines.residual_step_env import ResidualStepEnv, StepScales
 from poise.baselines.sensed_env import sensed_env
@@ -55,7 +56,7 @@ def test_action_zero_is_the_planner_bit_for_bit(env):
 
 @pytest.mark.parametrize("controller", ["capture-step", "ipm-step"])
 def test_compiled_steps_are_those_of_python(controller):
-    """The same trial under a policy, tick by tick from Python: observations, rewards, metrics."""
+    """The same trial under a policy, ticks called from Python: observations, rewards, metrics."""
     env, ends = ResidualStepEnv(robot(), controller=controller, duration=1.2, residual=ALL), []
     assert env.compiled_step() is not None
     for compiled in (True, False):
@@ -68,6 +69,17 @@ def test_compiled_steps_are_those_of_python(controller):
         assert env.controller.steps >= 1 and len(rows) > 10
     for one, other in zip(*ends, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6)
+
+
+def test_entries_are_in_the_order_of_the_shift():
+    """What an action is called is where the controller reads it."""
+    names = list(StepScales().entries())
+    assert len(names) == step_shift.SHIFTS
+    for name in ("com", "cop", "lean", "foothold"):
+        first = getattr(step_shift, name.upper())
+        assert names[first : first + 2] == [f"{name}_x", f"{name}_y"]
+    for name, entry in (("HEIGHT", "com_z"), ("TIME", "time"), ("TRIGGER", "trigger")):
+        assert names[getattr(step_shift, name)] == entry
 
 
 def test_threads_do_not_share_anything():

@@ -71,13 +71,19 @@ def test_statistics_are_symmetric(config):
 
 
 def test_a_symmetric_run_resumes(config, run):
-    """It goes on from its weights and statistics."""
+    """It goes on from its weights and statistics, which stay symmetric."""
     longer = replace(config, steps=config.steps + 64)
-    before = load_policy(run / "last").layers[0][0]
+    before = load_policy(run / "last")
+    with np.load(run / "last" / "vecnormalize.npz") as data:
+        count = float(data["obs_count"])
     train(longer, run, resume=True, progress=False)
     after = load_policy(run / "last")
     assert after.state["timesteps"] == longer.steps
-    assert 0.0 < abs(after.layers[0][0] - before).max() < 0.01
+    assert 0.0 < abs(after.layers[0][0] - before.layers[0][0]).max() < 0.01
+    seen, _ = after.make_env().mirrors()
+    with np.load(run / "last" / "vecnormalize.npz") as data:
+        assert data["obs_count"] > count + 2 * 64  # each with its mirror image
+        np.testing.assert_allclose(seen(data["obs_mean"]), data["obs_mean"], atol=1e-9)
 
 
 def test_not_with_state_dependent_noise():

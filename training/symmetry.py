@@ -57,8 +57,10 @@ class MirroredPolicy(ActorCriticPolicy):
 
     def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:
         mean, image = self.action_net(latent_pi)
+        mean = 0.5 * (mean + self.mirror(image))
+        log_std = 0.5 * (self.log_std + self.log_std[self.mirror.order])
         assert isinstance(self.action_dist, DiagGaussianDistribution)
-        return self.action_dist.proba_distribution(0.5 * (mean + self.mirror(image)), self.log_std)
+        return self.action_dist.proba_distribution(mean, log_std)
 
 
 class MirroredMeanStd(RunningMeanStd):

@@ -114,11 +114,11 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
 
 
 def _training_envs(config: TrainConfig) -> VecNormalize:
-    envs = replicate(config.make_env(), config.ppo.n_envs)
-    vec = ThreadedVecEnv(envs, config.threads)
+    env = config.make_env()
+    moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
+    vec = ThreadedVecEnv(replicate(env, config.ppo.n_envs), config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
-    if config.ppo.symmetric:
-        moments: Any = MirroredMeanStd(envs[0].mirrors()[0])
+    if moments is not None:
         normalize.obs_rms = moments
     return normalize
 
