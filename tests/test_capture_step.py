@@ -130,7 +130,7 @@ def test_hips_that_are_used_up_bring_the_step_forward():
 
 
 @pytest.mark.parametrize("direction", [10.0, 200.0])
-def test_targets_are_those_of_the_readable_form(direction):
+def test_targets_are_those_of_the_readable_form(direction, monkeypatch):
     """What the QPs are asked for at every tick of a recovery, in a swing and after it."""
     controller, kinds = load_controller("capture-step", robot()), set()
     reach, stood = controller.reach, []
@@ -153,11 +153,11 @@ def test_targets_are_those_of_the_readable_form(direction):
         for name, value in expected.items():
             np.testing.assert_allclose(getattr(c._guided, name), value, rtol=1e-9, atol=1e-9)
 
-    shift = controller.shift  # cleared by the reset, so it is set at every tick
-    shift.clear = lambda: shift.values.__setitem__(slice(None), moved)
+    shift = controller.shift
     moved = np.zeros(len(shift.values))
     moved[[COM, COM + 1, COP, COP + 1, HEIGHT]] = 0.02, -0.01, 0.01, 0.005, -0.01
     moved[[LEAN, LEAN + 1]] = 0.05, 0.08
+    monkeypatch.setattr(shift, "clear", lambda: np.copyto(shift.values, moved))  # by the reset
     watched(controller, 22.0, direction, look)
     assert kinds == {True, False} and np.array_equal(shift.values, moved)
 
