@@ -182,6 +182,28 @@ def test_resuming_goes_on_from_the_weights(run):
     assert [int(row["timesteps"]) for row in evaluations(run)] == [0, 128, 192, 256]
 
 
+def test_a_run_starts_from_a_policy(tmp_path):
+    """Its first evaluation is that policy's; weights go on from there, steps from 0."""
+    first = tiny_config(start_from=str(finished_run() / "last"), seed=5)
+    train(first, tmp_path / "run", progress=False)
+    before, after = weights(finished_run()), weights(tmp_path / "run")
+    change = max(abs(a - b).max() for a, b in zip(before, after, strict=True))
+    assert 0.0 < change < 0.05  # another seed's own first weights are further away
+    assert state(tmp_path / "run")["timesteps"] == first.steps
+    assert evaluations(tmp_path / "run")[0]["mean_abs_action"] != "0.0"
+
+
+def test_a_start_that_is_no_policy_is_refused(tmp_path):
+    """Before anything is written: no such policy, or another size of network."""
+    with pytest.raises(ConfigError, match="nowhere: .*no policy.zip"):
+        train(tiny_config(start_from="nowhere"), tmp_path / "run", progress=False)
+    wide = replace(tiny_config().ppo, net_arch=(8,))
+    start = str(finished_run() / "last")
+    with pytest.raises(ConfigError, match=r"policy\.zip: cannot be read"):
+        train(tiny_config(start_from=start, ppo=wide), tmp_path / "run", progress=False)
+    assert not (tmp_path / "run").exists()
+
+
 def snapshot(folder):
     return {p: p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 

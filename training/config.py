@@ -79,6 +79,7 @@ class TrainConfig:
     seed: int = 0
     steps: int = field(default=3_000_000, metadata={"min": 1})  # [environment steps]
     threads: int = field(default=2, metadata={"min": 1})
+    start_from: str | None = None  # a policy whose weights and statistics are the first ones
     env: EnvConfig = field(default_factory=EnvConfig)
     residual: ResidualScales = field(default_factory=ResidualScales)
     step_residual: StepScales = field(default_factory=StepScales)

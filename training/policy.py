@@ -92,7 +92,7 @@ def load_policy(folder: str | Path | None = None, robot: Robot | None = None) ->
     (of `robot`, or of the configuration's own) or has another number of observations or actions.
     No code from the files is executed.
     """
-    path = _locate(folder)
+    path = locate_policy(folder)
     config = build(TrainConfig, read_yaml(path / CONFIG), str(path / CONFIG))
     state = read_state(path / STATE)
     mean, var, clip, epsilon = _read_statistics(path / STATISTICS)
@@ -115,7 +115,8 @@ def load_policy(folder: str | Path | None = None, robot: Robot | None = None) ->
     return Policy(config, layers, mean, var, clip, epsilon, state, mirrors)
 
 
-def _locate(folder: str | Path | None) -> Path:
+def locate_policy(folder: str | Path | None) -> Path:
+    """The folder that `load_policy` reads; raises ConfigError where there is none."""
     name = SHIPPED if folder is None else str(folder)
     if name in packaged("policies"):
         path = packaged_folder("policies") / name

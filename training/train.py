@@ -1,5 +1,6 @@
 """Training a residual policy with Stable-Baselines3's PPO on the CPU."""
 
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from poise.envs.errors import ConfigError
 from .callbacks import Checkpoints, Progress, Throughput
 from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
+from .policy import locate_policy
 from .schedules import CurriculumCallback, ExplorationCallback
 from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
@@ -32,42 +34,45 @@ def train(
 
     `out` gets config.yaml, evaluations.csv, tensorboard/, and the policy folders best/ and last/.
     `resume` goes on from last/, which is written after every rollout; the configuration must be
-    the same but for `steps` and `threads`. The same configuration gives the same weights,
-    whatever the number of threads; a resumed run starts new episodes, and so differs.
+    the same but for `steps` and `threads`. A new run begins with the policy `config.start_from`,
+    if there is one, of the same robot and size of network. The same configuration gives the same
+    weights, whatever the number of threads; a resumed run starts new episodes, and so differs.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
     round; when the configurations or robots differ; when a file of last/ cannot be read.
     """
     out = Path(out)
     checkpoint = check_folder(config, out, resume)
+    start = None if checkpoint or config.start_from is None else locate_policy(config.start_from)
     torch.set_num_threads(1)
     prepare()
-    normalize = _training_envs(config)
-    model = make_model(config, normalize)
-    normalize.seed(_env_seed(config.seed))
-    state: dict[str, Any] = {}
-    if checkpoint is not None:
-        robot = normalize.get_attr("robot")[0]
-        state = restore(checkpoint, model, normalize, robot.fingerprint)
-        check_controller(state, config, checkpoint / STATE)
-        model.num_timesteps = state["timesteps"]
-        _reseed(model, normalize, config.seed + model.num_timesteps)
-    write_atomic(out / CONFIG, to_yaml(config))
-    model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
-    checkpoints = Checkpoints(config, out / LAST, out / BEST, out / "evaluations.csv", state)
-    schedules = [CurriculumCallback(config), ExplorationCallback(config)]
-    callbacks = [Throughput(), *schedules, checkpoints]
-    bar = Progress(config.steps)
-    if progress:
-        callbacks.append(bar)
-    try:
+    with ExitStack() as stack:
+        normalize = _training_envs(config)
+        stack.callback(normalize.close)
+        model = make_model(config, normalize)
+        normalize.seed(_env_seed(config.seed))
+        state: dict[str, Any] = {}
+        fingerprint = normalize.get_attr("robot")[0].fingerprint
+        if start is not None:
+            restore(start, model, normalize, fingerprint)
+        if checkpoint is not None:
+            state = restore(checkpoint, model, normalize, fingerprint)
+            check_controller(state, config, checkpoint / STATE)
+            model.num_timesteps = state["timesteps"]
+            _reseed(model, normalize, config.seed + model.num_timesteps)
+        write_atomic(out / CONFIG, to_yaml(config))
+        model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
+        checkpoints = Checkpoints(config, out / LAST, out / BEST, out / "evaluations.csv", state)
+        stack.callback(checkpoints.close)
+        schedules = [CurriculumCallback(config), ExplorationCallback(config)]
+        callbacks = [Throughput(), *schedules, checkpoints]
+        bar = Progress(config.steps)
+        stack.callback(bar.close)
+        if progress:
+            callbacks.append(bar)
         remaining = config.steps - model.num_timesteps
         if remaining > 0:
             model.learn(remaining, callback=callbacks, reset_num_timesteps=checkpoint is None)
-    finally:
-        bar.close()
-        checkpoints.close()
-        normalize.close()
     return out / BEST
 
 
