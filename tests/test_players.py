@@ -96,6 +96,26 @@ def test_a_packaged_policy_is_known_by_its_folder(
         load_player("residual-abe07", robot)
 
 
+def test_a_fingerprint_tells_how_a_policy_plays(robot: Robot, tmp_path: Path) -> None:
+    """Other statistics or another environment change it, another number of epochs does not."""
+    last = finished_run() / "last"
+    player = load_player(str(last), robot)
+    for name, old, new, same in (
+        ("statistics", "", "", False),
+        ("epochs", "n_epochs: 2", "n_epochs: 3", True),
+        ("smoothing", "smoothing: 0.0", "smoothing: 0.1", False),
+    ):
+        folder = Path(shutil.copytree(last, tmp_path / name))
+        written = (folder / "config.yaml").read_text()
+        assert old in written
+        (folder / "config.yaml").write_text(written.replace(old, new))
+        if name == "statistics":
+            with np.load(folder / "vecnormalize.npz") as data:
+                arrays = {**data, "obs_mean": data["obs_mean"] + 0.1}
+            np.savez(folder / "vecnormalize.npz", **arrays)
+        assert (load_player(str(folder), robot).fingerprint == player.fingerprint) is same
+
+
 @pytest.mark.parametrize("name", packaged("policies"))
 def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
     """residual on the baseline, residual-CONTROLLER on another; no larger than need be."""

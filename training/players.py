@@ -13,7 +13,7 @@ from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.baselines.residual_step_env import ResidualStepEnv
 from poise.envs.balance import BalanceEnv
-from poise.envs.config import packaged, to_yaml
+from poise.envs.config import packaged, to_dict, to_yaml
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 from poise.envs.torque_balance import TorqueBalanceEnv
@@ -80,6 +80,7 @@ def _idle(name: str, env: BalanceEnv, content: str) -> Player:
 
 
 def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
+    from .checkpoints import controller_fingerprint
     from .policy import load_policy  # loads torch, which the other players do without
 
     policy = load_policy(name, robot)
@@ -92,10 +93,14 @@ def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
             f"{robot.name!r} has {expected[0]} and {expected[1]}",
             source=name,
         )
-    weights = [array.tobytes() for layer in policy.layers for array in layer]
-    return Player(name, env, policy.act, _hash(to_yaml(policy.config).encode(), *weights))
+    world = {k: v for k, v in to_dict(policy.config).items() if k not in TRAINING}
+    below = controller_fingerprint(policy.config)
+    content = _hash(to_yaml(world).encode(), below.encode(), *policy.content())
+    return Player(name, env, policy.act, content)
 
 
+# fields of a training configuration that do not change how its policy plays
+TRAINING = ("seed", "steps", "threads", "start_from", "ppo", "curriculum", "evaluation")
 ENVIRONMENTS = {
     "residual": ResidualBalanceEnv,
     "step": ResidualStepEnv,

@@ -78,6 +78,13 @@ class Policy:
         weight, bias = self.layers[-1]
         return (x @ weight + bias)[..., 0, :]
 
+    def content(self) -> list[bytes]:
+        """All that decides its actions."""
+        layers = [array for layer in self.layers for array in layer]
+        sides = [] if self._mirrors is None else [m.sign * (1 + m.order) for m in self._mirrors]
+        numbers = [*layers, self._mean, self._scale, np.array(self._clip), *sides]
+        return [array.tobytes() for array in numbers]
+
     def make_env(self, **overrides: Any) -> BalanceEnv:
         """The environment that the policy was trained in; `overrides` as in `EnvConfig`."""
         return self.config.make_env(**overrides)

@@ -12,11 +12,19 @@ from poise.baselines.solvers import make_solver, residuals
 
 from .recoveries import record
 
+
+def loose(tolerance: float) -> dict:
+    """Options of `momentum-qp-osqp`, but for the tolerance."""
+    return {"eps_abs": tolerance, "eps_rel": tolerance, "scaling": 0, "polishing": False}
+
+
 SOLVERS = {
     "active-set": ("active-set", {}),
     "daqp": ("daqp", {}),
     "osqp": ("osqp", {}),
-    "osqp, 1e-3, unpolished": ("osqp", {"eps_abs": 1e-3, "eps_rel": 1e-3, "polishing": False}),
+    "osqp, 1e-2": ("osqp", loose(1e-2)),
+    "osqp, 1e-3": ("osqp", loose(1e-3)),
+    "osqp, 1e-4": ("osqp", loose(1e-4)),
 }
 
 
