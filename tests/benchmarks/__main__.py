@@ -9,12 +9,14 @@ from . import (
     startup,
     step,
     stepping,
+    steps,
     vector,
 )
 
 for benchmark in (
     step,
     stepping,
+    steps,
     vector,
     momentum_qp,
     solvers,
