@@ -7,14 +7,14 @@ import numpy as np
 
 from poise.envs.arrays import apart
 from poise.envs.block import Block
+from poise.envs.hull import convex_hull
 from poise.envs.jit import compiled
 from poise.envs.robot import Robot
-
-from .support import convex_hull
 
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
+LINE = 1e-12  # [m] a corner of the reach that is nearer to the line of its neighbours is none
 
 
 def turn(yaw: float) -> np.ndarray:
@@ -158,7 +158,7 @@ def reach_of_two(r, points, cos, sin, cloud, out):
             u, v = r.sums[k, i, 0], r.sums[k, i, 1]
             cloud[n, 0], cloud[n, 1] = x + cos * u - sin * v, y + sin * u + cos * v
             n += 1
-    return convex_hull(cloud, out)
+    return convex_hull(cloud, n, LINE, out)
 
 
 def stacked(polygons: list[np.ndarray]) -> np.ndarray:

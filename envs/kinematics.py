@@ -12,6 +12,7 @@ import numpy as np
 
 from .arrays import GAP, MAX_VERTICES, Plant, RobotArrays, apart
 from .block import Block
+from .hull import convex_hull
 from .jit import compiled
 
 
@@ -284,38 +285,11 @@ def update_support(robot: RobotArrays, s: StateArrays):
             points[n, 0] = s.sole_point[i, 0] + axes[0, 0] * u + axes[0, 1] * v
             points[n, 1] = s.sole_point[i, 1] + axes[1, 0] * u + axes[1, 1] * v
             n += 1
-    for i in range(1, n):  # insertion sort by x, then y
-        x, y = points[i, 0], points[i, 1]
-        j = i - 1
-        while j >= 0 and (points[j, 0] > x or (points[j, 0] == x and points[j, 1] > y)):
-            points[j + 1, 0], points[j + 1, 1] = points[j, 0], points[j, 1]
-            j -= 1
-        points[j + 1, 0], points[j + 1, 1] = x, y
     hull = np.empty((2 * n + 1 + 2 * GAP, 2))[GAP:]
-    size = 0
-    for i in range(n):  # lower chain
-        while size >= 2 and _turn(hull, size, points, i) <= 0.0:
-            size -= 1
-        hull[size, 0], hull[size, 1] = points[i, 0], points[i, 1]
-        size += 1
-    lower = size + 1
-    for i in range(n - 2, -1, -1):  # upper chain
-        while size >= lower and _turn(hull, size, points, i) <= 0.0:
-            size -= 1
-        hull[size, 0], hull[size, 1] = points[i, 0], points[i, 1]
-        size += 1
-    size -= 1
+    size = convex_hull(points, n, 0.0, hull)
     for i in range(size):
         s.support[i, 0], s.support[i, 1] = hull[i, 0], hull[i, 1]
     s.support_size[0] = size
-
-
-@compiled
-def _turn(hull, size, points, i):
-    """Twice the area of the triangle (second last, last, candidate): > 0 for a left turn."""
-    ax, ay = hull[size - 2, 0], hull[size - 2, 1]
-    bx, by = hull[size - 1, 0], hull[size - 1, 1]
-    return (bx - ax) * (points[i, 1] - ay) - (by - ay) * (points[i, 0] - ax)
 
 
 @compiled

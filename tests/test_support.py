@@ -5,7 +5,6 @@ import pytest
 
 from poise.baselines.support import (
     MOMENT_LEVER,
-    convex_hull,
     joint_torques,
     nearest_inside,
     shrunk,
@@ -100,17 +99,3 @@ def test_shrunk_polygon():
     np.testing.assert_allclose(
         shrunk(polygon, 0.5), [[0.5, 0.25], [1.5, 0.25], [1.5, 0.75], [0.5, 0.75]]
     )
-
-
-def test_hull_of_points():
-    """Corners of a polygon in order; no point inside, on an edge, or twice."""
-    rng = np.random.default_rng(2)
-    angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, 9))
-    polygon = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    edges = 0.3 * polygon + 0.7 * np.roll(polygon, 1, axis=0)
-    inside = polygon.mean(axis=0) + 0.1 * rng.normal(size=(20, 2))
-    points = rng.permutation(np.vstack([polygon, polygon[::2], edges, inside]))
-    out = np.zeros((2 * len(points) + 1, 2))
-    found = out[: convex_hull(points.copy(), out)]
-    start = int(np.argmin(polygon[:, 0]))
-    np.testing.assert_array_equal(found, np.roll(polygon, -start, axis=0))
