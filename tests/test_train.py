@@ -195,7 +195,7 @@ def test_a_run_starts_from_a_policy(tmp_path):
 
 def test_a_start_that_is_no_policy_is_refused(tmp_path):
     """Before anything is written: no such policy, or another size of network."""
-    with pytest.raises(ConfigError, match="nowhere: .*no policy.zip"):
+    with pytest.raises(ConfigError, match="nowhere: no such folder.*residual-step"):
         train(tiny_config(start_from="nowhere"), tmp_path / "run", progress=False)
     wide = replace(tiny_config().ppo, net_arch=(8,))
     start = str(finished_run() / "last")

@@ -130,6 +130,10 @@ def locate_policy(folder: str | Path | None) -> Path:
     else:
         path = Path(name)
         path = find_checkpoint(path / "best") or find_checkpoint(path) or path
+        if not path.exists():
+            raise ConfigError(
+                "no such folder, and no packaged policy", source=path, choices=packaged("policies")
+            )
     for name in FILES:
         if not (path / name).is_file():
             raise ConfigError(
