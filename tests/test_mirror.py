@@ -9,7 +9,7 @@ import pytest
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
 from poise.baselines.residual_step_env import ResidualStepEnv, StepScales
 from poise.envs.errors import ConfigError
-from poise.envs.mirror import mirror_robot
+from poise.envs.mirror import SIDES, mirror_robot
 from poise.envs.robot import load_robot
 from poise.envs.torque_balance import TorqueBalanceEnv
 
@@ -49,6 +49,16 @@ def test_joints_of_the_humanoid():
     np.testing.assert_array_equal(mirror(mirror(values)), values)
 
 
+def observed(env, actions, **options):
+    """(n, no) observations of an episode with these actions."""
+    env.reset(options=options)
+    rows = []
+    for action in actions:
+        env.step_in_place(action)
+        rows.append(env.episode.observation.copy())
+    return np.array(rows)
+
+
 @pytest.mark.parametrize("kind", ENVS)
 def test_a_mirrored_trial(kind, even):
     """Pushed from the other side, with the actions mirrored, it observes the mirror image."""
@@ -56,16 +66,10 @@ def test_a_mirrored_trial(kind, even):
     seen, done = env.mirrors()
     rng = np.random.default_rng(3)
     actions = rng.uniform(-0.3, 0.3, (12, *env.action_space.shape))
-    trials = []
-    for direction in (50.0, 310.0):
-        push = {"impulse": 24.0, "direction": direction, "start": 0.0, "body": "torso"}
-        env.reset(options={"push": push, "qpos": even.standing_qpos, "qvel": np.zeros(27)})
-        rows = []
-        for action in actions:
-            env.step_in_place(action if direction < 180.0 else done(action))
-            rows.append(env.episode.observation.copy())
-        trials.append(np.array(rows))
-    one, other = trials
+    push = {"impulse": 24.0, "direction": 50.0, "start": 0.0, "body": "torso"}
+    start = {"qpos": even.standing_qpos, "qvel": np.zeros(27)}
+    one = observed(env, actions, push=push, **start)
+    other = observed(env, done(actions), push={**push, "direction": 310.0}, **start)
     np.testing.assert_allclose(seen(one), other, atol=1e-4)
     assert np.mean(abs(one - other).max(axis=0) > 0.02) > 0.6  # not the same trial again
     assert env.info().get("steps", 1) == 1
@@ -80,21 +84,13 @@ def test_other_robots_in_the_air(name):
     env = TorqueBalanceEnv(robot(name), duration=1.0, pushes=None)
     seen, done = env.mirrors()
     actions = np.random.default_rng(1).uniform(-0.3, 0.3, (5, *env.action_space.shape))
-    flip = mirror_robot(robot(name))
-    trials = []
-    for side in (1.0, -1.0):
-        qpos, qvel = robot(name).standing_qpos.copy(), np.zeros(robot(name).model.nv)
-        qpos[2] += 0.3
-        turn = np.array([0.5, 0.4, 0.6])
-        qvel[:3] = 0.3, 0.4 * side, 0.1
-        qvel[3:6] = turn if side > 0.0 else flip["root turn"](turn)
-        env.reset(options={"qpos": qpos, "qvel": qvel})
-        rows = []
-        for action in actions:
-            env.step_in_place(action if side > 0.0 else done(action))
-            rows.append(env.episode.observation.copy())
-        trials.append(np.array(rows))
-    one, other = trials
+    qpos, qvel = robot(name).standing_qpos.copy(), np.zeros(robot(name).model.nv)
+    qpos[2] += 0.3
+    qvel[:6] = 0.3, 0.4, 0.1, 0.5, 0.4, 0.6
+    image = qvel.copy()
+    image[:3], image[3:6] = SIDES * qvel[:3], mirror_robot(robot(name))["root turn"](qvel[3:6])
+    one = observed(env, actions, qpos=qpos, qvel=qvel)
+    other = observed(env, done(actions), qpos=qpos, qvel=image)
     np.testing.assert_allclose(seen(one), other, atol=1e-9)
     assert abs(one - other).max() > 0.1
 
