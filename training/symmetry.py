@@ -1,7 +1,7 @@
 """A policy that is its own mirror image: half the pushes teach all of them.
 
 μ(o) = ½ (f(o) + M_a f(M_o o)), V(o) = ½ (v(o) + v(M_o o)), where M_o and M_a exchange left and
-right in observations and actions (Abdolhosseini et al. 2019, "On Learning Symmetric Locomotion").
+right in observations and actions [Abdolhosseini19].
 The weights are those of an ordinary policy.
 """
 
