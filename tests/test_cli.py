@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -38,6 +39,17 @@ def test_help_is_light() -> None:
     )
     for name in names:
         assert name in done.stdout
+
+
+@pytest.mark.parametrize("args", [["list"], ["--help"]])
+def test_a_closed_pipe_is_no_error(args: list[str]) -> None:
+    """`poise list | head -1` ends without a traceback, with a shell's code for a broken pipe."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "poise.training.cli", *args]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, "")
 
 
 @pytest.mark.parametrize(

@@ -22,31 +22,41 @@ Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run a sub-command; returns 0, 1 (see `benchmark`), 2 after bad input, 130 after Ctrl-C."""
+    """Run a sub-command; returns 0, 1 (see `benchmark`), 2 after bad input, 130 after Ctrl-C, 141
+    if nobody reads the output any more."""
     args = list(sys.argv[1:] if args is None else args)
     # Small matrices lose time to threads, and sums may change their order. Read at import.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     try:
-        if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass
-            from .train_command import run
-
-            run(args[1:])
-        else:
-            code = tyro.extras.subcommand_cli_from_dict(
-                COMMANDS,
-                prog="poise",
-                description="Keep a simulated humanoid on its feet while it is pushed.",
-                args=args,
-            )
-            return code if isinstance(code, int) else 0
+        try:
+            return _run(args)
+        finally:
+            sys.stdout.flush()
     except PoiseError as error:
         print(f"poise: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("poise: stopped", file=sys.stderr)
         return 130
-    return 0
+    except BrokenPipeError:  # poise list | head; worker processes raise others
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the exit flushes once more
+        return 141
+
+
+def _run(args: list[str]) -> int:
+    if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass
+        from .train_command import run
+
+        run(args[1:])
+        return 0
+    code = tyro.extras.subcommand_cli_from_dict(
+        COMMANDS,
+        prog="poise",
+        description="Keep a simulated humanoid on its feet while it is pushed.",
+        args=args,
+    )
+    return code if isinstance(code, int) else 0
 
 
 def demo(out: Path = Path("out/demo"), workers: int | None = None, seed: int = 0) -> None:
