@@ -1,9 +1,11 @@
-"""Length and time of real steps: `python -m tests.benchmarks.steps [CONTROLLER…]`.
+"""Reach, length and time of real steps: `python -m tests.benchmarks.steps [CONTROLLER…]`.
 
 First steps of recoveries from 0.1 s torso pushes in 16 directions at 0.7 to 1.1 of
-`residual-step`'s J50, against the l and T_s that `NStepLimit` takes from the planner's limits. A
-step lasts from lift-off to touchdown (to 20 ms, a policy step); its length is how far the sole
-moved. Sideways: directions of 67 to 113° and 247 to 293°.
+`residual-step`'s J50, against the r, l and T_s that `NStepLimit` takes from soles, ankles and the
+planner's limits. A step lasts from lift-off to touchdown (to 20 ms, a policy step); its length is
+how far the sole moved. r is how far the CoP got in the push's direction from where the CoM was
+before it, with both feet in place: until a lift-off. Sideways: directions of 67 to 113° and 247 to
+293°.
 """
 
 from __future__ import annotations
@@ -24,31 +26,41 @@ SHARES = (0.7, 0.8, 0.9, 1.0, 1.1)
 
 
 def first_step(player, impulse: float, direction: float, seed: int):
-    """(time [s], length [m]) of the first step of a recovery; None for a fall or no step."""
+    """Reach r [m], time [s] and length [m] of the first step of a recovery; None for a fall or no
+    step."""
     env = player.env
     push = {"impulse": impulse, "direction": direction, "start": 0.5, "body": "torso"}
     observation, _ = env.reset(seed=seed, options={"push": push})
+    away = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
     begun = found = None
+    start, reach = np.zeros(2), -np.inf
     over = False
     while not over:
         observation, _, fallen, over, _ = env.step(player.act(observation))
         over = over or fallen
-        now, feet = env.simulation.time, env.simulation.state.sole_points
+        state, now = env.simulation.state, env.simulation.time
+        feet = state.sole_points
+        if now <= 0.5:
+            start = state.com[:2].copy()
+        elif begun is None:
+            reach = max(reach, float((state.cop - start) @ away))
         told = env.controller.stepping()
         if begun is None and told.steps == 1 and told.foot >= 0 and told.phase > 0.0:
             begun = (told.foot, now, feet[told.foot, :2].copy())
         if begun is not None and found is None and (told.foot < 0 or told.steps > 1):
             foot, since, place = begun
-            found = (now - since, float(np.linalg.norm(feet[foot, :2] - place)))
+            found = (reach, now - since, float(np.linalg.norm(feet[foot, :2] - place)))
     return None if fallen else found
 
 
 def main() -> None:
     names = sys.argv[1:] or ["capture-step", "residual-step"]
     robot = load_robot()
-    print("| controller | directions | first steps | time, median (5 %) [s] | "
-          "length, median (95 %) [m] | T_s, l of the limit |")  # fmt: skip
-    print("| --- | --- | --- | --- | --- | --- |")
+    print(
+        "| controller | directions | first steps | reach, median (95 %) [m] | "
+        "time, median (5 %) [s] | length, median (95 %) [m] | r, T_s, l of the limit |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- |")
     for name in names:
         player = load_player(name, robot)
         steps = defaultdict(list)
@@ -59,13 +71,16 @@ def main() -> None:
             for seed, share in enumerate(SHARES):
                 step = first_step(player, share * J50[k], angle, seed)
                 if step is not None:
-                    steps[sideways].append((*step, limit.length(angle)))
+                    steps[sideways].append((*step, limit.reach(angle), limit.length(angle)))
         for which, rows in steps.items():
-            time, length, bound = np.array(rows).T
-            short, long = np.percentile(time, 5), np.percentile(length, 95)
-            print(f"| {name} | {which} | {len(rows)} | {np.median(time):.2f} ({short:.2f}) | "
-                  f"{np.median(length):.2f} ({long:.2f}) | "
-                  f"{limit.time:.2f}, {bound.mean():.2f} |")  # fmt: skip
+            reach, time, length, radius, bound = np.array(rows).T
+            far, short, long = (
+                np.percentile(column, share)
+                for column, share in ((reach, 95), (time, 5), (length, 95))
+            )
+            print(f"| {name} | {which} | {len(rows)} | {np.median(reach):.2f} ({far:.2f}) | "
+                  f"{np.median(time):.2f} ({short:.2f}) | {np.median(length):.2f} ({long:.2f}) | "
+                  f"{radius.mean():.2f}, {limit.time:.2f}, {bound.mean():.2f} |")  # fmt: skip
 
 
 if __name__ == "__main__":
