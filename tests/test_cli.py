@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -188,6 +189,14 @@ def test_train_without_flags_is_the_packaged_configuration() -> None:
     command = parse(["--out", "run"])
     assert to_dict(command.settings) == to_dict(train_config(train_command.DEFAULT))
     assert not command.resume
+
+
+def test_another_robot_is_trained_by_a_configuration_that_fits_it() -> None:
+    """The packaged default names bodies of the humanoid."""
+    settings = parse(["--out", "run", "--robot", "tall"]).settings
+    assert settings == replace(train_config(train_command.ANY_ROBOT), robot="tall")
+    named = parse(["--out", "run", "--robot", "tall", "--config", "residual"]).settings
+    assert named == replace(train_config("residual"), robot="tall")
 
 
 def test_resume_takes_the_runs_own_configuration(tmp_path: Path) -> None:

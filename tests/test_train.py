@@ -19,6 +19,7 @@ from poise.baselines.residual_step_env import ResidualStepEnv
 from poise.envs.batch import EnvBatch
 from poise.envs.config import build, read_yaml
 from poise.envs.errors import ConfigError
+from poise.envs.push_schedule import PushSampler
 from poise.training import callbacks, schedules
 from poise.training.checkpoints import FILES, POLICY, STATE
 from poise.training.config import Curriculum, PPOConfig, TrainConfig, train_config
@@ -287,6 +288,17 @@ def test_bad_configurations_are_refused(section, named):
     """One error names the field, the value and the choices."""
     with pytest.raises(ConfigError, match=named):
         build(TrainConfig, section, "test")
+
+
+@pytest.mark.parametrize("which", ["env", "evaluation"])
+def test_pushes_that_do_not_fit_the_robot_are_refused_before_anything_is_written(tmp_path, which):
+    """A body that the robot lacks: one error with the choices, no folder."""
+    config = tiny_config()
+    pushes = PushSampler(magnitude=(0.1, 0.2), unit="specific_impulse", bodies=("tail",))
+    config = replace(config, **{which: replace(getattr(config, which), pushes=pushes)})
+    with pytest.raises(ConfigError, match="no body 'tail'"):
+        train(config, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def test_exploration_narrows_on_a_schedule(tmp_path, monkeypatch):

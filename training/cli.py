@@ -108,7 +108,7 @@ def evaluate(
         seed: of the trials.
         workers: number of processes; all cores if not given.
         trials: number of pushes (random), of starts (quiet), of trials per direction and controller
-            in the second stage (envelope), of repeats (grid).
+            in the second stage (envelope), of repeats (grid), of sequences (repeated, in-step).
         limits: a .yaml file that pushes are measured by; if not given, the packaged file of the
             robot, else its ankle limit.
         write_limits: write the first controller's J50s to this file, for --limits.

@@ -120,6 +120,12 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
 
 def _training_envs(config: TrainConfig) -> VecNormalize:
     env = config.make_env()
+    for pushes in (
+        config.env.pushes,
+        config.evaluation.pushes,
+    ):  # fit the robot: nothing is written
+        if pushes is not None:
+            pushes.sample(np.random.default_rng(), env.robot, env.simulation.state.support_margin)
     moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
     vec = ThreadedVecEnv(replicate(env, config.ppo.n_envs), config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)

@@ -19,7 +19,8 @@ from .seed_groups import SEEDS
 from .train import train
 from .train_seeds import train_seeds
 
-DEFAULT = "residual"
+DEFAULT, ANY_ROBOT = "residual", "any-robot"
+HUMANOID = TrainConfig.robot  # of the first
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Command:
         settings: fields of the configuration.
         out: folder to write to.
         config: a packaged training configuration or a path to a .yaml file; the flags below
-            replace its fields. With --resume, the run's own configuration if not given.
+            replace its fields. If not given: residual, with another --robot any-robot, with
+            --resume the run's own.
         resume: go on with the run, or the runs, that the folder holds.
         seeds: train a run for each of these seeds, in folders seed-SEED of the folder.
         backend: of runs with several seeds: local (processes of this machine), joblib (the same
@@ -84,6 +86,7 @@ def _base(args: Sequence[str]) -> str | Path:
     """Where the defaults of the flags come from: looked up before the flags are read."""
     peek = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     peek.add_argument("--config")
+    peek.add_argument("--robot", default=HUMANOID)
     peek.add_argument("--out")
     peek.add_argument("--resume", action="store_true")
     try:
@@ -93,4 +96,6 @@ def _base(args: Sequence[str]) -> str | Path:
     if known.config is not None:
         return known.config
     own = Path(known.out or ".") / "config.yaml"
-    return own if known.resume and own.is_file() else DEFAULT
+    if known.resume and own.is_file():
+        return own
+    return DEFAULT if known.robot == HUMANOID else ANY_ROBOT

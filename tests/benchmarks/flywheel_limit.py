@@ -129,7 +129,7 @@ def main() -> None:
     parser.add_argument("--body", default="torso")
     parser.add_argument("--duration", type=float, default=0.1)
     parser.add_argument("--hips", type=float, default=240.0, help="largest L̇ of the ground [N·m]")
-    parser.add_argument("--offset", type=float, default=-0.0416, help="c_ref's, over h, as gains")
+    parser.add_argument("--offset", type=float, default=-0.028, help="c_ref's, over h, as gains")
     given = parser.parse_args()
     robot = load_robot(given.robot)
     simulation = Simulation(robot)
