@@ -1,9 +1,11 @@
 """Tuning: what a candidate is worth."""
 
+import numpy as np
 import pytest
 
 from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.push_schedule import push_bodies
 from poise.envs.pushes import Push
 from poise.training import tuning
 
@@ -34,6 +36,23 @@ def test_a_dragged_foot_is_no_recovery(env, monkeypatch):
     monkeypatch.setattr(tuning, "STEP_LENGTH", 1e-6)
     _, reached = tuning.score(env, controller_config("momentum-qp"), rows(5.0), seed=0)
     assert reached == [10.0 + 0.6 * 2.0]
+
+
+def test_pushes_fit_the_robot():
+    """The ladder is the humanoid's own, to 0.1 %; another robot's is scaled by m √(g h)."""
+    pushes = tuning.TuningPushes()
+    gravity = -robot().model.opt.gravity[2]
+    ladders = {}
+    for name in ("humanoid", "toddler"):
+        r = robot(name)
+        drawn = pushes.draw(0, r)
+        assert {push.body for row in drawn for push in row} == {push_bodies(r)[0]}
+        ladders[name] = np.array([[push.impulse for push in row] for row in drawn])
+        ladders[name] /= r.mass * np.sqrt(gravity * r.height_com)
+    assert np.allclose(ladders["humanoid"], ladders["toddler"], rtol=1e-12)
+    mean = ladders["humanoid"].mean() * robot().mass * np.sqrt(gravity * robot().height_com)
+    unscaled = ladders["humanoid"].mean() * tuning.SIZE
+    assert mean == pytest.approx(unscaled, rel=1e-3)
 
 
 def test_the_candidates_offset_counts(env):

@@ -17,8 +17,9 @@ from poise.baselines.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.config import to_yaml, write_atomic
 from poise.envs.episode import MAX_SLIDE
+from poise.envs.push_schedule import push_bodies
 from poise.envs.pushes import Push
-from poise.envs.robot import load_robot
+from poise.envs.robot import Robot, load_robot
 
 from .trials import STEP_LENGTH
 
@@ -80,19 +81,27 @@ GAINS = (
 )
 
 
+SIZE = 113.7  # [N·s] m √(g h) of the humanoid
+
+
 @dataclass(frozen=True)
 class TuningPushes:
-    """Half a circle of directions (the robot is symmetric) times a ladder of impulses."""
+    """Half a circle of directions (the robot is symmetric) times a ladder of impulses.
+
+    The ladder is for a robot with m √(g h) = `SIZE`; another one's impulses are as much larger.
+    They push the first of the robot's `push_bodies`.
+    """
 
     directions: int = 9
     impulses: tuple[float, ...] = (11.0, 13.0, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0)
     duration: float = 0.1
-    body: str = "torso"
     seconds: float = 5.0
 
-    def draw(self, seed: int) -> list[list[Push]]:
+    def draw(self, seed: int, robot: Robot) -> list[list[Push]]:
         """A row per direction; impulses and directions are jittered within their steps."""
         rng = np.random.default_rng(seed)
+        size = robot.mass * np.sqrt(-robot.model.opt.gravity[2] * robot.height_com) / SIZE
+        body = push_bodies(robot)[0]
         gap = np.diff(self.impulses, append=2 * self.impulses[-1] - self.impulses[-2])
         rows = []
         for angle in np.linspace(0.0, 180.0, self.directions):
@@ -100,8 +109,8 @@ class TuningPushes:
             jitter = rng.uniform(-0.5, 0.5, len(self.impulses)) * gap
             rows.append(
                 [
-                    Push(self.body, 0.5, self.duration, float(j), float(turned))
-                    for j in np.asarray(self.impulses) + jitter
+                    Push(body, 0.5, self.duration, float(j), float(turned))
+                    for j in size * (np.asarray(self.impulses) + jitter)
                 ]
             )
         return rows
@@ -119,7 +128,8 @@ def set_gains(
 
 
 def score(env: ResidualBalanceEnv, config: MomentumQPConfig, rows: list[list[Push]], seed: int):
-    """Mean over directions of the impulse recovered, plus half of the worst; and the detail.
+    """Mean over directions of the impulse recovered, plus half of the worst; and the detail [N·s,
+    as of a robot of `SIZE`].
 
     A trial that fell counts for at most 0.3 by how long it stood, one that is not quiet, or that
     dragged a foot further than `STEP_LENGTH`, 0.6.
@@ -155,7 +165,7 @@ def _work(arguments: tuple[MomentumQPConfig, TuningPushes, str, int]):
     config, pushes, robot, seed = arguments
     if _ENV is None:
         _ENV = ResidualBalanceEnv(robot, duration=pushes.seconds, pushes=None)
-    return score(_ENV, config, pushes.draw(seed), seed)
+    return score(_ENV, config, pushes.draw(seed, _ENV.robot), seed)
 
 
 @dataclass(frozen=True)
