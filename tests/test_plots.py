@@ -138,7 +138,9 @@ def test_series_differ_without_colour(tmp_path):
     """The first six series have six colours and six markers."""
     looks = [plot_style.look(k) for k in range(6)]
     assert len({x.colour for x in looks}) == len({x.marker for x in looks}) == 6
-    assert plot_style.look(6) == looks[0]
+    every = [plot_style.look(k) for k in range(36)]
+    assert len({(look.colour, look.marker) for look in every}) == 36
+    assert plot_style.look(36) == looks[0]
 
 
 def test_dots_are_falls_with_wilson_bars(tmp_path, figures):

@@ -73,12 +73,14 @@ class Look(NamedTuple):
 
 
 def look(index: int) -> Look:
-    """Look of the series number `index`; the first is the baseline. Repeats after six."""
+    """Look of the series number `index`; the first is the baseline. Colours repeat after six, with
+    other markers; after 36 all does."""
     colours = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY)
     lines = ("-", "-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)), ":")
     markers = ("o", "s", "^", "D", "v", "P")
-    k = index % len(colours)
-    return Look(colours[k], lines[k], markers[k])  # type: ignore[arg-type]
+    k, turn = index % len(colours), index // len(colours)
+    other = (k + turn) % len(colours)
+    return Look(colours[k], lines[other], markers[other])  # type: ignore[arg-type]
 
 
 @contextmanager
