@@ -1,6 +1,6 @@
 """Feet in place as long as that holds; then steps to where the capture point can be stopped."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -117,7 +117,7 @@ class CaptureStep(AroundQP):
             raise ConfigError(
                 f"needs two feet, {robot.name!r} has {len(robot.soles)}", field="controller"
             )
-        prepare("contacts")
+        prepare("contacts", "planner")
         self.config = config or CaptureStepConfig()
         check_qps(self.config)
         super().__init__(robot, self.config.qp)
@@ -209,25 +209,30 @@ class CaptureStep(AroundQP):
             known is None or known.state is not s or known.given is not given
             or known.place.problem.parameters is not self.qp.parameters
         ):  # fmt: skip
-            if self._guided is None:
-                self._guided = Targets.standing(self.robot, state)
-            guided, sets, reach = self._guided.arrays(), self.sets, self.reach.arrays
-            place = self.qp.tick(state, targets)
-            one, two, both = (
-                sets.sets[soles].bind(s, guided, 6 * (len(soles) == 1), sets)
-                for soles in ((0,), (1,), (0, 1))
-            )
-            known = self._tick = CaptureTick(
-                self.qp.arrays, s, given, guided, step_gains(self.robot, self.config, self.period),
-                self.planner.search(state), self._swing.arrays,
-                swing_gains(self.qp.arrays, self.config.swing), self.memory, self.shift.values,
-                one, two, both, place, self.tau, self._failures, apart(1, dtype=np.int64),
-                apart(reach.alone.shape[1:]), apart((len(self.memory.region) // 2, 2)),
-                apart(2), apart(3),
-                address_of(momentum_tick, place) if self.solver is None else 0,
-                address_of(contact_tick, both),
-            )  # fmt: skip
+            blocks = self.blocks(state, targets)
+            place = address_of(momentum_tick, blocks.place) if self.solver is None else 0
+            contacts = address_of(contact_tick, blocks.both)
+            known = self._tick = replace(blocks, place_kernel=place, contact_kernel=contacts)
         return known
+
+    def blocks(self, state: RobotState, targets: Targets) -> CaptureTick:
+        """`tick`, but for the addresses of the kernels that it calls."""
+        if self._guided is None:
+            self._guided = Targets.standing(self.robot, state)
+        s, guided, sets, reach = state.arrays, self._guided.arrays(), self.sets, self.reach.arrays
+        one, two, both = (
+            sets.sets[soles].bind(s, guided, 6 * (len(soles) == 1), sets)
+            for soles in ((0,), (1,), (0, 1))
+        )
+        return CaptureTick(
+            self.qp.arrays, s, targets.arrays(), guided,
+            step_gains(self.robot, self.config, self.period),
+            self.planner.search(state), self._swing.arrays,
+            swing_gains(self.qp.arrays, self.config.swing), self.memory, self.shift.values,
+            one, two, both, self.qp.tick(state, targets), self.tau, self._failures,
+            apart(1, dtype=np.int64), apart(reach.alone.shape[1:]),
+            apart((len(self.memory.region) // 2, 2)), apart(2), apart(3), 0, 0,
+        )  # fmt: skip
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, CaptureTick]:
         """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""

@@ -7,14 +7,16 @@ from poise.envs.kinematics import allocate_state
 from poise.envs.robot import load_robot
 from poise.envs.state import RobotState
 
+from .capture_tick import CaptureTick, capture_tick
+from .contact_sets import contact_tick
 from .controller import Targets
 from .momentum_qp import MomentumQP, Tick, accept, momentum_tick, solve
 from .residual_balance import ResidualBalanceEnv
 from .residual_step import residual_step
-from .residual_step_env import ResidualStepEnv
+from .residual_step_env import ResidualStepEnv, stepping_step
 from .warmup import begin
 
-__all__ = ["assembly", "begin", "contacts", "solver", "steps"]
+__all__ = ["assembly", "begin", "contacts", "planner", "solver", "steps"]
 
 
 def _standing() -> tuple[MomentumQP, RobotState, Targets]:
@@ -53,12 +55,20 @@ def steps() -> None:
     batch.play(0, batch.NOBODY, np.zeros(1, dtype=np.int64))
 
 
+def _stepping() -> tuple[ResidualStepEnv, CaptureTick]:
+    """A stepping controller's environment, and its tick but for the kernels that it calls."""
+    env = ResidualStepEnv(duration=0.1)
+    env.reset(seed=0)
+    return env, env.controller.blocks(env.simulation.state, env.targets)
+
+
 def contacts() -> None:
-    """What controllers that step need besides: a push that takes a step."""
-    env = ResidualStepEnv(duration=2.0)
-    push = {"impulse": 0.55 * env.robot.mass, "start": 0.0}
-    env.reset(seed=0, options={"push": push})
-    over = False
-    while not over:
-        *_, fallen, truncated, _ = env.step(np.zeros(env.action_space.shape or ()))
-        over = fallen or truncated
+    """The momentum QP with contacts that change."""
+    contact_tick.compile((_stepping()[1].both.numba_type,))
+
+
+def planner() -> None:
+    """When, where to and how a foot steps, and what a policy sees of it."""
+    env, tick = _stepping()
+    capture_tick.compile((tick.numba_type,))
+    stepping_step.compile((env.bind_steps(env.bind(tick, 0), 0).numba_type,))

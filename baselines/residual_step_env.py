@@ -19,7 +19,7 @@ from poise.envs.vector import make_vector_env
 
 from .capture_tick import StepMemory
 from .residual_balance import ResidualBalanceEnv, ResidualScales
-from .residual_step import residual_step
+from .residual_step import ResidualStep, residual_step
 from .step_shift import (
     COM,
     COP,
@@ -197,15 +197,15 @@ class ResidualStepEnv(ResidualBalanceEnv):
         steps = self._steps
         residual: Any = known[1]
         if steps is None or steps.residual.inner is not residual:
-            tick, scales = residual.tick.inner, self.scales
-            sight = StepSight(
-                residual.state, apart(7), scales.height, scales.omega, self.episode.observation
-            )
-            address = address_of(residual_step, residual)
-            steps = self._steps = SteppingStep(
-                Erased(residual), address, tick.memory, tick.swing, sight
-            )
+            steps = self._steps = self.bind_steps(residual, address_of(residual_step, residual))
         return stepping_step, steps
+
+    def bind_steps(self, residual: ResidualStep, kernel: int) -> SteppingStep:
+        """All that a step works on, with what `bind` made and the address of `residual_step`."""
+        tick: Any = residual.tick.inner
+        scales, observation = self.scales, self.episode.observation
+        sight = StepSight(residual.state, apart(7), scales.height, scales.omega, observation)
+        return SteppingStep(Erased(residual), kernel, tick.memory, tick.swing, sight)
 
     def info(self) -> dict[str, Any]:
         """As of `ResidualBalanceEnv`, and the number of steps."""

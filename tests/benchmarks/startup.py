@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("envs", "baselines", "training", "configs")
 REPEATS = 5
 FIRST_USE = "from poise.baselines.warmup import prepare; prepare()"
+STEPS = "from poise.baselines.warmup import prepare; prepare('contacts', 'planner')"
 
 
 class Spent(NamedTuple):
@@ -66,8 +67,13 @@ def main(args: list[str] | None = None) -> None:
             spent = best(code, path)
             print(f"| {code} | {spent.clock - empty.clock:.2f} s | {spent.cpu - empty.cpu:.2f} s |")
         if "--no-compile" not in args:
-            for name in ("first use, compiling", "second use"):
-                spent = run(FIRST_USE, path)
+            uses = {
+                "first use, compiling": FIRST_USE,
+                "second use": FIRST_USE,
+                "first use of a controller that steps, besides": STEPS,
+            }
+            for name, code in uses.items():
+                spent = run(code, path)
                 print(f"| {name} | {spent.clock:.1f} s | {spent.cpu:.1f} s |")
 
 
