@@ -63,7 +63,7 @@ def _stepping() -> tuple[ResidualStepEnv, CaptureTick]:
 
 
 def contacts() -> None:
-    """The momentum QP with contacts that change."""
+    """The momentum QP with contacts that change. What a reset needs, `planner` compiles as well."""
     contact_tick.compile((_stepping()[1].both.numba_type,))
 
 

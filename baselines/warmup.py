@@ -20,9 +20,9 @@ _tried: set[str] = set()  # shares that this process has had compiled, or could 
 
 
 def prepare(*further: str) -> None:
-    """Fill the cache of compiled kernels if it is cold: some fifteen seconds on two cores, once.
+    """Fill the cache of compiled kernels if it is cold: some twenty seconds on two cores, once.
 
-    `further` shares of `compilation.py` follow; they may use the kernels of the first.
+    `further` shares of `compilation.py` follow, for ten more; they use the kernels of the first.
     """
     if _compiling:
         return

@@ -20,7 +20,7 @@ compiled = numba.njit(
 )
 
 PATIENCE = 1.0  # [s] of compilation before the user is told
-MESSAGE = "poise: compiling for the first use; this takes some twenty seconds, once"
+MESSAGE = "poise: compiling for the first use; this takes twenty to thirty seconds, once"
 
 
 class Patience(event.Listener):

@@ -44,4 +44,4 @@ def pytest_sessionstart(session):
     """Compile the kernels in a process of their own, so that this one and its children agree."""
     from poise.baselines.warmup import prepare
 
-    prepare("contacts")
+    prepare("contacts", "planner")

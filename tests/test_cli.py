@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from poise.envs.config import to_dict
+from poise.envs.config import resolve, to_dict
 from poise.envs.errors import ConfigError
 from poise.training import cli, evaluation, train_command
 from poise.training.cli import main
@@ -19,6 +20,7 @@ from poise.training.train_command import parse
 
 from .evaluations import RANDOM, InProcess, write_suite
 
+RICH = "from poise.training.progress import terminal; cli._run = lambda _: terminal().print('x')"
 BAD_SUITE = "kind: random\ntrials: many\n"
 BAD_ROBOT = "name: a\nsource: {mjcf: nowhere.xml}\nroot: b\nfeet: []\n"
 
@@ -42,15 +44,44 @@ def test_help_is_light() -> None:
         assert name in done.stdout
 
 
-@pytest.mark.parametrize("args", [["list"], ["--help"]])
-def test_a_closed_pipe_is_no_error(args: list[str]) -> None:
-    """`poise list | head -1` ends without a traceback, with a shell's code for a broken pipe."""
+@pytest.mark.parametrize(("args", "before"), [(["list"], ""), (["--help"], ""), (["list"], RICH)])
+def test_a_closed_pipe_is_no_error(args: list[str], before: str) -> None:
+    """`poise list | head -1` ends without a traceback, with a shell's code for a broken pipe; so
+    does what Rich prints."""
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-m", "poise.training.cli", *args]
+    code = f"import sys\nfrom poise.training import cli\n{before}\nsys.exit(cli.main({args}))"
+    command = [sys.executable, "-c", code]
     done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_an_error_with_its_output_closed() -> None:
+    """The code is that of bad input without a standard output, 141 if its text finds no reader."""
+    command = [sys.executable, "-m", "poise.training.cli", "replay", "nowhere", "--trial", "0"]
+    shell = f"{shlex.join(command)} >&-; echo $?"
+    shut = subprocess.run(["sh", "-c", shell], capture_output=True, text=True, check=False)
+    assert shut.stdout == "2\n" and "Traceback" not in shut.stderr
+    reader, writer = os.pipe()
+    os.close(reader)
+    assert subprocess.run(command, stderr=writer, check=False).returncode == 141
+    os.close(writer)
+
+
+def test_a_broken_pipe_of_another_kind_is_raised(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One to a process, say: the output is read, so this is an error like any other."""
+
+    def fail(_: object) -> int:
+        raise BrokenPipeError
+
+    monkeypatch.setattr(cli, "_run", fail)
+    with pytest.raises(BrokenPipeError):
+        main(["list"])
+    print("still here")
+    assert "still here" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -195,6 +226,9 @@ def test_another_robot_is_trained_by_a_configuration_that_fits_it() -> None:
     """The packaged default names bodies of the humanoid."""
     settings = parse(["--out", "run", "--robot", "tall"]).settings
     assert settings == replace(train_config(train_command.ANY_ROBOT), robot="tall")
+    humanoid = str(resolve("robots", "humanoid"))
+    same = parse(["--out", "run", "--robot", humanoid]).settings
+    assert same == replace(train_config(train_command.DEFAULT), robot=humanoid)
     named = parse(["--out", "run", "--robot", "tall", "--config", "residual"]).settings
     assert named == replace(train_config("residual"), robot="tall")
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stable_baselines3 import PPO
 
 from poise.baselines.outside import OutsideController, is_outside
 from poise.baselines.registry import controller_config, load_controller
@@ -57,10 +58,11 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 def example(tmp_path: Path) -> Path:
     """The example in the docs, saved as they say."""
     page = (Path(__file__).parents[1] / "docs/controllers.md").read_text()
-    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    code, sb3 = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     assert len(code.splitlines()) <= 45
     path = tmp_path / "my_controller.py"
     path.write_text(code)
+    (tmp_path / "my_sb3.py").write_text(sb3)
     return path
 
 
@@ -73,6 +75,17 @@ def test_the_example_of_the_docs_is_played(example: Path) -> None:
     assert isinstance(policy.env, ResidualBalanceEnv)
     alone = load_player("momentum-qp", robot(), **SETTINGS)
     assert run_trial(policy, trial) == run_trial(alone, trial)
+
+
+def test_what_sb3_has_trained_is_played(example: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second example: its file is looked for in the current folder."""
+    monkeypatch.chdir(example.parent)
+    model = PPO("MlpPolicy", ResidualBalanceEnv(robot()), n_steps=8, batch_size=8, device="cpu")
+    model.save("sb3_residual")
+    player = load_player("my_sb3.py:MyPolicy", robot(), **SETTINGS)
+    seen, _ = player.env.reset(seed=0)
+    expected = model.predict(seen, deterministic=True)[0]
+    assert np.array_equal(player.act(seen), expected)
 
 
 def test_a_module_in_the_current_folder_is_found(module: str) -> None:

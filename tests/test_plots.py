@@ -135,7 +135,7 @@ def test_text_stays_in_the_picture(tmp_path, figures):
 
 
 def test_series_differ_without_colour(tmp_path):
-    """The first six series have six colours and six markers."""
+    """Six colours and markers, then 36 different pairs."""
     looks = [plot_style.look(k) for k in range(6)]
     assert len({x.colour for x in looks}) == len({x.marker for x in looks}) == 6
     every = [plot_style.look(k) for k in range(36)]

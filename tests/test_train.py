@@ -26,6 +26,7 @@ from poise.training.config import Curriculum, PPOConfig, TrainConfig, train_conf
 from poise.training.players import load_player
 from poise.training.policy import load_policy
 from poise.training.train import _env_seed, train
+from poise.training.train_seeds import train_seeds
 
 from .shared import finished_run, robot, tiny_config
 
@@ -292,12 +293,15 @@ def test_bad_configurations_are_refused(section, named):
 
 @pytest.mark.parametrize("which", ["env", "evaluation"])
 def test_pushes_that_do_not_fit_the_robot_are_refused_before_anything_is_written(tmp_path, which):
-    """A body that the robot lacks: one error with the choices, no folder."""
+    """A body that the robot lacks: one error with field and choices, no folder; seeds likewise."""
     config = tiny_config()
     pushes = PushSampler(magnitude=(0.1, 0.2), unit="specific_impulse", bodies=("tail",))
     config = replace(config, **{which: replace(getattr(config, which), pushes=pushes)})
-    with pytest.raises(ConfigError, match="no body 'tail'"):
+    named = f"^{which}.pushes.bodies: no body 'tail' .*choices: .*torso"
+    with pytest.raises(ConfigError, match=named):
         train(config, tmp_path / "run")
+    with pytest.raises(ConfigError, match=named):
+        train_seeds(config, [0, 1], tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 

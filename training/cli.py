@@ -1,10 +1,11 @@
 """The command `poise`. What is heavy (MuJoCo, Numba, torch) is imported by the sub-commands."""
 
 import os
+import select
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TextIO
 
 import tyro
 
@@ -31,17 +32,33 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         try:
             return _run(args)
+        except PoiseError as error:
+            print(f"poise: {error}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            print("poise: stopped", file=sys.stderr)
+            return 130
         finally:
-            sys.stdout.flush()
-    except PoiseError as error:
-        print(f"poise: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("poise: stopped", file=sys.stderr)
-        return 130
-    except BrokenPipeError:  # poise list | head; worker processes raise others
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the exit flushes once more
+            if sys.stdout is not None:  # poise list >&-
+                sys.stdout.flush()
+    except BrokenPipeError:
+        unread = [stream for stream in (sys.stdout, sys.stderr) if _unread(stream)]
+        if not unread:
+            raise
+        with open(os.devnull, "w") as nowhere:  # the exit flushes once more
+            for stream in unread:
+                os.dup2(nowhere.fileno(), stream.fileno())
         return 141
+
+
+def _unread(stream: TextIO | None) -> bool:
+    """Whether this is a pipe that nobody reads any more."""
+    try:
+        poll = select.poll()
+        poll.register(stream.fileno(), 0)  # type: ignore[union-attr]
+    except (AttributeError, OSError, ValueError):  # no stream, no descriptor, no poll
+        return False
+    return bool(poll.poll(0))
 
 
 def _run(args: list[str]) -> int:

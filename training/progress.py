@@ -6,10 +6,17 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 WIDTH = 120  # of tables that no terminal shows
 
 
+class Terminal(Console):
+    """A console that leaves a pipe that nobody reads to `cli.main`; Rich would exit with 1."""
+
+    def on_broken_pipe(self) -> None:
+        raise  # what Rich has just caught
+
+
 def terminal() -> Console:
     """Where a command prints."""
-    console = Console()
-    return console if console.is_terminal else Console(width=WIDTH)
+    console = Terminal()
+    return console if console.is_terminal else Terminal(width=WIDTH)
 
 
 def progress_bar(console: Console) -> Progress:

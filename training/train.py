@@ -12,6 +12,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.baselines.warmup import prepare
+from poise.envs.balance import BalanceEnv
 from poise.envs.batch import replicate
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
@@ -39,7 +40,8 @@ def train(
     weights, whatever the number of threads; a resumed run starts new episodes, and so differs.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
-    round; when the configurations or robots differ; when a file of last/ cannot be read.
+    round; when the configurations or robots differ; when a file of last/ cannot be read; for
+    pushes that do not fit the robot.
     """
     out = Path(out)
     checkpoint = check_folder(config, out, resume)
@@ -120,18 +122,29 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
 
 def _training_envs(config: TrainConfig) -> VecNormalize:
     env = config.make_env()
-    for pushes in (
-        config.env.pushes,
-        config.evaluation.pushes,
-    ):  # fit the robot: nothing is written
-        if pushes is not None:
-            pushes.sample(np.random.default_rng(), env.robot, env.simulation.state.support_margin)
+    check_pushes(config, env)
     moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
     vec = ThreadedVecEnv(replicate(env, config.ppo.n_envs), config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
     if moments is not None:
         normalize.obs_rms = moments
     return normalize
+
+
+def check_pushes(config: TrainConfig, env: BalanceEnv) -> None:
+    """Raises ConfigError, naming the field, for pushes that do not fit the environment's robot."""
+    margin = env.simulation.state.support_margin
+    for section in ("env", "evaluation"):
+        sampler = getattr(config, section).pushes
+        if sampler is None:
+            continue
+        try:
+            sampler.sample(np.random.default_rng(0), env.robot, margin)
+        except ConfigError as error:
+            name = error.source or error.field
+            raise ConfigError(
+                error.message, field=f"{section}.pushes.{name}", choices=error.choices
+            ) from None
 
 
 def _reseed(model: PPO, env: VecNormalize, seed: int) -> None:

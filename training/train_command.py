@@ -1,6 +1,7 @@
 """`poise train`: a training configuration, changed by flags; one run, or one per seed."""
 
 import argparse
+import contextlib
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ from typing import Annotated
 
 import tyro
 
-from poise.envs.config import build, to_dict
+from poise.envs.config import build, resolve, to_dict
 from poise.envs.errors import ConfigError
 
 from .backends import Backend
@@ -20,7 +21,7 @@ from .train import train
 from .train_seeds import train_seeds
 
 DEFAULT, ANY_ROBOT = "residual", "any-robot"
-HUMANOID = TrainConfig.robot  # of the first
+HUMANOID = TrainConfig.robot  # whose bodies and limits DEFAULT names
 
 
 @dataclass(frozen=True)
@@ -98,4 +99,11 @@ def _base(args: Sequence[str]) -> str | Path:
     own = Path(known.out or ".") / "config.yaml"
     if known.resume and own.is_file():
         return own
-    return DEFAULT if known.robot == HUMANOID else ANY_ROBOT
+    return DEFAULT if _is_humanoid(known.robot) else ANY_ROBOT
+
+
+def _is_humanoid(robot: str) -> bool:
+    """By its name or its file; what there is not is refused later."""
+    with contextlib.suppress(ConfigError):
+        return resolve("robots", robot).samefile(resolve("robots", HUMANOID))
+    return False

@@ -21,7 +21,7 @@ from .config import TrainConfig
 from .provenance import circumstances
 from .seed_groups import SEEDS, read_seeds, seed_figures, seed_folder
 from .seed_progress import SeedProgress, print_seeds
-from .train import LAST, check_folder, train
+from .train import LAST, check_folder, check_pushes, train
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,11 @@ def train_seeds(
     seeds = _all_seeds(seeds, out, resume)
     runs = [_run(replace(config, seed=seed, threads=1), seed_folder(out, seed)) for seed in seeds]
     missing = [run for run in runs if not _finished(run)]
+    env = config.make_env()  # compiles all that the runs need, once
+    check_pushes(config, env)
+    env.close()
     write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
     write_atomic(out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n")
-    config.make_env().close()  # compiles all that the runs need, once
     failed: list[str] = []
     with SeedProgress(runs, console), Crew(backend, workers) as crew:
         for run, error in crew.each(train_run, missing):

@@ -88,8 +88,8 @@ SIZE = 113.7  # [N·s] m √(g h) of the humanoid
 class TuningPushes:
     """Half a circle of directions (the robot is symmetric) times a ladder of impulses.
 
-    The ladder is for a robot with m √(g h) = `SIZE`; another one's impulses are as much larger.
-    They push the first of the robot's `push_bodies`.
+    Impulses [N·s] are scaled by the robot's m √(g h) over `SIZE`, and push the first of its
+    `push_bodies`.
     """
 
     directions: int = 9
@@ -128,8 +128,8 @@ def set_gains(
 
 
 def score(env: ResidualBalanceEnv, config: MomentumQPConfig, rows: list[list[Push]], seed: int):
-    """Mean over directions of the impulse recovered, plus half of the worst; and the detail [N·s,
-    as of a robot of `SIZE`].
+    """Mean over directions of the impulse recovered [N·s, of the ladder before it is scaled to the
+    robot], plus half of the worst; and the detail.
 
     A trial that fell counts for at most 0.3 by how long it stood, one that is not quiet, or that
     dragged a foot further than `STEP_LENGTH`, 0.6.

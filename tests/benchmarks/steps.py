@@ -40,13 +40,13 @@ def first_step(player, impulse: float, direction: float, seed: int):
         over = over or fallen
         state, now = env.simulation.state, env.simulation.time
         feet = state.sole_points
+        told = env.controller.stepping()
+        if begun is None and told.steps == 1 and told.foot >= 0 and told.phase > 0.0:
+            begun = (told.foot, now, feet[told.foot, :2].copy())
         if now <= 0.5:
             start = state.com[:2].copy()
         elif begun is None:
             reach = max(reach, float((state.cop - start) @ away))
-        told = env.controller.stepping()
-        if begun is None and told.steps == 1 and told.foot >= 0 and told.phase > 0.0:
-            begun = (told.foot, now, feet[told.foot, :2].copy())
         if begun is not None and found is None and (told.foot < 0 or told.steps > 1):
             foot, since, place = begun
             found = (reach, now - since, float(np.linalg.norm(feet[foot, :2] - place)))
