@@ -1,7 +1,7 @@
 """Reach, length and time of real steps: `python -m tests.benchmarks.steps [CONTROLLER…]`.
 
 First steps of recoveries from 0.1 s torso pushes in 16 directions at 0.7 to 1.1 of
-`residual-step`'s J50, against the r, l and T_s that `NStepLimit` takes from soles, ankles and the
+`IMPULSES`, against the r, l and T_s that `NStepLimit` takes from soles, ankles and the
 planner's limits. A step lasts from lift-off to touchdown (to 20 ms, a policy step); its length is
 how far the sole moved. r is how far the CoP got in the push's direction from where the CoM was
 before it, with both feet in place: until a lift-off. Sideways: directions of 67 to 113° and 247 to
@@ -20,8 +20,9 @@ from poise.training.limits import PushLimits
 from poise.training.players import load_player
 from poise.training.step_limits import NStepLimit
 
-J50 = (30.5, 29.0, 30.5, 22.0, 22.5, 27.0, 31.5, 31.5)  # [N·s] every 22.5°, left as right
-J50 = (*J50, 30.6, *J50[:0:-1])
+# about J50 of `residual-step` after its first stage
+IMPULSES = (30.5, 29.0, 30.5, 22.0, 22.5, 27.0, 31.5, 31.5)  # [N·s] every 22.5°, left as right
+IMPULSES = (*IMPULSES, 30.6, *IMPULSES[:0:-1])
 SHARES = (0.7, 0.8, 0.9, 1.0, 1.1)
 
 
@@ -69,7 +70,7 @@ def main() -> None:
             angle = 22.5 * k
             sideways = "sideways" if abs(np.sin(np.radians(angle))) > 0.9 else "others"
             for seed, share in enumerate(SHARES):
-                step = first_step(player, share * J50[k], angle, seed)
+                step = first_step(player, share * IMPULSES[k], angle, seed)
                 if step is not None:
                     steps[sideways].append((*step, limit.reach(angle), limit.length(angle)))
         for which, rows in steps.items():
