@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from poise.envs.config import build, packaged, read_yaml, resolve
+from poise.envs.config import build, on_base, packaged, read_yaml, resolve
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 
@@ -100,12 +100,7 @@ def _build(data: dict[str, Any], source: str) -> Any:
 
     `base` names a controller whose fields hold where `data` has none of its own.
     """
-    if "base" in data:
-        if not isinstance(data["base"], str):
-            raise ConfigError("must be a name", source=source, field="base",
-                              choices=packaged("controllers"))  # fmt: skip
-        base = read_yaml(resolve("controllers", data["base"]))
-        data = _merged(base, {key: value for key, value in data.items() if key != "base"})
+    data = on_base(data, "controllers", source)
     kind = data.get("kind", "momentum-qp")
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigError(
@@ -118,12 +113,3 @@ def _build(data: dict[str, Any], source: str) -> Any:
     if isinstance(config, OutsideConfig):  # with the hash of what is there now
         return outside_config(config.name, config.arguments)
     return config
-
-
-def _merged(base: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
-    """`base` with the entries of `data` in their places, mappings merged."""
-    merged = dict(base)
-    for key, value in data.items():
-        both = isinstance(value, dict) and isinstance(base.get(key), dict)
-        merged[key] = _merged(base[key], value) if both else value
-    return merged

@@ -42,6 +42,33 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     return data
 
 
+def on_base(
+    data: dict[str, Any], kind: str, source: str | Path, above: tuple[Path, ...] = ()
+) -> dict[str, Any]:
+    """`data` over the file of `kind` that its `base` names, mappings merged; as it is without one.
+
+    Raises ConfigError for a base that does not exist, cannot be read, or leads back to itself.
+    """
+    if "base" not in data:
+        return data
+    if not isinstance(data["base"], str):
+        raise ConfigError("must be a name", source=source, field="base", choices=packaged(kind))
+    path = resolve(kind, data["base"])
+    if path in above:
+        raise ConfigError(f"{data['base']!r} leads back to itself", source=source, field="base")
+    base = on_base(read_yaml(path), kind, path, (*above, path))
+    return _merged(base, {key: value for key, value in data.items() if key != "base"})
+
+
+def _merged(base: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
+    """`base` with the entries of `data` in their places."""
+    merged = dict(base)
+    for key, value in data.items():
+        both = isinstance(value, dict) and isinstance(base.get(key), dict)
+        merged[key] = _merged(base[key], value) if both else value
+    return merged
+
+
 def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
     """A dataclass instance from a mapping, strictly.
 

@@ -12,7 +12,16 @@ import numpy as np
 import pytest
 
 from poise.envs import config
-from poise.envs.config import build, packaged, read_yaml, resolve, to_dict, to_yaml, write_atomic
+from poise.envs.config import (
+    build,
+    on_base,
+    packaged,
+    read_yaml,
+    resolve,
+    to_dict,
+    to_yaml,
+    write_atomic,
+)
 from poise.envs.errors import ConfigError, PoiseError
 
 
@@ -312,3 +321,26 @@ def test_errors_survive_a_process_boundary() -> None:
     copy = pickle.loads(pickle.dumps(error))
     assert str(copy) == str(error) == "a.yaml: b: is wrong (choices: c, d)"
     assert (copy.field, copy.choices) == ("b", ("c", "d"))
+
+
+def test_a_base_may_have_a_base(tmp_path: Path) -> None:
+    """What is nearest counts; mappings are merged, lists are not."""
+    (tmp_path / "a.yaml").write_text("x: 1\nlist: [1, 2]\npart: {y: 1, z: {u: 1, v: 1}}\n")
+    (tmp_path / "b.yaml").write_text(f"base: {tmp_path}/a.yaml\npart: {{z: {{u: 2}}}}\n")
+    data = {"base": str(tmp_path / "b.yaml"), "list": [3], "part": {"y": 3}}
+    found = on_base(data, "training", "c.yaml")
+    assert found == {"x": 1, "list": [3], "part": {"y": 3, "z": {"u": 2, "v": 1}}}
+    assert data["part"] == {"y": 3}
+
+
+def test_a_base_that_is_none(tmp_path: Path) -> None:
+    """Not a name, no such file, and two that are each other's: one error that names the file."""
+    with pytest.raises(ConfigError, match=r"^c.yaml: base: must be a name .*residual-step"):
+        on_base({"base": 3}, "training", "c.yaml")
+    with pytest.raises(ConfigError, match="nowhere"):
+        on_base({"base": "nowhere"}, "training", "c.yaml")
+    one, other = tmp_path / "one.yaml", tmp_path / "other.yaml"
+    one.write_text(f"base: {other}\n")
+    other.write_text(f"base: {one}\n")
+    with pytest.raises(ConfigError, match=r"other.yaml: base: .*one.yaml' leads back to itself"):
+        on_base({"base": str(one)}, "training", "c.yaml")

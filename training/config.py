@@ -7,7 +7,7 @@ from typing import Any, Literal
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
 from poise.baselines.residual_step_env import ResidualStepEnv, StepScales
 from poise.envs.balance import BalanceEnv, EnvConfig
-from poise.envs.config import build, read_yaml, resolve
+from poise.envs.config import build, on_base, read_yaml, resolve
 from poise.envs.push_schedule import PushSampler
 from poise.envs.robot import Robot
 from poise.envs.torque_balance import TorqueBalanceEnv
@@ -112,7 +112,8 @@ class TrainConfig:
 def train_config(name_or_path: str | Path) -> TrainConfig:
     """A packaged training configuration (`configs/training`) or a path to one.
 
-    Raises ConfigError naming the file, the field and the choices.
+    `base` in it names another one, whose fields hold where it has none of its own. Raises
+    ConfigError naming the file, the field and the choices.
     """
     path = resolve("training", name_or_path)
-    return build(TrainConfig, read_yaml(path), str(path))
+    return build(TrainConfig, on_base(read_yaml(path), "training", path), str(path))
