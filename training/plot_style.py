@@ -73,9 +73,10 @@ class Look(NamedTuple):
 
 
 def look(index: int) -> Look:
-    """Look of the series number `index`; the first is the baseline. Colours repeat after six, with
-    other markers; after 36 everything
-    repeats."""
+    """Look of the series number `index`; the first is the baseline.
+
+    Colours repeat after six, with other markers; after 36 everything repeats.
+    """
     colours = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY)
     lines = ("-", "-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)), ":")
     markers = ("o", "s", "^", "D", "v", "P")

@@ -1,11 +1,10 @@
 """Reach, length and time of real steps: `python -m tests.benchmarks.steps [CONTROLLER…]`.
 
-First steps of recoveries from 0.1 s torso pushes in 16 directions at 0.7 to 1.1 of
-`IMPULSES`, against the r, l and T_s that `NStepLimit` takes from soles, ankles and the
-planner's limits. A step lasts from lift-off to touchdown (to 20 ms, a policy step); its length is
-how far the sole moved. r is how far the CoP got in the push's direction from where the CoM was
-before it, with both feet in place: until a lift-off. Sideways: directions of 67 to 113° and 247 to
-293°.
+First steps of recoveries from 0.1 s torso pushes in 16 directions at 0.7 to 1.1 of `IMPULSES`,
+against the r, l and T_s that `NStepLimit` takes from soles, ankles and the planner's limits. A step
+lasts from lift-off to touchdown (to 20 ms, a policy step); its length is how far the sole moved. r
+is how far the CoP got in the push's direction from where the CoM was before it, with both feet in
+place: until a lift-off. Sideways: directions of 67 to 113° and 247 to 293°.
 """
 
 from __future__ import annotations
