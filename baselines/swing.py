@@ -25,6 +25,7 @@ class SwingTask:
 
     weight: float = field(default=1000.0, metadata={"above": 0.0})
     turn_weight: float = field(default=100.0, metadata={"above": 0.0})
+    yaw_share: float = field(default=1.0, metadata={"min": 0.0})  # of it, about the vertical
     stiffness: float = field(default=60.0, metadata={"min": 0.0})
     damping_ratio: float = field(default=1.0, metadata={"min": 0.0})
     clearance: float = field(default=0.06, metadata={"above": 0.0, "max": 0.5})  # [h]
@@ -193,6 +194,7 @@ class SwingGains(Block):
     damping: float
     weight: float
     turn_weight: float
+    yaw_weight: float
     error: np.ndarray  # (3,) scratch
 
 
@@ -201,9 +203,10 @@ def swing_gains(robot: RobotArrays, task: SwingTask) -> SwingGains:
     g, rate2 = robot.gravity, robot.gravity / robot.height_com
     k = task.stiffness * rate2
     d = 2.0 * task.damping_ratio * np.sqrt(k)
+    turn = task.turn_weight / rate2**2
     return SwingGains(
         stiffness=float(k), damping=float(d), weight=float(task.weight / g**2),
-        turn_weight=float(task.turn_weight / rate2**2), error=apart(3),
+        turn_weight=float(turn), yaw_weight=float(task.yaw_share * turn), error=apart(3),
     )  # fmt: skip
 
 
@@ -220,6 +223,7 @@ def fill_swing_rows(s, sole, reference, axes, gains, A, b, weights):
         )  # fmt: skip
         b[3 + a] = k * turn[a] - d * s.J_v[3 + r] - s.Jdot_v[3 + r]
         weights[a], weights[3 + a] = gains.weight, gains.turn_weight
+    weights[5] = gains.yaw_weight
     for r in range(6):
         copy(s.J[6 * sole + r], A[r])
 

@@ -60,6 +60,7 @@ def swing_rows(state, sole, reference, axes, task):
     linear = linear + d * (reference[1] - velocity[:3])
     wanted = np.concatenate([linear, k * error - d * velocity[3:]])
     weights = np.repeat([task.weight / g**2, task.turn_weight / (g / h) ** 2], 3)
+    weights[5] *= task.yaw_share
     return state.J[rows], wanted - state.Jdot_v[rows], weights
 
 

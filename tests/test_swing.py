@@ -123,12 +123,21 @@ def test_rows_are_those_of_the_readable_form():
     for sole in range(2):
         state = generic_state(seed=sole).state
         reference, axes = rng.normal(size=(3, 3)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        task = SwingTask(weight=3.0, turn_weight=2.0, damping_ratio=0.7)
+        task = SwingTask(weight=3.0, turn_weight=2.0, yaw_share=0.4, damping_ratio=0.7)
         found = swing_rows(state, sole, reference, axes, task)
         for part, expected in zip(
             found, readable.swing_rows(state, sole, reference, axes, task), strict=True
         ):
             np.testing.assert_allclose(part, expected, rtol=1e-12, atol=1e-9)
+
+
+def test_a_smaller_share_lets_the_sole_turn_about_the_vertical_only():
+    """`yaw_share` scales the sixth weight; all else stays."""
+    state = generic_state().state
+    reference, axes = np.zeros((3, 3)), state.sole_axes[0]
+    whole, part = (swing_rows(state, 0, reference, axes, SwingTask(yaw_share=s)) for s in (1.0, 0.3))
+    np.testing.assert_allclose(part.weights / whole.weights, [1.0] * 5 + [0.3], rtol=1e-14)
+    np.testing.assert_array_equal(part.b, whole.b)
 
 
 def test_rotation_error_is_the_mean_cross_product():
