@@ -135,7 +135,8 @@ def test_a_smaller_share_lets_the_sole_turn_about_the_vertical_only():
     """`yaw_share` scales the sixth weight; all else stays."""
     state = generic_state().state
     reference, axes = np.zeros((3, 3)), state.sole_axes[0]
-    whole, part = (swing_rows(state, 0, reference, axes, SwingTask(yaw_share=s)) for s in (1.0, 0.3))
+    tasks = SwingTask(), SwingTask(yaw_share=0.3)
+    whole, part = (swing_rows(state, 0, reference, axes, task) for task in tasks)
     np.testing.assert_allclose(part.weights / whole.weights, [1.0] * 5 + [0.3], rtol=1e-14)
     np.testing.assert_array_equal(part.b, whole.b)
 

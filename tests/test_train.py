@@ -195,14 +195,27 @@ def test_a_run_starts_from_a_policy(tmp_path):
     assert evaluations(tmp_path / "run")[0]["mean_abs_action"] != "0.0"
 
 
+def test_a_larger_network_starts_as_the_policy(tmp_path):
+    """Its first evaluation is that of the smaller network; then its new units learn."""
+    start = str(finished_run() / "last")
+    wide = replace(tiny_config().ppo, net_arch=(32, 24))
+    for name, ppo in (("narrow", tiny_config().ppo), ("wide", wide)):
+        train(tiny_config(start_from=start, ppo=ppo), tmp_path / name, progress=False)
+    narrow, grown = (evaluations(tmp_path / name)[0] for name in ("narrow", "wide"))
+    assert float(grown["mean_abs_action"]) == pytest.approx(float(narrow["mean_abs_action"]))
+    outgoing = next(w for w in weights(tmp_path / "wide") if w.shape == (32, 24))
+    assert np.abs(outgoing[16:, :16]).max() > 0.0
+
+
 def test_a_start_that_is_no_policy_is_refused(tmp_path):
-    """Before anything is written: no such policy, or another size of network."""
+    """Before anything is written: no such policy, or more layers or units than asked for."""
     with pytest.raises(ConfigError, match="nowhere: no such folder.*residual-step"):
         train(tiny_config(start_from="nowhere"), tmp_path / "run", progress=False)
-    wide = replace(tiny_config().ppo, net_arch=(8,))
     start = str(finished_run() / "last")
-    with pytest.raises(ConfigError, match=r"policy\.zip: cannot be read"):
-        train(tiny_config(start_from=start, ppo=wide), tmp_path / "run", progress=False)
+    for widths, said in (((8,), "other layers"), ((8, 16), "has shape")):
+        ppo = replace(tiny_config().ppo, net_arch=widths)
+        with pytest.raises(ConfigError, match=rf"policy\.zip: cannot be read.*{said}"):
+            train(tiny_config(start_from=start, ppo=ppo), tmp_path / "run", progress=False)
     assert not (tmp_path / "run").exists()
 
 

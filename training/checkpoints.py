@@ -13,17 +13,20 @@ import shutil
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from stable_baselines3 import PPO
+from stable_baselines3.common.save_util import load_from_zip_file
 from stable_baselines3.common.vec_env import VecNormalize
+from torch import Tensor
 
 from poise.baselines.registry import controller_config
 from poise.envs.config import to_yaml
 from poise.envs.errors import ConfigError, PoiseError
 
 from .config import TrainConfig
+from .widening import widened
 
 POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.yaml", "state.json"
 FILES = (POLICY, STATISTICS, CONFIG, STATE)
@@ -66,17 +69,26 @@ def find_checkpoint(folder: Path) -> Path | None:
     return None
 
 
-def restore(folder: Path, model: PPO, normalize: VecNormalize, fingerprint: str) -> dict[str, Any]:
+def restore(
+    folder: Path, model: PPO, normalize: VecNormalize, fingerprint: str, wider: bool = False
+) -> dict[str, Any]:
     """Load weights, optimizer and statistics into `model` and `normalize`; returns the state.
 
-    Raises ConfigError naming the file that cannot be read or is for another robot than the one
-    with this `fingerprint`.
+    With `wider` the network of `model` may be larger than the stored one; its optimizer then
+    begins anew. Raises ConfigError naming the file that cannot be read or is for another robot
+    than the one with this `fingerprint`.
     """
     state = read_state(folder / STATE)
     check_robot(state, fingerprint, folder / STATE)
     path = folder / POLICY
     try:
-        model.set_parameters(str(path), exact_match=True, device="cpu")
+        archive = load_from_zip_file(path, load_data=False, device="cpu")
+        stored = cast(dict[str, Tensor], archive[1]["policy"])
+        own = model.policy.state_dict()
+        if wider and any(own[name].shape != value.shape for name, value in stored.items()):
+            model.policy.load_state_dict(widened(stored, own))
+        else:
+            model.set_parameters(str(path), exact_match=True, device="cpu")
         path = folder / STATISTICS
         with np.load(path, allow_pickle=False) as data:
             for prefix, moments in (("obs", normalize.obs_rms), ("ret", normalize.ret_rms)):

@@ -36,8 +36,9 @@ def train(
     `out` gets config.yaml, evaluations.csv, tensorboard/, and the policy folders best/ and last/.
     `resume` goes on from last/, which is written after every rollout; the configuration must be
     the same but for `steps` and `threads`. A new run begins with the policy `config.start_from`,
-    if there is one, of the same robot and size of network. The same configuration gives the same
-    weights, whatever the number of threads; a resumed run starts new episodes, and so differs.
+    if there is one, of the same robot; its network may be smaller (`widened`). The same
+    configuration gives the same weights, whatever the number of threads; a resumed run starts new
+    episodes, and so differs.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
     round; when the configurations or robots differ; when a file of last/ cannot be read; for
@@ -56,7 +57,7 @@ def train(
         state: dict[str, Any] = {}
         fingerprint = normalize.get_attr("robot")[0].fingerprint
         if start is not None:
-            restore(start, model, normalize, fingerprint)
+            restore(start, model, normalize, fingerprint, wider=True)
         if checkpoint is not None:
             state = restore(checkpoint, model, normalize, fingerprint)
             check_controller(state, config, checkpoint / STATE)
