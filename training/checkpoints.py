@@ -82,12 +82,7 @@ def restore(
     check_robot(state, fingerprint, folder / STATE)
     path = folder / POLICY
     try:
-        archive = load_from_zip_file(path, load_data=False, device="cpu")
-        stored = cast(dict[str, Tensor], archive[1]["policy"])
-        own = model.policy.state_dict()
-        if wider and any(own[name].shape != value.shape for name, value in stored.items()):
-            model.policy.load_state_dict(widened(stored, own))
-        else:
+        if not (wider and _load_into_wider(path, model)):
             model.set_parameters(str(path), exact_match=True, device="cpu")
         path = folder / STATISTICS
         with np.load(path, allow_pickle=False) as data:
@@ -100,6 +95,17 @@ def restore(
     except UNREADABLE as error:
         raise unreadable(path, error) from None
     return state
+
+
+def _load_into_wider(path: Path, model: PPO) -> bool:
+    """Load the weights if the network of `model` is another one than the stored; else False."""
+    archive = load_from_zip_file(path, load_data=False, device="cpu")
+    stored = cast(dict[str, Tensor], archive[1]["policy"])
+    own = model.policy.state_dict()
+    if {n: w.shape for n, w in stored.items()} == {n: w.shape for n, w in own.items()}:
+        return False
+    model.policy.load_state_dict(widened(stored, own))
+    return True
 
 
 def read_state(path: Path) -> dict[str, Any]:
