@@ -18,6 +18,7 @@ from .contact_sets import ContactSets, contact_tick
 from .controller import Targets
 from .momentum_qp import COMPILED_SOLVER, MomentumQPConfig, Outputs, momentum_tick
 from .reduced_qp import QPParameters
+from .step_feedback import StepFeedback
 from .step_plan import Foothold, StepLimits, StepPlanner
 from .step_shift import STANDING, Stepping
 from .swing import Swing, SwingTask, swing_gains
@@ -36,7 +37,8 @@ class CaptureStepConfig:
     sets the CoM's height, `sink` lower in a swing. `unload`, `ramp`: time in which a foot gives its
     load away, and takes it up; `pause` between two steps.
     `jump`: largest change of a torque from tick to tick, share of its limit. `root_accel` (in a
-    swing `swing_accel`), `joint_accel`: most that the posture asks for [ω²].
+    swing `swing_accel`), `joint_accel`: most that the posture asks for [ω²]. `feedback`: what lean
+    and turn of the body add to a step, see `step_feedback.py`.
     """
 
     kind: Literal["capture-step"] = "capture-step"
@@ -57,6 +59,7 @@ class CaptureStepConfig:
     joint_accel: float = field(default=100.0, metadata={"above": 0.0})
     limits: StepLimits = field(default_factory=StepLimits)
     foothold: Foothold = field(default_factory=Foothold)
+    feedback: StepFeedback = field(default_factory=StepFeedback)
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
     step_qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
@@ -139,7 +142,8 @@ class CaptureStep(AroundQP):
         return type(self), (self.robot, self.config)  # a copy has memory and addresses of its own
 
     def _planner(self, reach: Reach) -> StepPlanner:
-        return StepPlanner(self.robot, reach, self.config.limits, self.config.foothold)
+        c = self.config
+        return StepPlanner(self.robot, reach, c.limits, c.foothold, c.feedback)
 
     @property
     def failures(self) -> int:

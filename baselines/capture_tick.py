@@ -133,6 +133,7 @@ def begin_step(t: CaptureTick):
         m.level[1, 0] = np.sin(yaw)
         m.level[0, 1] = -m.level[1, 0]
     q.heading[0], q.heading[1] = m.level[0, 0], m.level[1, 0]
+    q.feedback.stage[0] = 1.0 if m.steps[0] > 0 else 0.0
     plan_step(q)
     foot = q.best_foot[0]
     m.steps[0] += 1

@@ -10,9 +10,9 @@ from poise.envs.robot import Robot
 
 from .capturability import Reach
 from .capture_step import CaptureStep, CaptureStepConfig
+from .step_feedback import StepFeedback
 from .step_plan import Foothold, StepLimits, StepPlanner
-from .step_search import Search, allowed, put_foothold, to_local
-from .step_shift import FOOTHOLD
+from .step_search import Search, allowed, moved, put_foothold, to_local
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,9 @@ def energy_law(q: Search):
     speed = np.sqrt(vx * vx + vy * vy)
     away = rest_distance(speed, omega, q.height, q.arc) / max(speed, 1e-9)
     x, y = to_local(q, x + away * vx, y + away * vy)
-    x += q.shift[FOOTHOLD] - q.reach.middle[foot, 0]
-    y += q.shift[FOOTHOLD + 1] - q.reach.middle[foot, 1] + q.sides[foot] * q.outward
+    x -= q.reach.middle[foot, 0]
+    y += q.sides[foot] * q.outward - q.reach.middle[foot, 1]
+    x, y = moved(q, x, y)
     near_x, near_y = allowed(q, x, y)
     put_foothold(q, near_x, near_y)
     q.left[0] = np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
@@ -71,9 +72,15 @@ class EnergyPlanner(StepPlanner):
     law = staticmethod(energy_law)
 
     def __init__(
-        self, robot: Robot, reach: Reach, limits: StepLimits, choice: Foothold, arc: float = 0.0
+        self,
+        robot: Robot,
+        reach: Reach,
+        limits: StepLimits,
+        choice: Foothold,
+        arc: float = 0.0,
+        feedback: StepFeedback | None = None,
     ):
-        super().__init__(robot, reach, limits, choice)
+        super().__init__(robot, reach, limits, choice, feedback)
         self.arc = arc
 
 
@@ -91,4 +98,6 @@ class IPMStep(CaptureStep):
         config = self.config
         if not isinstance(config, IPMStepConfig):
             raise TypeError(f"config must be an IPMStepConfig, not {type(config).__name__}")
-        return EnergyPlanner(self.robot, reach, config.limits, config.foothold, config.arc)
+        return EnergyPlanner(
+            self.robot, reach, config.limits, config.foothold, config.arc, config.feedback
+        )

@@ -11,6 +11,7 @@ from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .capturability import Reach, sides
+from .step_feedback import StepFeedback, feedback_arrays
 from .step_search import Search, capture_law, plan_step, replan_step, take_foot
 from .step_shift import StepShift
 from .swing import Swing
@@ -74,12 +75,20 @@ class StepPlanner:
     law: Any = staticmethod(capture_law)  #: compiled: finds the foothold of one foot and time
     arc = 0.0
 
-    def __init__(self, robot: Robot, reach: Reach, limits: StepLimits, choice: Foothold):
+    def __init__(
+        self,
+        robot: Robot,
+        reach: Reach,
+        limits: StepLimits,
+        choice: Foothold,
+        feedback: StepFeedback | None = None,
+    ):
         self.reach, self.limits, self.choice = reach, limits, choice
         self.h = robot.height_com
         self.rate = float(np.sqrt(-robot.model.opt.gravity[2] / self.h))  # ω
         self.sides = sides(robot)
         self.shift = StepShift()  #: what a policy adds
+        self.feedback = feedback_arrays(robot, feedback or StepFeedback())
         self._search: Search | None = None
 
     def search(self, state: RobotState) -> Search:
@@ -87,7 +96,8 @@ class StepPlanner:
         if self._search is None or self._search.state is not state.arrays:
             limits, choice, h, rate = self.limits, self.choice, self.h, self.rate
             search = Search(
-                state.arrays, self.reach.arrays, self.shift.values, apart(2), self.sides, h,
+                state.arrays, self.reach.arrays, self.shift.values, self.feedback, apart(2),
+                self.sides, h,
                 limits.ahead * h, limits.behind * h, limits.width_min * h, limits.width_max * h,
                 limits.speed * h * rate, limits.side_speed * h * rate,
                 limits.time_min / rate, limits.time_max / rate,

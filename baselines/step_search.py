@@ -9,6 +9,8 @@ from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
 
 from .capturability import ReachArrays, distance_beyond, reach_of_one
+from .step_feedback import AHEAD, OUTWARD, FeedbackArrays, feed_back
+from .step_feedback import TIME as LONGER
 from .step_shift import FOOTHOLD, TIME
 from .support import find_nearest
 from .swing import FROZEN, SwingArrays, time_left
@@ -24,6 +26,7 @@ class Search(Block):
     state: StateArrays
     reach: ReachArrays
     shift: np.ndarray  # see `StepShift`
+    feedback: FeedbackArrays
     heading: np.ndarray  # (2,) its cosine and sine
     sides: np.ndarray  # (2,)
     height: float
@@ -57,6 +60,7 @@ def take_foot(q: Search, foot: int):
     """Move this foot; the CoP stays where the other sole brakes ξ most."""
     q.foot[0] = foot
     stance = q.state.sole_point[1 - foot]
+    feed_back(q.feedback, q.state, stance, q.heading[0], q.heading[1], q.sides[foot])
     n = reach_of_one(q.reach, 1 - foot, stance, q.heading[0], q.heading[1], q.under)
     find_nearest(q.under[:n], q.state.capture_point, q.p)
 
@@ -83,6 +87,14 @@ def put_foothold(q: Search, x: float, y: float):
 
 
 @compiled
+def moved(q: Search, x: float, y: float):
+    """(x, y) from the stance sole, as feedback and a policy want it."""
+    added, side = q.feedback.added, q.sides[q.foot[0]]
+    x += added[AHEAD] + q.shift[FOOTHOLD]
+    return x, y + side * added[OUTWARD] + q.shift[FOOTHOLD + 1]
+
+
+@compiled
 def allowed(q: Search, x: float, y: float):
     """What limits of place and speed leave of (x, y), from the stance sole along the heading."""
     side, start = q.sides[q.foot[0]], to_local(q, q.start[0], q.start[1])
@@ -102,8 +114,9 @@ def capture_law(q: Search):
     end_x, end_y = p[0] + (xi[0] - p[0]) * grown, p[1] + (xi[1] - p[1]) * grown
     x, y = to_local(q, end_x, end_y)
     x, y = x - q.reach.middle[foot, 0], y - q.reach.middle[foot, 1]
-    x += q.overshoot * np.tanh(x / (0.1 * q.height)) + q.shift[FOOTHOLD]
-    y += q.sides[foot] * q.outward + q.shift[FOOTHOLD + 1]
+    x += q.overshoot * np.tanh(x / (0.1 * q.height))
+    y += q.sides[foot] * q.outward
+    x, y = moved(q, x, y)
     x, y = allowed(q, x, y)
     put_foothold(q, x, y)
     first, second = q.foothold, q.state.sole_point[1 - foot]
@@ -129,11 +142,12 @@ def _try(q: Search, time: float, extra: float):
 
 @compiled
 def _shift_best(q: Search):
-    """The same step, but that it lands earlier or later, as a policy wants."""
+    """The same step, but that it lands earlier or later, as feedback and a policy want."""
     q.best[4] = 0.0
-    if q.shift[TIME] == 0.0:
+    later = q.feedback.added[LONGER] + q.shift[TIME]
+    if later == 0.0:
         return
-    q.time[0] = max(q.best[2] + q.shift[TIME], FROZEN)
+    q.time[0] = max(q.best[2] + later, FROZEN)
     call(q.law, q)
     q.best[0], q.best[1] = q.foothold[0], q.foothold[1]
     q.best[2], q.best[4] = q.time[0], q.time[0] - q.best[2]
@@ -143,6 +157,7 @@ def _shift_best(q: Search):
 def plan_step(q: Search):
     """The cheapest step of either foot from where they stand, into `best` and `best_foot`."""
     q.best_foot[0] = -1
+    q.feedback.stage[1] = 0.0
     for foot in range(2):
         take_foot(q, foot)
         start_from(q, q.state.sole_point[foot, 0], q.state.sole_point[foot, 1])
@@ -162,6 +177,7 @@ def replan_step(q: Search, foot: int, w: SwingArrays):
     left = max(time_left(w) - w.shift[0], FROZEN)
     carried = 0.5 * min(left, 0.1)  # where its speed carries it anyway
     q.best_foot[0] = -1
+    q.feedback.stage[1] = w.time[0] / w.duration[0]
     take_foot(q, foot)
     start_from(
         q,

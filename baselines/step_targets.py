@@ -5,6 +5,7 @@ import numpy as np
 from poise.envs.jit import compiled
 from poise.envs.kinematics import copy
 
+from .step_feedback import HEIGHT as FEEDBACK_HEIGHT
 from .step_shift import COM, COP, HEIGHT, LEAN
 from .support import find_nearest
 from .swing import rotation_error
@@ -59,7 +60,7 @@ def guide(t, region, hips, ground, way_x, way_y):
     reach = np.sqrt(max(g.leg * g.leg - 0.25 * (way_x * way_x + way_y * way_y), 0.0))
     own.com[2] = ground + min(t.robot.height_com, reach) + shift[HEIGHT]
     if t.memory.swinging[0]:
-        own.com[2] -= g.sink
+        own.com[2] += t.search.feedback.added[FEEDBACK_HEIGHT] - g.sink
     own.com_vel[2] = own.com_acc[2] = 0.0
     limit_posture(t)
 

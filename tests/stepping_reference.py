@@ -82,10 +82,25 @@ class ReadablePlanner:
     def __init__(self, planner):
         self.planner, self.reach, self.shift = planner, planner.reach, planner.shift
         self.limits, self.choice, self.h = planner.limits, planner.choice, planner.h
+        self.phase = 0.0
+
+    def added(self, state, foot, yaw):
+        """What is fed back: foothold ahead and outward, time, height."""
+        f, side, robot = self.planner.feedback, self.planner.sides[foot], state.robot
+        out = np.array([1.0, side])  # ahead, outward
+        R = turn(yaw)
+        capture = R.T @ (state.capture_point - state.sole_points[1 - foot, :2]) / self.h
+        standing = robot.root_standing
+        lean = R.T @ (state.root_axes @ standing.T @ [0.0, 0.0, 1.0])[:2]
+        L = state.arrays.momentum[3:5]
+        spin = R.T @ [L[1], -L[0]] * self.planner.rate / (robot.mass * robot.gravity * self.h)
+        signals = [1.0, f.stage[0], self.phase, *out * capture, *out * lean, *out * spin]
+        return f.gains @ signals
 
     def plan(self, state, yaw):
         """The best step of either foot."""
         low, high = self.limits.time_min, self.limits.time_max
+        self.phase = 0.0
         times = np.linspace(low, high, 8) / self.planner.rate
         starts = [state.sole_points[foot, :2] for foot in range(2)]
         plans = [self.best(state, foot, yaw, times, starts[foot], 0.0) for foot in range(2)]
@@ -95,6 +110,7 @@ class ReadablePlanner:
     def replan(self, state, foot, yaw, swing):
         """The best time and place of a running step."""
         rate = self.planner.rate
+        self.phase = swing.time / swing.duration
         low = max(self.limits.time_min / rate - swing.time, FROZEN)
         high = max(self.limits.time_max / rate - swing.time, low)
         left = max(swing.remaining - swing.arrays.shift[0], FROZEN)
@@ -104,10 +120,11 @@ class ReadablePlanner:
         return self.shifted(state, yaw, best, start)
 
     def shifted(self, state, yaw, plan, start):
-        """It lands earlier or later, as a policy wants."""
-        if self.shift.time == 0.0:
+        """It lands earlier or later, as feedback and a policy want."""
+        later = self.added(state, plan.foot, yaw)[2] + self.shift.time
+        if later == 0.0:
             return plan
-        time = max(plan.time + self.shift.time, FROZEN)
+        time = max(plan.time + later, FROZEN)
         foothold, _ = self.foothold(state, plan.foot, yaw, time, start)
         return Plan(plan.foot, foothold, time, plan.cost, time - plan.time)
 
@@ -128,7 +145,9 @@ class ReadablePlanner:
         local = R.T @ (end - stance) - self.reach.middle[foot]
         local[0] += choice.overshoot * h * np.tanh(local[0] / (0.1 * h))
         local[1] += side * choice.outward * h
-        local = self.allowed(local + self.shift.foothold, R.T @ (start - stance), foot, time)
+        ahead, outward, _, _ = self.added(state, foot, yaw)
+        local = local + self.shift.foothold + [ahead, side * outward]
+        local = self.allowed(local, R.T @ (start - stance), foot, time)
         foothold = stance + R @ local
         first, second = (foothold, stance) if foot == 0 else (stance, foothold)
         outside = beyond(self.reach, first, second, yaw, end)
@@ -168,6 +187,10 @@ def guided(controller, state, targets, region, hips, ground, way):
     reach = np.sqrt(max((c.stretch * h) ** 2 - 0.25 * (way @ way), 0.0))
     height = ground + min(h, reach) + shift.height
     swinging = controller.swing is not None
+    if swinging:
+        readable = ReadablePlanner(controller.planner)
+        readable.phase = controller.planner.feedback.stage[1]
+        height += readable.added(state, controller.foot, np.arctan2(level[1, 0], level[0, 0]))[3]
     asked = p.stiffness[6:] * (targets.q_ref - state.q)
     asked = asked + p.damping[6:] * (targets.v_ref - state.qvel[6:])
     bound = c.joint_accel * rate2

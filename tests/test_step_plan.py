@@ -4,18 +4,24 @@ import numpy as np
 import pytest
 
 from poise.baselines.capturability import Reach
+from poise.baselines.step_feedback import SignalGains, StepFeedback
 from poise.baselines.step_plan import Foothold, StepLimits, StepPlanner
 from poise.baselines.swing import Swing, SwingTask
 
 from .shared import generic_state, robot
 from .stepping_reference import ReadablePlanner
 
+FEEDBACK = StepFeedback(
+    ahead=SignalGains(-0.03, 0.02, -0.01, -0.06, -0.2, 0.1, -0.05, 0.3, 0.2),
+    outward=SignalGains(0.02, -0.01, 0.03, 0.05, 0.04, -0.06, 0.07, -0.2, 0.1),
+    time=SignalGains(-0.05, 0.04, -0.1, 0.06, -0.08, 0.3, 0.2, 0.9, 0.5),
+)
 CHOICE = Foothold(overshoot=0.07, outward=0.05, margin=0.03, haste=0.02)
 
 
-def planner(**limits):
+def planner(feedback=None, **limits):
     """A planner whose step times cost something."""
-    return StepPlanner(robot(), Reach(robot()), StepLimits(**limits), CHOICE)
+    return StepPlanner(robot(), Reach(robot()), StepLimits(**limits), CHOICE, feedback)
 
 
 def falling(seed):
@@ -34,10 +40,12 @@ def agree(plan, expected):
     np.testing.assert_allclose(*numbers, atol=1e-9)
 
 
+@pytest.mark.parametrize("feedback", [None, FEEDBACK])
 @pytest.mark.parametrize("shift", [0.0, 0.06])
-def test_plan_is_that_of_the_readable_planner(shift):
-    """Foot, foothold, time and cost, also where a policy moves both."""
-    plans, feet = planner(), set()
+def test_plan_is_that_of_the_readable_planner(shift, feedback):
+    """Foot, foothold, time and cost, also where feedback and a policy move both."""
+    plans, feet = planner(feedback), set()
+    plans.feedback.stage[0] = 1.0
     plans.shift.foothold = [0.3 * shift, -0.5 * shift]
     plans.shift.time = shift
     readable = ReadablePlanner(plans)
@@ -49,10 +57,11 @@ def test_plan_is_that_of_the_readable_planner(shift):
     assert feet == {0, 1}
 
 
+@pytest.mark.parametrize("feedback", [None, FEEDBACK])
 @pytest.mark.parametrize("shift", [0.0, -0.05])
-def test_a_running_step_is_planned_as_by_the_readable_planner(shift):
+def test_a_running_step_is_planned_as_by_the_readable_planner(shift, feedback):
     """From where the foot is in its swing, with the time that is left."""
-    plans = planner()
+    plans = planner(feedback)
     plans.shift.time = shift
     readable = ReadablePlanner(plans)
     for seed in range(8):

@@ -1,66 +1,162 @@
-"""Tuning: what a candidate is worth."""
+"""Tuning: what a candidate is worth, what may be searched, and that a search can be resumed."""
+
+import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.config import build, packaged, read_yaml, to_dict
+from poise.envs.errors import ConfigError
 from poise.envs.push_schedule import push_bodies
 from poise.envs.pushes import Push
-from poise.training import tuning
+from poise.training import tuning_trials
+from poise.training.players import Player
+from poise.training.trials import Trial
+from poise.training.tuning import GAINS, HISTORY, TuneConfig, tune, tune_config
+from poise.training.tuning_gains import Gains
+from poise.training.tuning_trials import Candidate, TuningPushes, follow, play, worth
 
 from .shared import robot
 
 
+def small(**changes):
+    """A search that takes a second a generation."""
+    settings = {
+        "controller": "momentum-qp",
+        "gains": {"com.stiffness": (0.2, 12.0), "com.offset": (-0.06, 0.06)},
+        "pushes": TuningPushes(directions=2, levels=(1.0,), seconds=1.0),
+        "generations": 3,
+        "population": 4,
+    }
+    return TuneConfig(**{**settings, **changes})
+
+
 @pytest.fixture(scope="module")
-def env():
-    return ResidualBalanceEnv(robot(), duration=3.0, pushes=None)
+def player():
+    env = ResidualBalanceEnv(robot(), duration=3.0, pushes=None)
+    return Player("momentum-qp", env, lambda observation: np.zeros(len(env.action_names)), "")
 
 
-def rows(*impulses):
-    """One direction."""
-    return [[Push("torso", 0.5, 0.1, impulse, 0.0) for impulse in impulses]]
+def trial(impulse):
+    """A push forward."""
+    return Trial(0, 5, Push("torso", 0.5, 0.1, impulse, 0.0))
 
 
-def test_a_fall_is_worth_less_than_standing(env):
-    """Both pushes recovered: the ladder's 10 and two steps of 2; a fall counts for part of one."""
-    config = controller_config("momentum-qp")
-    _, reached = tuning.score(env, config, rows(5.0, 8.0), seed=0)
-    assert reached == [14.0]
-    _, reached = tuning.score(env, config, rows(5.0, 40.0), seed=0)
-    assert 12.0 < reached[0] < 12.6
+def test_a_fall_is_worth_less_than_standing(player, monkeypatch):
+    """A recovery counts fully, a fall by how long it took; a dragged foot is no recovery."""
+    assert worth(player, trial(5.0), in_place=True) == 1.0
+    assert 0.03 < worth(player, trial(40.0), in_place=True) < 0.15
+    monkeypatch.setattr(tuning_trials, "STEP_LENGTH", 1e-6)
+    assert worth(player, trial(5.0), in_place=True) == 0.6
+    assert worth(player, trial(5.0), in_place=False) == 1.0
 
 
-def test_a_dragged_foot_is_no_recovery(env, monkeypatch):
-    """Balance that moves the feet counts like one that does not come to rest."""
-    monkeypatch.setattr(tuning, "STEP_LENGTH", 1e-6)
-    _, reached = tuning.score(env, controller_config("momentum-qp"), rows(5.0), seed=0)
-    assert reached == [10.0 + 0.6 * 2.0]
+def test_pushes_surround_the_limits():
+    """Each direction has its levels of its own limit, at angles that fill its share."""
+    pushes, limits = TuningPushes(directions=8, levels=(0.9, 1.1)), np.linspace(10.0, 17.0, 8)
+    angles = []
+    for seed in range(50):
+        trials = pushes.draw(seed, robot(), limits)
+        assert [t.push.impulse for t in trials] == pytest.approx(
+            np.outer(limits, [0.9, 1.1]).ravel()
+        )
+        assert {t.push.body for t in trials} == {push_bodies(robot())[0]}
+        away = [t.push.direction - 45.0 * (t.number // 2) for t in trials]
+        angles += [(a + 180.0) % 360.0 - 180.0 for a in away]
+        assert len({t.seed for t in trials}) == len(trials)
+    assert -22.5 <= min(angles) < -20.0 and 20.0 < max(angles) <= 22.5
 
 
-def test_pushes_fit_the_robot():
-    """The ladder is the humanoid's own, but for the jitter; another robot's by m √(g h)."""
-    pushes = tuning.TuningPushes()
-    size, drawn = {}, {}
-    for name in ("humanoid", "toddler"):
-        r = robot(name)
-        rows = pushes.draw(0, r)
-        assert {push.body for row in rows for push in row} == {push_bodies(r)[0]}
-        size[name] = r.mass * np.sqrt(-r.model.opt.gravity[2] * r.height_com)
-        drawn[name] = np.array([[push.impulse for push in row] for row in rows])
-    gap = pushes.impulses[1] - pushes.impulses[0]
-    assert np.all(np.abs(drawn["humanoid"] - pushes.impulses) <= 0.51 * gap)
-    ratio = size["toddler"] / size["humanoid"]
-    assert np.allclose(drawn["toddler"], ratio * drawn["humanoid"], rtol=1e-12)
+def test_limits_follow_what_is_recovered():
+    """Up where more than half is recovered, down where less; not quiet is not recovered."""
+    values = np.array([[[1.0, 1.0], [1.0, 0.6], [0.3, 0.6]]])
+    found = follow(np.array([10.0, 20.0, 30.0]), values)
+    np.testing.assert_allclose(found, [10.0 * np.exp(0.05), 20.0, 30.0 * np.exp(-0.05)])
 
 
-def test_the_candidates_offset_counts(env):
-    """Tuning changes the controller of an environment that is already made."""
-    config = controller_config("momentum-qp")
-    gains = [gain for gain in tuning.GAINS if gain.path == "com.offset"]
-    moved = tuning.set_gains(config, gains, [1.0])
-    tuning.score(env, moved, rows(1.0), seed=0)
-    forward = float(env.targets.com[0])
-    tuning.score(env, config, rows(1.0), seed=0)
-    expected = (gains[0].high - config.com.offset) * robot().height_com
-    assert forward - float(env.targets.com[0]) == pytest.approx(expected, abs=5e-3)
+@pytest.mark.parametrize("name", packaged("tuning"))
+def test_packaged_ranges(name):
+    """All are numbers of the controller, and hold where the search starts from."""
+    config = tune_config(name)
+    gains = Gains(config.controller, config.gains, config.robot)
+    start = to_dict(controller_config(config.controller))
+    assert np.all((gains.first() >= 0.0) & (gains.first() <= 1.0))
+    again = gains.at(gains.first())
+    for path, (low, high) in config.gains.items():
+        value, found = start, again
+        for part in path.split("."):
+            value, found = value[part], found[part]
+        assert low <= value <= high, path
+        assert found == pytest.approx(value, rel=1e-4, abs=1e-12)
+
+
+def test_gains_are_put_in_their_places():
+    """On a log scale where both ends are above 0; what is not searched stays."""
+    gains = Gains("momentum-qp", small().gains, "humanoid")
+    data = gains.at(np.array([0.5, 0.25]))
+    assert data["com"]["stiffness"] == pytest.approx(np.sqrt(0.2 * 12.0), rel=1e-4)
+    assert data["com"]["offset"] == pytest.approx(-0.03)
+    data["com"].update({k: gains.start["com"][k] for k in ("stiffness", "offset")})
+    assert data == to_dict(controller_config("momentum-qp"))
+
+
+def test_the_candidate_is_what_plays():
+    """Another configuration, another outcome: without torque the same push is a fall."""
+    data = to_dict(controller_config("momentum-qp"))
+    job = Candidate(0, "humanoid", data, 3.0, True, (trial(8.0),))
+    assert play(job) == ([1.0], [])
+    data["torque"]["share"] = 0.05
+    assert play(replace(job, controller=data))[0][0] < 0.3
+
+
+@pytest.mark.parametrize(
+    ("gains", "field", "words"),
+    [
+        ({"com.stifness": (1.0, 2.0)}, "gains.com.stifness", "com.stiffness"),
+        ({"com": (1.0, 2.0)}, "gains.com", "no such number"),
+        ({"solver": (1.0, 2.0)}, "gains.solver", "no such number"),
+        ({"contact.polygon_share": (0.5, 1.5)}, "gains.contact.polygon_share", "1.5 is out of"),
+    ],
+)
+def test_gains_that_are_not_there(gains, field, words):
+    """One error that names the gain."""
+    with pytest.raises(ConfigError, match=words) as error:
+        Gains("momentum-qp", gains, "humanoid")
+    assert error.value.field == field
+
+
+def test_ranges_the_wrong_way_round():
+    """Ends in order, and at least one gain."""
+    data = to_dict(small())
+    for gains in ({}, {"com.weight": [2.0, 1.0]}):
+        with pytest.raises(ConfigError, match="gains"):
+            build(TuneConfig, {**data, "gains": gains}, "file")
+
+
+def test_a_search_resumes_as_if_nothing_had_happened(tmp_path):
+    """Two generations and one more are three, bit for bit, with any number of workers."""
+    once, twice = tmp_path / "once", tmp_path / "twice"
+    found = tune(small(), once, workers=1)
+    tune(small(generations=2), twice, workers=2)
+    with pytest.raises(ConfigError, match="--resume"):
+        tune(small(), twice)
+    with pytest.raises(ConfigError) as error:
+        tune(small(seed=1), twice, resume=True)
+    assert error.value.field == "seed"
+    assert tune(small(), twice, workers=2, resume=True) == found
+    for name in (GAINS, HISTORY):
+        assert (once / name).read_bytes() == (twice / name).read_bytes()
+    assert to_dict(controller_config(once / GAINS)) == found
+    lines = [json.loads(line) for line in (once / HISTORY).read_text().splitlines()]
+    assert len({str(line["units"]) for line in lines}) == 3  # a generation is not the one before
+
+    lines[1]["units"][0][0] += 0.1
+    (twice / HISTORY).write_text("".join(json.dumps(line) + "\n" for line in lines))
+    with pytest.raises(ConfigError, match="line 2"):
+        tune(small(generations=4), twice, resume=True)
+    assert read_yaml(twice / GAINS) == found  # nothing lost
+    with pytest.raises(ConfigError, match="no search"):
+        tune(small(), tmp_path / "none", resume=True)

@@ -299,34 +299,36 @@ def report(folder: Folder, /, *, out: Path | None = None, films: bool = True) ->
 def tune(
     *,
     out: Path,
-    controller: str = "momentum-qp",
-    robot: str = "humanoid",
-    generations: int = 60,
-    population: int = 14,
-    spread: float = 0.15,
-    seed: int = 0,
+    config: str = "momentum-qp",
+    controller: str | None = None,
+    robot: str | None = None,
+    policy: str | None = None,
+    generations: int | None = None,
+    seed: int | None = None,
     workers: int = 2,
+    resume: Switch = False,
 ) -> None:
     """Search a controller's gains by CMA-ES on seeded pushes.
 
     Args:
-        out: folder to write gains.yaml and history.jsonl to.
+        out: folder to write gains.yaml (a controller) and history.jsonl to.
+        config: a packaged tuning configuration or a .yaml file: which gains, how far.
         controller: where the search starts: a packaged controller or a .yaml file.
         robot: a packaged robot or a .yaml description.
+        policy: a policy on top of the controller, which counts too.
         generations: of the search.
-        population: candidates in a generation.
-        spread: initial standard deviation, as a share of each gain's range.
         seed: of the search and its pushes.
         workers: number of processes.
+        resume: go on with the search that the folder holds.
     """
-    from poise.baselines.registry import momentum_qp_config
+    from dataclasses import replace
 
-    from .tuning import Tuning, tune
+    from .tuning import tune, tune_config
 
-    start = momentum_qp_config(controller)
-    tuning = Tuning(start, robot, generations=generations, population=population,
-                    spread=spread, seed=seed, workers=workers)  # fmt: skip
-    tune(tuning, out)
+    given = {"controller": controller, "robot": robot, "policy": policy,
+             "generations": generations, "seed": seed}  # fmt: skip
+    chosen = {name: value for name, value in given.items() if value is not None}
+    tune(replace(tune_config(config), **chosen), out, workers, resume, terminal())
 
 
 def qp_set(
@@ -370,6 +372,7 @@ def list_names() -> None:
         "benchmarks",
         "training",
         "motions",
+        "tuning",
         "limits",
     )
     for kind in kinds:

@@ -1,230 +1,213 @@
-"""Tuning a controller's gains by CMA-ES on seeded pushes.
+"""Tuning a controller's gains by CMA-ES on seeded pushes [Hansen16].
 
 Candidates of one generation meet the same pushes; every generation draws new ones, so that
 gains are not fitted to a few trials. Needs the `cma` package (`pip install poise[dev]`).
 """
 
 import json
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 
-from poise.baselines.momentum_qp import MomentumQP, MomentumQPConfig
-from poise.baselines.residual_balance import ResidualBalanceEnv
-from poise.envs.config import to_yaml, write_atomic
-from poise.envs.episode import MAX_SLIDE
-from poise.envs.push_schedule import push_bodies
-from poise.envs.pushes import Push
-from poise.envs.robot import Robot, load_robot
+from poise.envs.config import build, on_base, read_yaml, resolve, to_dict, to_yaml, write_atomic
+from poise.envs.errors import ConfigError
+from poise.envs.robot import load_robot
 
-from .trials import STEP_LENGTH
+from .backends import Crew
+from .tuning_gains import Gains
+from .tuning_trials import Candidate, TuningPushes, follow, play
 
-
-@dataclass(frozen=True)
-class Gain:
-    """One number of the configuration: `section.name`, searched on a log or a linear scale."""
-
-    path: str
-    low: float
-    high: float
-    log: bool = True
-
-    def value(self, unit: float) -> float:
-        """From the search's [0, 1] to the gain."""
-        if self.log:
-            return float(self.low * (self.high / self.low) ** unit)
-        return float(self.low + (self.high - self.low) * unit)
-
-    def unit(self, value: float) -> float:
-        """From a gain to [0, 1]."""
-        value = min(max(value, self.low), self.high)
-        if self.log:
-            return float(np.log(value / self.low) / np.log(self.high / self.low))
-        return float((value - self.low) / (self.high - self.low))
-
-
-GAINS = (
-    Gain("posture.trunk_weight", 0.03, 100.0),
-    Gain("posture.free_weight", 0.003, 10.0),
-    Gain("posture.root_weight", 0.03, 100.0),
-    Gain("posture.stiffness", 0.5, 60.0),
-    Gain("posture.free_stiffness", 0.3, 60.0),
-    Gain("posture.root_stiffness", 0.3, 60.0),
-    Gain("posture.damping_ratio", 0.3, 8.0),
-    Gain("posture.far_share", 1e-4, 1.0),
-    Gain("posture.far_distance", 0.003, 0.3),
-    Gain("com.weight", 10.0, 1e6),
-    Gain("com.height_weight", 10.0, 1e6),
-    Gain("com.stiffness", 0.2, 12.0),
-    Gain("com.height_stiffness", 0.5, 20.0),
-    Gain("com.damping_ratio", 0.4, 3.0),
-    Gain("com.offset", -0.06, 0.06, log=False),
-    Gain("cop.weight", 1e-3, 1e4),
-    Gain("cop.yaw_weight", 1e-3, 1e3),
-    Gain("cop.stiffness", 0.3, 1e4),
-    Gain("cop.damping", 0.01, 100.0),
-    Gain("cop.horizon", 0.005, 0.5),
-    Gain("cop.angular_damping", 0.0, 5.0, log=False),
-    Gain("contact.damping", 0.5, 60.0),
-    Gain("contact.polygon_share", 0.6, 1.0, log=False),
-    Gain("contact.friction_share", 0.5, 1.0, log=False),
-    Gain("contact.force_weight", 1e-5, 10.0),
-    Gain("contact.moment_weight", 1e-5, 10.0),
-    Gain("torque.weight", 1e-6, 10.0),
-    Gain("joint.brake", 0.5, 30.0),
-    Gain("joint.horizon", 0.03, 1.0),
-    Gain("joint.floor", 2.0, 100.0),
-)
-
-
-SIZE = 113.7  # [N·s] m √(g h) of the humanoid
+CONFIG, GAINS, HISTORY = "config.yaml", "gains.yaml", "history.jsonl"
 
 
 @dataclass(frozen=True)
-class TuningPushes:
-    """Half a circle of directions (the robot is symmetric) times a ladder of impulses.
+class TuneConfig:
+    """Everything that decides a search; written beside its results.
 
-    Impulses [N·s] are scaled by the robot's m √(g h) over `SIZE`, and push the first of its
-    `push_bodies`.
+    Attributes:
+        controller: where the search starts: a packaged controller or a .yaml file.
+        gains: the range of each number that is searched, by its path in the controller's
+            configuration (``com.weight``); on a log scale if both ends are above 0.
+        policy: a policy on top of the candidates counts too, by `policy_share` of the whole.
+        in_place: a foot that moves is no recovery.
+        generations, population, spread: of CMA-ES; spread is the first standard deviation, as a
+            share of each range.
     """
 
-    directions: int = 9
-    impulses: tuple[float, ...] = (11.0, 13.0, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0)
-    duration: float = 0.1
-    seconds: float = 5.0
-
-    def draw(self, seed: int, robot: Robot) -> list[list[Push]]:
-        """A row per direction; impulses and directions are jittered within their steps."""
-        rng = np.random.default_rng(seed)
-        size = robot.mass * np.sqrt(-robot.model.opt.gravity[2] * robot.height_com) / SIZE
-        body = push_bodies(robot)[0]
-        gap = np.diff(self.impulses, append=2 * self.impulses[-1] - self.impulses[-2])
-        rows = []
-        for angle in np.linspace(0.0, 180.0, self.directions):
-            turned = angle + rng.uniform(-8.0, 8.0)
-            jitter = rng.uniform(-0.5, 0.5, len(self.impulses)) * gap
-            rows.append(
-                [
-                    Push(body, 0.5, self.duration, float(j), float(turned))
-                    for j in size * (np.asarray(self.impulses) + jitter)
-                ]
-            )
-        return rows
-
-
-def set_gains(
-    config: MomentumQPConfig, gains: Sequence[Gain], units: np.ndarray
-) -> MomentumQPConfig:
-    """`config` with the gains at the search's coordinates."""
-    for gain, unit in zip(gains, units, strict=True):
-        section, name = gain.path.split(".")
-        part = replace(getattr(config, section), **{name: gain.value(float(unit))})
-        config = replace(config, **{section: part})
-    return config
-
-
-def score(env: ResidualBalanceEnv, config: MomentumQPConfig, rows: list[list[Push]], seed: int):
-    """Mean over directions of the impulse recovered [N·s, of the ladder before it is scaled to the
-    robot], plus half of the worst; and the detail.
-
-    A trial that fell counts for at most 0.3 by how long it stood, one that is not quiet, or that
-    dragged a foot further than `STEP_LENGTH`, 0.6.
-    """
-    env.controller = MomentumQP(env.robot, config)
-    action = np.zeros(env.action_space.shape)
-    step = 2.0  # [N·s] between two impulses of the ladder
-    reached = []
-    for d, row in enumerate(rows):
-        total = 10.0  # below the ladder everything is recovered
-        for i, push in enumerate(row):
-            env.reset(seed=seed + 1000 * d + i, options={"push": [push]})
-            terminated = truncated = False
-            while not (terminated or truncated):
-                _, _, terminated, truncated, _ = env.step(action)
-            if truncated:
-                in_place = env.episode.metrics[MAX_SLIDE] <= STEP_LENGTH
-                value = 1.0 if env.recovered and in_place else 0.6
-            else:
-                value = 0.3 * env.steps / env.max_steps
-            total += value * step
-            if terminated and i + 1 < len(row) and env.steps < 0.3 * env.max_steps:
-                break  # larger pushes fall faster
-        reached.append(total)
-    return float(np.mean(reached) + 0.5 * np.min(reached)), reached
-
-
-_ENV: ResidualBalanceEnv | None = None
-
-
-def _work(arguments: tuple[MomentumQPConfig, TuningPushes, str, int]):
-    global _ENV
-    config, pushes, robot, seed = arguments
-    if _ENV is None:
-        _ENV = ResidualBalanceEnv(robot, duration=pushes.seconds, pushes=None)
-    return score(_ENV, config, pushes.draw(seed, _ENV.robot), seed)
-
-
-@dataclass(frozen=True)
-class Tuning:
-    """Budget and seed of a search."""
-
-    start: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+    controller: str
+    gains: dict[str, tuple[float, float]]
     robot: str = "humanoid"
     pushes: TuningPushes = field(default_factory=TuningPushes)
-    generations: int = 60
-    population: int = 14
-    spread: float = 0.15
-    seed: int = 0
-    workers: int = 2
+    policy: str | None = None
+    policy_share: float = field(default=0.4, metadata={"min": 0.0, "max": 1.0})
+    in_place: bool = False
+    generations: int = field(default=60, metadata={"min": 1})
+    population: int = field(default=14, metadata={"min": 4})
+    spread: float = field(default=0.15, metadata={"above": 0.0, "max": 1.0})
+    seed: int = field(default=0, metadata={"min": 0})
+
+    def __post_init__(self) -> None:
+        if not self.gains:
+            raise ValueError("gains: must name one or more")
+        for path, (low, high) in self.gains.items():
+            if not low < high:
+                raise ValueError(f"gains.{path}: must be [low, high] with low < high")
 
 
-def tune(tuning: Tuning, out: Path, report: Callable[[str], Any] = print) -> MomentumQPConfig:
-    """Search; writes `out/gains.yaml` (mean of the search) and `out/history.jsonl` as it goes."""
-    import cma
+def tune_config(name_or_path: str | Path) -> TuneConfig:
+    """A packaged tuning configuration (`configs/tuning`) or a path to one; `base` names another.
 
-    load_robot(tuning.robot)
-    mean = np.array(
-        [
-            gain.unit(
-                getattr(getattr(tuning.start, gain.path.split(".")[0]), gain.path.split(".")[1])
+    Raises ConfigError naming the file, the field and the choices.
+    """
+    path = resolve("tuning", name_or_path)
+    return build(TuneConfig, on_base(read_yaml(path), "tuning", path), str(path))
+
+
+def tune(
+    config: TuneConfig,
+    out: Path,
+    workers: int = 2,
+    resume: bool = False,
+    console: Console | None = None,
+) -> dict[str, Any]:
+    """Search; returns the controller's configuration at the mean of the search.
+
+    Writes `out/gains.yaml`, that controller, after each generation, and `out/history.jsonl` with
+    all that was tried, from which `resume` goes on as if nothing had happened.
+
+    Raises ConfigError for a configuration that is not valid, or a folder that holds another search.
+    """
+    gains = Gains(config.controller, config.gains, config.robot)
+    if config.policy is not None:
+        from .policy import load_policy
+
+        load_policy(config.policy, load_robot(config.robot))
+    search = _Search(config, gains)
+    rows = _known(config, out, resume)
+    for row in rows:
+        search.again(row, out / HISTORY)
+    write_atomic(out / CONFIG, to_yaml(config))
+    console = console or Console(quiet=True)
+    with Crew("local", workers) as crew:
+        while search.generation < config.generations:
+            rows.append(search.step(crew))
+            write_atomic(out / GAINS, to_yaml(gains.at(search.mean)))
+            write_atomic(out / HISTORY, "".join(json.dumps(row) + "\n" for row in rows))
+            console.print(search.words(rows[-1]), highlight=False)
+    return gains.at(search.mean)
+
+
+def _known(config: TuneConfig, out: Path, resume: bool) -> list[dict[str, Any]]:
+    """What an earlier call has tried."""
+    if not (out / CONFIG).is_file():
+        if resume:
+            raise ConfigError("holds no search to resume", source=out, field="resume")
+        return []
+    if not resume:
+        raise ConfigError(
+            "already holds a search; go on with --resume or choose another folder",
+            source=out, field="out",
+        )  # fmt: skip
+    before = to_dict(build(TuneConfig, read_yaml(out / CONFIG), out / CONFIG))
+    for name, value in to_dict(config).items():
+        if name != "generations" and before[name] != value:
+            raise ConfigError("is not that of the search here", source=out / CONFIG, field=name)
+    if not (out / HISTORY).is_file():
+        return []
+    lines = (out / HISTORY).read_text().splitlines()
+    try:
+        return [json.loads(line) for line in lines]
+    except ValueError as error:
+        raise ConfigError(f"not valid JSON: {error}", source=out / HISTORY) from None
+
+
+class _Search:
+    """CMA-ES, and how far the pushes have followed the candidates."""
+
+    def __init__(self, config: TuneConfig, gains: Gains):
+        import cma
+
+        self.config, self.gains, self.robot = config, gains, load_robot(config.robot)
+        rng = np.random.default_rng(config.seed)
+        options = {
+            "bounds": [0, 1], "popsize": config.population, "verbose": -9, "seed": np.nan,
+            "randn": lambda *shape: rng.standard_normal(shape),
+        }  # fmt: skip
+        self.cma = cma.CMAEvolutionStrategy(gains.first(), config.spread, options)
+        first = np.full(config.pushes.directions, config.pushes.impulse * self.robot.mass)
+        self.limits = [first, first]  # alone, under the policy
+        self.generation = 0
+        self.mean = gains.first()
+
+    def step(self, crew: Crew) -> dict[str, Any]:
+        """A generation; returns its line of the history."""
+        config = self.config
+        units = [np.asarray(u) for u in self.cma.ask()]
+        seeds = [config.seed + 100_000 * (2 * self.generation + k + 1) for k in range(2)]
+        with_policy = config.policy is not None and config.policy_share > 0.0
+        alone, below = (
+            tuple(config.pushes.draw(seed, self.robot, limits))
+            for seed, limits in zip(seeds, self.limits, strict=True)
+        )
+        if with_policy and config.policy_share == 1.0:
+            alone = ()
+        jobs = [
+            Candidate(
+                number, config.robot, self.gains.at(u), config.pushes.seconds, config.in_place,
+                alone, config.policy if with_policy else None, below if with_policy else (),
             )
-            for gain in GAINS
-        ]
-    )
-    search = cma.CMAEvolutionStrategy(
-        mean, tuning.spread,
-        {"bounds": [0, 1], "popsize": tuning.population, "seed": tuning.seed + 1, "verbose": -9},
-    )  # fmt: skip
-    history = []
-    best = tuning.start
-    with ProcessPoolExecutor(tuning.workers) as pool:
-        for generation in range(tuning.generations):
-            units = search.ask()
-            configs = [set_gains(tuning.start, GAINS, u) for u in units]
-            centre = set_gains(tuning.start, GAINS, np.clip(search.mean, 0.0, 1.0))
-            seed = tuning.seed + 100_000 * (generation + 1)
-            jobs = [(c, tuning.pushes, tuning.robot, seed) for c in [*configs, centre]]
-            results = list(pool.map(_work, jobs))
-            search.tell(units, [-value for value, _ in results[:-1]])
-            best = set_gains(tuning.start, GAINS, np.clip(search.mean, 0.0, 1.0))
-            row = {
-                "generation": generation,
-                "centre": results[-1][0],
-                "best": max(value for value, _ in results[:-1]),
-                "reached": np.round(results[-1][1], 2).tolist(),
-                "gains": {
-                    g.path: round(g.value(u), 5)
-                    for g, u in zip(GAINS, np.clip(search.mean, 0, 1), strict=True)
-                },
-            }
-            history.append(row)
-            report(
-                f"{generation} centre {row['centre']:.2f} best {row['best']:.2f} {row['reached']}"
+            for number, u in enumerate(units)
+        ]  # fmt: skip
+        found = {job.number: values for job, values in crew.each(play, jobs)}
+        values = [[found[k][player] for k in range(len(units))] for player in range(2)]
+        row = {
+            "generation": self.generation,
+            "units": [u.tolist() for u in units],
+            "alone": values[0],
+            "below": values[1],
+        }
+        self._take(units, values)
+        row["limits"] = [limits.tolist() for limits in self.limits]
+        return row
+
+    def again(self, row: dict[str, Any], source: Path) -> None:
+        """A generation that has been played before."""
+        units = [np.asarray(u) for u in self.cma.ask()]
+        try:
+            same = np.allclose(units, row["units"], rtol=0.0, atol=1e-12)
+            values = [row["alone"], row["below"]]
+        except (KeyError, TypeError, ValueError):
+            same = False
+        if not same:
+            raise ConfigError(
+                f"line {self.generation + 1} is not what this search tries there", source=source
             )
-            write_atomic(out / "gains.yaml", to_yaml(best))
-            write_atomic(out / "history.jsonl", "".join(json.dumps(r) + "\n" for r in history))
-    return best
+        self._take(units, values)
+
+    def _take(self, units: list[np.ndarray], values: list[list[list[float]]]) -> None:
+        share = self.config.policy_share if values[1][0] else 0.0
+        scores = np.zeros(len(units))
+        shape = (len(units), self.config.pushes.directions, len(self.config.pushes.levels))
+        for player, weight in enumerate((1.0 - share, share)):
+            if values[player][0]:
+                found = np.reshape(values[player], shape)
+                scores += weight * found.mean(axis=(1, 2))
+                self.limits[player] = follow(self.limits[player], found)
+        self.cma.tell(units, (-scores).tolist())
+        self.mean = np.clip(self.cma.mean, 0.0, 1.0)
+        self.scores = scores
+        self.generation += 1
+
+    def words(self, row: dict[str, Any]) -> str:
+        """A line for the terminal."""
+        text = f"generation {self.generation} of {self.config.generations}"
+        text += f": score {self.scores.mean():.2f}, best {self.scores.max():.2f}"
+        for name, limits in zip(("alone", "below"), self.limits, strict=True):
+            if row[name][0]:
+                who = "alone" if name == "alone" else f"under {self.config.policy}"
+                text += f"; half recovered {who} at {limits.mean():.1f} N·s"
+                text += f" (worst {limits.min():.1f})"
+        return text
