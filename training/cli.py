@@ -321,14 +321,12 @@ def tune(
         workers: number of processes.
         resume: go on with the search that the folder holds.
     """
-    from dataclasses import replace
-
     from .tuning import tune, tune_config
 
     given = {"controller": controller, "robot": robot, "policy": policy,
              "generations": generations, "seed": seed}  # fmt: skip
     chosen = {name: value for name, value in given.items() if value is not None}
-    tune(replace(tune_config(config), **chosen), out, workers, resume, terminal())
+    tune(tune_config(config, **chosen), out, workers, resume, terminal())
 
 
 def qp_set(

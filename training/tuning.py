@@ -57,13 +57,15 @@ class TuneConfig:
                 raise ValueError(f"gains.{path}: must be [low, high] with low < high")
 
 
-def tune_config(name_or_path: str | Path) -> TuneConfig:
+def tune_config(name_or_path: str | Path, **fields: Any) -> TuneConfig:
     """A packaged tuning configuration (`configs/tuning`) or a path to one; `base` names another.
+
+    `fields` replace its own.
 
     Raises ConfigError naming the file, the field and the choices.
     """
     path = resolve("tuning", name_or_path)
-    return build(TuneConfig, on_base(read_yaml(path), "tuning", path), str(path))
+    return build(TuneConfig, {**on_base(read_yaml(path), "tuning", path), **fields}, str(path))
 
 
 def tune(

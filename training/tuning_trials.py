@@ -44,7 +44,8 @@ class TuningPushes:
         `limits` (directions,) [N·s].
         """
         rng = np.random.default_rng(seed)
-        body, gap, trials = push_bodies(robot)[0], 360.0 / self.directions, []
+        body, gap = push_bodies(robot)[0], 360.0 / self.directions
+        trials: list[Trial] = []
         for d, limit in enumerate(limits):
             for level in self.levels:
                 angle = (gap * (d + rng.uniform(-0.5, 0.5))) % 360.0
