@@ -174,8 +174,8 @@ def lean_matrix(lean):
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
 
 
-def guided(controller, state, targets, region, hips, ground, way):
-    """What `copy_targets` and `guide` should put into the targets, by name."""
+def guided(controller, state, targets, region, hips, ground, way, raised):
+    """What `copy_targets` and `guide` should put into the targets, by name; `raised`: fed back."""
     c, h, shift = controller.config, controller.h, controller.shift
     level, rate2 = controller.memory.level, controller.rate**2
     R, xi, p = level[:2, :2], state.capture_point, controller.sets.parameters
@@ -187,10 +187,7 @@ def guided(controller, state, targets, region, hips, ground, way):
     reach = np.sqrt(max((c.stretch * h) ** 2 - 0.25 * (way @ way), 0.0))
     height = ground + min(h, reach) + shift.height
     swinging = controller.swing is not None
-    if swinging:
-        readable = ReadablePlanner(controller.planner)
-        readable.phase = controller.planner.feedback.stage[1]
-        height += readable.added(state, controller.foot, np.arctan2(level[1, 0], level[0, 0]))[3]
+    height += raised * swinging
     asked = p.stiffness[6:] * (targets.q_ref - state.q)
     asked = asked + p.damping[6:] * (targets.v_ref - state.qvel[6:])
     bound = c.joint_accel * rate2

@@ -133,7 +133,8 @@ def test_hips_that_are_used_up_bring_the_step_forward():
 def test_targets_are_those_of_the_readable_form(direction, monkeypatch):
     """What the QPs are asked for at every tick of a recovery, in a swing and after it."""
     controller, kinds = load_controller("capture-step", robot()), set()
-    reach, stood = controller.reach, []
+    reach, stood, raised, left = controller.reach, [], [0.0], [np.inf]
+    planner = readable.ReadablePlanner(controller.planner)
 
     def look(c, state, targets, tau):
         if not c.stepped:
@@ -144,12 +145,17 @@ def test_targets_are_those_of_the_readable_form(direction, monkeypatch):
             stance = 1 - c.foot
             region, hips = reach.under(stance, feet[stance], yaw), 0.0
             ground, way = feet[stance, 2], c.swing.foothold - feet[stance, :2]
+            if left[0] > readable.FROZEN:  # the last ticks keep what was fed back
+                planner.phase = c.planner.feedback.stage[1]
+                raised[0] = planner.added(state, c.foot, yaw)[3]
+            left[0] = c.swing.remaining
         else:
             stood.append(feet.copy())
+            left[0] = np.inf
             region, hips = reach.both(stood[0], yaw), c.config.hips
             ground, way = feet[:, 2].mean(), feet[0, :2] - feet[1, :2]
         kinds.add(c.swing is not None)
-        expected = readable.guided(c, state, targets, region, hips, ground, way)
+        expected = readable.guided(c, state, targets, region, hips, ground, way, raised[0])
         for name, value in expected.items():
             np.testing.assert_allclose(getattr(c._guided, name), value, rtol=1e-9, atol=1e-9)
 

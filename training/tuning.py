@@ -21,6 +21,7 @@ from .tuning_gains import Gains
 from .tuning_trials import Candidate, TuningPushes, follow, play
 
 CONFIG, GAINS, HISTORY = "config.yaml", "gains.yaml", "history.jsonl"
+AVERAGED = 16  # generations whose better halves the result is the mean of
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def tune(
     resume: bool = False,
     console: Console | None = None,
 ) -> dict[str, Any]:
-    """Search; returns the controller's configuration at the mean of the search.
+    """Search; returns the controller's configuration at the mean of the last candidates.
 
     Writes `out/gains.yaml`, that controller, after each generation, and `out/history.jsonl` with
     all that was tried, from which `resume` goes on as if nothing had happened.
@@ -142,7 +143,8 @@ class _Search:
         first = np.full(config.pushes.directions, config.pushes.impulse * self.robot.mass)
         self.limits = [first, first]  # alone, under the policy
         self.generation = 0
-        self.mean = gains.first()
+        self.mean = gains.first()  #: what the search has found
+        self.centres: list[np.ndarray] = []
 
     def step(self, crew: Crew) -> dict[str, Any]:
         """A generation; returns its line of the history."""
@@ -199,7 +201,10 @@ class _Search:
                 scores += weight * found.mean(axis=(1, 2))
                 self.limits[player] = follow(self.limits[player], found)
         self.cma.tell(units, (-scores).tolist())
-        self.mean = np.clip(self.cma.mean, 0.0, 1.0)
+        better = np.argsort(-scores, kind="stable")[: (len(units) + 1) // 2]
+        self.centres.append(np.mean([units[k] for k in better], axis=0))
+        # a generation's own mean follows the chance of its pushes
+        self.mean = np.mean(self.centres[-AVERAGED:], axis=0)
         self.scores = scores
         self.generation += 1
 
