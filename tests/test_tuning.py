@@ -27,7 +27,7 @@ def small(**changes):
     settings = {
         "controller": "momentum-qp",
         "gains": {"com.stiffness": (0.2, 12.0), "com.offset": (-0.06, 0.06)},
-        "pushes": TuningPushes(directions=2, levels=(1.0,), seconds=1.0),
+        "pushes": TuningPushes(directions=(0.0, 180.0), levels=(1.0,), seconds=1.0),
         "generations": 3,
         "population": 4,
     }
@@ -56,7 +56,8 @@ def test_a_fall_is_worth_less_than_standing(player, monkeypatch):
 
 def test_pushes_surround_the_limits():
     """Each direction has its levels of its own limit, at angles that fill its share."""
-    pushes, limits = TuningPushes(directions=8, levels=(0.9, 1.1)), np.linspace(10.0, 17.0, 8)
+    directions, limits = tuple(45.0 * k for k in range(8)), np.linspace(10.0, 17.0, 8)
+    pushes = TuningPushes(directions, jitter=22.5, levels=(0.9, 1.1))
     angles = []
     for seed in range(50):
         trials = pushes.draw(seed, robot(), limits)

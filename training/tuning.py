@@ -140,7 +140,7 @@ class _Search:
             "randn": lambda *shape: rng.standard_normal(shape),
         }  # fmt: skip
         self.cma = cma.CMAEvolutionStrategy(gains.first(), config.spread, options)
-        first = np.full(config.pushes.directions, config.pushes.impulse * self.robot.mass)
+        first = np.full(len(config.pushes.directions), config.pushes.impulse * self.robot.mass)
         self.limits = [first, first]  # alone, under the policy
         self.generation = 0
         self.mean = gains.first()  #: what the search has found
@@ -194,7 +194,7 @@ class _Search:
     def _take(self, units: list[np.ndarray], values: list[list[list[float]]]) -> None:
         share = self.config.policy_share if values[1][0] else 0.0
         scores = np.zeros(len(units))
-        shape = (len(units), self.config.pushes.directions, len(self.config.pushes.levels))
+        shape = (len(units), len(self.limits[0]), len(self.config.pushes.levels))
         for player, weight in enumerate((1.0 - share, share)):
             if values[player][0]:
                 found = np.reshape(values[player], shape)

@@ -24,31 +24,35 @@ UNQUIET, FALLEN = 0.6, 0.3  # what a trial counts at most that is up but not qui
 class TuningPushes:
     """Pushes of a generation: `levels` times the limit found so far, in each of `directions`.
 
-    The limit of a direction starts at `impulse` [N·s/kg] and follows the candidates: it rises
-    while they recover more than half of its pushes, and falls else.
+    Directions [°] are those of the environment's pushes, ± up to `jitter`; one that is named twice
+    counts twice. The limit of a direction starts at `impulse` [N·s/kg] and follows the candidates:
+    it rises while they recover more than half of its pushes, and falls else.
     """
 
-    directions: int = field(default=16, metadata={"min": 1})
+    directions: tuple[float, ...] = tuple(22.5 * k for k in range(16))
+    jitter: float = field(default=11.25, metadata={"min": 0.0, "max": 180.0})
     levels: tuple[float, ...] = (0.95, 1.05)
     impulse: float = field(default=0.4, metadata={"above": 0.0})
     duration: float = field(default=0.1, metadata={"above": 0.0})
     seconds: float = field(default=5.0, metadata={"above": START})
 
     def __post_init__(self) -> None:
+        if not self.directions:
+            raise ValueError("directions: must be one or more")
         if not self.levels or min(self.levels) <= 0.0:
             raise ValueError("levels: must be one or more shares above 0")
 
     def draw(self, seed: int, robot: Robot, limits: np.ndarray) -> list[Trial]:
         """Trials, direction by direction; directions are jittered, so that all angles occur.
 
-        `limits` (directions,) [N·s].
+        `limits` [N·s] has one for each.
         """
         rng = np.random.default_rng(seed)
-        body, gap = push_bodies(robot)[0], 360.0 / self.directions
+        body = push_bodies(robot)[0]
         trials: list[Trial] = []
-        for d, limit in enumerate(limits):
+        for direction, limit in zip(self.directions, limits, strict=True):
             for level in self.levels:
-                angle = (gap * (d + rng.uniform(-0.5, 0.5))) % 360.0
+                angle = (direction + self.jitter * rng.uniform(-1.0, 1.0)) % 360.0
                 push = Push(body, START, self.duration, float(level * limit), float(angle))
                 number = len(trials)
                 trials.append(Trial(number, seed + number, push, level))
