@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -158,13 +159,31 @@ def test_the_leaderboard_ranks_and_says_where_it_comes_from(tmp_path: Path) -> N
     assert text.index("| 1 | `abe07` | 15.0 [14.0, 16.0]") < text.index("| 2 | `pd` | 10.0")
     assert "| delay | 0.02 | 40% | 40% |" in text and "`0123456789`" in text
     assert f"poise leaderboard {folder}" in text
-    write_leaderboard(folder / "summary.json", page)
-    assert page.read_text() == leaderboard(
-        json.loads((folder / "summary.json").read_text()), str(folder / "summary.json")
-    )
+    file = folder / "summary.json"
+    write_leaderboard([file], page)
+    assert page.read_text() == leaderboard({str(file): json.loads(file.read_text())})
     (folder / "summary.json").write_text("[]")
     with pytest.raises(ConfigError, match="is not a benchmark's summary"):
-        write_leaderboard(folder, page)
+        write_leaderboard([folder], page)
+    assert main(["leaderboard", "--page", str(page)]) == 2
+
+
+def test_later_results_take_their_rows(tmp_path: Path) -> None:
+    """By name, ranked anew, said where from; not the reference's, and not from another suite."""
+    a = write_result(tmp_path / "a", {"pd": YES, "abe07": NO, "lip-mpc": NO}, abe07=15.0)
+    b = write_result(tmp_path / "b", {"pd": NO, "abe07": YES}, abe07=8.0, pd=50.0)
+    page = tmp_path / "page.md"
+    write_leaderboard([a, b], page)
+    text = page.read_text()
+    assert text.index("`pd` | 10.0 [") < text.index("`abe07` | 8.0 [")
+    assert f"poise leaderboard {a} {b}`" in text and "15.0" not in text and "50.0" not in text
+    (line,) = (line for line in text.splitlines() if line.startswith("Played later"))
+    assert line.endswith("cores: `abe07`.")
+    data = json.loads((b / "summary.json").read_text())
+    (b / "summary.json").write_text(json.dumps({**data, "seed": data["seed"] + 1}))
+    with pytest.raises(ConfigError, match="is not that of") as error:
+        write_leaderboard([a, b], page)
+    assert error.value.field == "seed" and page.read_text() == text
 
 
 def test_levels_are_compared_with_the_standard_case_on_the_same_trials() -> None:
@@ -234,9 +253,8 @@ def test_ticks_are_timed_and_leave_no_trace() -> None:
 
 
 def test_the_committed_leaderboard_is_generated() -> None:
-    """docs/leaderboard.md is what the command makes of docs/leaderboard.json."""
-    docs = Path(__file__).parents[1] / "docs"
-    if not (docs / "leaderboard.json").exists():
-        pytest.skip("no committed result")
-    text = leaderboard(read_summary(docs / "leaderboard.json"), "docs/leaderboard.json")
-    assert (docs / "leaderboard.md").read_text() == text
+    """docs/leaderboard.md is what the command that it names makes of the files beside it."""
+    root = Path(__file__).parents[1]
+    text = (root / "docs/leaderboard.md").read_text()
+    (command,) = re.findall("`poise leaderboard ([^`]+)`", text)
+    assert leaderboard({name: read_summary(root / name) for name in command.split()}) == text

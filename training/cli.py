@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TextIO
 
 import tyro
 
-from poise.envs.errors import PoiseError
+from poise.envs.errors import ConfigError, PoiseError
 
 from .progress import terminal
 
@@ -225,20 +225,27 @@ def compare(
 
 
 def leaderboard(
-    result: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULT")],
+    results: Annotated[
+        tuple[Path, ...],
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="RESULT …", help_behavior_hint=""),
+    ],
     /,
     *,
     page: Path = Path("docs/leaderboard.md"),
 ) -> None:
-    """Write the leaderboard page from a benchmark's result.
+    """Write the leaderboard page from benchmarks' results.
 
     Args:
-        result: a summary.json of poise benchmark, or the folder that holds it.
+        results: summary.json of poise benchmark, or the folder that holds it. Controllers of
+            later results are added, or take the place of earlier ones of their name.
         page: the Markdown file to write.
     """
     from .benchmark.leaderboard import write_leaderboard
 
-    write_leaderboard(result, page)
+    if not results:
+        raise ConfigError("needs one or more results", field="results")
+    write_leaderboard(results, page)
     print(page)
 
 

@@ -1,4 +1,4 @@
-"""The leaderboard page, generated from a committed summary.json."""
+"""The leaderboard page, generated from committed files summary.json."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from poise.envs.config import write_atomic
+from poise.envs.errors import ConfigError
 
 from ..seed_groups import seed_lines
 from .reading import read_summary
@@ -24,21 +25,53 @@ force that a controller took from nowhere: only those with 0 obey physics.
 """
 
 
-def write_leaderboard(source: str | Path, page: str | Path) -> None:
-    """Write the page from a summary.json of `poise benchmark`, or a folder that holds one.
+SAME = ("suite", "seed", "robot", "reference")  # of results whose rows may stand in one table
 
-    Raises ConfigError for another file, PoiseError when the page cannot be written.
+
+def write_leaderboard(sources: Sequence[str | Path], page: str | Path) -> None:
+    """Write the page from files summary.json of `poise benchmark`, or folders that hold one.
+
+    Raises ConfigError for another file, or of another suite, seed, robot or reference than the
+    first; PoiseError when the page cannot be written.
     """
-    path = Path(source)
-    path = path / "summary.json" if path.is_dir() else path
-    write_atomic(page, leaderboard(read_summary(path), str(source)))
+    summaries = {}
+    for source in sources:
+        path = Path(source)
+        path = path / "summary.json" if path.is_dir() else path
+        summaries[str(source)] = read_summary(path)
+    write_atomic(page, leaderboard(summaries))
 
 
-def leaderboard(summary: Mapping[str, Any], source: str) -> str:
-    """The page as Markdown."""
+def merged(summaries: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], dict[str, str]]:
+    """The first result with the rows of later ones; and whose result each row is.
+
+    A controller of a later result takes the place of an earlier one of its name; the reference
+    stays that of the first.
+    """
+    (first, summary), *later = summaries.items()
+    whole = dict(summary)
+    entries, origin = dict(whole["controllers"]), dict.fromkeys(whole["controllers"], first)
+    pairs = {pair["b"]: pair for pair in whole["pairs"]}
+    for source, other in later:
+        for key in SAME:
+            if other[key] != whole[key]:
+                raise ConfigError(f"is not that of {first}", source=source, field=key)
+        names = [name for name in other["controllers"] if name != whole["reference"]]
+        for name in names:
+            entries[name], origin[name] = other["controllers"][name], source
+            pairs.pop(name, None)
+        pairs |= {pair["b"]: pair for pair in other["pairs"] if pair["b"] in names}
+    whole["controllers"], whole["pairs"] = entries, list(pairs.values())
+    whole["ranking"] = sorted(entries, key=lambda name: -entries[name]["j50_mean"])
+    return whole, origin
+
+
+def leaderboard(summaries: Mapping[str, Mapping[str, Any]]) -> str:
+    """The page as Markdown; `summaries` by where they come from."""
+    summary, origin = merged(summaries)
     versions, machine = summary["versions"], summary["machine"]
     text = HEAD.format(
-        source=source,
+        source=" ".join(summaries),
         suite=summary["suite"],
         robot=summary["robot"]["name"],
         seed=summary["seed"],
@@ -49,6 +82,10 @@ def leaderboard(summary: Mapping[str, Any], source: str) -> str:
         cores=machine["cores"],
         reference=summary["reference"],
     )
+    for source, other in list(summaries.items())[1:]:
+        names = ", ".join(f"`{name}`" for name in summary["ranking"] if origin[name] == source)
+        text += f"Played later, commit `{(other['commit'] or 'unknown')[:10]}`, "
+        text += f"{other['machine']['processor']}, {other['machine']['cores']} cores: {names}.\n\n"
     text += _table(["", *(name for name, _ in COLUMNS)], _ranked(summary))
     if lines := seed_lines(summary["seeds"]):
         text += "\n" + "\n".join(f"- {line}" for line in lines) + "\n"
