@@ -34,22 +34,31 @@ def trial(controller, impulse, direction, seed=0, duration=4.0, watch=None):
     return fallen, env
 
 
-def test_a_small_push_is_the_feet_in_place_controllers_bit_for_bit():
+@pytest.mark.parametrize("name", ["capture-step", "feedback-step"])
+def test_a_small_push_is_the_feet_in_place_controllers_bit_for_bit(name):
     """Until the capture point leaves what the feet reach, nothing differs from its own `qp`."""
     ends = []
-    for controller in (controller_config("capture-step").qp, "capture-step"):
+    for controller in (controller_config("capture-step").qp, name):
         _, env = trial(controller, 10.0, 45.0, duration=1.0)
         ends.append(env.simulation.data.qpos.copy())
     np.testing.assert_array_equal(*ends)
     assert env.controller.steps == 0
 
 
-@pytest.mark.parametrize("direction", [0.0, 135.0])
-def test_steps_recover_what_feet_in_place_do_not(direction):
+@pytest.mark.parametrize(
+    ("name", "impulse", "direction"),
+    [
+        ("capture-step", 24.0, 0.0),
+        ("capture-step", 24.0, 135.0),
+        ("feedback-step", 31.0, 135.0),
+        ("feedback-step", 22.0, 270.0),
+    ],
+)
+def test_steps_recover_what_feet_in_place_do_not(name, impulse, direction):
     """A push far above the baseline's limit: the momentum QP falls, this one comes to rest."""
-    fallen, _ = trial("momentum-qp", 24.0, direction, seed=1)
+    fallen, _ = trial("momentum-qp", impulse, direction, seed=1)
     assert fallen
-    fallen, env = trial("capture-step", 24.0, direction, seed=1, duration=6.0)
+    fallen, env = trial(name, impulse, direction, seed=1, duration=6.0)
     assert not fallen and env.recovered and env.controller.steps >= 1
 
 
@@ -129,10 +138,13 @@ def test_hips_that_are_used_up_bring_the_step_forward():
     assert begun[1] < begun[0]
 
 
-@pytest.mark.parametrize("direction", [10.0, 200.0])
-def test_targets_are_those_of_the_readable_form(direction, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "direction"),
+    [("capture-step", 10.0), ("feedback-step", 10.0), ("feedback-step", 200.0)],
+)
+def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
     """What the QPs are asked for at every tick of a recovery, in a swing and after it."""
-    controller, kinds = load_controller("capture-step", robot()), set()
+    controller, kinds = load_controller(name, robot()), set()
     reach, stood, raised, left = controller.reach, [], [0.0], [np.inf]
     planner = readable.ReadablePlanner(controller.planner)
 
