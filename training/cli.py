@@ -77,9 +77,10 @@ def _run(args: list[str]) -> int:
 
 
 def demo(out: Path = Path("out/demo"), workers: int | None = None, seed: int = 0) -> None:
-    """Push two controllers and the shipped policy of each, and compare, in a few minutes.
+    """Push three controllers and the shipped policies, and compare, in a few minutes.
 
-    momentum-qp, whose feet stay in place, and residual; capture-step and residual-step.
+    momentum-qp, whose feet stay in place, and residual on it; capture-step and residual-step on it;
+    feedback-step.
 
     Args:
         out: folder to write to; an earlier demo there is replaced.

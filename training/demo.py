@@ -1,4 +1,4 @@
-"""The main job in a few minutes: two controllers, and what a policy on top of each gains."""
+"""The main job in a few minutes: three controllers, and what a policy on two of them gains."""
 
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from .evaluation_folder import PLOTS
 from .players import SHIPPED
 from .report import print_paths
 
-CONTROLLERS = ("momentum-qp", SHIPPED, "capture-step", "residual-step")
+CONTROLLERS = ("momentum-qp", SHIPPED, "capture-step", "residual-step", "feedback-step")
 SUITES = ("demo-envelope", "demo-random")
 
 
