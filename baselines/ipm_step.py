@@ -1,7 +1,7 @@
 """Steps to where an inverted pendulum comes to rest upright, by its energy."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -10,8 +10,7 @@ from poise.envs.robot import Robot
 
 from .capturability import Reach
 from .capture_step import CaptureStep, CaptureStepConfig
-from .step_feedback import StepFeedback
-from .step_plan import Foothold, StepLimits, StepPlanner
+from .step_plan import StepPlanner
 from .step_search import Search, allowed, moved, put_foothold, to_local
 
 
@@ -71,16 +70,8 @@ class EnergyPlanner(StepPlanner):
 
     law = staticmethod(energy_law)
 
-    def __init__(
-        self,
-        robot: Robot,
-        reach: Reach,
-        limits: StepLimits,
-        choice: Foothold,
-        arc: float = 0.0,
-        feedback: StepFeedback | None = None,
-    ):
-        super().__init__(robot, reach, limits, choice, feedback)
+    def __init__(self, *arguments: Any, arc: float = 0.0):
+        super().__init__(*arguments)  # those of a `StepPlanner`
         self.arc = arc
 
 
@@ -99,5 +90,5 @@ class IPMStep(CaptureStep):
         if not isinstance(config, IPMStepConfig):
             raise TypeError(f"config must be an IPMStepConfig, not {type(config).__name__}")
         return EnergyPlanner(
-            self.robot, reach, config.limits, config.foothold, config.arc, config.feedback
+            self.robot, reach, config.limits, config.foothold, config.feedback, arc=config.arc
         )

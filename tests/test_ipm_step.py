@@ -13,6 +13,7 @@ from poise.baselines.ipm_step import (
     rest_distance,
 )
 from poise.baselines.registry import controller_config, load_controller
+from poise.baselines.step_feedback import SignalGains, StepFeedback
 from poise.baselines.step_plan import Foothold, StepLimits
 from poise.baselines.support import nearest_inside
 
@@ -59,28 +60,30 @@ def test_the_pendulum_moves_by_its_equation():
     np.testing.assert_allclose(position + velocity / OMEGA, xi, atol=1e-12)
 
 
-def planner(arc, outward=0.0, **limits):
+def planner(arc, outward=0.0, feedback=None, **limits):
     """A planner with wide limits."""
     wide = {"ahead": 9.0, "behind": 9.0, "width_min": 1e-3, "width_max": 9.0, "speed": 99.0}
     return EnergyPlanner(
         robot(), Reach(robot()), StepLimits(**{**wide, "side_speed": 99.0, **limits}),
-        Foothold(outward=outward), arc,
+        Foothold(outward=outward), feedback, arc=arc,
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("foot", [0, 1])
 def test_a_policy_and_the_configuration_move_footholds(foot):
-    """`outward` [h] to the foot's own side, the policy's shift along the heading."""
+    """`outward` and feedback [h] to the foot's own side, the policy's shift along the heading."""
     state = generic_state().state.copy()
     times, yaw, start = np.array([0.3]), state.heading_yaw, state.sole_points[foot, :2]
-    plain, moved = planner(0.5), planner(0.5, outward=0.05)
+    feedback = StepFeedback(ahead=SignalGains(0.03), outward=SignalGains(0.04))
+    plain, moved = planner(0.5), planner(0.5, outward=0.05, feedback=feedback)
     moved.shift.foothold[:] = 0.02, -0.01
     (before,), _ = plain.footholds(state, foot, yaw, times, start)
     (after,), _ = moved.footholds(state, foot, yaw, times, start)
     side = 1.0 if foot == 0 else -1.0  # the left foot is the first
     cos, sin = state.heading
     local = np.array([[cos, sin], [-sin, cos]]) @ (after - before)
-    np.testing.assert_allclose(local, [0.02, side * 0.05 * robot().height_com - 0.01], atol=1e-12)
+    h = robot().height_com
+    np.testing.assert_allclose(local, [0.03 * h + 0.02, side * 0.09 * h - 0.01], atol=1e-12)
 
 
 def test_another_configuration_is_refused():
