@@ -109,6 +109,9 @@ def test_the_candidate_is_what_plays():
     data = to_dict(controller_config("momentum-qp"))
     job = Candidate(0, "humanoid", data, 3.0, True, (trial(8.0),))
     assert play(job) == ([1.0], [])
+    policy = replace(job, alone=(), policy="residual", below=(trial(8.0), trial(40.0)))
+    alone, (won, lost) = play(policy)
+    assert alone == [] and won == 1.0 and lost < 0.15
     data["torque"]["share"] = 0.05
     assert play(replace(job, controller=data))[0][0] < 0.3
 

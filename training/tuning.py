@@ -81,7 +81,8 @@ def tune(
     Writes `out/gains.yaml`, that controller, after each generation, and `out/history.jsonl` with
     all that was tried, from which `resume` goes on as if nothing had happened.
 
-    Raises ConfigError for a configuration that is not valid, or a folder that holds another search.
+    Raises ConfigError for a configuration that is not valid, a folder that holds another search, or
+    where the library `cma` is missing.
     """
     gains = Gains(config.controller, config.gains, config.robot)
     if config.policy is not None:
@@ -131,7 +132,10 @@ class _Search:
     """CMA-ES, and how far the pushes have followed the candidates."""
 
     def __init__(self, config: TuneConfig, gains: Gains):
-        import cma
+        try:
+            import cma
+        except ImportError:
+            raise ConfigError("needs the library cma: pip install 'poise[dev]'") from None
 
         self.config, self.gains, self.robot = config, gains, load_robot(config.robot)
         rng = np.random.default_rng(config.seed)
