@@ -12,7 +12,7 @@ from poise.envs.config import build, packaged, read_yaml, to_dict
 from poise.envs.errors import ConfigError
 from poise.envs.push_schedule import push_bodies
 from poise.envs.pushes import Push
-from poise.training import tuning_trials
+from poise.training import trials
 from poise.training.players import Player
 from poise.training.trials import Trial
 from poise.training.tuning import GAINS, HISTORY, TuneConfig, tune, tune_config
@@ -49,7 +49,7 @@ def test_a_fall_is_worth_less_than_standing(player, monkeypatch):
     """A recovery counts fully, a fall by how long it took; a dragged foot is no recovery."""
     assert worth(player, trial(5.0), in_place=True) == 1.0
     assert 0.03 < worth(player, trial(40.0), in_place=True) < 0.15
-    monkeypatch.setattr(tuning_trials, "STEP_LENGTH", 1e-6)
+    monkeypatch.setattr(trials, "STEP_LENGTH", 1e-6)
     assert worth(player, trial(5.0), in_place=True) == 0.6
     assert worth(player, trial(5.0), in_place=False) == 1.0
 

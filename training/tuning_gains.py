@@ -1,7 +1,7 @@
 """The numbers of a controller's configuration that a search moves."""
 
-import json
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,11 +49,14 @@ class Gains:
     def __init__(self, controller: str, ranges: Mapping[str, tuple[float, float]], robot: str):
         self.start = to_dict(controller_config(controller))
         self.gains = [Gain(path, low, high) for path, (low, high) in ranges.items()]
-        body = load_robot(robot)
+        body, numbers = load_robot(robot), sorted(_numbers(self.start))
         for gain in self.gains:
+            if gain.path not in numbers:
+                raise ConfigError("the controller has no such number", field=f"gains.{gain.path}",
+                                  choices=numbers)  # fmt: skip
             for end in (gain.low, gain.high):
-                data = self._copy()
-                self._put(data, gain.path, end)
+                data = deepcopy(self.start)
+                _put(data, gain.path, end)
                 try:
                     load_controller(data, body)
                 except ConfigError as error:
@@ -63,44 +66,31 @@ class Gains:
 
     def first(self) -> np.ndarray:
         """(n,) where the search starts, in [0, 1]."""
-        return np.array([gain.unit(float(self._at(gain.path))) for gain in self.gains])
+        values = _numbers(self.start)
+        return np.array([gain.unit(values[gain.path]) for gain in self.gains])
 
     def at(self, units: np.ndarray) -> dict[str, Any]:
         """The controller's configuration at these coordinates."""
-        data = self._copy()
+        data = deepcopy(self.start)
         for gain, unit in zip(self.gains, units, strict=True):
-            self._put(data, gain.path, gain.value(float(unit)))
+            _put(data, gain.path, gain.value(float(unit)))
         return data
 
-    def _copy(self) -> dict[str, Any]:
-        return json.loads(json.dumps(self.start))
 
-    def _at(self, path: str) -> Any:
-        return self._parent(self.start, path)[path.split(".")[-1]]
-
-    def _put(self, data: dict[str, Any], path: str, value: float) -> None:
-        self._parent(data, path)[path.split(".")[-1]] = float(f"{value:.5g}")
-
-    def _parent(self, data: dict[str, Any], path: str) -> dict[str, Any]:
-        *sections, name = path.split(".")
-        inner: Any = data
-        for section in sections:
-            inner = inner.get(section) if isinstance(inner, Mapping) else None
-        found = isinstance(inner, Mapping) and name in inner
-        if not found or isinstance(inner[name], bool) or not isinstance(inner[name], (int, float)):
-            raise ConfigError(
-                "the controller has no such number", field=f"gains.{path}",
-                choices=sorted(_numbers(data)),
-            )  # fmt: skip
-        return inner
+def _put(data: dict[str, Any], path: str, value: float) -> None:
+    """Set a number of a configuration, to five digits."""
+    *sections, name = path.split(".")
+    for section in sections:
+        data = data[section]
+    data[name] = float(f"{value:.5g}")
 
 
-def _numbers(data: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """Paths of all numbers of a configuration."""
-    paths = []
+def _numbers(data: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+    """All numbers of a configuration by their paths."""
+    found: dict[str, float] = {}
     for name, value in data.items():
         if isinstance(value, Mapping):
-            paths += _numbers(value, f"{prefix}{name}.")
+            found |= _numbers(value, f"{prefix}{name}.")
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
-            paths.append(prefix + name)
-    return paths
+            found[prefix + name] = float(value)
+    return found

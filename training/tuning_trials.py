@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.residual_balance import ResidualBalanceEnv
-from poise.envs.episode import MAX_SLIDE
 from poise.envs.push_schedule import push_bodies
 from poise.envs.pushes import Push
 from poise.envs.robot import Robot, load_robot
 
 from .players import Player
-from .trials import STEP_LENGTH, Trial, run_trial
+from .trials import Trial, run_trial
 
 START = 0.5  # [s] of a push
 UNQUIET, FALLEN = 0.6, 0.3  # what a trial counts at most that is up but not quiet, or fell
@@ -94,13 +93,13 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
 
 def worth(player: Player, trial: Trial, in_place: bool) -> float:
     """1 for a recovery, 0.6 for one that does not come to rest, at most 0.3 for a fall, by the time
-    until then. With `in_place` a foot that moves further than `STEP_LENGTH` is no recovery.
+    until then. With `in_place` one whose foot moved (`Outcome.stepped`) is no recovery.
     """
     outcome, env = run_trial(player, trial), player.env
     if outcome.fallen:
         return FALLEN * env.steps / env.max_steps
-    stayed = not in_place or env.episode.metrics[MAX_SLIDE] <= STEP_LENGTH
-    return 1.0 if outcome.recovered and stayed else UNQUIET
+    moved = in_place and outcome.stepped
+    return 1.0 if outcome.recovered and not moved else UNQUIET
 
 
 def follow(limits: np.ndarray, values: np.ndarray, speed: float = 0.1) -> np.ndarray:
