@@ -53,15 +53,20 @@ def clipped(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarra
     return np.array(kept)
 
 
-def sides(robot: Robot) -> np.ndarray:
-    """(2,) 1 for the left foot, −1 for the right one, in the standing posture."""
+def standing_feet(robot: Robot) -> np.ndarray:
+    """(2, 3) middles of the soles in the standing posture, which faces along x [m]."""
     data = mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing_qpos
     mujoco.mj_kinematics(robot.model, data)
     feet = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position
             for s in robot.soles]  # fmt: skip
-    left = data.xmat[robot.soles[0].body_id].reshape(3, 3) @ robot.soles[0].rotation[:, 1]
-    sign = 1.0 if (feet[0] - feet[1]) @ left > 0.0 else -1.0
+    return np.array(feet)
+
+
+def sides(robot: Robot) -> np.ndarray:
+    """(2,) 1 for the left foot, −1 for the right one, in the standing posture."""
+    feet = standing_feet(robot)
+    sign = 1.0 if feet[0, 1] > feet[1, 1] else -1.0
     return np.array([sign, -sign])
 
 

@@ -19,6 +19,7 @@ from .controller import Targets
 from .momentum_qp import COMPILED_SOLVER, MomentumQPConfig, Outputs, momentum_tick
 from .reduced_qp import QPParameters
 from .step_feedback import StepFeedback
+from .step_home import StepHome, home_arrays, leave_home
 from .step_plan import Foothold, StepLimits, StepPlanner
 from .step_shift import STANDING, Stepping
 from .swing import Swing, SwingTask, swing_gains
@@ -38,7 +39,8 @@ class CaptureStepConfig:
     load away, and takes it up; `pause` between two steps.
     `jump`: largest change of a torque from tick to tick, share of its limit. `root_accel` (in a
     swing `swing_accel`), `joint_accel`: most that the posture asks for [ω²]. `feedback`: what lean
-    and turn of the body add to a step, see `step_feedback.py`.
+    and turn of the body add to a step, see `step_feedback.py`. `home`: steps back to the stance of
+    standing, see `step_home.py`.
     """
 
     kind: Literal["capture-step"] = "capture-step"
@@ -60,6 +62,7 @@ class CaptureStepConfig:
     limits: StepLimits = field(default_factory=StepLimits)
     foothold: Foothold = field(default_factory=Foothold)
     feedback: StepFeedback = field(default_factory=StepFeedback)
+    home: StepHome = field(default_factory=StepHome)
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
     step_qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
@@ -98,8 +101,8 @@ def allocate_step_memory(reach: ReachArrays) -> StepMemory:
     """No step yet."""
     corners, whole = reach.sums.shape[0] * reach.sums.shape[1], np.int64
     return StepMemory(
-        steps=apart(1, whole), foot=apart(1, whole), swinging=apart(1, whole),
-        level=apart((3, 3)), clock=apart(1), load=apart(1), left=apart(1),
+        steps=apart(1, whole), again=apart(1, whole), foot=apart(1, whole),
+        swinging=apart(1, whole), level=apart((3, 3)), clock=apart(1), load=apart(1), left=apart(1),
         region=apart((2 * corners + 1, 2)), corners=apart(1, whole),
     )  # fmt: skip
 
@@ -130,6 +133,7 @@ class CaptureStep(AroundQP):
         self.h, self.rate = self.planner.h, self.planner.rate
         self.shift = self.planner.shift  #: what a policy adds
         self._swing = Swing(np.zeros(3), 0.0, self.config.swing, self.h)
+        self.home = home_arrays(robot, self.config.home)
         self.memory = allocate_step_memory(self.reach.arrays)
         self.tau = apart(len(self.qp.parameters.torque_limit))  #: (nv−6,) of the last tick [N·m]
         self._failures = apart(1, dtype=np.int64)
@@ -173,6 +177,7 @@ class CaptureStep(AroundQP):
         for array in self.memory.members():
             array[...] = 0
         self.memory.foot[0] = -1
+        leave_home(self.home)
         self.memory.level[:] = np.eye(3)
         self._failures[0] = 0
 
@@ -232,9 +237,9 @@ class CaptureStep(AroundQP):
             self.qp.arrays, s, targets.arrays(), guided,
             step_gains(self.robot, self.config, self.period),
             self.planner.search(state), self._swing.arrays,
-            swing_gains(self.qp.arrays, self.config.swing), self.memory, self.shift.values,
-            one, two, both, self.qp.tick(state, targets), self.tau, self._failures,
-            apart(1, dtype=np.int64), apart(reach.alone.shape[1:]),
+            swing_gains(self.qp.arrays, self.config.swing), self.memory, self.home,
+            self.shift.values, one, two, both, self.qp.tick(state, targets), self.tau,
+            self._failures, apart(1, dtype=np.int64), apart(reach.alone.shape[1:]),
             apart((len(self.memory.region) // 2, 2)), apart(2), apart(3), 0, 0,
         )  # fmt: skip
 

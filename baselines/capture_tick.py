@@ -13,11 +13,25 @@ from .capturability import distance_beyond, reach_of_one, reach_of_two
 from .contact_sets import ContactTick
 from .momentum_qp import Tick
 from .reduced_qp import TargetArrays
+from .step_home import (
+    AWAY,
+    SWINGING,
+    HomeArrays,
+    come_home,
+    face,
+    leave_home,
+    lost_foot,
+    lower_again,
+    plan_home,
+    replan_home,
+    wants_home,
+)
 from .step_search import Search, plan_step, replan_step
 from .step_shift import TRIGGER
 from .step_targets import copy_targets, guide
 from .swing import (
     FROZEN,
+    LANDING,
     SwingArrays,
     SwingGains,
     advance_swing,
@@ -27,7 +41,6 @@ from .swing import (
     time_left,
 )
 
-LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
 LOW = 0.04  # [h] above the ground: a foot that touches it higher up stands on its edge
 FIRST_LOAD = 0.3  # [m g] that a foot may bear at touchdown; then the limit rises by m g a ramp
 
@@ -57,6 +70,7 @@ class StepMemory(Block):
     """What outlives a tick."""
 
     steps: np.ndarray  # (1,) int: begun since the reset
+    again: np.ndarray  # (1,) int: 1 from a step until all is calm and both feet are at home
     foot: np.ndarray  # (1,) int: that stepped last
     swinging: np.ndarray  # (1,) int: whether it is in the air, or about to leave
     level: np.ndarray  # (3, 3) axes of a level sole along the heading at the first step
@@ -80,6 +94,7 @@ class CaptureTick(Block):
     swing: SwingArrays
     task: SwingGains
     memory: StepMemory
+    home: HomeArrays
     shift: np.ndarray  # see `StepShift`
     first: ContactTick  # on the first sole, on the second, on both
     second: ContactTick
@@ -100,7 +115,7 @@ class CaptureTick(Block):
 def must_step(t: CaptureTick) -> bool:
     """Whether ξ has left what both soles reach, see `CaptureStepConfig`."""
     s, m, g, feet = t.state, t.memory, t.gains, t.state.sole_point
-    stepped = m.steps[0] > 0
+    stepped = m.again[0] > 0
     if stepped and m.clock[0] < g.pause:
         return False
     cos, sin = s.heading[0], s.heading[1]
@@ -118,8 +133,8 @@ def must_step(t: CaptureTick) -> bool:
 
 
 @compiled
-def begin_step(t: CaptureTick):
-    """Plan a step and start its swing."""
+def begin_step(t: CaptureTick, home: bool):
+    """Plan a step, or one home, and start its swing."""
     s, m, q = t.state, t.memory, t.search
     wrenches = t.both.problem.workspace.wrenches
     if m.steps[0] == 0:
@@ -128,15 +143,18 @@ def begin_step(t: CaptureTick):
         copy(before.tau, t.both.memory.torques)
         t.both.follows[0] = 1
         wrenches = before.wrenches
-        yaw = np.arctan2(s.heading[1], s.heading[0])
-        m.level[0, 0] = m.level[1, 1] = np.cos(yaw)
-        m.level[1, 0] = np.sin(yaw)
-        m.level[0, 1] = -m.level[1, 0]
+    if m.again[0] == 0:
+        face(m.level, s.heading[0], s.heading[1])
     q.heading[0], q.heading[1] = m.level[0, 0], m.level[1, 0]
-    q.feedback.stage[0] = 1.0 if m.steps[0] > 0 else 0.0
-    plan_step(q)
+    q.feedback.stage[0] = 1.0 if m.again[0] > 0 else 0.0
+    if home:
+        plan_home(q, t.home)
+    else:
+        leave_home(t.home)
+        plan_step(q)
     foot = q.best_foot[0]
     m.steps[0] += 1
+    m.again[0] = 1
     m.foot[0], m.swinging[0] = foot, 1
     start_swing(t.swing, s.sole_point[foot], s.sole_point[1 - foot, 2], q.best[2])
     aim_swing(t.swing, q.best[0], q.best[1], q.best[2])
@@ -175,7 +193,9 @@ def swing_tick(t: CaptureTick):
     stance = s.sole_point[1 - foot]
     if time_left(w) > FROZEN:
         q.heading[0], q.heading[1] = level[0, 0], level[1, 0]
-        replan_step(q, foot, w)
+        if t.home.stage[0] != SWINGING or not replan_home(q, t.home, w):
+            t.home.stage[0] = AWAY
+            replan_step(q, foot, w)
         aim_swing(w, q.best[0], q.best[1], w.time[0] + q.best[2])
         w.shift[0] = q.best[4]
     n = reach_of_one(q.reach, 1 - foot, stance, level[0, 0], level[1, 0], t.points)
@@ -219,7 +239,7 @@ def capture_tick(t: CaptureTick):
     t.to_python[0] = 0
     if not m.swinging[0]:
         if must_step(t):
-            begin_step(t)
+            begin_step(t, False)
         elif m.steps[0] == 0:
             if t.place_kernel == 0:
                 t.to_python[0] = 1
@@ -228,9 +248,16 @@ def capture_tick(t: CaptureTick):
             copy(t.place.problem.workspace.tau, t.tau)
             t.failures[0] = t.place.memory.failures[0]
             return
+        elif wants_home(t):
+            begin_step(t, True)
     copy_targets(t)
     if m.swinging[0] and has_landed(t):
         m.swinging[0], m.clock[0], m.corners[0] = 0, 0.0, 0
+        come_home(t.home)
+    if not m.swinging[0] and t.home.gentle[0]:
+        foot = lost_foot(t)
+        if foot >= 0:
+            lower_again(t, foot)
     if m.swinging[0]:
         swing_tick(t)
     else:

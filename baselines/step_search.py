@@ -80,6 +80,13 @@ def to_local(q: Search, x: float, y: float):
 
 
 @compiled
+def turned(q: Search, x: float, y: float):
+    """(x, y) along the heading, in the world."""
+    cos, sin = q.heading[0], q.heading[1]
+    return cos * x - sin * y, sin * x + cos * y
+
+
+@compiled
 def put_foothold(q: Search, x: float, y: float):
     """Set `foothold` to (x, y) from the stance sole, along the heading."""
     stance, cos, sin = q.state.sole_point[1 - q.foot[0]], q.heading[0], q.heading[1]
@@ -107,11 +114,30 @@ def allowed(q: Search, x: float, y: float):
 
 
 @compiled
-def capture_law(q: Search):
-    """The foothold under ξ(T) = p + (ξ − p) e^(ωT), see `StepPlanner.footholds`."""
-    foot, xi, p = q.foot[0], q.state.capture_point, q.p
+def drift(q: Search):
+    """ξ(T) = p + (ξ − p) e^(ωT)."""
+    xi, p = q.state.capture_point, q.p
     grown = np.exp(q.state.omega[0] * q.time[0])
-    end_x, end_y = p[0] + (xi[0] - p[0]) * grown, p[1] + (xi[1] - p[1]) * grown
+    return p[0] + (xi[0] - p[0]) * grown, p[1] + (xi[1] - p[1]) * grown
+
+
+@compiled
+def left_outside(q: Search, x: float, y: float) -> float:
+    """How far (x, y) lies outside the reach of both soles, this foot at its foothold [m]."""
+    foot, heading = q.foot[0], q.heading
+    first, second = q.foothold, q.state.sole_point[1 - foot]
+    if foot == 1:
+        first, second = second, first
+    return distance_beyond(
+        q.reach, first[0], first[1], second[0], second[1], heading[0], heading[1], x, y
+    )
+
+
+@compiled
+def capture_law(q: Search):
+    """The foothold under ξ(T), see `StepPlanner.footholds`."""
+    foot = q.foot[0]
+    end_x, end_y = drift(q)
     x, y = to_local(q, end_x, end_y)
     x, y = x - q.reach.middle[foot, 0], y - q.reach.middle[foot, 1]
     x += q.overshoot * np.tanh(x / (0.1 * q.height))
@@ -119,14 +145,7 @@ def capture_law(q: Search):
     x, y = moved(q, x, y)
     x, y = allowed(q, x, y)
     put_foothold(q, x, y)
-    first, second = q.foothold, q.state.sole_point[1 - foot]
-    if foot == 1:
-        first, second = second, first
-    outside = distance_beyond(
-        q.reach, first[0], first[1], second[0], second[1],
-        q.heading[0], q.heading[1], end_x, end_y,
-    )  # fmt: skip
-    q.left[0] = max(outside, -q.margin)
+    q.left[0] = max(left_outside(q, end_x, end_y), -q.margin)
 
 
 @compiled

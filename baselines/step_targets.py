@@ -6,6 +6,7 @@ from poise.envs.jit import compiled
 from poise.envs.kinematics import copy
 
 from .step_feedback import HEIGHT as FEEDBACK_HEIGHT
+from .step_home import LEANING, PRESSING, press
 from .step_shift import COM, COP, HEIGHT, LEAN
 from .support import find_nearest
 from .swing import rotation_error
@@ -44,11 +45,15 @@ def guide(t, region, hips, ground, way_x, way_y):
     for i in range(n):
         rest_x += region[i, 0] / n
         rest_y += region[i, 1] / n
+    if t.home.stage[0] == LEANING:
+        rest_x, rest_y = t.home.rest[0], t.home.rest[1]
     rest_x += cos * shift[COM] - sin * shift[COM + 1]
     rest_y += sin * shift[COM] + cos * shift[COM + 1]
     wanted = t.error
     wanted[0] = s.capture_point[0] + g.gain * (s.capture_point[0] - rest_x)
     wanted[1] = s.capture_point[1] + g.gain * (s.capture_point[1] - rest_y)
+    if t.home.stage[0] == PRESSING:
+        press(t, rest_x, rest_y, wanted)
     find_nearest(region, wanted, p)
     over_x, over_y = wanted[0] - p[0], wanted[1] - p[1]
     share = min(1.0, hips / max(np.sqrt(over_x * over_x + over_y * over_y), 1e-9))

@@ -13,6 +13,7 @@ from poise.envs.state import RobotState
 from .task_rows import Rows
 
 GRAVITY = 9.81  # [m/s²] of the landing speed's unit
+LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
 FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
 
 
