@@ -130,6 +130,7 @@ def _choose_foot(t):
     share = min(1.0, m.lean / max(np.sqrt(x * x + y * y), 1e-9))
     m.rest[0], m.rest[1] = stance[0] + share * x, stance[1] + share * y
     m.stage[0], m.foot[0], m.waited[0] = LEANING, foot, 0.0
+    t.memory.again[0] = 1
     axes = s.sole_axes[1 - foot]
     face(t.memory.level, axes[0, 0], axes[1, 0])
     t.memory.corners[0] = 0
@@ -149,7 +150,7 @@ def _is_calm(t) -> bool:
 def wants_home(t) -> bool:
     """On both feet after steps: whether one of them lifts off for home now."""
     s, m = t.state, t.home
-    if m.far == 0.0 or t.memory.again[0] == 0:
+    if m.far == 0.0:
         return False
     if m.stage[0] == LEANING:
         m.waited[0] += t.gains.period
