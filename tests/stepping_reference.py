@@ -3,6 +3,7 @@
 import numpy as np
 
 from poise.baselines.capturability import DIRECTIONS, SHARES, drifted, turn
+from poise.baselines.step_home import LEANING, PRESSING
 from poise.baselines.step_plan import Plan
 from poise.baselines.support import nearest_inside
 
@@ -179,7 +180,14 @@ def guided(controller, state, targets, region, hips, ground, way, raised):
     c, h, shift = controller.config, controller.h, controller.shift
     level, rate2 = controller.memory.level, controller.rate**2
     R, xi, p = level[:2, :2], state.capture_point, controller.sets.parameters
-    wanted = xi + c.gain * (xi - region.mean(axis=0) - R @ shift.com)
+    home = controller.home
+    rest = region.mean(axis=0) + R @ shift.com
+    if home.stage[0] == LEANING:
+        rest = home.rest
+    wanted = xi + c.gain * (xi - rest)
+    if home.stage[0] == PRESSING:
+        away = wanted - xi
+        wanted = xi + away * min(1.0, c.home.press * h / max(float(np.linalg.norm(away)), 1e-9))
     cop = nearest_inside(region, wanted)
     over = wanted - cop
     cop = cop + over * min(1.0, hips * h / max(float(np.linalg.norm(over)), 1e-9))

@@ -10,6 +10,7 @@ import pytest
 from poise.baselines.capture_step import CaptureStep, CaptureStepConfig
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.baselines.step_home import LEANING
 from poise.baselines.step_shift import COM, COP, HEIGHT, LEAN
 from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
@@ -98,12 +99,16 @@ def watched(controller, impulse, direction, look, duration=1.5):
     return watch.seen
 
 
-@pytest.mark.parametrize("direction", [0.0, 90.0])
-def test_torques_do_not_jump_at_a_switch(direction):
-    """From the tick before the first step on, torques change by at most `jump` of their limits."""
-    controller = load_controller("capture-step", robot())
+@pytest.mark.parametrize(
+    ("name", "direction", "duration"),
+    [("capture-step", 0.0, 1.5), ("capture-step", 90.0, 1.5), ("feedback-step", 0.0, 4.0)],
+)
+def test_torques_do_not_jump_at_a_switch(name, direction, duration):
+    """From the tick before the first step on, torques change by at most `jump` of their limits; on
+    the way home too."""
+    controller = load_controller(name, robot())
     ticks = watched(
-        controller, 24.0, direction, lambda c, state, targets, tau: (c.steps, tau.copy())
+        controller, 24.0, direction, lambda c, state, targets, tau: (c.steps, tau.copy()), duration
     )
     first = next(i for i, (steps, _) in enumerate(ticks) if steps > 0)
     torques = np.array([tau for _, tau in ticks[first - 1 :]])
@@ -145,7 +150,7 @@ def test_hips_that_are_used_up_bring_the_step_forward():
 def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
     """What the QPs are asked for at every tick of a recovery, in a swing and after it."""
     controller, kinds = load_controller(name, robot()), set()
-    reach, stood, raised, left = controller.reach, [], [0.0], [np.inf]
+    reach, stood, raised, left, stages = controller.reach, [], [0.0], [np.inf], [0]
     planner = readable.ReadablePlanner(controller.planner)
 
     def look(c, state, targets, tau):
@@ -162,21 +167,25 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
                 raised[0] = planner.added(state, c.foot, yaw)[3]
             left[0] = c.swing.remaining
         else:
+            if c.home.stage[0] == LEANING and stages[-1] != LEANING:
+                stood.clear()  # another heading from now on
             stood.append(feet.copy())
             left[0] = np.inf
             region, hips = reach.both(stood[0], yaw), c.config.hips
             ground, way = feet[:, 2].mean(), feet[0, :2] - feet[1, :2]
         kinds.add(c.swing is not None)
+        stages.append(int(c.home.stage[0]))
         expected = readable.guided(c, state, targets, region, hips, ground, way, raised[0])
-        for name, value in expected.items():
-            np.testing.assert_allclose(getattr(c._guided, name), value, rtol=1e-9, atol=1e-9)
+        for entry, value in expected.items():
+            np.testing.assert_allclose(getattr(c._guided, entry), value, rtol=1e-9, atol=1e-9, err_msg=f"{entry} {stages[-3:]} {c.swing} {c.memory.clock} {region.shape} {c.memory.corners} {np.abs(np.sort(region[:,0])-np.sort(c.memory.region[:c.memory.corners[0],0])).max() if len(region)==c.memory.corners[0] else 0} {c.home.rest}")
 
     shift = controller.shift
     moved = np.zeros(len(shift.values))
     moved[[COM, COM + 1, COP, COP + 1, HEIGHT]] = 0.02, -0.01, 0.01, 0.005, -0.01
     moved[[LEAN, LEAN + 1]] = 0.05, 0.08
     monkeypatch.setattr(shift, "clear", lambda: np.copyto(shift.values, moved))  # by the reset
-    watched(controller, 22.0, direction, look)
+    watched(controller, 22.0, direction, look, duration=2.5)
+    assert set(stages) == (set(range(4)) if name == "feedback-step" else {0})
     assert kinds == {True, False} and np.array_equal(shift.values, moved)
 
 
