@@ -181,10 +181,8 @@ def guided(controller, state, targets, region, hips, ground, way, raised):
     level, rate2 = controller.memory.level, controller.rate**2
     R, xi, p = level[:2, :2], state.capture_point, controller.sets.parameters
     home = controller.home
-    rest = region.mean(axis=0) + R @ shift.com
-    if home.stage[0] == LEANING:
-        rest = home.rest
-    wanted = xi + c.gain * (xi - rest)
+    rest = home.rest if home.stage[0] == LEANING else region.mean(axis=0)
+    wanted = xi + c.gain * (xi - rest - R @ shift.com)
     if home.stage[0] == PRESSING:
         away = wanted - xi
         wanted = xi + away * min(1.0, c.home.press * h / max(float(np.linalg.norm(away)), 1e-9))

@@ -177,7 +177,7 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
         stages.append(int(c.home.stage[0]))
         expected = readable.guided(c, state, targets, region, hips, ground, way, raised[0])
         for entry, value in expected.items():
-            np.testing.assert_allclose(getattr(c._guided, entry), value, rtol=1e-9, atol=1e-9, err_msg=f"{entry} {stages[-3:]} {c.swing} {c.memory.clock} {region.shape} {c.memory.corners} {np.abs(np.sort(region[:,0])-np.sort(c.memory.region[:c.memory.corners[0],0])).max() if len(region)==c.memory.corners[0] else 0} {c.home.rest}")
+            np.testing.assert_allclose(getattr(c._guided, entry), value, rtol=1e-9, atol=1e-9)
 
     shift = controller.shift
     moved = np.zeros(len(shift.values))
