@@ -21,11 +21,11 @@ from .shared import robot
 QUIET_STEPS = 0
 
 
-def trial(controller, impulse, direction, seed=0, duration=4.0, watch=None):
-    """Whether it fell, and the environment at the end."""
+def trial(controller, impulse, direction, seed=0, duration=4.0, watch=None, later=()):
+    """Whether it fell, and the environment at the end; `later`: further pushes."""
     env = ResidualBalanceEnv(robot(), controller=controller, duration=duration)
     push = {"impulse": impulse, "direction": direction, "start": 0.2, "body": "torso"}
-    env.reset(seed=seed, options={"push": push})
+    env.reset(seed=seed, options={"push": [push, *later]})
     done, action = False, np.zeros(4)
     while not done:
         _, fallen, over = env.step_in_place(action)

@@ -24,24 +24,16 @@ from poise.envs.simulation import Simulation
 
 from . import stepping_reference as readable
 from .shared import robot
+from .test_capture_step import trial
 
-PUSH = {"impulse": 22.0, "start": 0.2, "body": "torso"}
 
-
-def play(direction, home=True, duration=6.0, later=(), watch=None):
+def play(direction, home=True, **settings):
     """feedback-step after a push that it steps for."""
     config = controller_config("feedback-step")
     if not home:
         config = replace(config, home=replace(config.home, far=0.0))
-    env = ResidualBalanceEnv(robot(), controller=CaptureStep(robot(), config), duration=duration)
-    env.reset(seed=3, options={"push": [{**PUSH, "direction": direction}, *later]})
-    done, action = False, np.zeros(len(env.action_names))
-    while not done:
-        _, fallen, over = env.step_in_place(action)
-        done = fallen or over
-        if watch is not None:
-            watch(env)
-    return fallen, env
+    controller = CaptureStep(robot(), config)
+    return trial(controller, 22.0, direction, seed=3, **{"duration": 6.0, **settings})
 
 
 def away(env):
@@ -89,7 +81,7 @@ def test_a_push_on_the_way_home_is_caught():
     def watch(env):
         stages.append((env.simulation.time, int(env.controller.home.stage[0])))
 
-    second = {**PUSH, "impulse": 20.0, "direction": 150.0, "start": begun[0] + 0.04}
+    second = {"impulse": 20.0, "direction": 150.0, "start": begun[0] + 0.04, "body": "torso"}
     fallen, env = play(0.0, later=[second], watch=watch, duration=6.5)
     assert not fallen and env.recovered
     after = [stage for time, stage in stages if second["start"] < time < second["start"] + 0.3]
