@@ -148,7 +148,8 @@ def _is_calm(t) -> bool:
 
 @compiled
 def wants_home(t) -> bool:
-    """On both feet after steps: whether one of them lifts off for home now."""
+    """On both feet after steps: whether one of them lifts off for home now. Counts how long it has
+    been calm, and when it has been for long chooses the foot or begins anew."""
     s, m = t.state, t.home
     if m.far == 0.0:
         return False
@@ -252,7 +253,7 @@ def lower_again(t, foot: int):
 
 @compiled
 def come_home(m: HomeArrays):
-    """At touchdown."""
+    """At touchdown: the foot that came home is to take up its load."""
     m.lost[0] = m.lost[1] = 0.0
     if m.stage[0] == SWINGING:
         m.stage[0] = PRESSING
