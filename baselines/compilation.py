@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.envs import batch
+from poise.envs.compiled_steps import NOTHING, Turns, play_one
 from poise.envs.kinematics import allocate_state
 from poise.envs.robot import load_robot
 from poise.envs.state import RobotState
@@ -12,8 +12,8 @@ from .contact_sets import contact_tick
 from .controller import Targets
 from .momentum_qp import MomentumQP, Tick, accept, momentum_tick, solve
 from .residual_balance import ResidualBalanceEnv
-from .residual_step import residual_step
-from .residual_step_env import ResidualStepEnv, stepping_step
+from .residual_step import residual_tick
+from .residual_step_env import ResidualStepEnv, stepping_tick
 from .warmup import begin
 
 __all__ = ["assembly", "begin", "contacts", "planner", "solver", "steps"]
@@ -49,10 +49,11 @@ def steps() -> None:
     qp = env.controller
     problem = qp.assembly(env.simulation.state, env.targets)
     tick = Tick(problem, qp.memory, 0, 0)
-    residual_step.compile((env.bind(tick, 0).numba_type,))
+    residual_tick.compile((env.bind(tick, 0).numba_type,))
     momentum_tick.compile((tick.numba_type,))
     accept(problem.state, problem.parameters, problem.workspace, qp.memory)
-    batch.play(0, batch.NOBODY, np.zeros(1, dtype=np.int64))
+    Turns(NOTHING, 1).play(0)
+    play_one(0, 0, 0)
 
 
 def _stepping() -> tuple[ResidualStepEnv, CaptureTick]:
@@ -71,4 +72,4 @@ def planner() -> None:
     """When, where to and how a foot steps, and what a policy sees of it."""
     env, tick = _stepping()
     capture_tick.compile((tick.numba_type,))
-    stepping_step.compile((env.bind_steps(env.bind(tick, 0), 0).numba_type,))
+    stepping_tick.compile((env.bind_steps(env.bind(tick, 0), 0).numba_type,))

@@ -10,7 +10,8 @@ import numpy as np
 
 from poise.envs.arrays import apart
 from poise.envs.balance import BalanceEnv, EnvConfig
-from poise.envs.block import Block, Erased
+from poise.envs.block import Block, Erased, address_of
+from poise.envs.compiled_steps import CompiledStep
 from poise.envs.config import build, to_dict
 from poise.envs.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.errors import ConfigError
@@ -25,7 +26,7 @@ from .ipm_step import IPMStep
 from .momentum_qp import MomentumQP, MomentumQPConfig
 from .motions import ReferenceMotion, load_motion
 from .registry import CONTROLLERS, load_controller
-from .residual_step import Residual, ResidualStep, residual_step, set_offsets, soft_root_force
+from .residual_step import Residual, ResidualStep, residual_tick, set_offsets, soft_root_force
 from .targets import Motion
 from .tick_parts import Aim, Record, aim, record
 from .warmup import prepare
@@ -286,8 +287,8 @@ class ResidualBalanceEnv(BalanceEnv):
         # other solvers and controllers are called from Python, tick by tick
         self._compiled = type(controller) in COMPILED and controller.solver is None
         self._com_offset = float(getattr(controller, "com_offset", 0.0))
-        self._step: ResidualStep | None = None
-        self._gains: Any = None  # with which it was made
+        self._step = None
+        self._bound: tuple[ResidualStep, Any]  # what `_step` works on, the gains when it was made
         self._aim: Aim | None = None
         self._record: Record | None = None
 
@@ -334,20 +335,22 @@ class ResidualBalanceEnv(BalanceEnv):
             )  # fmt: skip
         aim(known)
 
-    def compiled_step(self) -> tuple[Any, Block] | None:
+    def compiled_step(self) -> CompiledStep | None:
         """See `BalanceEnv`: controllers with a compiled tick and solver."""
-        return (residual_step, self._bound()) if self._compiled else None
+        if not self._compiled:
+            return None
+        known, gains, pushes = self._step, self.controller.parameters, self.simulation.push_table
+        if known is not None:
+            bound, made_with = self._bound
+            if bound.episode is self.episode and bound.pushes is pushes and made_with is gains:
+                return known
+        address, tick = self.controller.compiled_tick(self.simulation.state, self.targets)
+        bound = self.bind(tick, address)
+        self._bound, self._step = (bound, gains), self._whole_step(bound)
+        return self._step
 
-    def _bound(self) -> ResidualStep:
-        step, gains, pushes = self._step, self.controller.parameters, self.simulation.push_table
-        if (
-            step is None or step.episode is not self.episode
-            or self._gains is not gains or step.pushes is not pushes
-        ):  # fmt: skip
-            address, tick = self.controller.compiled_tick(self.simulation.state, self.targets)
-            step, self._gains = self.bind(tick, address), gains
-            self._step = step
-        return step
+    def _whole_step(self, bound: ResidualStep) -> CompiledStep:
+        return CompiledStep(address_of(residual_tick, bound), bound, bound.ticks)
 
     def bind(self, tick: Block, kernel: int) -> ResidualStep:
         """All that a step works on, with the controller's tick and the address of its kernel."""
@@ -360,10 +363,9 @@ class ResidualBalanceEnv(BalanceEnv):
         )  # fmt: skip
 
     def advance(self) -> None:
-        known = self.compiled_step()
-        if known is not None:
-            kernel, block = known
-            kernel(block)
+        step = self.compiled_step()
+        if step is not None:
+            step.play()
         else:
             self._advance_in_python()
 
@@ -372,7 +374,7 @@ class ResidualBalanceEnv(BalanceEnv):
         set_offsets(self._residual, s, self._motion, self._com_offset, self.episode)
 
     def _advance_in_python(self) -> None:
-        """What `residual_step` does, for any controller."""
+        """What `residual_tick` does, for any controller."""
         sim, e = self.simulation, self.episode
         s, ctrl, wrench = sim.state_arrays, sim.plant.ctrl, e.root_wrench
         self._set_offsets()
@@ -385,7 +387,17 @@ class ResidualBalanceEnv(BalanceEnv):
             record(accounts)
             sim.step(ctrl, self.control_substeps)
         e.metrics[FAILURES] = getattr(self.controller, "failures", 0)
-        judge_step(self.arrays, s, self.scales, self.judge, self.targets.q_ref, ctrl, sim.time, e)
+        judge_step(
+            self.arrays,
+            sim.plant,
+            s,
+            self.scales,
+            self.judge,
+            self.targets.q_ref,
+            ctrl,
+            sim.time,
+            e,
+        )
         self._observe()
 
     def _accounts(self) -> Record:

@@ -102,30 +102,34 @@ class ResidualStep(Block):
 
 
 @compiled
-def residual_step(step: ResidualStep):
-    """One policy step: `ticks` times the controller, each held for `substeps` physics steps."""
+def residual_tick(step: ResidualStep):
+    """The controller, held for `substeps` physics steps; `ticks` calls are a policy step."""
     robot, plant, s, clock, motion = step.robot, step.plant, step.state, step.clock, step.motion
     t, e, tau, w = step.targets, step.episode, step.tau, step.root_wrench
     period = step.substeps * robot.timestep
-    set_offsets(step.residual, s, motion, step.com_offset, e)
-    for _ in range(step.ticks):
-        update_targets(
-            robot, s, motion, clock[0] * robot.timestep, step.com_offset, step.residual.offsets, t
-        )
-        call(step.kernel, step.tick)
-        for i in range(plant.ctrl.shape[0]):
-            plant.ctrl[i] = tau[robot.motor_dofs[i] - 6]
-        if step.soft_root:
-            soft_root_force(s, w, plant.qfrc_applied)
-            m = e.metrics
-            m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
-            m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
-        record_tick(robot, s, plant.ctrl, period, e)
-        for _ in range(step.substeps):
-            advance(robot, plant, step.pushes, clock)
-        update_state(robot, plant, s)
+    if e.ticks[0] == 0:
+        set_offsets(step.residual, s, motion, step.com_offset, e)
+    update_targets(
+        robot, s, motion, clock[0] * robot.timestep, step.com_offset, step.residual.offsets, t
+    )
+    call(step.kernel, step.tick)
+    for i in range(plant.ctrl.shape[0]):
+        plant.ctrl[i] = tau[robot.motor_dofs[i] - 6]
+    if step.soft_root:
+        soft_root_force(s, w, plant.qfrc_applied)
+        m = e.metrics
+        m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
+        m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
+    record_tick(robot, s, plant.ctrl, period, e)
+    for _ in range(step.substeps):
+        advance(robot, plant, step.pushes, clock)
+    update_state(robot, plant, s)
+    e.ticks[0] += 1
+    if e.ticks[0] < step.ticks:
+        return
+    e.ticks[0] = 0
     copy(w, e.root_wrench)
     e.metrics[FAILURES] = step.failures[0]
     now = clock[0] * robot.timestep
-    judge_step(robot, s, step.scales, step.judge, t.q_ref, plant.ctrl, now, e)
+    judge_step(robot, plant, s, step.scales, step.judge, t.q_ref, plant.ctrl, now, e)
     observe(robot, s, step.scales, t.q_ref, t.v_ref, e.action, e.observation)

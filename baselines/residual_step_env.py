@@ -10,6 +10,7 @@ import numpy as np
 
 from poise.envs.arrays import apart
 from poise.envs.block import Block, Erased, address_of, call
+from poise.envs.compiled_steps import CompiledStep
 from poise.envs.env_config import EnvConfig
 from poise.envs.errors import ConfigError
 from poise.envs.jit import compiled
@@ -19,7 +20,7 @@ from poise.envs.vector import make_vector_env
 
 from .capture_tick import StepMemory
 from .residual_balance import ResidualBalanceEnv, ResidualScales
-from .residual_step import ResidualStep, residual_step
+from .residual_step import ResidualStep
 from .step_shift import (
     COM,
     COP,
@@ -61,16 +62,19 @@ class SteppingStep(Block):
     """A policy step of a compiled controller that steps."""
 
     residual: Erased  # a `ResidualStep`
-    kernel: int  # address of `residual_step`
+    ticks: np.ndarray  # (1,) int: of the running policy step
+    kernel: int  # address of `residual_tick`
     memory: StepMemory
     swing: SwingArrays
     sight: StepSight
 
 
 @compiled
-def stepping_step(step: SteppingStep):
-    """`residual_step`, and what the policy sees of the steps."""
+def stepping_tick(step: SteppingStep):
+    """`residual_tick`, after the last one what the policy sees of the steps."""
     call(step.kernel, step.residual)
+    if step.ticks[0] > 0:
+        return
     m, w, told = step.memory, step.swing, step.sight.told
     told[0], told[1] = m.steps[0], -1.0
     told[4], told[5], told[6] = 0.0, 0.0, m.clock[0]
@@ -147,7 +151,6 @@ class ResidualStepEnv(ResidualBalanceEnv):
         if not hasattr(controller, "shift") or not hasattr(controller, "stepping"):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
         ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
-        self._steps: SteppingStep | None = None
         if isinstance(controller.shift, StepShift):  # one array is both
             self._offsets = controller.shift.values
         else:
@@ -189,23 +192,19 @@ class ResidualStepEnv(ResidualBalanceEnv):
         )
         shift.height, shift.time, shift.trigger = offsets[[HEIGHT, TIME, TRIGGER]].tolist()
 
-    def compiled_step(self) -> tuple[Any, Block] | None:
-        """See `ResidualBalanceEnv`."""
-        known = super().compiled_step()
-        if known is None:
-            return None
-        steps = self._steps
-        residual: Any = known[1]
-        if steps is None or steps.residual.inner is not residual:
-            steps = self._steps = self.bind_steps(residual, address_of(residual_step, residual))
-        return stepping_step, steps
+    def _whole_step(self, bound: ResidualStep) -> CompiledStep:
+        alone = super()._whole_step(bound)
+        block = self.bind_steps(bound, alone.kernel)
+        return CompiledStep(address_of(stepping_tick, block), block, alone.ticks)
 
     def bind_steps(self, residual: ResidualStep, kernel: int) -> SteppingStep:
-        """All that a step works on, with what `bind` made and the address of `residual_step`."""
+        """All that a step works on, with what `bind` made and the address of `residual_tick`."""
         tick: Any = residual.tick.inner
         scales, observation = self.scales, self.episode.observation
         sight = StepSight(residual.state, apart(7), scales.height, scales.omega, observation)
-        return SteppingStep(Erased(residual), kernel, tick.memory, tick.swing, sight)
+        return SteppingStep(
+            Erased(residual), self.episode.ticks, kernel, tick.memory, tick.swing, sight
+        )
 
     def info(self) -> dict[str, Any]:
         """As of `ResidualBalanceEnv`, and the number of steps."""

@@ -101,8 +101,9 @@ class SensedTorqueEnv(Sensed, TorqueBalanceEnv):
         record_tick(self.arrays, s, ctrl, period, e)
         sim.step(ctrl, self.substeps)
         judge_step(
-            self.arrays, s, self.scales, self.judge, self.arrays.q_standing, ctrl, sim.time, e
-        )
+            self.arrays, sim.plant, s, self.scales, self.judge, self.arrays.q_standing,
+            ctrl, sim.time, e,
+        )  # fmt: skip
         self._observe()
 
 

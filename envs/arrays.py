@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 
 import mujoco
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
 from .block import Block
 from .robot import Robot
@@ -80,6 +81,7 @@ class Plant(Block):
     qfrc_constraint: np.ndarray
     M: np.ndarray
     sensordata: np.ndarray
+    warnings: np.ndarray  # (13,) int: each second one counts a kind of `mujoco.mjtWarning`
 
 
 MAX_VERTICES = 8
@@ -127,8 +129,10 @@ def robot_arrays(robot: Robot) -> RobotArrays:
 
 def plant_views(model: mujoco.MjModel, data: mujoco.MjData) -> Plant:
     """Views into `data` under their MuJoCo names."""
-    views = {field.name: getattr(data, field.name) for field in fields(Plant)[2:]}
-    return Plant(model._address, data._address, **views)
+    views = {field.name: getattr(data, field.name) for field in fields(Plant)[2:-1]}
+    counts = data.warning.number  # with something else between any two
+    every = as_strided(counts, (2 * len(counts) - 1,), (counts.strides[0] // 2,))
+    return Plant(model._address, data._address, **views, warnings=every)
 
 
 def _chain(model: mujoco.MjModel, body: int) -> list[int]:

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 
 from .arrays import RobotArrays
-from .block import Block
+from .compiled_steps import CompiledStep
 from .env_config import EnvConfig as EnvConfig
 from .env_config import env_config
 from .episode import (
@@ -72,7 +72,9 @@ class BalanceEnv(gymnasium.Env):
         self.quiet_steps = int(np.ceil(self.config.fall.quiet_time / period - 1e-9))
         state = self.simulation.state
         self.scales = scales(self.arrays, state.support_polygon)
-        self.judge = judge(self.config.fall, self.config.reward, self.robot.height_com)
+        self.judge = judge(
+            self.config.fall, self.config.reward, self.robot.height_com, self.max_steps
+        )
         self.action_names = self._action_names()
         soles = [sole.name for sole in self.robot.soles]
         self.terms = self._observation_terms(soles)
@@ -80,11 +82,13 @@ class BalanceEnv(gymnasium.Env):
         self.episode = allocate_episode(len(self.action_names), size, len(soles))
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
-        self.steps = 0
-        self._described: Any = None  # the pushes of which these are
-        self._descriptions: list[dict[str, Any]] = []
+        self._described: tuple[Any, list[dict[str, Any]]] = None, []  # pushes, their infos
         self._renderer: SceneRenderer | None = None
-        self._needs_reset = True
+
+    @property
+    def steps(self) -> int:
+        """Policy steps since the reset."""
+        return int(self.episode.steps[0])
 
     @property
     def simulation(self) -> Simulation:
@@ -142,8 +146,10 @@ class BalanceEnv(gymnasium.Env):
         """One policy step with `episode.action`: reward, metrics and observation of the record."""
         raise NotImplementedError
 
-    def compiled_step(self) -> tuple[Any, Block] | None:
-        """A kernel and its block that do what `advance` does, if there are any."""
+    def compiled_step(self) -> CompiledStep | None:
+        """What does what `advance` does, if it can be compiled; the same object while it can be
+        used again.
+        """
         return None
 
     def reset(
@@ -158,7 +164,7 @@ class BalanceEnv(gymnasium.Env):
         Raises ConfigError naming the option that is unknown or wrong, and what it may be.
         """
         super().reset(seed=seed)
-        self._needs_reset = True  # until this one has succeeded
+        self.episode.running[0] = 0  # until this one has succeeded
         options = dict(options or {})
         for name in options:
             if name not in RESET_OPTIONS:
@@ -178,8 +184,6 @@ class BalanceEnv(gymnasium.Env):
             pushes = self.push_sampler.sample(self.np_random, self.robot, state.support_margin)
         self.simulation.set_pushes(pushes)
         begin_episode(self.simulation.state_arrays, self.episode)
-        self.steps = 0
-        self._needs_reset = False
         self._begin()
         self._observe()
         if self.render_mode == "human":
@@ -258,29 +262,14 @@ class BalanceEnv(gymnasium.Env):
         """What `step_in_place` does with an action that has been set."""
         self.expect_running()
         self.advance()
-        return self.conclude_step()
+        terminated = self.fallen
+        truncated = not (terminated or self.episode.running[0])
+        return float(self.episode.reward[0]), terminated, truncated
 
     def expect_running(self) -> None:
         """Raises PoiseError if there is no episode that could go on."""
-        if self._needs_reset:
+        if not self.episode.running[0]:
             raise PoiseError("step() after the episode's end: call reset() first")
-
-    def conclude_step(self) -> tuple[float, bool, bool]:
-        """Reward, terminated and truncated of the policy step that has been taken."""
-        if self.simulation.diverged:
-            self._diverged()
-        self.steps += 1
-        terminated = self.fallen
-        truncated = self.steps >= self.max_steps and not terminated
-        self._needs_reset = terminated or truncated
-        return float(self.episode.reward[0]), terminated, truncated
-
-    def _diverged(self) -> None:
-        """A simulation that went to infinity, and that MuJoCo started anew, is a fall."""
-        e = self.episode
-        e.metrics[FALLEN], e.metrics[QUIET_STEPS] = 1.0, 0.0
-        e.reward_terms[:] = 0.0
-        e.reward_terms[REWARD_TERMS.index("fall")] = e.reward[0] = -self.config.reward.fall
 
     def _observe(self) -> None:
         q_ref, v_ref = self._references()
@@ -305,7 +294,7 @@ class BalanceEnv(gymnasium.Env):
         return bool(self.episode.metrics[QUIET_STEPS] >= self.quiet_steps)
 
     def info(self) -> dict[str, Any]:
-        """Reward terms, push and record of the episode so far; see also `info_columns`."""
+        """Reward terms, push and record of the episode so far; see also `InfoColumns`."""
         metrics, terms = self.episode.metrics, self.episode.reward_terms.tolist()
         return {
             "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
@@ -318,11 +307,11 @@ class BalanceEnv(gymnasium.Env):
 
     def push_infos(self) -> list[dict[str, Any]]:
         """What `info` says of the episode's pushes, see `push_info`."""
-        pushes = self.simulation.pushes
-        if self._described is not pushes:
-            self._described = pushes
-            self._descriptions = [push_info(push, self.robot) for push in pushes]
-        return [description.copy() for description in self._descriptions]
+        pushes, (known, infos) = self.simulation.pushes, self._described
+        if known is not pushes:
+            infos = [push_info(push, self.robot) for push in pushes]
+            self._described = pushes, infos
+        return [info.copy() for info in infos]
 
     def render(self) -> np.ndarray | None:
         """A frame (h, w, 3) for "rgb_array"; shows it for "human"."""
@@ -341,17 +330,30 @@ class BalanceEnv(gymnasium.Env):
             self._renderer = None
 
 
-def info_columns(envs: Sequence[BalanceEnv], record: EpisodeArrays) -> dict[str, Any]:
-    """What `BalanceEnv.info` says of each, one array for each key; `record` holds their rows."""
-    terms, metrics = record.reward_terms.T.copy(), record.metrics
-    pushes = np.empty(len(envs), dtype=object)
-    for i, env in enumerate(envs):
-        pushes[i] = env.push_infos()
-    return {
-        "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
-        "push": pushes,
-        "is_success": metrics[:, QUIET_STEPS] >= [env.quiet_steps for env in envs],
-        "solver_failures": metrics[:, FAILURES].astype(int),
-        "torque_saturation": metrics[:, SATURATED] / np.maximum(metrics[:, TICKS], 1.0),
-        "root_wrench": record.root_wrench.copy(),
-    }
+class InfoColumns:
+    """What `BalanceEnv.info` says of each of `envs`, one array for each key.
+
+    `record` holds their rows. The lists of pushes are the same ones until the next episode.
+    """
+
+    def __init__(self, envs: Sequence[BalanceEnv], record: EpisodeArrays):
+        self.envs, self.record = envs, record
+        self._quiet_steps = np.array([env.quiet_steps for env in envs])
+        self._pushes: list[Any] = [None] * len(envs)  # those described
+        self._descriptions = np.empty(len(envs), dtype=object)
+
+    def read(self) -> dict[str, Any]:
+        """The columns of the last step."""
+        record, metrics = self.record, self.record.metrics
+        for i, env in enumerate(self.envs):
+            pushes = env.simulation.pushes
+            if pushes is not self._pushes[i]:
+                self._pushes[i], self._descriptions[i] = pushes, env.push_infos()
+        return {
+            "reward_terms": dict(zip(REWARD_TERMS, record.reward_terms.T.copy(), strict=True)),
+            "push": self._descriptions.copy(),
+            "is_success": metrics[:, QUIET_STEPS] >= self._quiet_steps,
+            "solver_failures": metrics[:, FAILURES].astype(int),
+            "torque_saturation": metrics[:, SATURATED] / np.maximum(metrics[:, TICKS], 1.0),
+            "root_wrench": record.root_wrench.copy(),
+        }

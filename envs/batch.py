@@ -6,44 +6,16 @@ and generator: results do not depend on the number of threads.
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
-import llvmlite.ir
 import numpy as np
-from numba.core import types
-from numba.extending import intrinsic
 
 from .arrays import apart
 from .balance import BalanceEnv
-from .block import address_of, call
-from .episode import EpisodeArrays
+from .compiled_steps import NOTHING, CompiledStep, Turns
+from .episode import FALLEN, EpisodeArrays
 from .errors import ConfigError
-from .jit import compiled
-
-
-@intrinsic
-def take_turn(typing: Any, turn: Any) -> Any:
-    """The number in `turn` (1,) int, which is one more for whoever comes next in any thread."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        numbers = context.make_array(turn)(context, builder, args[0])
-        one = llvmlite.ir.Constant(llvmlite.ir.IntType(64), 1)
-        return builder.atomic_rmw("add", numbers.data, one, "monotonic")
-
-    return types.int64(turn), generate
-
-
-@compiled
-def play(kernel: int, blocks: np.ndarray, turn: np.ndarray):
-    """Call `kernel` with each block, all by address, until the threads have had their turns."""
-    k = take_turn(turn)
-    while k < blocks.shape[0]:
-        call(kernel, blocks[k])
-        k = take_turn(turn)
-
-
-NOBODY = np.zeros(0, dtype=np.int64)
+from .helpers import Helpers
 
 
 def replicate(env: BalanceEnv, count: int) -> list[BalanceEnv]:
@@ -86,8 +58,9 @@ class EnvBatch:
         self.rewards = np.zeros(n)
         self.terminated = np.zeros(n, dtype=bool)
         self.truncated = np.zeros(n, dtype=bool)
-        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
-        self._kernel: tuple[Any, int] = None, 0  # the environments' step and its address
+        self._helpers = Helpers(self.threads - 1)
+        self._nothing = Turns(NOTHING, self.threads)
+        self._turns: tuple[list[CompiledStep], Turns] = [], self._nothing  # of those steps
 
     @property
     def ended(self) -> np.ndarray:
@@ -144,40 +117,35 @@ class EnvBatch:
         reset. Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
         """
         live = np.ones(len(self.envs), dtype=bool) if restart is None else ~restart
-        played = np.flatnonzero(live).tolist()
-        for i in played:
-            self.envs[i].expect_running()
+        played = np.flatnonzero(live)
+        for i in played[self.episodes.running[played, 0] == 0]:
+            self.envs[i].expect_running()  # raises
         self._set_actions(actions, live)
         self._forget(~live)
-        kernel, blocks = self._compiled_steps(played)
-        if kernel:
-            self._share(self._restart, np.flatnonzero(~live).tolist(), kernel, blocks)
+        turns = self._compiled_steps(played.tolist())
+        if turns is not None:
+            self._share(self._restart, np.flatnonzero(~live).tolist(), turns)
         else:
             everyone = range(len(live))
             self._share(lambda i: self._play(i) if live[i] else self._restart(i), everyone)
-        for i in played:
-            env = self.envs[i]
-            self.rewards[i], self.terminated[i], self.truncated[i] = env.conclude_step()
+        record = self.episodes
+        self.rewards[live] = record.reward[live, 0]
+        self.terminated[:] = live & (record.metrics[:, FALLEN] != 0.0)
+        self.truncated[:] = live & ~self.terminated & (record.running[:, 0] == 0)
         self.observations[:] = self.episodes.observation
 
-    def _compiled_steps(self, played: Sequence[int]) -> tuple[int, np.ndarray]:
-        """Addresses of a kernel and of the blocks of `played`; 0 if Python has to step them."""
-        steps = []
-        for i in played:
-            step = self.envs[i].compiled_step()
-            if step is None:
-                return 0, NOBODY
-            steps.append(step)
-        if len({(kernel, block.numba_type) for kernel, block in steps}) != 1:
-            return 0, NOBODY
-        kernel, block = steps[0]
-        if self._kernel[0] != (kernel, block.numba_type):
-            self._kernel = (kernel, block.numba_type), address_of(kernel, block)
-        blocks = np.array([block.address for _, block in steps])
-        # turns from either half, so that threads do not write to neighbouring rows at a time
-        half = len(blocks) // 2
-        blocks[: 2 * half] = blocks[: 2 * half].reshape(2, half).T.ravel()
-        return self._kernel[1], blocks
+    def _compiled_steps(self, played: Sequence[int]) -> Turns | None:
+        """Turns at the steps of `played`; None if Python has to take them."""
+        steps = [self.envs[i].compiled_step() for i in played]
+        known, turns = self._turns
+        if steps == known:  # the same objects, as long as nobody was bound anew
+            return turns
+        found = [step for step in steps if step is not None]
+        if len(found) < len(steps):
+            return None
+        rows = np.array([step.row() for step in found], dtype=np.int64).reshape(-1, 3)
+        self._turns = found, Turns(rows, self.threads)
+        return self._turns[1]
 
     def _set_actions(self, actions: np.ndarray, live: np.ndarray) -> None:
         """What `BalanceEnv.set_action` does, for all rows at once."""
@@ -212,41 +180,27 @@ class EnvBatch:
         self.terminated[rows] = self.truncated[rows] = False
 
     def _share(
-        self,
-        work: Callable[[int], None],
-        indices: Iterable[int],
-        kernel: int = 0,
-        blocks: np.ndarray = NOBODY,
+        self, work: Callable[[int], None], indices: Iterable[int], turns: Turns | None = None
     ) -> None:
-        """Call `work` with every index and `kernel` with every block, in all threads.
+        """Call `work` with every index and play all `turns`, in all threads.
 
         Whoever is free takes the next. Of the indices they take from both ends, so that most
         environments stay with a thread and in its cache.
         """
-        todo, turn = deque(indices), np.zeros(1, dtype=np.int64)
+        todo, turns = deque(indices), turns or self._nothing
+        turns.begin()
 
-        def take_part(take: Callable[[], int]) -> None:
-            _work_off(work, take)
-            play(kernel, blocks, turn)
+        def take_part(thread: int) -> None:
+            _work_off(work, todo.pop if thread % 2 else todo.popleft)
+            turns.play(thread)
 
-        jobs = []
-        if self._pool is not None:
-            ends = todo.pop, todo.popleft
-            others = min(self.threads, len(todo) + len(blocks)) - 1
-            jobs = [self._pool.submit(take_part, ends[k % 2]) for k in range(others)]
-        try:
-            take_part(todo.popleft)
-        finally:
-            wait(jobs)
-        for job in jobs:
-            job.result()
+        self._helpers.share(take_part, min(self.threads, len(todo) + len(turns.steps)) - 1)
 
     def close(self) -> None:
         """Close the environments and stop the threads."""
         for env in self.envs:
             env.close()
-        if self._pool is not None:
-            self._pool.shutdown()
+        self._helpers.close()
 
 
 def _work_off(work: Callable[[int], None], take: Callable[[], int]) -> None:

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass, field
 
+import mujoco
 import numpy as np
 
-from .arrays import RobotArrays, apart
+from .arrays import Plant, RobotArrays, apart
 from .block import Block
 from .jit import compiled
 from .kinematics import StateArrays, support_distance, update_support
@@ -73,6 +74,9 @@ class EpisodeArrays(Block):
     metrics: np.ndarray  # (METRICS,)
     root_wrench: np.ndarray  # (6,) of a soft root in the last tick [N, N·m]
     sole_start: np.ndarray  # (nc, 2)
+    steps: np.ndarray  # (1,) int: policy steps since the reset
+    running: np.ndarray  # (1,) int: whether there may be another one
+    ticks: np.ndarray  # (1,) int: control ticks of the running policy step
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +88,11 @@ class Judge(Block):
     ground_contact: bool
     quiet_speed: float
     quiet_cos_tilt: float
+    max_steps: int  # of an episode
     weights: np.ndarray  # (terms,)
 
 
-def judge(limits: FallLimits, weights: RewardWeights, height_com: float) -> Judge:
+def judge(limits: FallLimits, weights: RewardWeights, height_com: float, max_steps: int) -> Judge:
     """Numbers for compiled code."""
     return Judge(
         height=limits.height * height_com,
@@ -95,6 +100,7 @@ def judge(limits: FallLimits, weights: RewardWeights, height_com: float) -> Judg
         ground_contact=limits.ground_contact,
         quiet_speed=limits.quiet_speed,
         quiet_cos_tilt=float(np.cos(np.radians(limits.quiet_tilt))),
+        max_steps=max_steps,
         weights=np.array([getattr(weights, name) for name in REWARD_TERMS], dtype=float),
     )
 
@@ -110,6 +116,9 @@ def allocate_episode(actions: int, observations: int, nc: int) -> EpisodeArrays:
         metrics=apart(METRICS),
         root_wrench=apart(6),
         sole_start=apart((nc, 2)),
+        steps=apart(1, dtype=np.int64),
+        running=apart(1, dtype=np.int64),
+        ticks=apart(1, dtype=np.int64),
     )
 
 
@@ -123,6 +132,7 @@ def begin_episode(s: StateArrays, e: EpisodeArrays):
     e.metrics[:] = 0.0
     e.root_wrench[:] = 0.0
     e.metrics[MIN_COP_MARGIN] = np.inf
+    e.steps[0], e.running[0], e.ticks[0] = 0, 1, 0
     for i in range(s.sole_point.shape[0]):
         e.sole_start[i, 0], e.sole_start[i, 1] = s.sole_point[i, 0], s.sole_point[i, 1]
 
@@ -163,9 +173,24 @@ def has_fallen(robot: RobotArrays, s: StateArrays, j: Judge) -> bool:
     return low or uprightness(robot, s) < j.cos_tilt or touching or not finite
 
 
+BAD_STATE = tuple(
+    2 * int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{name}")) for name in ("QPOS", "QVEL", "QACC")
+)
+
+
+@compiled
+def has_diverged(plant: Plant) -> bool:
+    """Whether numbers became too large since the reset; MuJoCo then starts anew by itself."""
+    for i in BAD_STATE:
+        if plant.warnings[i] > 0:
+            return True
+    return False
+
+
 @compiled
 def judge_step(
     robot: RobotArrays,
+    plant: Plant,
     s: StateArrays,
     scale: Scales,
     j: Judge,
@@ -174,10 +199,11 @@ def judge_step(
     time: float,
     e: EpisodeArrays,
 ):
-    """Metrics and reward of one policy step that ended at `time`."""
+    """Metrics and reward of one policy step that ended at `time`, and whether it was the last."""
     m = e.metrics
     update_support(robot, s)
-    fallen = has_fallen(robot, s, j)
+    diverged = has_diverged(plant)
+    fallen = diverged or has_fallen(robot, s, j)
     m[FALLEN] = 1.0 if fallen else 0.0
     com_x, com_y = s.com[0] - s.origin[0], s.com[1] - s.origin[1]
     xi_x, xi_y = s.capture_point[0] - s.origin[0], s.capture_point[1] - s.origin[1]
@@ -224,10 +250,12 @@ def judge_step(
     terms[8] = -0.25 * action_rate
     terms[9] = -1.0 if fallen else 0.0
     if fallen:
-        for i in range(6):
+        for i in range(9 if diverged else 6):
             terms[i] = 0.0
     total = 0.0
     for i in range(terms.shape[0]):
         terms[i] *= j.weights[i]
         total += terms[i]
     e.reward[0] = total
+    e.steps[0] += 1
+    e.running[0] = not fallen and e.steps[0] < j.max_steps

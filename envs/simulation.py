@@ -53,11 +53,6 @@ def advance_world(world: World):
     update_state(world.robot, world.plant, world.state)
 
 
-BAD_STATE = [
-    int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{name}")) for name in ("QPOS", "QVEL", "QACC")
-]
-
-
 class Simulation:
     """A robot on flat ground. `state` is current after `reset` and after every `step`."""
 
@@ -70,9 +65,9 @@ class Simulation:
         self.state_arrays = allocate_state(robot.model.nv, len(robot.soles))
         self.clock = apart(1, dtype=np.int64)
         self._count = apart(1, dtype=np.int64)
-        self._warnings = self.data.warning.number  # a view
         self.pushes: tuple[Push | Kick, ...] = ()
         self.push_table = apart((0, TABLE_COLUMNS))
+        self._tables = {0: self.push_table}  # by number of pushes: compiled code is bound to them
         self._world: World | None = None
         self.reset()
 
@@ -80,11 +75,6 @@ class Simulation:
     def time(self) -> float:
         """Seconds since the reset."""
         return float(self.clock[0] * self.arrays.timestep)
-
-    @property
-    def diverged(self) -> bool:
-        """Whether numbers became too large since the reset; MuJoCo then starts anew by itself."""
-        return any(self._warnings[i] for i in BAD_STATE)
 
     @property
     def state(self) -> RobotState:
@@ -116,9 +106,10 @@ class Simulation:
         """Replace the schedule; starts are seconds since the reset."""
         self.pushes = tuple(pushes)
         table = pack(self.pushes, self.robot, self.state.heading_yaw)
-        if table.shape != self.push_table.shape:
-            self.push_table = apart(table.shape)
-        self.push_table[:] = table  # in place: compiled code may be bound to it
+        if len(table) not in self._tables:
+            self._tables[len(table)] = apart(table.shape)
+        self.push_table = self._tables[len(table)]
+        self.push_table[:] = table
 
     def step(self, torques: np.ndarray, count: int = 1) -> RobotState:
         """Apply joint torques (nu,) [N·m] for `count` physics steps."""

@@ -10,7 +10,8 @@ import numpy as np
 
 from .arrays import Plant, RobotArrays
 from .balance import BalanceEnv, EnvConfig
-from .block import Block
+from .block import Block, address_of
+from .compiled_steps import CompiledStep
 from .episode import EpisodeArrays, Judge, judge_step, record_tick
 from .jit import compiled
 from .kinematics import StateArrays, update_state
@@ -48,7 +49,7 @@ def torque_step(step: TorqueStep):
         advance(robot, plant, step.pushes, clock)
     update_state(robot, plant, s)
     now = clock[0] * robot.timestep
-    judge_step(robot, s, step.scales, step.judge, robot.q_standing, plant.ctrl, now, e)
+    judge_step(robot, plant, s, step.scales, step.judge, robot.q_standing, plant.ctrl, now, e)
     observe(robot, s, step.scales, robot.q_standing, step.still, e.action, e.observation)
 
 
@@ -231,7 +232,6 @@ class TorqueBalanceEnv(BalanceEnv):
     ):
         super().__init__(robot, config, render_mode=render_mode, **overrides)
         self._still = np.zeros(len(self.robot.joint_names))
-        self._step: TorqueStep | None = None
 
     def _action_names(self) -> tuple[str, ...]:
         model = self.robot.model
@@ -244,20 +244,22 @@ class TorqueBalanceEnv(BalanceEnv):
         return self.arrays.q_standing, self._still
 
     def advance(self) -> None:
-        torque_step(self._bound())
+        self._bound().play()
 
-    def compiled_step(self) -> tuple[Any, Block] | None:
+    def compiled_step(self) -> CompiledStep | None:
         """See `BalanceEnv`."""
-        return torque_step, self._bound()
+        return self._bound()
 
-    def _bound(self) -> TorqueStep:
-        sim, e, step = self.simulation, self.episode, self._step
-        if step is None or step.episode is not e or step.pushes is not sim.push_table:
-            step = self._step = TorqueStep(
+    def _bound(self) -> CompiledStep:
+        sim, e, known = self.simulation, self.episode, self._step
+        block: Any = known and known.block
+        if known is None or block.episode is not e or block.pushes is not sim.push_table:
+            block = TorqueStep(
                 self.arrays, sim.plant, sim.state_arrays, sim.clock, self.scales, self.judge,
                 self.substeps, self._still, sim.push_table, e,
             )  # fmt: skip
-        return step
+            known = self._step = CompiledStep(address_of(torque_step, block), block)
+        return known
 
 
 vector_env = partial(make_vector_env, TorqueBalanceEnv)  # for gymnasium.make_vec

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from .balance import BalanceEnv, info_columns
+from .balance import BalanceEnv, InfoColumns
 from .batch import EnvBatch, replicate
 from .errors import ConfigError
 
@@ -70,6 +70,7 @@ class BalanceVectorEnv(VectorEnv):
         self.observation_space = batch_space(first.observation_space, self.num_envs)
         self.action_space = batch_space(first.action_space, self.num_envs)
         self._own_infos: bool = any(type(env).info is not BalanceEnv.info for env in self.envs)
+        self._columns: InfoColumns = InfoColumns(self.envs, self.batch.episodes)
 
     def reset(
         self,
@@ -137,7 +138,7 @@ class BalanceVectorEnv(VectorEnv):
         every = np.ones(self.num_envs, dtype=bool)
         if self._own_infos:  # of a subclass
             return stack_infos([env.info() for env in self.envs], every)
-        columns = info_columns(self.envs, self.batch.episodes)
+        columns = self._columns.read()
         columns["reward_terms"] = _with_masks(columns["reward_terms"], every)
         return _with_masks(columns, every)
 

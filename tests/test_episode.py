@@ -30,9 +30,9 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         begin_episode(simulation.state_arrays, e)
         e.action[:], e.last_action[:] = [0.5, -0.25, 0.0], [0.1, 0.1, -0.1]
     judge_step(
-        simulation.arrays, simulation.state_arrays,
+        simulation.arrays, simulation.plant, simulation.state_arrays,
         scales(simulation.arrays, Simulation(r).state.support_polygon),
-        judge(limits or FallLimits(), weights or RewardWeights(), r.height_com),
+        judge(limits or FallLimits(), weights or RewardWeights(), r.height_com, 100),
         r.standing_qpos[7:].copy() if q_ref is None else q_ref,
         np.zeros(r.model.nu) if tau is None else tau, time, e,
     )  # fmt: skip
@@ -99,7 +99,7 @@ def test_weights_scale_the_terms():
 def fallen(simulation, **limits):
     return has_fallen(
         simulation.arrays, simulation.state_arrays,
-        judge(FallLimits(**limits), RewardWeights(), simulation.robot.height_com),
+        judge(FallLimits(**limits), RewardWeights(), simulation.robot.height_com, 100),
     )  # fmt: skip
 
 

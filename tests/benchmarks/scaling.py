@@ -160,8 +160,7 @@ def by_environments(counts: Sequence[int], threads: int) -> dict[int, tuple[floa
                     env.simulation.data.qpos[:], env.simulation.data.qvel[:] = qpos, qvel
                     mujoco.mj_forward(env.robot.model, env.simulation.data)
         found[n] = 1e6 * float(np.median(spent)), 1e6 * float(np.median(floor))
-        if batch._pool is not None:
-            batch._pool.shutdown()
+        batch.close()
     return found
 
 

@@ -1,0 +1,114 @@
+"""Policy steps that compiled code plays by their addresses, many of them in several threads."""
+
+from typing import Any, NamedTuple
+
+import llvmlite.ir
+import numpy as np
+from numba.core import types
+from numba.extending import intrinsic
+
+from .block import Block, call
+from .jit import compiled
+
+SPLIT = 2  # steps for each thread that are shared out tick by tick at the end
+MANY = 6  # steps for each thread from which on that is worth its while
+
+
+class CompiledStep(NamedTuple):
+    """A policy step: `kernel`, by its address, `ticks` times with `block`. It must not raise."""
+
+    kernel: int
+    block: Block
+    ticks: int = 1
+
+    def row(self) -> tuple[int, int, int]:
+        """What `play` reads."""
+        return self.kernel, self.block.address, self.ticks
+
+    def play(self) -> None:
+        """Take the step."""
+        play_one(*self.row())
+
+
+NOTHING = np.zeros((0, 3), dtype=np.int64)  #: no steps
+
+
+@compiled
+def play_one(kernel: int, block: int, ticks: int):
+    """Call `kernel` `ticks` times."""
+    for _ in range(ticks):
+        call(kernel, block)
+
+
+@intrinsic
+def take_turn(typing: Any, turns: Any, k: Any) -> Any:
+    """`turns[k]` (int), which is one more for whoever asks next in any thread."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        numbers = context.make_array(turns)(context, builder, args[0])
+        one = llvmlite.ir.Constant(llvmlite.ir.IntType(64), 1)
+        return builder.atomic_rmw("add", builder.gep(numbers.data, [args[1]]), one, "acq_rel")
+
+    return types.int64(turns, types.int64), generate
+
+
+@intrinsic
+def look_at(typing: Any, turns: Any, k: Any) -> Any:
+    """`turns[k]` (int) as other threads left it, with all that they wrote before."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        numbers = context.make_array(turns)(context, builder, args[0])
+        return builder.load_atomic(builder.gep(numbers.data, [args[1]]), "acquire", 8)
+
+    return types.int64(turns, types.int64), generate
+
+
+class Turns:
+    """Who takes which of `steps` (n, 3), rows of `CompiledStep`, in `threads` threads.
+
+    A thread plays those of its own queue, which stay in its cache from call to call, then helps the
+    others; at last all of them play some steps tick by tick, so that none waits for a whole step
+    of another one.
+    """
+
+    def __init__(self, steps: np.ndarray, threads: int):
+        n = len(steps)
+        split = SPLIT * threads if threads > 1 and n >= MANY * threads else 0
+        self.steps = steps
+        self.ends = np.arange(threads + 1) * (n - split) // threads  # of the queues
+        self.turns = np.zeros(threads + 1, dtype=np.int64)  # next of each queue; then of the ticks
+        self.done = np.zeros(split, dtype=np.int64)  # ticks of the steps that are split
+
+    def begin(self) -> None:
+        """All are to be played, once more."""
+        self.turns[:-1] = self.ends[:-1]
+        self.turns[-1] = 0
+        self.done[:] = 0
+
+    def play(self, thread: int) -> None:
+        """A thread's part."""
+        play(self.steps, self.ends, self.turns, self.done, thread)
+
+
+@compiled
+def play(steps: np.ndarray, ends: np.ndarray, turns: np.ndarray, done: np.ndarray, thread: int):
+    """See `Turns`."""
+    queues = ends.shape[0] - 1
+    for i in range(queues):
+        queue = (thread + i) % queues
+        k = take_turn(turns, queue)
+        while k < ends[queue + 1]:
+            play_one(steps[k, 0], steps[k, 1], steps[k, 2])
+            k = take_turn(turns, queue)
+    split, first, most = done.shape[0], steps.shape[0] - done.shape[0], 0
+    for i in range(split):
+        most = max(most, steps[first + i, 2])
+    turn = take_turn(turns, queues)
+    while turn < split * most:
+        i, tick = turn % split, turn // split
+        if tick < steps[first + i, 2]:
+            while look_at(done, i) < tick:  # another thread has the tick before
+                pass
+            call(steps[first + i, 0], steps[first + i, 1])
+            take_turn(done, i)
+        turn = take_turn(turns, queues)
