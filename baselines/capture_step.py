@@ -18,7 +18,7 @@ from .contact_sets import ContactSets, contact_tick
 from .controller import Targets
 from .momentum_qp import COMPILED_SOLVER, MomentumQPConfig, Outputs, momentum_tick
 from .reduced_qp import QPParameters
-from .step_feedback import StepFeedback
+from .step_feedback import FallFeedback, StepFeedback
 from .step_home import StepHome, home_arrays, leave_home
 from .step_plan import Foothold, StepLimits, StepPlanner
 from .step_shift import STANDING, Stepping
@@ -39,7 +39,8 @@ class CaptureStepConfig:
     load away, and takes it up; `pause` between two steps.
     `jump`: largest change of a torque from tick to tick, share of its limit. `root_accel` (in a
     swing `swing_accel`), `joint_accel`: most that the posture asks for [ω²]. `feedback`: what lean
-    and turn of the body add to a step, see `step_feedback.py`. `home`: steps back to the stance of
+    and turn of the body add to a step, `falls` besides in falls along some directions, see
+    `step_feedback.py`. `home`: steps back to the stance of
     standing, see `step_home.py`.
     """
 
@@ -62,10 +63,15 @@ class CaptureStepConfig:
     limits: StepLimits = field(default_factory=StepLimits)
     foothold: Foothold = field(default_factory=Foothold)
     feedback: StepFeedback = field(default_factory=StepFeedback)
+    falls: dict[str, FallFeedback] = field(default_factory=dict)
     home: StepHome = field(default_factory=StepHome)
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
     step_qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+
+    def __post_init__(self) -> None:
+        if len({fall.angle for fall in self.falls.values()}) < len(self.falls):
+            raise ValueError("falls: angles must differ")
 
 
 def check_qps(config: CaptureStepConfig) -> None:
@@ -147,7 +153,7 @@ class CaptureStep(AroundQP):
 
     def _planner(self, reach: Reach) -> StepPlanner:
         c = self.config
-        return StepPlanner(self.robot, reach, c.limits, c.foothold, c.feedback)
+        return StepPlanner(self.robot, reach, c.limits, c.foothold, c.feedback, c.falls)
 
     @property
     def failures(self) -> int:

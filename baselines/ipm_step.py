@@ -90,5 +90,6 @@ class IPMStep(CaptureStep):
         if not isinstance(config, IPMStepConfig):
             raise TypeError(f"config must be an IPMStepConfig, not {type(config).__name__}")
         return EnergyPlanner(
-            self.robot, reach, config.limits, config.foothold, config.feedback, arc=config.arc
-        )
+            self.robot, reach, config.limits, config.foothold, config.feedback, config.falls,
+            arc=config.arc,
+        )  # fmt: skip

@@ -6,9 +6,16 @@ leans and turns moves the foothold, the time and the height of the CoM by a line
     Δ = K s,   Δ = (ahead, outward, time, height)
 
 with the signals s of `SIGNALS`. Outward is to the swinging foot's own side, so that left and right
-are alike.
+are alike. A step to the side is not one ahead that has been turned: hips spread less than they
+swing, and the other leg is in the way. So K of the first step of a fall may depend on where to,
+
+    K = K_always + Σ w_i(θ) K_i
+
+with θ from the heading to the CoM's velocity at lift-off and w linear between the angles of the
+`FallFeedback`s: gains are scheduled.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -66,11 +73,21 @@ class StepFeedback:
         return np.array([[getattr(row, name) for name in SIGNALS] for row in rows])
 
 
+@dataclass(frozen=True)
+class FallFeedback(StepFeedback):
+    """What is added to K in the first step of a fall at `angle` [°] from the heading."""
+
+    angle: float = field(kw_only=True, metadata={"min": 0.0, "max": 180.0})
+
+
 @dataclass(frozen=True, eq=False)
 class FeedbackArrays(Block):
-    """A `StepFeedback` for one robot, and what it gives now."""
+    """K for one robot, and what it gives now."""
 
-    gains: np.ndarray  # (4, 9) K in m and s
+    always: np.ndarray  # (4, 9) K in m and s
+    angles: np.ndarray  # (n,) [rad] rising
+    added_at: np.ndarray  # (n, 4, 9) what is added to K there
+    gains: np.ndarray  # (4, 9) K of the running step
     upright: np.ndarray  # (3,) the vertical at rest, in the root's axes
     height: float  # h [m]
     spin: float  # [1/(N·m·s)] of an angular momentum: ω/(m g h)
@@ -79,17 +96,44 @@ class FeedbackArrays(Block):
     added: np.ndarray  # (4,) Δ [m, m, s, m]
 
 
-def feedback_arrays(robot: Robot, feedback: StepFeedback) -> FeedbackArrays:
-    """`feedback` scaled by the robot's mass and height."""
+def feedback_arrays(
+    robot: Robot, always: StepFeedback, falls: Mapping[str, FallFeedback]
+) -> FeedbackArrays:
+    """Both scaled by the robot's mass and height."""
     h, g = robot.height_com, -float(robot.model.opt.gravity[2])
     rate = float(np.sqrt(g / h))
     units = np.array([h, h, 1.0 / rate, h])
-    gains = apart((4, len(SIGNALS)))
-    gains[:] = units[:, None] * feedback.matrix()
+    rising, size = sorted(falls.values(), key=lambda fall: fall.angle), (4, len(SIGNALS))
+    law, gains, angles = apart(size), apart(size), apart(len(rising))
+    added_at = apart((len(rising), *size))
+    law[:] = gains[:] = units[:, None] * always.matrix()
+    for k, fall in enumerate(rising):
+        angles[k], added_at[k] = np.radians(fall.angle), units[:, None] * fall.matrix()
     upright, spin = robot_arrays(robot).root_standing[2].copy(), rate / (robot.mass * g * h)
     return FeedbackArrays(
-        gains, upright, float(h), float(spin), apart(2), apart(len(SIGNALS)), apart(4)
-    )
+        law, angles, added_at, gains, upright, float(h), float(spin),
+        apart(2), apart(len(SIGNALS)), apart(4),
+    )  # fmt: skip
+
+
+@compiled
+def take_gains(f: FeedbackArrays, ahead: float, left: float):
+    """K of a step in a fall along this direction."""
+    n, low, share = f.angles.shape[0], 0, 0.0
+    first = n > 0 and f.stage[0] == 0.0
+    if n > 1 and first:
+        angle = np.arctan2(abs(left), ahead)
+        while low < n - 2 and angle > f.angles[low + 1]:
+            low += 1
+        share = (angle - f.angles[low]) / (f.angles[low + 1] - f.angles[low])
+        share = min(max(share, 0.0), 1.0)
+    for i in range(f.gains.shape[0]):
+        for k in range(f.gains.shape[1]):
+            f.gains[i, k] = f.always[i, k]
+            if first:
+                f.gains[i, k] += (1.0 - share) * f.added_at[low, i, k]
+            if share > 0.0:
+                f.gains[i, k] += share * f.added_at[low + 1, i, k]
 
 
 @compiled

@@ -16,7 +16,7 @@ from poise.envs.jit import compiled
 from poise.envs.robot import Robot
 
 from .capturability import standing_feet
-from .step_search import Search, drift, left_outside, start_from, take_foot, turned
+from .step_search import Search, drift, left_outside, see_fall, start_from, take_foot, turned
 from .swing import FROZEN, LANDING, SwingArrays, start_swing, time_left
 
 # stages: nobody goes home; the weight goes to one foot; the other swings; it takes up its load
@@ -204,6 +204,7 @@ def _foothold_home(q: Search, m: HomeArrays, time: float):
 @compiled
 def plan_home(q: Search, m: HomeArrays):
     """The step of the foot that goes home."""
+    see_fall(q)
     foot = m.foot[0]
     q.feedback.stage[1] = 0.0
     take_foot(q, foot)

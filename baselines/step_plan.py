@@ -1,5 +1,6 @@
 """Which foot steps, where to and how fast: footholds from which the fall can be stopped."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .capturability import Reach, sides
-from .step_feedback import StepFeedback, feedback_arrays
+from .step_feedback import FallFeedback, StepFeedback, feedback_arrays
 from .step_search import Search, capture_law, plan_step, replan_step, take_foot
 from .step_shift import StepShift
 from .swing import Swing
@@ -82,13 +83,14 @@ class StepPlanner:
         limits: StepLimits,
         choice: Foothold,
         feedback: StepFeedback | None = None,
+        falls: Mapping[str, FallFeedback] | None = None,
     ):
         self.reach, self.limits, self.choice = reach, limits, choice
         self.h = robot.height_com
         self.rate = float(np.sqrt(-robot.model.opt.gravity[2] / self.h))  # ω
         self.sides = sides(robot)
         self.shift = StepShift()  #: what a policy adds
-        self.feedback = feedback_arrays(robot, feedback or StepFeedback())
+        self.feedback = feedback_arrays(robot, feedback or StepFeedback(), falls or {})
         self._search: Search | None = None
 
     def search(self, state: RobotState) -> Search:

@@ -9,7 +9,7 @@ from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
 
 from .capturability import ReachArrays, distance_beyond, reach_of_one
-from .step_feedback import AHEAD, OUTWARD, FeedbackArrays, feed_back
+from .step_feedback import AHEAD, OUTWARD, FeedbackArrays, feed_back, take_gains
 from .step_feedback import TIME as LONGER
 from .step_shift import FOOTHOLD, TIME
 from .support import find_nearest
@@ -173,8 +173,16 @@ def _shift_best(q: Search):
 
 
 @compiled
+def see_fall(q: Search):
+    """Feedback is that of where the body falls now."""
+    v, cos, sin = q.state.com_vel, q.heading[0], q.heading[1]
+    take_gains(q.feedback, cos * v[0] + sin * v[1], cos * v[1] - sin * v[0])
+
+
+@compiled
 def plan_step(q: Search):
     """The cheapest step of either foot from where they stand, into `best` and `best_foot`."""
+    see_fall(q)
     q.best_foot[0] = -1
     q.feedback.stage[1] = 0.0
     for foot in range(2):

@@ -83,7 +83,16 @@ class ReadablePlanner:
     def __init__(self, planner):
         self.planner, self.reach, self.shift = planner, planner.reach, planner.shift
         self.limits, self.choice, self.h = planner.limits, planner.choice, planner.h
-        self.phase = 0.0
+        self.phase, self.gains = 0.0, planner.feedback.always
+
+    def see(self, state, yaw):
+        """Take the gains of where the body falls: each linear in the angle from the heading."""
+        f, (ahead, left) = self.planner.feedback, turn(yaw).T @ state.com_vel[:2]
+        self.gains = f.always.copy()
+        if f.stage[0] == 0.0 and len(f.angles):
+            angle = np.arctan2(abs(left), ahead)
+            for i, k in np.ndindex(f.always.shape):
+                self.gains[i, k] += np.interp(angle, f.angles, f.added_at[:, i, k])
 
     def added(self, state, foot, yaw):
         """What is fed back: foothold ahead and outward, time, height."""
@@ -96,12 +105,13 @@ class ReadablePlanner:
         L = state.arrays.momentum[3:5]
         spin = R.T @ [L[1], -L[0]] * self.planner.rate / (robot.mass * robot.gravity * self.h)
         signals = [1.0, f.stage[0], self.phase, *out * capture, *out * lean, *out * spin]
-        return f.gains @ signals
+        return self.gains @ signals
 
     def plan(self, state, yaw):
         """The best step of either foot."""
         low, high = self.limits.time_min, self.limits.time_max
         self.phase = 0.0
+        self.see(state, yaw)
         times = np.linspace(low, high, 8) / self.planner.rate
         starts = [state.sole_points[foot, :2] for foot in range(2)]
         plans = [self.best(state, foot, yaw, times, starts[foot], 0.0) for foot in range(2)]

@@ -145,12 +145,18 @@ def test_hips_that_are_used_up_bring_the_step_forward():
 
 @pytest.mark.parametrize(
     ("name", "direction"),
-    [("capture-step", 10.0), ("feedback-step", 10.0), ("feedback-step", 200.0)],
+    [
+        ("capture-step", 10.0),
+        ("feedback-step", 10.0),
+        ("feedback-step", 65.0),
+        ("feedback-step", 200.0),
+    ],
 )
 def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
     """What the QPs are asked for at every tick of a recovery, in a swing and after it."""
     controller, kinds = load_controller(name, robot()), set()
     reach, stood, raised, left, stages = controller.reach, [], [0.0], [np.inf], [0]
+    steps = [0]
     planner = readable.ReadablePlanner(controller.planner)
 
     def look(c, state, targets, tau):
@@ -158,6 +164,9 @@ def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
             return
         yaw, feet = np.arctan2(*c.memory.level[1::-1, 0]), state.sole_points
         if c.swing is not None:
+            if c.steps > steps[-1]:
+                planner.see(state, yaw)
+            steps.append(c.steps)
             stood.clear()
             stance = 1 - c.foot
             region, hips = reach.under(stance, feet[stance], yaw), 0.0

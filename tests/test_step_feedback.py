@@ -4,8 +4,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.baselines.step_feedback import SIGNALS, SignalGains, StepFeedback, feed_back
+from poise.baselines.registry import load_controller
+from poise.baselines.step_feedback import (
+    SIGNALS,
+    FallFeedback,
+    SignalGains,
+    StepFeedback,
+    feed_back,
+    take_gains,
+)
 from poise.baselines.step_feedback import feedback_arrays as arrays_of
+from poise.envs.errors import ConfigError
 from poise.envs.simulation import Simulation
 
 from .shared import generic_state, robot
@@ -15,7 +24,7 @@ YAW = 0.7
 
 def signals(simulation, side=1.0, yaw=YAW):
     """What is read beside the second sole."""
-    f, state = arrays_of(simulation.robot, StepFeedback()), simulation.state
+    f, state = arrays_of(simulation.robot, StepFeedback(), {}), simulation.state
     feed_back(f, state.arrays, state.sole_points[1], np.cos(yaw), np.sin(yaw), side)
     return dict(zip(SIGNALS, f.signals.copy(), strict=True))
 
@@ -75,7 +84,7 @@ def test_the_other_foot_sees_the_mirror_image():
 def test_what_is_added_fits_the_robot(name):
     """Lengths in h, times in 1/ω; a row adds up its gains times the signals."""
     r, row = robot(name), SignalGains(constant=0.1, again=0.2, phase=0.3, lean_ahead=1.0)
-    f = arrays_of(r, StepFeedback(row, row, row, row))
+    f = arrays_of(r, StepFeedback(row, row, row, row), {})
     f.stage[:] = 1.0, 0.5
     state = generic_state(name, seed=1).state
     feed_back(f, state.arrays, state.sole_points[0], np.cos(YAW), np.sin(YAW), 1.0)
@@ -83,3 +92,46 @@ def test_what_is_added_fits_the_robot(name):
     h = r.height_com
     units = np.array([h, h, np.sqrt(h / -r.model.opt.gravity[2]), h])
     np.testing.assert_allclose(f.added, expected * units, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("angle", "expected"),
+    [(0.0, 1.5), (30.0, 1.5), (60.0, 1.25), (75.0, 1.125), (90.0, 1.0), (120.0, 2.5), (170.0, 4.0)],
+)
+def test_gains_are_linear_between_the_angles_of_falls(angle, expected):
+    """What is always fed back and what is added there; further out as at the last angle."""
+    r = robot()
+    falls = {
+        "back": FallFeedback(angle=150.0, ahead=SignalGains(lean_ahead=3.0)),
+        "ahead": FallFeedback(angle=30.0, ahead=SignalGains(lean_ahead=0.5)),
+        "side": FallFeedback(angle=90.0),
+    }
+    f = arrays_of(r, StepFeedback(SignalGains(lean_ahead=1.0, phase=0.3)), falls)
+    for side in (1.0, -1.0):
+        speed = 0.7 * np.array([np.cos(np.radians(angle)), side * np.sin(np.radians(angle))])
+        f.stage[0] = 1.0
+        take_gains(f, *speed)
+        np.testing.assert_array_equal(f.gains, f.always)  # further steps
+        f.stage[0] = 0.0
+        take_gains(f, *speed)
+        gains = dict(zip(SIGNALS, f.gains[0] / r.height_com, strict=True))
+        assert gains.pop("lean_ahead") == pytest.approx(expected, rel=1e-12)
+        assert gains.pop("phase") == pytest.approx(0.3, rel=1e-12)
+        assert not any(gains.values()) and not f.gains[1:].any()
+
+
+@pytest.mark.parametrize(
+    ("falls", "words"),
+    [
+        ({"a": {"angle": 40.0}, "b": {"angle": 40.0}}, ["falls", "differ"]),
+        ({"a": {"angle": 190.0}}, ["falls.a.angle", "180"]),
+        ({"a": {"time": {"phase": 0.1}}}, ["falls.a.angle", "missing"]),
+        ({"a": {"angle": 40.0, "sideways": {}}}, ["falls.a.sideways", "outward"]),
+    ],
+)
+def test_falls_that_are_wrong(falls, words):
+    """One error names the field."""
+    with pytest.raises(ConfigError) as error:
+        load_controller({"kind": "capture-step", "falls": falls}, robot())
+    for word in words:
+        assert word in str(error.value)

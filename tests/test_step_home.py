@@ -104,7 +104,7 @@ def test_foothold_home(shift):
     state, planner, home = moved_state(controller, shift), controller.planner, controller.home
     q = planner.search(state)
     q.heading[:] = 1.0, 0.0
-    home.foot[0] = 1
+    home.foot[0], q.feedback.stage[0] = 1, 1.0
     plan_home(q, home)
     stance, foot = state.sole_points[:, :2]
     readers = readable.ReadablePlanner(planner)

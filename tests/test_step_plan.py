@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.capturability import Reach
-from poise.baselines.step_feedback import SignalGains, StepFeedback
+from poise.baselines.step_feedback import FallFeedback, SignalGains, StepFeedback
 from poise.baselines.step_plan import Foothold, StepLimits, StepPlanner
 from poise.baselines.swing import Swing, SwingTask
 
@@ -16,12 +16,17 @@ FEEDBACK = StepFeedback(
     outward=SignalGains(0.02, -0.01, 0.03, 0.05, 0.04, -0.06, 0.07, -0.2, 0.1),
     time=SignalGains(-0.05, 0.04, -0.1, 0.06, -0.08, 0.3, 0.2, 0.9, 0.5),
 )
+FALLS = {
+    "back": FallFeedback(angle=150.0, ahead=SignalGains(0.1, lean_ahead=0.3)),
+    "ahead": FallFeedback(angle=20.0, outward=SignalGains(-0.1, spin_ahead=0.4)),
+    "side": FallFeedback(angle=80.0, time=SignalGains(0.3, phase=0.2, capture_outward=-0.3)),
+}
 CHOICE = Foothold(overshoot=0.07, outward=0.05, margin=0.03, haste=0.02)
 
 
-def planner(feedback=None, **limits):
+def planner(feedback=None, falls=None, **limits):
     """A planner whose step times cost something."""
-    return StepPlanner(robot(), Reach(robot()), StepLimits(**limits), CHOICE, feedback)
+    return StepPlanner(robot(), Reach(robot()), StepLimits(**limits), CHOICE, feedback, falls)
 
 
 def falling(seed):
@@ -40,17 +45,18 @@ def agree(plan, expected):
     np.testing.assert_allclose(*numbers, atol=1e-9)
 
 
+@pytest.mark.parametrize("falls", [None, FALLS])
 @pytest.mark.parametrize("feedback", [None, FEEDBACK])
 @pytest.mark.parametrize("shift", [0.0, 0.06])
-def test_plan_is_that_of_the_readable_planner(shift, feedback):
+def test_plan_is_that_of_the_readable_planner(shift, feedback, falls):
     """Foot, foothold, time and cost, also where feedback and a policy move both."""
-    plans, feet = planner(feedback), set()
-    plans.feedback.stage[0] = 1.0
+    plans, feet = planner(feedback, falls), set()
     plans.shift.foothold = [0.3 * shift, -0.5 * shift]
     plans.shift.time = shift
     readable = ReadablePlanner(plans)
     for seed in range(12):
         state, yaw, _ = falling(seed)
+        plans.feedback.stage[0] = seed % 3 == 0  # the law of first steps is another one
         plan = plans.plan(state, yaw)
         agree(plan, readable.plan(state, yaw))
         feet.add(plan.foot)
