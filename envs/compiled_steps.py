@@ -53,14 +53,25 @@ def take_turn(typing: Any, turns: Any, k: Any) -> Any:
 
 
 @intrinsic
-def look_at(typing: Any, turns: Any, k: Any) -> Any:
-    """`turns[k]` (int) as other threads left it, with all that they wrote before."""
+def look_at(typing: Any, numbers: Any, k: Any) -> Any:
+    """`numbers[k]` (int), which other threads write."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        numbers = context.make_array(turns)(context, builder, args[0])
-        return builder.load_atomic(builder.gep(numbers.data, [args[1]]), "acquire", 8)
+        array = context.make_array(numbers)(context, builder, args[0])
+        return builder.load_atomic(builder.gep(array.data, [args[1]]), "acquire", 8)
 
-    return types.int64(turns, types.int64), generate
+    return types.int64(numbers, types.int64), generate
+
+
+@intrinsic
+def swap(typing: Any, numbers: Any, k: Any, new: Any) -> Any:
+    """`numbers[k]` (int), which is now `new`."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        array = context.make_array(numbers)(context, builder, args[0])
+        return builder.atomic_rmw("xchg", builder.gep(array.data, [args[1]]), args[2], "acq_rel")
+
+    return types.int64(numbers, types.int64, types.int64), generate
 
 
 class Turns:
@@ -76,39 +87,45 @@ class Turns:
         split = SPLIT * threads if threads > 1 and n >= MANY * threads else 0
         self.steps = steps
         self.ends = np.arange(threads + 1) * (n - split) // threads  # of the queues
-        self.turns = np.zeros(threads + 1, dtype=np.int64)  # next of each queue; then of the ticks
+        self.turns = np.zeros(threads, dtype=np.int64)  # next of each queue
         self.done = np.zeros(split, dtype=np.int64)  # ticks of the steps that are split
+        self.taken = np.zeros(split, dtype=np.int64)  # 1 while a thread plays one of their ticks
 
     def begin(self) -> None:
         """All are to be played, once more."""
-        self.turns[:-1] = self.ends[:-1]
-        self.turns[-1] = 0
+        self.turns[:] = self.ends[:-1]
         self.done[:] = 0
 
     def play(self, thread: int) -> None:
-        """A thread's part."""
-        play(self.steps, self.ends, self.turns, self.done, thread)
+        """A thread's part; returns when what is left is in the hands of others."""
+        play(self.steps, self.ends, self.turns, self.done, self.taken, thread)
 
 
 @compiled
-def play(steps: np.ndarray, ends: np.ndarray, turns: np.ndarray, done: np.ndarray, thread: int):
+def play(
+    steps: np.ndarray, ends: np.ndarray, turns: np.ndarray,
+    done: np.ndarray, taken: np.ndarray, thread: int,
+):  # fmt: skip
     """See `Turns`."""
-    queues = ends.shape[0] - 1
+    queues, split = turns.shape[0], done.shape[0]
     for i in range(queues):
         queue = (thread + i) % queues
         k = take_turn(turns, queue)
         while k < ends[queue + 1]:
             play_one(steps[k, 0], steps[k, 1], steps[k, 2])
             k = take_turn(turns, queue)
-    split, first, most = done.shape[0], steps.shape[0] - done.shape[0], 0
-    for i in range(split):
-        most = max(most, steps[first + i, 2])
-    turn = take_turn(turns, queues)
-    while turn < split * most:
-        i, tick = turn % split, turn // split
-        if tick < steps[first + i, 2]:
-            while look_at(done, i) < tick:  # another thread has the tick before
-                pass
-            call(steps[first + i, 0], steps[first + i, 1])
-            take_turn(done, i)
-        turn = take_turn(turns, queues)
+    first = steps.shape[0] - split
+    while True:
+        least, found = np.int64(0), -1
+        for i in range(split):  # the one that is most behind
+            ticks = look_at(done, i)
+            if ticks < steps[first + i, 2] and look_at(taken, i) == 0:
+                if found < 0 or ticks < least:
+                    least, found = ticks, i
+        if found < 0:
+            return
+        if swap(taken, found, 1) == 0:
+            if done[found] < steps[first + found, 2]:
+                call(steps[first + found, 0], steps[first + found, 1])
+                done[found] += 1
+            swap(taken, found, 0)

@@ -4,31 +4,34 @@ import numpy as np
 import pytest
 
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.baselines.residual_step_env import ResidualStepEnv
 from poise.envs.batch import EnvBatch
+from poise.envs.compiled_steps import MANY
 from poise.envs.errors import ConfigError
+from poise.envs.torque_balance import TorqueBalanceEnv
 
 from .shared import robot
 
 PUSHES = {"magnitude": [0.1, 1.2], "unit": "specific_impulse", "start": [0.0, 0.1]}
 
 
-def make(**changes):
-    return ResidualBalanceEnv(robot(), duration=0.3, pushes=PUSHES, **changes)
+def make(kind=ResidualBalanceEnv, **changes):
+    return kind(robot(), duration=0.3, pushes=PUSHES, **changes)
 
 
-def actions(steps, n):
-    return np.random.default_rng(5).uniform(-1.0, 1.0, (steps, n, *make().action_space.shape))
+def actions(steps, n, kind=ResidualBalanceEnv):
+    return np.random.default_rng(5).uniform(-1.0, 1.0, (steps, n, *make(kind).action_space.shape))
 
 
-def run(threads, n=3, steps=25):
+def run(threads, n=3, steps=25, kind=ResidualBalanceEnv):
     """All that a batch returns, step by step."""
-    batch, ends = EnvBatch([make() for _ in range(n)], threads), []
+    batch, ends = EnvBatch([make(kind) for _ in range(n)], threads), []
     record = [batch.reset([10 + i for i in range(n)]).copy()]
 
     def at_end(i, env):
         ends.append((i, env.steps, env.fallen))
 
-    for action in actions(steps, n):
+    for action in actions(steps, n, kind):
         batch.step(action, at_end)
         record += [batch.observations.copy(), batch.rewards.copy(), batch.final_observations.copy()]
         record += [batch.terminated.copy(), batch.truncated.copy()]
@@ -44,6 +47,16 @@ def test_the_number_of_threads_changes_nothing():
         assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
         assert ends == other_ends
     assert len(ends) >= 3
+
+
+@pytest.mark.parametrize("kind", [ResidualBalanceEnv, ResidualStepEnv, TorqueBalanceEnv])
+def test_nor_where_steps_are_shared_out_tick_by_tick(kind):
+    """As they are with many environments for each thread."""
+    n = 2 * MANY + 1
+    one, ends = run(1, n, 20, kind)
+    other, other_ends = run(2, n, 20, kind)
+    assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+    assert ends == other_ends and len(ends) >= n
 
 
 def test_a_batch_is_its_environments():

@@ -1,0 +1,77 @@
+"""Steps that threads share out: each is played whole, in order, by one thread at a time."""
+
+from dataclasses import dataclass
+from threading import Thread
+
+import numpy as np
+import pytest
+
+from poise.envs.block import Block, address_of
+from poise.envs.compiled_steps import MANY, CompiledStep, Turns
+from poise.envs.jit import compiled
+
+
+@dataclass(frozen=True, eq=False)
+class Log(Block):
+    """What a step has seen."""
+
+    ticks: np.ndarray  # (1,) int: played
+    busy: np.ndarray  # (1,) int: whether a thread is at it
+    clashes: np.ndarray  # (1,) int: ticks begun while another one ran
+    work: np.ndarray  # (1,)
+
+
+@compiled
+def tick(log: Log):
+    """Take a while."""
+    log.clashes[0] += log.busy[0]
+    log.busy[0] = 1
+    before = log.ticks[0]
+    for i in range(2000):
+        log.work[0] = np.sin(log.work[0] + i)
+    log.ticks[0] = before + 1
+    log.busy[0] = 0
+
+
+def counted(ticks):
+    """A step that counts."""
+    log = Log(*(np.zeros(1, dtype=np.int64) for _ in range(3)), np.zeros(1))
+    return CompiledStep(address_of(tick, log), log, ticks)
+
+
+def test_one_step():
+    """Alone it is played `ticks` times."""
+    step = counted(3)
+    step.play()
+    assert step.block.ticks[0] == 3
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("per_thread", [1, MANY, 3 * MANY])
+def test_every_step_is_played_whole(threads, per_thread):
+    """With as few steps as threads and with many; the last ones are shared out tick by tick."""
+    steps = [counted(1 + k % 5) for k in range(per_thread * threads)]
+    turns = Turns(np.array([step.row() for step in steps]), threads)
+    split = len(turns.done)
+    assert (split > 0) == (threads > 1 and per_thread >= MANY)
+    rounds = 30
+    for _ in range(rounds):
+        turns.begin()
+        helpers = [Thread(target=turns.play, args=(k,)) for k in range(1, threads)]
+        for helper in helpers:
+            helper.start()
+        turns.play(0)
+        for helper in helpers:
+            helper.join()
+    for step in steps:
+        assert step.block.ticks[0] == rounds * step.ticks
+        assert step.block.clashes[0] == 0
+
+
+def test_a_thread_alone_plays_all():
+    """The queues of threads that never come are emptied, and all ticks taken."""
+    steps = [counted(2) for _ in range(3 * MANY)]
+    turns = Turns(np.array([step.row() for step in steps]), 3)
+    turns.begin()
+    turns.play(1)
+    assert [step.block.ticks[0] for step in steps] == [2] * len(steps)
