@@ -223,6 +223,15 @@ class BalanceEnv(gymnasium.Env):
     def set_action(self, action: np.ndarray) -> None:
         """Check `action` and remember it and the one before.
 
+        Raises ConfigError as `check_action` does.
+        """
+        vector = self.check_action(action)
+        self.episode.last_action[:] = self.episode.action
+        self.episode.action[:] = np.clip(vector, -1.0, 1.0)
+
+    def check_action(self, action: np.ndarray) -> np.ndarray:
+        """`action` as numbers.
+
         Raises ConfigError naming the entries: all for a wrong shape, else those out of bounds.
         """
         try:
@@ -239,8 +248,7 @@ class BalanceEnv(gymnasium.Env):
         if not good.all():
             bad = [f"{names[i]} is {vector[i]:g}" for i in np.flatnonzero(~good)]
             raise ConfigError(f"must lie in [-1, 1], but {', '.join(bad)}", field="action")
-        self.episode.last_action[:] = self.episode.action
-        self.episode.action[:] = np.clip(vector, -1.0, 1.0)
+        return vector
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """One policy step; a fall is `terminated`, the end of time is `truncated`.

@@ -116,23 +116,30 @@ class EnvBatch:
         The action of a restarted environment is not looked at; its reward is 0. Nothing else is
         reset. Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
         """
-        live = np.ones(len(self.envs), dtype=bool) if restart is None else ~restart
-        played = np.flatnonzero(live)
-        for i in played[self.episodes.running[played, 0] == 0]:
-            self.envs[i].expect_running()  # raises
+        record, everyone = self.episodes, range(len(self.envs))
+        played: Sequence[int] = everyone
+        restarted: list[int] = []
+        live: Any = slice(None)  # rows that are played: nearly always all, and a slice is cheap
+        if restart is not None and restart.any():
+            live, restarted = ~restart, np.flatnonzero(restart).tolist()
+            played = np.flatnonzero(live).tolist()
+        if not record.running[live].all():
+            for env in np.array(self.envs, dtype=object)[live]:
+                env.expect_running()  # raises
         self._set_actions(actions, live)
-        self._forget(~live)
-        turns = self._compiled_steps(played.tolist())
+        if restarted:
+            self._forget(restarted)
+        turns = self._compiled_steps(played)
         if turns is not None:
-            self._share(self._restart, np.flatnonzero(~live).tolist(), turns)
+            self._share(self._restart, restarted, turns)
         else:
-            everyone = range(len(live))
-            self._share(lambda i: self._play(i) if live[i] else self._restart(i), everyone)
-        record = self.episodes
+            again = set(restarted)
+            self._share(lambda i: self._restart(i) if i in again else self._play(i), everyone)
         self.rewards[live] = record.reward[live, 0]
-        self.terminated[:] = live & (record.metrics[:, FALLEN] != 0.0)
-        self.truncated[:] = live & ~self.terminated & (record.running[:, 0] == 0)
-        self.observations[:] = self.episodes.observation
+        self.terminated[live] = record.metrics[live, FALLEN] != 0.0
+        self.truncated[live] = record.running[live, 0] == 0
+        self.truncated[live] &= ~self.terminated[live]
+        self.observations[:] = record.observation
 
     def _compiled_steps(self, played: Sequence[int]) -> Turns | None:
         """Turns at the steps of `played`; None if Python has to take them."""
@@ -147,8 +154,8 @@ class EnvBatch:
         self._turns = found, Turns(rows, self.threads)
         return self._turns[1]
 
-    def _set_actions(self, actions: np.ndarray, live: np.ndarray) -> None:
-        """What `BalanceEnv.set_action` does, for all rows at once."""
+    def _set_actions(self, actions: np.ndarray, live: Any) -> None:
+        """What `BalanceEnv.set_action` does, for these rows at once."""
         record = self.episodes
         try:
             vectors = np.asarray(actions, dtype=float)
@@ -158,13 +165,13 @@ class EnvBatch:
             raise ConfigError(
                 f"has shape {vectors.shape}, expected {record.action.shape}", field="action"
             )
+        vectors = vectors[live]
         good = np.abs(vectors) <= 1.0 + 1e-6  # NaN is not
         if not good.all():
-            for i in np.flatnonzero(~(good.all(axis=1) | ~live)):
-                self.envs[i].set_action(vectors[i])  # raises, and names the entries
-        rows = slice(None) if live.all() else live
-        record.last_action[rows] = record.action[rows]
-        record.action[rows] = np.minimum(np.maximum(vectors[rows], -1.0), 1.0)
+            for env, vector in zip(np.array(self.envs, dtype=object)[live], vectors, strict=True):
+                env.check_action(vector)  # raises, and names the entries
+        record.last_action[live] = record.action[live]
+        record.action[live] = np.minimum(np.maximum(vectors, -1.0), 1.0)
 
     def _play(self, i: int) -> None:
         self.envs[i].advance()
@@ -174,7 +181,7 @@ class EnvBatch:
     ) -> None:
         self.envs[i].reset(seed=seed, options=options)
 
-    def _forget(self, rows: np.ndarray) -> None:
+    def _forget(self, rows: Any) -> None:
         """Rows that start anew have earned nothing and ended nothing."""
         self.rewards[rows] = 0.0
         self.terminated[rows] = self.truncated[rows] = False

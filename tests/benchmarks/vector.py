@@ -23,6 +23,9 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
 import poise  # noqa: F401  (registers the environments)
+from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs.batch import replicate
+from poise.training.vec_env import ThreadedVecEnv
 
 NAME = "poise/ResidualBalance-v0"
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -52,6 +55,14 @@ def native(count: int, threads: int) -> tuple[int, Stepper]:
     env = gymnasium.make_vec(NAME, num_envs=count, threads=threads)
     env.reset(seed=0)
     draw = actions(env.action_space.shape)
+    return count, lambda: env.step(draw())
+
+
+def for_sb3(count: int, threads: int) -> tuple[int, Stepper]:
+    """The same as Stable-Baselines3 sees it, which asks for no infos but at an end."""
+    env = ThreadedVecEnv(replicate(ResidualBalanceEnv(), count), threads)
+    env.reset()
+    draw = actions((count, *(env.action_space.shape or ())))
     return count, lambda: env.step(draw())
 
 
@@ -135,6 +146,7 @@ def main() -> None:
         "1 environment, 1 thread": partial(rate, *single()),
         "16 vectorised, 1 thread": partial(rate, *native(16, 1)),
         f"16 vectorised, {THREADS} threads": partial(rate, *native(16, THREADS)),
+        f"16 vectorised for SB3, {THREADS} threads": partial(rate, *for_sb3(16, THREADS)),
         f"64 vectorised, {THREADS} threads": partial(rate, *native(64, THREADS)),
         f"{THREADS} × 1 environment, processes apart": Apart(THREADS).rate,
         f"SubprocVecEnv, {CORES} processes": partial(rate, *processes(CORES)),
