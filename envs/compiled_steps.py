@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 from .block import Block, call
 from .jit import compiled
 
-SPLIT = 2  # steps for each thread that are shared out tick by tick at the end
+SPLIT = 1  # steps for each thread that are shared out tick by tick at the end
 MANY = 6  # steps for each thread from which on that is worth its while
 
 
