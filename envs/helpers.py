@@ -1,4 +1,4 @@
-"""Threads that wait for work: a tenth of what an executor's futures and locks cost a call."""
+"""Threads that wait for work, without the futures and locks of an executor."""
 
 import threading
 import weakref
