@@ -388,16 +388,9 @@ class ResidualBalanceEnv(BalanceEnv):
             sim.step(ctrl, self.control_substeps)
         e.metrics[FAILURES] = getattr(self.controller, "failures", 0)
         judge_step(
-            self.arrays,
-            sim.plant,
-            s,
-            self.scales,
-            self.judge,
-            self.targets.q_ref,
-            ctrl,
-            sim.time,
-            e,
-        )
+            self.arrays, sim.plant, s, self.scales, self.judge, self.targets.q_ref,
+            ctrl, sim.time, e,
+        )  # fmt: skip
         self._observe()
 
     def _accounts(self) -> Record:

@@ -58,7 +58,7 @@ class EnvBatch:
         self.rewards = np.zeros(n)
         self.terminated = np.zeros(n, dtype=bool)
         self.truncated = np.zeros(n, dtype=bool)
-        self._helpers = Helpers(self.threads - 1)
+        self._helpers = Helpers()
         self._nothing = Turns(NOTHING, self.threads)
         self._turns: tuple[list[CompiledStep], Turns] = [], self._nothing  # of those steps
 

@@ -6,21 +6,27 @@ from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Any
 
+from .errors import PoiseError
+
 
 class Helpers:
-    """`count` threads that share some work with the one that asks for it."""
+    """Threads that share some work with the one that asks for it; they start when first asked."""
 
-    def __init__(self, count: int):
-        self._calls: list[SimpleQueue[Any]] = [SimpleQueue() for _ in range(count)]
-        for calls in self._calls:
-            threading.Thread(target=_serve, args=(calls,), name="poise", daemon=True).start()
+    def __init__(self) -> None:
+        self._calls: list[SimpleQueue[Any]] = []
         self._end = weakref.finalize(self, _end, self._calls)
 
     def share(self, work: Callable[[int], None], helpers: int) -> None:
         """`work(0)` in this thread, `work(1)`, `work(2)`… in some helpers; returns when all have.
 
-        Raises what one of them raised.
+        Raises what one of them raised, PoiseError if they have been closed.
         """
+        if helpers > 0 and not self._end.alive:
+            raise PoiseError("the threads have ended: close() comes last")
+        while len(self._calls) < helpers:
+            self._calls.append(SimpleQueue())
+            arguments = (self._calls[-1],)
+            threading.Thread(target=_serve, args=arguments, name="poise", daemon=True).start()
         done: SimpleQueue[BaseException | None] = SimpleQueue()
         asked = self._calls[:helpers]
         for k, calls in enumerate(asked):

@@ -5,12 +5,13 @@ import time
 
 import pytest
 
+from poise.envs.errors import PoiseError
 from poise.envs.helpers import Helpers
 
 
 def test_the_work_is_shared():
     """Each number once, 0 in the thread that asks, the others at the same time as it."""
-    helpers, seen, meeting = Helpers(3), {}, threading.Barrier(3, timeout=10.0)
+    helpers, seen, meeting = Helpers(), {}, threading.Barrier(3, timeout=10.0)
 
     def work(number):
         meeting.wait()
@@ -25,7 +26,7 @@ def test_the_work_is_shared():
 @pytest.mark.parametrize("where", [0, 1])
 def test_an_error_reaches_the_one_that_asked(where):
     """After all have ended; and the threads can be asked again."""
-    helpers, done = Helpers(1), []
+    helpers, done = Helpers(), []
 
     def work(number):
         if number == where:
@@ -45,12 +46,15 @@ def test_an_error_reaches_the_one_that_asked(where):
 def test_threads_end(how):
     """When they are closed, and when nobody holds the helpers any more."""
     before = set(threading.enumerate())
-    helpers = Helpers(2)
+    helpers = Helpers()
+    assert set(threading.enumerate()) == before  # a copy of this process would have none of them
+    helpers.share(lambda number: None, 2)
     ours = set(threading.enumerate()) - before
     assert len(ours) == 2
-    helpers.share(lambda number: None, 2)
     if how == "closed":
         helpers.close()
+        with pytest.raises(PoiseError, match="close"):
+            helpers.share(lambda number: None, 1)
     del helpers
     for thread in ours:
         thread.join(10.0)
