@@ -1,7 +1,7 @@
 """Steps that threads share out: each is played whole, in order, by one thread at a time."""
 
 from dataclasses import dataclass
-from threading import Thread
+from threading import Barrier, Thread
 
 import numpy as np
 import pytest
@@ -19,6 +19,7 @@ class Log(Block):
     busy: np.ndarray  # (1,) int: whether a thread is at it
     clashes: np.ndarray  # (1,) int: ticks begun while another one ran
     work: np.ndarray  # (1,)
+    effort: int
 
 
 @compiled
@@ -27,15 +28,15 @@ def tick(log: Log):
     log.clashes[0] += log.busy[0]
     log.busy[0] = 1
     before = log.ticks[0]
-    for i in range(2000):
+    for i in range(log.effort):
         log.work[0] = np.sin(log.work[0] + i)
     log.ticks[0] = before + 1
     log.busy[0] = 0
 
 
-def counted(ticks):
+def counted(ticks, effort=2000):
     """A step that counts."""
-    log = Log(*(np.zeros(1, dtype=np.int64) for _ in range(3)), np.zeros(1))
+    log = Log(*(np.zeros(1, dtype=np.int64) for _ in range(3)), np.zeros(1), effort)
     return CompiledStep(address_of(tick, log), log, ticks)
 
 
@@ -66,6 +67,33 @@ def test_every_step_is_played_whole(threads, per_thread):
     for step in steps:
         assert step.block.ticks[0] == rounds * step.ticks
         assert step.block.clashes[0] == 0
+
+
+def test_a_tick_is_one_threads():
+    """Also where threads reach for the same steps all the time."""
+    threads, rounds, ticks = 4, 10, 20_000
+    steps = [counted(ticks, effort=3) for _ in range(MANY * threads)]
+    turns = Turns(np.array([step.row() for step in steps]), threads)
+    turns.ends[:] = 0  # all but those that are split have been played
+    start, end = Barrier(threads), Barrier(threads)
+
+    def help_out(thread):
+        for _ in range(rounds):
+            if thread == 0:
+                turns.begin()
+            start.wait()
+            turns.play(thread)
+            end.wait()
+
+    helpers = [Thread(target=help_out, args=(k,)) for k in range(1, threads)]
+    for helper in helpers:
+        helper.start()
+    help_out(0)
+    for helper in helpers:
+        helper.join()
+    split = steps[-len(turns.done) :]
+    assert [step.block.ticks[0] for step in split] == [rounds * ticks] * len(split)
+    assert not any(step.block.clashes[0] for step in split)
 
 
 def test_a_thread_alone_plays_all():
