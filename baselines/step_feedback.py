@@ -75,7 +75,10 @@ class StepFeedback:
 
 @dataclass(frozen=True)
 class FallFeedback(StepFeedback):
-    """What is added to K in the first step of a fall at `angle` [°] from the heading."""
+    """What is added to K in the first step of a fall, `angle` [°] from the heading to either side.
+
+    Gains of `again`, which is 0 there, do nothing.
+    """
 
     angle: float = field(kw_only=True, metadata={"min": 0.0, "max": 180.0})
 

@@ -41,15 +41,15 @@ def play_one(kernel: int, block: int, ticks: int):
 
 
 @intrinsic
-def take_turn(typing: Any, turns: Any, k: Any) -> Any:
-    """`turns[k]` (int), which is one more for whoever asks next in any thread."""
+def take_turn(typing: Any, numbers: Any, k: Any) -> Any:
+    """`numbers[k]` (int), which is one more for whoever asks next in any thread."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        numbers = context.make_array(turns)(context, builder, args[0])
+        array = context.make_array(numbers)(context, builder, args[0])
         one = llvmlite.ir.Constant(llvmlite.ir.IntType(64), 1)
-        return builder.atomic_rmw("add", builder.gep(numbers.data, [args[1]]), one, "acq_rel")
+        return builder.atomic_rmw("add", builder.gep(array.data, [args[1]]), one, "acq_rel")
 
-    return types.int64(turns, types.int64), generate
+    return types.int64(numbers, types.int64), generate
 
 
 @intrinsic
