@@ -16,7 +16,17 @@ from poise.envs.jit import compiled
 from poise.envs.robot import Robot
 
 from .capturability import standing_feet
-from .step_search import Search, drift, left_outside, see_fall, start_from, take_foot, turned
+from .step_search import (
+    Search,
+    drift,
+    left_outside,
+    put_foothold,
+    see_fall,
+    start_from,
+    take_foot,
+    to_local,
+    turned,
+)
 from .swing import FROZEN, LANDING, SwingArrays, start_swing, time_left
 
 # stages: nobody goes home; the weight goes to one foot; the other swings; it takes up its load
@@ -34,7 +44,10 @@ class StepHome:
         far: a foot this far from where it stands at rest beside the other one goes home; 0: never.
         calm, tilt: CoM speed [h ω] and tilt of the root [°] below which the robot is calm.
         after: time that it must be.
-        lean: how far from the stance sole ξ is brought before the other foot lifts off.
+        lean: how far from the middle of the stance sole's reach, towards where the other foot goes,
+            ξ is brought before that lifts off.
+        counter: share of the other foot's way that ξ is brought against it besides, since the leg
+            that swings takes ξ along.
         near: ξ is there.
         patience: time after which the foot lifts off wherever ξ is.
         time: from lift-off to touchdown.
@@ -47,11 +60,12 @@ class StepHome:
     calm: float = field(default=0.1, metadata={"min": 0.0})
     tilt: float = field(default=35.0, metadata={"above": 0.0, "max": 180.0})
     after: float = field(default=0.5, metadata={"min": 0.0})
-    lean: float = field(default=0.05, metadata={"min": 0.0})
+    lean: float = field(default=0.025, metadata={"min": 0.0})
+    counter: float = field(default=0.07, metadata={"min": 0.0})
     near: float = field(default=0.02, metadata={"above": 0.0})
     patience: float = field(default=3.0, metadata={"min": 0.0})
-    time: float = field(default=0.9, metadata={"above": 0.0})
-    margin: float = 0.03
+    time: float = field(default=1.0, metadata={"above": 0.0})
+    margin: float = 0.015
     press: float = field(default=0.05, metadata={"min": 0.0})
 
 
@@ -64,6 +78,7 @@ class HomeArrays(Block):
     upright: float  # cosine of `tilt`
     after: float
     lean: float
+    counter: float
     near: float
     patience: float
     time: float
@@ -85,7 +100,8 @@ def home_arrays(robot: Robot, home: StepHome) -> HomeArrays:
     feet = standing_feet(robot)
     return HomeArrays(
         c.far * h, c.calm * h * rate, float(np.cos(np.radians(c.tilt))), c.after / rate,
-        c.lean * h, c.near * h, c.patience / rate, c.time / rate, c.margin * h, c.press * h,
+        c.lean * h, c.counter, c.near * h, c.patience / rate, c.time / rate, c.margin * h,
+        c.press * h,
         (feet[0] - feet[1])[:2].copy(), apart(1, dtype=np.int64), apart(1, dtype=np.int64),
         apart(1, dtype=np.int64), apart(2), apart(1), apart(2),
     )  # fmt: skip
@@ -116,7 +132,7 @@ def _away(t) -> float:
 
 
 @compiled
-def _choose_foot(t):
+def choose_foot(t):
     """The foot that is further from ξ goes home; ξ is brought near the other one before, and the
     way that this one points is ahead from now on."""
     s, m, feet = t.state, t.home, t.state.sole_point
@@ -125,15 +141,20 @@ def _choose_foot(t):
         x, y = s.capture_point[0] - feet[i, 0], s.capture_point[1] - feet[i, 1]
         distances[i] = np.sqrt(x * x + y * y)
     foot = 1 if distances[0] < distances[1] else 0
-    stance, other = feet[1 - foot], feet[foot]
-    x, y = other[0] - stance[0], other[1] - stance[1]
-    share = min(1.0, m.lean / max(np.sqrt(x * x + y * y), 1e-9))
-    m.rest[0], m.rest[1] = stance[0] + share * x, stance[1] + share * y
     m.stage[0], m.foot[0], m.waited[0] = LEANING, foot, 0.0
     t.memory.again[0] = 1
-    axes = s.sole_axes[1 - foot]
-    face(t.memory.level, axes[0, 0], axes[1, 0])
+    axes, level = s.sole_axes[1 - foot], t.memory.level
+    face(level, axes[0, 0], axes[1, 0])
     t.memory.corners[0] = 0
+    q, side = t.search, 1.0 if foot == 0 else -1.0
+    q.foot[0], q.heading[0], q.heading[1] = foot, level[0, 0], level[1, 0]
+    x, y = to_local(q, feet[foot, 0], feet[foot, 1])
+    home_x, home_y = side * m.standing[0], side * m.standing[1]
+    share = m.lean / np.sqrt(home_x * home_x + home_y * home_y)
+    rest_x = q.reach.middle[1 - foot, 0] + share * home_x + m.counter * (x - home_x)
+    rest_y = q.reach.middle[1 - foot, 1] + share * home_y + m.counter * (y - home_y)
+    put_foothold(q, rest_x, rest_y)  # into the world
+    m.rest[0], m.rest[1] = q.foothold[0], q.foothold[1]
 
 
 @compiled
@@ -160,7 +181,7 @@ def wants_home(t) -> bool:
     m.waited[0] = m.waited[0] + t.gains.period if _is_calm(t) else 0.0
     if m.waited[0] > m.after:
         if _away(t) > m.far:
-            _choose_foot(t)
+            choose_foot(t)
         else:
             t.memory.again[0] = 0  # as at the start: the next push meets a first step
     return False

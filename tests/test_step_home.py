@@ -15,6 +15,7 @@ from poise.baselines.step_home import (
     LOST,
     PRESSING,
     SWINGING,
+    choose_foot,
     lost_foot,
     lower_again,
     plan_home,
@@ -168,16 +169,37 @@ def test_a_lost_foot_is_lowered_again():
     assert heights[-1] < 0.0
 
 
-def test_rest_is_near_the_stance_foot_while_the_weight_goes_there():
-    """ξ_ref: beside the foot that stays, not between the feet."""
+@pytest.mark.parametrize("direction", [0.0, 90.0, 200.0])
+def test_where_the_weight_goes_before_a_step_home(direction):
+    """From the middle of the stance sole's reach: `lean` to home, `counter` of the way back."""
+    _, env = play(direction, home=False)
+    state, controller = env.simulation.state, env.controller
+    t, c, h = controller.tick(state, env.targets), controller.config.home, controller.h
+    choose_foot(t)
+    soles, foot = state.sole_points[:, :2], t.home.foot[0]
+    distances = np.linalg.norm(soles - state.capture_point, axis=1)
+    assert t.home.stage[0] == LEANING and foot == np.argmax(distances)
+    ahead = t.state.sole_axes[1 - foot, :2, 0]
+    ahead = ahead / np.linalg.norm(ahead)
+    home = controller.home.standing * (1.0 if foot == 0 else -1.0)
+    axes = np.array([ahead, [-ahead[1], ahead[0]]])  # rows
+    way = axes @ (soles[foot] - soles[1 - foot]) - home
+    assert np.linalg.norm(way) > 0.1
+    rest = controller.reach.arrays.middle[1 - foot] + c.counter * way
+    rest = rest + c.lean * h * home / np.linalg.norm(home)
+    np.testing.assert_allclose(t.home.rest, soles[1 - foot] + rest @ axes, atol=1e-12)
+
+
+def test_weight_goes_to_one_foot_before_the_other_lifts_off():
+    """ξ is nearer to the foot that stays than before."""
     seen = []
 
     def watch(env):
         home = env.controller.home
         if home.stage[0] == LEANING:
-            stance = env.simulation.state.sole_points[1 - home.foot[0], :2]
-            seen.append(np.linalg.norm(home.rest - stance))
+            xi = env.simulation.state.capture_point
+            seen.append(np.linalg.norm(xi - home.rest))
 
     play(90.0, watch=watch)
     assert len(seen) > 3
-    assert max(seen) < 0.1 * robot().height_com
+    assert seen[-1] < 0.5 * seen[0]
