@@ -29,7 +29,10 @@ def replicate(env: BalanceEnv, count: int) -> list[BalanceEnv]:
 
 
 class EnvBatch:
-    """`len(envs)` environments of one kind; what they report lies in arrays, one row for each."""
+    """`len(envs)` environments of one kind; what they report lies in arrays, one row for each.
+
+    These arrays are new ones with every call: whoever holds them keeps what they were.
+    """
 
     def __init__(self, envs: Sequence[BalanceEnv], threads: int = 1):
         if not envs:
@@ -54,7 +57,7 @@ class EnvBatch:
                 row[...] = own
             env.episode = EpisodeArrays(*rows)
         self.observations = np.zeros((n, *first.observation_space.shape), dtype=np.float32)
-        self.final_observations = np.zeros_like(self.observations)
+        self.final_observations = self.observations
         self.rewards = np.zeros(n)
         self.terminated = np.zeros(n, dtype=bool)
         self.truncated = np.zeros(n, dtype=bool)
@@ -85,9 +88,8 @@ class EnvBatch:
                 source="reset",
             )
         indices = np.arange(n) if mask is None else np.flatnonzero(mask)
-        self._forget(indices)
         self._share(lambda i: self._restart(i, seeds[i], options[i]), indices)
-        self.observations[:] = self.episodes.observation
+        self._report()
         return self.observations
 
     def step(
@@ -95,20 +97,20 @@ class EnvBatch:
     ) -> None:
         """One policy step of all; an episode that ends is followed by the next at once.
 
-        Fills `observations`, `rewards`, `terminated`, `truncated`, and `final_observations` of
-        the environments whose episode ended. `at_end(i, env)` sees a finished episode before its
-        reset. Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
+        Its outcome are `observations`, `rewards`, `terminated`, `truncated` and, where an episode
+        ended, `final_observations`. `at_end(i, env)` sees a finished episode before its reset.
+        Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
         """
         self.advance(actions)
         ended = np.flatnonzero(self.ended)
         if len(ended) == 0:
             return
-        self.final_observations[ended] = self.observations[ended]
+        self.final_observations = self.observations
         if at_end is not None:
             for i in ended:
                 at_end(int(i), self.envs[i])
         self._share(self._restart, ended)
-        self.observations[ended] = self.episodes.observation[ended]
+        self.observations = self.episodes.observation.astype(np.float32)
 
     def advance(self, actions: np.ndarray, restart: np.ndarray | None = None) -> None:
         """One policy step of all but those of `restart` (n,), which start an episode instead.
@@ -127,19 +129,23 @@ class EnvBatch:
             for env in np.array(self.envs, dtype=object)[live]:
                 env.expect_running()  # raises
         self._set_actions(actions, live)
-        if restarted:
-            self._forget(restarted)
         turns = self._compiled_steps(played)
-        if turns is not None:
+        if turns is not None and restarted:
             self._share(self._restart, restarted, turns)
+        elif turns is not None:
+            turns.play_all(self._helpers)
         else:
             again = set(restarted)
             self._share(lambda i: self._restart(i) if i in again else self._play(i), everyone)
-        self.rewards[live] = record.reward[live, 0]
-        self.terminated[live] = record.metrics[live, FALLEN] != 0.0
-        self.truncated[live] = record.running[live, 0] == 0
-        self.truncated[live] &= ~self.terminated[live]
-        self.observations[:] = record.observation
+        self._report()
+
+    def _report(self) -> None:
+        """What the records say; those of a new episode are clear."""
+        record = self.episodes
+        self.observations = record.observation.astype(np.float32)
+        self.rewards = record.reward[:, 0].copy()
+        self.terminated = record.metrics[:, FALLEN] != 0.0
+        self.truncated = (record.running[:, 0] == 0) & ~self.terminated
 
     def _compiled_steps(self, played: Sequence[int]) -> Turns | None:
         """Turns at the steps of `played`; None if Python has to take them."""
@@ -180,11 +186,6 @@ class EnvBatch:
         self, i: int, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> None:
         self.envs[i].reset(seed=seed, options=options)
-
-    def _forget(self, rows: Any) -> None:
-        """Rows that start anew have earned nothing and ended nothing."""
-        self.rewards[rows] = 0.0
-        self.terminated[rows] = self.truncated[rows] = False
 
     def _share(
         self, work: Callable[[int], None], indices: Iterable[int], turns: Turns | None = None

@@ -1,5 +1,6 @@
 """Policy steps that compiled code plays by their addresses, many of them in several threads."""
 
+import time
 from typing import Any, NamedTuple
 
 import llvmlite.ir
@@ -8,10 +9,16 @@ from numba.core import types
 from numba.extending import intrinsic
 
 from .block import Block, call
+from .helpers import Helpers
 from .jit import compiled
 
 SPLIT = 1  # steps for each thread that are shared out tick by tick at the end
 MANY = 6  # steps for each thread from which on that is worth its while
+# Looks of a helper for its next call before it sleeps: 0.25 ms here, what Python takes between two
+# batches. To sleep and be woken costs 0.1 ms.
+PATIENCE = 1_500_000
+AWAY, WAITING, CALLED = 0, 1, 2  # a helper plays or sleeps, looks for a call, has one
+LINE = 8  # integers that a cache line holds
 
 
 class CompiledStep(NamedTuple):
@@ -90,6 +97,9 @@ class Turns:
         self.turns = np.zeros(threads, dtype=np.int64)  # next of each queue
         self.done = np.zeros(split, dtype=np.int64)  # ticks of the steps that are split
         self.taken = np.zeros(split, dtype=np.int64)  # 1 while a thread plays one of their ticks
+        # of each helper, in a line of its own: AWAY, WAITING or CALLED; 1 once it has played
+        self.calls = np.zeros(LINE * threads, dtype=np.int64)
+        self.played = np.zeros(LINE * threads, dtype=np.int64)
 
     def begin(self) -> None:
         """All are to be played, once more."""
@@ -99,6 +109,28 @@ class Turns:
     def play(self, thread: int) -> None:
         """A thread's part; returns when what is left is in the hands of others."""
         play(self.steps, self.ends, self.turns, self.done, self.taken, thread)
+
+    def play_all(self, helpers: Helpers) -> None:
+        """Every step once, in this thread and as many `helpers` as there are threads."""
+        self.begin()
+        called = range(1, min(len(self.turns), len(self.steps)))
+        for thread in called:
+            if not call_waiting(self.calls, self.played, thread):
+                helpers.ask(self._stay, thread)
+        try:
+            self.play(0)
+        finally:
+            for thread in called:
+                while not has_played(self.played, thread):
+                    helpers.expect_alive()
+                    time.sleep(0.0)  # its turn, if there are fewer cores than threads
+
+    def _stay(self, thread: int) -> None:
+        """A helper's part of this call, and of those that follow soon enough."""
+        stay(
+            self.steps, self.ends, self.turns, self.done, self.taken, thread,
+            self.calls, self.played,
+        )  # fmt: skip
 
 
 @compiled
@@ -129,3 +161,39 @@ def play(
                 call(steps[first + found, 0], steps[first + found, 1])
                 done[found] += 1
             swap(taken, found, 0)
+
+
+@compiled
+def call_waiting(calls: np.ndarray, played: np.ndarray, thread: int):
+    """Call a helper; False if it is away."""
+    swap(played, LINE * thread, 0)
+    if swap(calls, LINE * thread, CALLED) == WAITING:
+        return True
+    swap(calls, LINE * thread, AWAY)  # nobody looks: what sleeps is woken another way
+    return False
+
+
+@compiled
+def has_played(played: np.ndarray, thread: int):
+    """Whether a helper has done its part; looks for a while."""
+    for _ in range(PATIENCE):
+        if look_at(played, LINE * thread) == 1:
+            return True
+    return False
+
+
+@compiled
+def stay(
+    steps: np.ndarray, ends: np.ndarray, turns: np.ndarray, done: np.ndarray,
+    taken: np.ndarray, thread: int, calls: np.ndarray, played: np.ndarray,
+):  # fmt: skip
+    """Play, and wait for the next call without the GIL; returns when there was none for a while."""
+    while True:
+        play(steps, ends, turns, done, taken, thread)
+        swap(calls, LINE * thread, WAITING)  # first: whoever sees that this one has played may call
+        swap(played, LINE * thread, 1)
+        for _ in range(PATIENCE):
+            if look_at(calls, LINE * thread) == CALLED:
+                break
+        if swap(calls, LINE * thread, AWAY) != CALLED:
+            return

@@ -14,6 +14,7 @@ class Helpers:
 
     def __init__(self) -> None:
         self._calls: list[SimpleQueue[Any]] = []
+        self._threads: list[threading.Thread] = []
         self._end = weakref.finalize(self, _end, self._calls)
 
     def share(self, work: Callable[[int], None], helpers: int) -> None:
@@ -21,16 +22,10 @@ class Helpers:
 
         Raises what one of them raised, PoiseError if they have been closed.
         """
-        if helpers > 0 and not self._end.alive:
-            raise PoiseError("the threads have ended: close() comes last")
-        while len(self._calls) < helpers:
-            self._calls.append(SimpleQueue())
-            arguments = (self._calls[-1],)
-            threading.Thread(target=_serve, args=arguments, name="poise", daemon=True).start()
         done: SimpleQueue[BaseException | None] = SimpleQueue()
-        asked = self._calls[:helpers]
-        for k, calls in enumerate(asked):
-            calls.put((work, k + 1, done))
+        asked = range(1, helpers + 1)
+        for k in asked:
+            self.ask(work, k, done)
         try:
             work(0)
         finally:
@@ -38,6 +33,31 @@ class Helpers:
         for error in errors:
             if error is not None:
                 raise error
+
+    def ask(
+        self,
+        work: Callable[[int], None],
+        helper: int,
+        done: "SimpleQueue[BaseException | None] | None" = None,
+    ) -> None:
+        """`work(helper)` in helper 1, 2…, once it is free; what it raised, or None, goes to `done`.
+
+        Raises PoiseError if they have been closed.
+        """
+        if not self._end.alive:
+            raise PoiseError("the threads have ended: close() comes last")
+        while len(self._calls) < helper:
+            self._calls.append(SimpleQueue())
+            arguments = (self._calls[-1],)
+            thread = threading.Thread(target=_serve, args=arguments, name="poise", daemon=True)
+            self._threads.append(thread)
+            thread.start()
+        self._calls[helper - 1].put((work, helper, done))
+
+    def expect_alive(self) -> None:
+        """Raises PoiseError if a helper has died, as in a process that was forked."""
+        if not all(thread.is_alive() for thread in self._threads):
+            raise PoiseError("a thread has ended: environments do not survive a fork")
 
     def close(self) -> None:
         """End the threads."""
@@ -49,10 +69,14 @@ def _serve(calls: "SimpleQueue[Any]") -> None:
         work, number, done = call
         try:
             work(number)
-            done.put(None)
-        except BaseException as error:  # the thread that asked raises it
+            error = None
+        except BaseException as caught:  # the thread that asked raises it
+            error = caught
+        if done is not None:
             done.put(error)
-        del call, work, done  # nothing is kept until the next call
+        elif error is not None:
+            raise error
+        del call, work, done, error  # nothing is kept until the next call
 
 
 def _end(calls: "list[SimpleQueue[Any]]") -> None:

@@ -96,7 +96,7 @@ class BalanceVectorEnv(VectorEnv):
         elif not mask.any():
             raise ConfigError("needs at least one True", source="reset", field="reset_mask")
         observations = self.batch.reset(seeds, [options] * n, mask)
-        return observations.copy(), stack_infos([env.info() for env in self.envs], mask)
+        return observations, stack_infos([env.info() for env in self.envs], mask)
 
     def step(
         self, actions: np.ndarray
@@ -117,7 +117,7 @@ class BalanceVectorEnv(VectorEnv):
             batch.step(actions, at_end)
             ended = batch.ended
             if ended.any():
-                last = zip(batch.final_observations.copy(), final, strict=True)
+                last = zip(batch.final_observations, final, strict=True)
                 ends = [{"final_obs": row, "final_info": info} for row, info in last]
                 infos = stack_infos(ends, ended)
         else:
@@ -126,9 +126,9 @@ class BalanceVectorEnv(VectorEnv):
         if self.render_mode == "human":
             self.render()
         return (
-            batch.observations.copy(),
-            batch.rewards.copy(),
-            batch.terminated.copy(),
+            batch.observations,
+            batch.rewards,
+            batch.terminated.copy(),  # by these it knows what to reset
             batch.truncated.copy(),
             {**self._infos(), **infos},
         )

@@ -120,7 +120,7 @@ class Checkpoints(BaseCallback):
             chunk = [int(s) for s in seeds[start : start + size]]
             chunk += [int(seeds[0])] * (size - len(chunk))  # filled up, not counted
             counted = min(size, evaluation.trials - start)
-            observations = batch.reset(chunk)
+            batch.reset(chunk)
             result: dict[int, tuple[bool, bool]] = {}
 
             def at_end(i, env, result=result):
@@ -128,7 +128,7 @@ class Checkpoints(BaseCallback):
 
             while len(result) < size:
                 action, _ = self.model.predict(
-                    normalize.normalize_obs(observations), deterministic=True
+                    normalize.normalize_obs(batch.observations), deterministic=True
                 )
                 running = [i for i in range(counted) if i not in result]
                 actions.extend(np.abs(action[running]).mean(axis=1))

@@ -31,7 +31,7 @@ class ThreadedVecEnv(VecEnv):
         observations = self.batch.reset(self._seeds, self._options)
         self._reset_seeds()
         self._reset_options()
-        return observations.copy()
+        return observations
 
     def step_async(self, actions: np.ndarray) -> None:
         """Remember the actions (n, na)."""
@@ -59,7 +59,7 @@ class ThreadedVecEnv(VecEnv):
         dones = batch.ended
         self._returns += batch.rewards
         self._returns[dones] = 0.0
-        return batch.observations.copy(), batch.rewards.astype(np.float32), dones, infos
+        return batch.observations, batch.rewards.astype(np.float32), dones, infos
 
     def close(self) -> None:
         """Stop the threads."""
