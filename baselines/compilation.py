@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from poise.envs.compiled_steps import NOTHING, Turns, play_one
+from poise.envs.compiled_steps import Turns
+from poise.envs.helpers import Helpers
 from poise.envs.kinematics import allocate_state
 from poise.envs.robot import load_robot
 from poise.envs.state import RobotState
@@ -52,8 +53,9 @@ def steps() -> None:
     residual_tick.compile((env.bind(tick, 0).numba_type,))
     momentum_tick.compile((tick.numba_type,))
     accept(problem.state, problem.parameters, problem.workspace, qp.memory)
-    Turns(NOTHING, 1).play(0)
-    play_one(0, 0, 0)
+    helpers = Helpers()
+    Turns(np.zeros((2, 3), dtype=np.int64), 2).play_all(helpers)
+    helpers.close()
 
 
 def _stepping() -> tuple[ResidualStepEnv, CaptureTick]:

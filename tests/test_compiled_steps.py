@@ -1,5 +1,6 @@
 """Steps that threads share out: each is played whole, in order, by one thread at a time."""
 
+import time
 from dataclasses import dataclass
 from threading import Barrier, Thread
 
@@ -8,6 +9,8 @@ import pytest
 
 from poise.envs.block import Block, address_of
 from poise.envs.compiled_steps import MANY, CompiledStep, Turns
+from poise.envs.errors import PoiseError
+from poise.envs.helpers import Helpers
 from poise.envs.jit import compiled
 
 
@@ -103,3 +106,65 @@ def test_a_thread_alone_plays_all():
     turns.begin()
     turns.play(1)
     assert [step.block.ticks[0] for step in steps] == [2] * len(steps)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("pause", [0.0, 0.02])
+def test_helpers_stay_for_the_next_call(threads, pause, monkeypatch):
+    """Called again at once they are still there; after a pause they are woken. All is played."""
+    steps = [counted(2) for _ in range(2 * MANY * threads)]
+    turns, helpers = Turns(np.array([step.row() for step in steps]), threads), Helpers()
+    woken, ask = [], helpers.ask
+    monkeypatch.setattr(helpers, "ask", lambda work, k: (woken.append(k), ask(work, k)))
+    rounds = 30
+    for _ in range(rounds):
+        turns.play_all(helpers)
+        time.sleep(pause)
+    assert [step.block.ticks[0] for step in steps] == [2 * rounds] * len(steps)
+    assert not any(step.block.clashes[0] for step in steps)
+    assert set(woken) == set(range(1, threads))
+    if threads > 1 and pause == 0.0:
+        assert len(woken) < rounds * (threads - 1)
+    if threads > 1 and pause > 0.0:
+        assert len(woken) > threads - 1
+    helpers.close()
+
+
+def test_other_steps_than_those_that_a_helper_waits_for():
+    """It comes once it has waited long enough; each of two kinds of turns is played in full."""
+    helpers, kinds = Helpers(), []
+    for count in (4, 9):
+        steps = [counted(3) for _ in range(count)]
+        kinds.append((steps, Turns(np.array([step.row() for step in steps]), 2)))
+    for _ in range(10):
+        for _, turns in kinds:
+            turns.play_all(helpers)
+    for steps, _ in kinds:
+        assert [step.block.ticks[0] for step in steps] == [30] * len(steps)
+    helpers.close()
+
+
+def test_an_interrupt_leaves_no_helper_at_work(monkeypatch):
+    """What the caller did not play its helper has, before the interrupt goes on."""
+    steps = [counted(2) for _ in range(4)]
+    turns, helpers = Turns(np.array([step.row() for step in steps]), 2), Helpers()
+
+    def interrupt(thread):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(turns, "play", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        turns.play_all(helpers)
+    assert [step.block.ticks[0] for step in steps] == [2] * len(steps)
+    helpers.close()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_helper_that_died_is_not_waited_for():
+    """As in the copy of a process: an error instead."""
+    helpers = Helpers()
+    helpers.ask(lambda number: 1 // 0, 1)
+    step = counted(1)
+    turns = Turns(np.array([step.row()] * 2), 2)
+    with pytest.raises(PoiseError, match="a thread has ended"):
+        turns.play_all(helpers)

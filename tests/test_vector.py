@@ -216,6 +216,25 @@ def test_what_is_returned_is_not_overwritten():
     env.close()
 
 
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_what_is_returned_may_be_overwritten(mode):
+    """Nothing that follows depends on it, resets included."""
+    records = []
+    for spoil in (False, True):
+        env, record = native(autoreset_mode=mode), []
+        env.reset(seed=0)
+        for _ in range(20):
+            step = env.step(np.full(env.action_space.shape, 0.3))
+            record.append([part.copy() for part in step[:4]])
+            if spoil:
+                for part in step[:4]:
+                    part[:] = 1
+        env.close()
+        records.append(record)
+    same(*records)
+    assert any(step[3].any() for step in records[0])
+
+
 def test_wrong_actions_move_nothing():
     """NaN, bounds, shape and text are named; the batch is as it was before."""
     env = native(threads=2)
