@@ -165,12 +165,9 @@ def play(
 
 @compiled
 def call_waiting(calls: np.ndarray, played: np.ndarray, thread: int):
-    """Call a helper; False if it is away."""
+    """Call a helper; False if it is away, and has to be woken."""
     swap(played, LINE * thread, 0)
-    if swap(calls, LINE * thread, CALLED) == WAITING:
-        return True
-    swap(calls, LINE * thread, AWAY)  # nobody looks: what sleeps is woken another way
-    return False
+    return swap(calls, LINE * thread, CALLED) == WAITING
 
 
 @compiled

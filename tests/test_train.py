@@ -8,10 +8,12 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from stable_baselines3 import PPO
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from poise.baselines.capture_step import CaptureStep
@@ -116,6 +118,21 @@ def test_every_evaluation_meets_the_same_pushes(tmp_path, monkeypatch):
     trained = [seed for given in seeds if len(given) == 4 for seed in given]
     assert len(held_out) == 2 and held_out[0] == held_out[1] and len(set(held_out[0])) == 5
     assert len(set(trained)) == 4 and not set(trained) & set(held_out[0])
+
+
+def test_an_evaluated_policy_sees_every_step(tmp_path, monkeypatch):
+    """What it acts on is what the step before has left."""
+    seen, predict = [], PPO.predict
+
+    def spy(self, observation, *rest, **named):
+        seen.append(observation.copy())
+        return predict(self, observation, *rest, **named)
+
+    monkeypatch.setattr(PPO, "predict", spy)
+    train(tiny_config(steps=64), tmp_path, progress=False)
+    assert len(seen) > 20
+    for before, after in pairwise(seen):
+        assert (before != after).any(axis=1).all()
 
 
 def test_neighbouring_seeds_share_no_environment():
