@@ -13,6 +13,7 @@ from poise.envs.state import RobotState
 
 DIRECTIONS = (0.0, 45.0, 90.0, 135.0, 180.0, 270.0)
 IMPULSES = (9.0, 13.0, 16.0, 19.0)  # [N·s]
+PERIOD = 0.004  # of the controller [s]: a policy step of one tick
 
 
 @dataclass
@@ -24,9 +25,9 @@ class Tick:
     problem: QP
 
 
-def record(seconds: float = 1.5, every: int = 2) -> tuple[ResidualBalanceEnv, list[list[Tick]]]:
-    """The environment, and the ticks after each push, `every`-th policy step, up to a fall."""
-    env = ResidualBalanceEnv(pushes=None, duration=0.5 + seconds)
+def record(seconds: float = 1.5, every: int = 10) -> tuple[ResidualBalanceEnv, list[list[Tick]]]:
+    """The environment, and every `every`-th control tick after each push, up to a fall."""
+    env = ResidualBalanceEnv(pushes=None, duration=0.5 + seconds, policy_period=PERIOD)
     action = np.zeros(env.action_space.shape)
     recoveries = []
     for direction in DIRECTIONS:

@@ -21,9 +21,10 @@ PASSES = 5  # over the same ticks: the least time of each is what it takes undis
 
 
 def tick_times() -> np.ndarray:
-    """(ticks, 3) seconds of the parts of each control tick, every policy step of the recoveries.
+    """(ticks, 3) seconds of the parts of each control tick of the recoveries.
 
-    A tick does the same in every pass, for the controller's memory is reset with each recovery.
+    All ticks, one after the other, since each starts from the solution of the one before. A tick
+    does the same in every pass, for the controller's memory is reset with each recovery.
     """
     env, recoveries = record(every=1)
     clock = TickClock(env.controller)
