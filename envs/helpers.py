@@ -20,7 +20,7 @@ class Helpers:
     def share(self, work: Callable[[int], None], helpers: int) -> None:
         """`work(0)` in this thread, `work(1)`, `work(2)`… in some helpers; returns when all have.
 
-        Raises what one of them raised, PoiseError if they have been closed.
+        Raises what one of them raised, PoiseError if they have been closed or have died.
         """
         done: SimpleQueue[BaseException | None] = SimpleQueue()
         asked = range(1, helpers + 1)
@@ -42,10 +42,11 @@ class Helpers:
     ) -> None:
         """`work(helper)` in helper 1, 2…, once it is free; what it raised, or None, goes to `done`.
 
-        Raises PoiseError if they have been closed.
+        Raises PoiseError if they have been closed or have died.
         """
         if not self._end.alive:
             raise PoiseError("the threads have ended: close() comes last")
+        self.expect_alive()
         while len(self._calls) < helper:
             self._calls.append(SimpleQueue())
             arguments = (self._calls[-1],)

@@ -53,9 +53,23 @@ def test_threads_end(how):
     assert len(ours) == 2
     if how == "closed":
         helpers.close()
+        for thread in ours:
+            thread.join(10.0)
         with pytest.raises(PoiseError, match="close"):
             helpers.share(lambda number: None, 1)
     del helpers
     for thread in ours:
         thread.join(10.0)
         assert not thread.is_alive()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_the_dead_are_not_waited_for():
+    """As in a process that was forked, which has none of the threads: an error instead."""
+    before = set(threading.enumerate())
+    helpers = Helpers()
+    helpers.ask(lambda number: 1 // 0, 1)
+    for thread in set(threading.enumerate()) - before:
+        thread.join(10.0)
+    with pytest.raises(PoiseError, match="a thread has ended"):
+        helpers.share(lambda number: None, 1)
