@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.baselines.controller import Targets
+from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.baselines.solvers import QP
 from poise.envs.state import RobotState
 
 DIRECTIONS = (0.0, 45.0, 90.0, 135.0, 180.0, 270.0)
 IMPULSES = (9.0, 13.0, 16.0, 19.0)  # [N·s]
-PERIOD = 0.004  # of the controller [s]: a policy step of one tick
+CONTROLLER = "momentum-qp"
 
 
 @dataclass
@@ -27,7 +28,10 @@ class Tick:
 
 def record(seconds: float = 1.5, every: int = 10) -> tuple[ResidualBalanceEnv, list[list[Tick]]]:
     """The environment, and every `every`-th control tick after each push, up to a fall."""
-    env = ResidualBalanceEnv(pushes=None, duration=0.5 + seconds, policy_period=PERIOD)
+    period = controller_config(CONTROLLER).period  # a policy step is one tick
+    env = ResidualBalanceEnv(
+        controller=CONTROLLER, pushes=None, duration=0.5 + seconds, policy_period=period
+    )
     action = np.zeros(env.action_space.shape)
     recoveries = []
     for direction in DIRECTIONS:
