@@ -130,7 +130,7 @@ def test_evaluations_are_compared_alike(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("summary.json", None, "summary.json: cannot be read .*: not a finished result"),
+        ("summary.json", None, "summary.json: no such file: not a finished result"),
         ("summary.json", "{}", "summary.json: is no summary"),
         ("summary.json", '{"controllers": {}}', "one is a benchmark, the other an evaluation"),
         ("trials.csv", "a,b\n1,2\n", "trials.csv: has no column 'recovered'"),
@@ -162,7 +162,7 @@ def test_the_leaderboard_ranks_and_says_where_it_comes_from(tmp_path: Path) -> N
     file = folder / "summary.json"
     write_leaderboard([file], page)
     assert page.read_text() == leaderboard({str(file): json.loads(file.read_text())})
-    (folder / "summary.json").write_text("[]")
+    (folder / "summary.json").write_text("{}")
     with pytest.raises(ConfigError, match="is not a benchmark's summary"):
         write_leaderboard([folder], page)
     assert main(["leaderboard", "--page", str(page)]) == 2
