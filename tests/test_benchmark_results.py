@@ -130,7 +130,7 @@ def test_evaluations_are_compared_alike(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("summary.json", None, "summary.json: no such file: not a finished result"),
+        ("summary.json", None, "summary.json: cannot be read .*: not a finished result"),
         ("summary.json", "{}", "summary.json: is no summary"),
         ("summary.json", '{"controllers": {}}', "one is a benchmark, the other an evaluation"),
         ("trials.csv", "a,b\n1,2\n", "trials.csv: has no column 'recovered'"),

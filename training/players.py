@@ -125,8 +125,8 @@ def _outside_policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Playe
     else:
         kind = getattr(policy, "environment", "torque")
         if kind not in ENVIRONMENTS:
-            raise ConfigError(f"no such environment: {shown(kind)}", source=name, field="environment",
-                              choices=ENVIRONMENTS)  # fmt: skip
+            raise ConfigError(f"no such environment: {shown(kind)}", source=name,
+                              field="environment", choices=ENVIRONMENTS)  # fmt: skip
         env = ENVIRONMENTS[kind](robot, **overrides)
     content = to_yaml(outside_config(name)).encode()
     return Player(name, env, policy.act, _hash(content), getattr(policy, "reset", None))

@@ -120,7 +120,9 @@ class _Result:
     def __init__(self, folder: Path):
         self.folder = folder
         if not is_file(folder / SUMMARY):
-            raise ConfigError("no such file: not a finished result", source=folder / SUMMARY)
+            raise ConfigError(
+                "cannot be read (no such file): not a finished result", source=folder / SUMMARY
+            )
         self.summary = read_json(folder / SUMMARY)
         self.controllers: dict[str, Any] = self.summary.get("controllers")
         if not isinstance(self.controllers, dict):

@@ -82,7 +82,7 @@ def read_summary(path: str | Path) -> dict[str, Any]:
     """A summary.json of a benchmark; raises ConfigError."""
     path = Path(path)
     if not is_file(path):
-        raise ConfigError("no such file: not a finished benchmark", source=path)
+        raise ConfigError("cannot be read (no such file): not a finished benchmark", source=path)
     summary = read_json(path)
     if summary.get("benchmark") != FORMAT:
         raise ConfigError(f"is not a benchmark's summary of format {FORMAT}", source=path)
