@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import os
 import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -32,7 +33,7 @@ P, R = ParamSpec("P"), TypeVar("R")
 
 @dataclass(frozen=True)
 class Allowance:
-    """What may run: `names` as `_key` gives them; `source`, the file that is being read, for errors."""
+    """What may run: `names` as of `_key`; `source`, the file that is being read, for errors."""
 
     names: frozenset[str] = frozenset()
     source: str | None = None
@@ -52,14 +53,14 @@ def check_allowed(name: str) -> None:
     if _key(name) not in allowance.names:
         raise ConfigError(
             f"wants to run code from outside, {name!r}: if you trust it, allow it by --allow "
-            f"{shlex.quote(name)}, in Python by allow=[{name!r}]",
+            f"{shlex.quote(name)}, or poise.allowing({name!r}) in Python",
             source=allowance.source, field="controller",
         )  # fmt: skip
 
 
 @contextmanager
 def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) -> Iterator[None]:
-    """Inside, these classes may run, besides those that already may.
+    """Inside, these classes may run, besides those that already may; a context.
 
     Args:
         names: ``module:Class`` or ``file.py:Class``; a file is the same by any path to it.
@@ -122,9 +123,9 @@ class Carried(Generic[R]):
     function: Callable[..., R]
     allowance: Allowance
 
-    def __call__(self, *arguments: Any, **named: Any) -> R:
+    def __call__(self, *arguments: Any, **options: Any) -> R:
         with _opened(self.allowance.names, self.allowance.source):
-            return self.function(*arguments, **named)
+            return self.function(*arguments, **options)
 
 
 def carried(function: Callable[..., R]) -> Carried[R]:
@@ -144,7 +145,7 @@ def _opened(names: frozenset[str], source: str | None) -> Iterator[None]:
 
 def _file(path: Path) -> Mapping[str, Any] | None:
     """The fields of a controller's file; of anything else nothing."""
-    is_yaml = path.suffix in (".yaml", ".yml") and path.is_file()
+    is_yaml = path.suffix in (".yaml", ".yml") and os.path.isfile(path)
     return read_yaml(path) if is_yaml else None
 
 

@@ -2,19 +2,12 @@
 
 import contextlib
 import hashlib
-import os
 import sys
 import time
 from pathlib import Path
 
-if "numba" not in sys.modules:
-    # Numba takes these from a .numba_config.yaml of the current folder, too: from there it would
-    # unpickle kernels, or import a class. What the environment says goes before that file.
-    for name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
-        os.environ.setdefault(name, "")
-
-import numba  # noqa: E402
-from numba.core import event  # noqa: E402
+import numba
+from numba.core import event
 
 #: Cached on disk, without the GIL, NumPy's rules for division by zero. Sums may be reordered
 #: (SIMD), but NaN and infinity keep their meaning: checks rely on them.

@@ -60,8 +60,7 @@ def write_report(
     path = Path(folder) / REPORT if out is None else Path(out)
     results = load_results(folder)
     with allowing(allow):
-        page = render(results, films=films, console=console)
-    write_atomic(path, page)
+        write_atomic(path, render(results, films=films, console=console))
     print_paths([path], console)
     return path
 
@@ -140,10 +139,8 @@ def _cases(
             if films and key not in done:
                 console.print(f"playing trial {k} of {len(cases)} again: {record.controller}",
                               markup=False, highlight=False)  # fmt: skip
-                before = len(notes)
-                done[key] = _film(results, record, frame_times(case.record), not problem, notes)
-                for note in notes[before:]:
-                    console.print(note, markup=False, highlight=False, soft_wrap=True)
+                times = frame_times(case.record)
+                done[key] = _film(results, record, times, not problem, notes, console)
             found = done.get(key)
             if found is not None:
                 played.append(found)
@@ -152,7 +149,12 @@ def _cases(
 
 
 def _film(
-    results: Results, record: Record, times: Sequence[float], draw: bool, notes: list[str]
+    results: Results,
+    record: Record,
+    times: Sequence[float],
+    draw: bool,
+    notes: list[str],
+    console: Console,
 ) -> Film | None:
     try:
         return film(results, record, times, draw)
@@ -163,6 +165,7 @@ def _film(
     note = f"{record.controller} was not played again: {reason}."
     if note not in notes:
         notes.append(note)
+        console.print(note, markup=False, highlight=False, soft_wrap=True)
     return None
 
 
