@@ -7,7 +7,7 @@ it is to run its module. `find_outside`, the one function that imports what has 
 - what the user types as a controller, or hands to an environment (`named`), and
 - what the user allows besides: ``--allow`` of a command, ``allow=`` in Python.
 
-A scope ends with its block, and is of its thread: processes are sent it with their work (`carried`).
+A scope ends with its block, in its thread; processes are sent it with their work (`carried`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from poise.envs.config import read_yaml
 from poise.envs.errors import ConfigError
 
 NAME = re.compile(r"(?P<place>[^:\s]+):(?P<name>[A-Za-z_]\w*)")
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class Allowance:
     source: str | None = None
 
 
-_current: ContextVar[Allowance] = ContextVar("allowance", default=Allowance())
+NOTHING = Allowance()
+_current: ContextVar[Allowance] = ContextVar("allowance", default=NOTHING)
 
 
 def is_outside(name: Any) -> bool:
@@ -78,7 +80,7 @@ def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) 
 
 
 def allows(*handed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Makes a function run with what its argument `allow` names, and what is `named` by `handed`."""
+    """Makes a function run with what its argument `allow` allows, and what `handed` ones name."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         signature = inspect.signature(function)

@@ -115,6 +115,7 @@ class Ground:
         summary = {"benchmark": FORMAT, "controllers": {controller: {"trials": 1}}}
         (out / "settings.yaml").write_text(to_yaml(settings))
         (out / "trials.csv").write_text(csv_text([line], CASE_COLUMNS))
+        (out / "trials.jsonl").touch()
         (out / "summary.json").write_text(json.dumps(summary))
         return out
 

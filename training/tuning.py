@@ -86,8 +86,8 @@ def tune(
     all that was tried, from which `resume` goes on as if nothing had happened. A controller from
     outside (``module:Class``) that the configuration or the policy names must be among `allow`.
 
-    Raises ConfigError for a configuration that is not valid or names what is not allowed, a folder that holds another search, or
-    where the library `cma` is missing.
+    Raises ConfigError for a configuration that is not valid or names what is not allowed, a folder
+    that holds another search, or where the library `cma` is missing.
     """
     gains = Gains(config.controller, config.gains, config.robot)
     if config.policy is not None:
