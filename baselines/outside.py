@@ -7,7 +7,6 @@ import importlib
 import importlib.util
 import inspect
 import os
-import re
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,9 +19,9 @@ from poise.envs.errors import ConfigError, PoiseError
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
+from .allowance import NAME, allowing, check_allowed, is_outside
 from .controller import Targets
 
-NAME = re.compile(r"(?P<place>[^:\s]+):(?P<name>[A-Za-z_]\w*)")
 METHODS = ("period", "reset", "torques")
 
 
@@ -31,18 +30,14 @@ class OutsideConfig:
     """`name` is ``module:Class`` or ``file.py:Class``, called with the robot and `arguments`.
 
     `source` is a hash of the file that the class is in, so that results tell versions apart; it is
-    filled in by `outside_config`.
+    filled in by `outside_config`. Whoever holds one may make its controller: what files say becomes
+    one by `outside_config` alone, which asks whether the user allows it.
     """
 
     name: str
     kind: Literal["outside"] = "outside"
     arguments: dict[str, Any] = field(default_factory=dict)
     source: str = ""
-
-
-def is_outside(name: Any) -> bool:
-    """Whether a name has the form ``module:Class``."""
-    return isinstance(name, str) and NAME.fullmatch(name) is not None
 
 
 def outside_config(name: str, arguments: dict[str, Any] | None = None) -> OutsideConfig:
@@ -57,13 +52,15 @@ def outside_config(name: str, arguments: dict[str, Any] | None = None) -> Outsid
 
 
 def find_outside(name: str) -> Any:
-    """What ``module:Class`` names; the current folder is searched for modules, too.
+    """What ``module:Class`` names; modules are searched for in the current folder, too, at last.
 
-    Raises ConfigError when the module cannot be imported or lacks the name.
+    Nothing else in this package imports what a user or a file names. Raises ConfigError when the
+    user has not allowed it (`allowing`), the module cannot be imported or lacks the name.
     """
     match = NAME.fullmatch(name)
-    if match is None:
+    if match is None or not is_outside(name):
         raise ConfigError(f"{name!r} is not of the form module:Class", field="controller")
+    check_allowed(name)
     module = _module(match["place"])
     if not hasattr(module, match["name"]):
         public = [key for key in vars(module) if not key.startswith("_")]
@@ -92,7 +89,8 @@ class OutsideController:
 
     def __init__(self, robot: Robot, config: OutsideConfig):
         self.robot, self.config = robot, config
-        self.inner = make_outside(config.name, robot, config.arguments)
+        with allowing(config.name):
+            self.inner = make_outside(config.name, robot, config.arguments)
         missing = [name for name in METHODS if not hasattr(self.inner, name)]
         if missing:
             raise ConfigError(f"is no controller: it lacks {', '.join(missing)}",
@@ -130,12 +128,30 @@ def _module(place: str) -> ModuleType:
     try:
         if place.endswith(".py"):
             return _from_file(Path(place))
-        if os.getcwd() not in sys.path:
-            sys.path.insert(0, os.getcwd())
-        return importlib.import_module(place)
+        return _by_name(place)
     except Exception as error:  # whatever the module itself raises
         raise ConfigError(f"{place!r} cannot be imported: {_text(error)}",
                           field="controller") from None  # fmt: skip
+
+
+def _by_name(place: str) -> ModuleType:
+    """The current folder comes last, and only where a module is there.
+
+    What lies in it then never stands in for another library's module.
+    """
+    try:
+        return importlib.import_module(place)
+    except ModuleNotFoundError as error:
+        here, top = os.getcwd(), place.partition(".")[0]
+        if error.name != top or here in sys.path:
+            raise
+    sys.path.append(here)
+    try:
+        return importlib.import_module(place)
+    except ModuleNotFoundError as error:
+        if error.name == top:
+            sys.path.remove(here)
+        raise
 
 
 def _from_file(path: Path) -> ModuleType:

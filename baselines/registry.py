@@ -9,6 +9,7 @@ from poise.envs.errors import ConfigError, shown
 from poise.envs.robot import Robot
 
 from .abe07 import Abe07, Abe07Config
+from .allowance import is_outside
 from .capture_point import CapturePoint, CapturePointConfig
 from .capture_step import CaptureStep, CaptureStepConfig
 from .ipm_step import IPMStep, IPMStepConfig
@@ -18,7 +19,7 @@ from .lip_mpc import LIPMPC, LIPMPCConfig
 from .lqr_lip import LQRLIP, LQRLIPConfig
 from .macchietto09 import Macchietto09, Macchietto09Config
 from .momentum_qp import MomentumQP, MomentumQPConfig
-from .outside import OutsideConfig, OutsideController, is_outside, outside_config
+from .outside import OutsideConfig, OutsideController, outside_config
 from .pd import PD, PDConfig
 from .simbicon import Simbicon, SimbiconConfig
 from .stable_pd import StablePD, StablePDConfig
@@ -44,22 +45,23 @@ KINDS: dict[str, tuple[type, type]] = {
 CONTROLLERS = tuple(controller for _, controller in KINDS.values())
 
 
-def controller_config(name_or_path: str | Path) -> Any:
-    """The configuration in a packaged file or a path, of the class that its `kind` names.
+def controller_config(controller: str | Path | Mapping[str, Any]) -> Any:
+    """The configuration in a packaged file, a path or a mapping, of the class of its `kind`.
 
     ``module:Class`` is one from outside.
 
-    Raises ConfigError naming the file, the field and the choices.
+    Raises ConfigError naming the file, the field and the choices; and for one from outside that the
+    user has not allowed, see `allowing`.
     """
-    if is_outside(name_or_path):
-        return outside_config(str(name_or_path))
-    path = resolve("controllers", name_or_path)
-    return _build(read_yaml(path), str(path))
+    config = _described(controller)
+    if isinstance(config, OutsideConfig):  # with the hash of what is there now
+        return outside_config(config.name, config.arguments)
+    return config
 
 
 def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
     """`controller_config` where only a momentum QP will do; raises ConfigError for others."""
-    config = controller_config(name_or_path)
+    config = _described(name_or_path)
     if not isinstance(config, MomentumQPConfig):
         raise ConfigError(
             f"{shown(str(name_or_path))} is of kind {config.kind!r}, not a momentum QP",
@@ -77,12 +79,11 @@ def load_controller(controller: Any, robot: Robot) -> Any:
     """A controller for `robot`: from a name, a path, a mapping or a configuration.
 
     Whatever has `period`, `reset` and `torques` (see `Controller`) is returned as it is.
-    Raises ConfigError naming the file, the field and the choices.
+    Raises ConfigError naming the file, the field and the choices; and for one from outside that the
+    user has not allowed, see `allowing`.
     """
-    if isinstance(controller, (str, Path)):
+    if isinstance(controller, (str, Path, Mapping)):
         controller = controller_config(controller)
-    if isinstance(controller, Mapping):
-        controller = _build(dict(controller), "controller")
     for config_class, controller_class in KINDS.values():
         if type(controller) is config_class:
             return controller_class(robot, controller)
@@ -93,6 +94,16 @@ def load_controller(controller: Any, robot: Robot) -> Any:
         field="controller",
         choices=packaged("controllers"),
     )
+
+
+def _described(controller: str | Path | Mapping[str, Any]) -> Any:
+    """What a name, a file or a mapping says; nothing from outside is looked up for it."""
+    if isinstance(controller, Mapping):
+        return _build(dict(controller), "controller")
+    if is_outside(controller):
+        return OutsideConfig(str(controller))
+    path = resolve("controllers", controller)
+    return _build(read_yaml(path), str(path))
 
 
 def _build(data: dict[str, Any], source: str) -> Any:
@@ -109,7 +120,4 @@ def _build(data: dict[str, Any], source: str) -> Any:
     if isinstance(data.get("qp"), str):
         inner = resolve("controllers", data["qp"])
         data = {**data, "qp": read_yaml(inner)}
-    config: Any = build(KINDS[kind][0], data, source)
-    if isinstance(config, OutsideConfig):  # with the hash of what is there now
-        return outside_config(config.name, config.arguments)
-    return config
+    return build(KINDS[kind][0], data, source)

@@ -20,6 +20,7 @@ from poise.envs.observation import Term
 from poise.envs.robot import Robot
 from poise.envs.vector import make_vector_env
 
+from .allowance import allowing, named
 from .capture_step import CaptureStep
 from .controller import Controller, Targets
 from .ipm_step import IPMStep
@@ -250,7 +251,8 @@ class ResidualBalanceEnv(BalanceEnv):
         self._residual = Residual(
             self._moved, scale[self._moved], float(share), self.gate, self._offsets
         )
-        self.controller = load_controller(controller, self.robot)
+        with allowing(named(controller)):  # the user hands it over, not a file
+            self.controller = load_controller(controller, self.robot)
         self.motion = (
             motion if isinstance(motion, ReferenceMotion) else load_motion(motion, self.robot)
         )

@@ -49,7 +49,8 @@ def _compile_apart(shares: Sequence[str]) -> bool:
     try:
         for share in shares:
             code = f"from poise.baselines.compilation import *; begin(); {share}()"
-            jobs.append(subprocess.Popen([sys.executable, "-c", code]))
+            # -P: no modules from the current folder
+            jobs.append(subprocess.Popen([sys.executable, "-P", "-c", code]))
         return all([job.wait() == 0 for job in jobs])
     finally:
         for job in jobs:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from poise.baselines.outside import OutsideController, is_outside
+import poise
+from poise.baselines.allowance import is_outside
+from poise.baselines.outside import OutsideController
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.errors import ConfigError, PoiseError
@@ -46,16 +49,19 @@ def make(robot): return Zero(robot)
 
 
 @pytest.fixture
-def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A module of someone else's, in the current folder."""
+def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """A module of someone else's, in the current folder; whatever it holds may run."""
     name = f"someone_{tmp_path.name.replace('-', '_')}"
     (tmp_path / f"{name}.py").write_text(CONTROLLER)
     monkeypatch.chdir(tmp_path)
-    return name
+    classes = ("Zero", "Infinite", "Slow", "Broken", "Nothing", "Counting", "make", "Nobody")
+    names = [f"{place}:{each}" for place in (name, f"{name}.py") for each in classes]
+    with poise.allowing([*names, "no_such_module:Zero", "nowhere.py:Zero"]):
+        yield name
 
 
 @pytest.fixture
-def example(tmp_path: Path) -> Path:
+def example(tmp_path: Path) -> Iterator[Path]:
     """The example in the docs, saved as they say."""
     page = (Path(__file__).parents[1] / "docs/controllers.md").read_text()
     code, sb3 = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
@@ -63,7 +69,9 @@ def example(tmp_path: Path) -> Path:
     path = tmp_path / "my_controller.py"
     path.write_text(code)
     (tmp_path / "my_sb3.py").write_text(sb3)
-    return path
+    places = (f"{path}:ShiftedCoM", f"{path}:Still", f"{tmp_path}/my_sb3.py:MyPolicy")
+    with poise.allowing(places):
+        yield path
 
 
 def test_the_example_of_the_docs_is_played(example: Path) -> None:

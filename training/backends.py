@@ -13,6 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from typing import Any, Literal, TypeVar
 
+from poise.baselines.allowance import carried
 from poise.envs.errors import ConfigError, PoiseError
 
 from .provenance import usable_cores
@@ -79,13 +80,16 @@ class Crew:
     ) -> Iterator[tuple[Job, Result]]:
         """Each job with `function(job)`, as they are done; both are pickled.
 
+        What the user allows to run here may run there.
+
+
         Raises PoiseError when a process has died, and what the function raises.
         """
         if not jobs:
             return iter(())
         if self._pool is not None:
-            return _in_pool(self._pool, function, jobs)
-        return self._with_joblib(function, jobs)
+            return _in_pool(self._pool, carried(function), jobs)
+        return self._with_joblib(carried(function), jobs)
 
     def _with_joblib(self, function: Callable, jobs: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
         import joblib

@@ -20,6 +20,7 @@ Names = Annotated[
 ]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
+Allow = Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="MODULE:CLASS")]
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -110,6 +111,7 @@ def evaluate(
     limits: str | None = None,
     write_limits: Path | None = None,
     overwrite: Switch = False,
+    allow: Allow = (),
 ) -> None:
     """Play a suite of pushes with several controllers, all on the same trials.
 
@@ -131,6 +133,7 @@ def evaluate(
             robot, else its ankle limit.
         write_limits: write the first controller's J50s to this file, for --limits.
         overwrite: replace an evaluation that the folder holds.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     from .evaluation import evaluate, measured_limits
 
@@ -138,7 +141,7 @@ def evaluate(
     try:
         summary = evaluate(
             controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, trials=trials,
-            limits=limits, overwrite=overwrite, console=terminal(),
+            limits=limits, overwrite=overwrite, console=terminal(), allow=allow,
         )  # fmt: skip
     except KeyboardInterrupt:
         if (folder / "trials.partial.jsonl").exists():
@@ -164,6 +167,7 @@ def benchmark(
     trials: int | None = None,
     overwrite: Switch = False,
     report: bool = True,
+    allow: Allow = (),
 ) -> int:
     """Rank controllers: J50 per direction, factors one at a time, a random mix; see docs.
 
@@ -183,16 +187,19 @@ def benchmark(
         trials: at most as many in every cell of the suite, to try things out.
         overwrite: replace what the folder holds.
         report: write report.html at the end, as poise report does.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     from poise.envs.gl import choose_gl_backend
 
     choose_gl_backend()
+    from poise.baselines.allowance import named
+
     from .benchmark.run import benchmark, errors
 
     try:
         summary = benchmark(
             controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
-            trials=trials, overwrite=overwrite, console=terminal(),
+            trials=trials, overwrite=overwrite, console=terminal(), allow=allow,
         )  # fmt: skip
     except KeyboardInterrupt:
         if (out / "trials.jsonl").exists():
@@ -205,7 +212,7 @@ def benchmark(
     if report:
         from .html_report import write_report
 
-        write_report(out, console=terminal())
+        write_report(out, console=terminal(), allow=[*named(*controllers), *allow])
     return 1 if failed else 0
 
 
@@ -258,6 +265,7 @@ def replay(
     controller: str | None = None,
     video: Path | None = None,
     plot: Path | None = None,
+    allow: Allow = (),
 ) -> None:
     """Play one trial of a result again, exactly, and say whether it ends as it was recorded.
 
@@ -267,6 +275,7 @@ def replay(
         controller: which of the evaluated ones; the last if not given.
         video: an MP4 file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     if video is not None:
         from poise.envs.gl import choose_gl_backend
@@ -274,7 +283,7 @@ def replay(
         choose_gl_backend()
     from .replay import replay
 
-    done = replay(folder, trial, controller, video=video, plot=plot)
+    done = replay(folder, trial, controller, video=video, plot=plot, allow=allow)
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
     print(f"trial {trial}, {done.controller}: {end}")
     print(done.trial.push or "no push")
@@ -286,7 +295,9 @@ def replay(
             print(path)
 
 
-def report(folder: Folder, /, *, out: Path | None = None, films: bool = True) -> None:
+def report(
+    folder: Folder, /, *, out: Path | None = None, films: bool = True, allow: Allow = ()
+) -> None:
     """Write one HTML file that shows a result: ranking, envelopes, falls, worst trials, numbers.
 
     The file opens from disk and needs nothing else.
@@ -295,13 +306,14 @@ def report(folder: Folder, /, *, out: Path | None = None, films: bool = True) ->
         folder: written by poise evaluate or poise benchmark.
         out: file to write; report.html in the folder if not given.
         films: play the worst trials again, for pictures and plots over time (seconds for each).
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     from poise.envs.gl import choose_gl_backend
 
     choose_gl_backend()
     from .html_report import write_report
 
-    write_report(folder, out, films=films, console=terminal())
+    write_report(folder, out, films=films, console=terminal(), allow=allow)
 
 
 def tune(
@@ -315,6 +327,7 @@ def tune(
     seed: int | None = None,
     workers: int = 2,
     resume: Switch = False,
+    allow: Allow = (),
 ) -> None:
     """Search a controller's gains by CMA-ES on seeded pushes.
 
@@ -328,13 +341,17 @@ def tune(
         seed: of the search and its pushes.
         workers: number of processes.
         resume: go on with the search that the folder holds.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
+    from poise.baselines.allowance import named
+
     from .tuning import tune, tune_config
 
     given = {"controller": controller, "robot": robot, "policy": policy,
              "generations": generations, "seed": seed}  # fmt: skip
     chosen = {name: value for name, value in given.items() if value is not None}
-    tune(tune_config(config, **chosen), out, workers, resume, terminal())
+    permitted = [*named(controller), *allow]
+    tune(tune_config(config, **chosen), out, workers, resume, terminal(), permitted)
 
 
 def qp_set(

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
 from poise.baselines.residual_step_env import ResidualStepEnv, StepScales
 from poise.envs.balance import BalanceEnv, EnvConfig
@@ -92,13 +93,15 @@ class TrainConfig:
     def make_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
         """The environment of this run; `overrides` replace its arguments or fields of `env`.
 
-        A loaded `robot` spares loading it again.
+        A loaded `robot` spares loading it again. Raises ConfigError for a controller from outside
+        that the user has not allowed, see `allowing`.
         """
         if self.action == "torque":
             return TorqueBalanceEnv(robot or self.robot, self.env, **overrides)
         steps = self.action == "step"
+        if "controller" not in overrides:  # an environment takes a name for what the user says
+            overrides["controller"] = controller_config(self.controller)
         arguments = {
-            "controller": self.controller,
             "motion": self.motion,
             "residual": self.step_residual if steps else self.residual,
             "smoothing": self.smoothing,

@@ -1,13 +1,14 @@
 """Evaluating controllers on the same trials."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 
+from poise.baselines.allowance import allows
 from poise.baselines.warmup import prepare
 from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
@@ -29,6 +30,7 @@ from .trials import Trial, row
 from .workers import Workers
 
 
+@allows("controllers")
 def evaluate(
     controllers: Sequence[str],
     suite: str | Path = "random",
@@ -41,6 +43,7 @@ def evaluate(
     limits: str | Path | None = None,
     overwrite: bool = False,
     console: Console | None = None,
+    allow: str | Iterable[str] = (),
 ) -> dict[str, Any]:
     """Play a suite with every controller and write what came of it; returns the summary.
 
@@ -60,6 +63,8 @@ def evaluate(
         limits: what pushes are measured by, see `load_limits`.
         overwrite: replace an evaluation that `out` holds.
         console: where progress and tables are printed; None: nowhere.
+        allow: controllers from outside (``module:Class``) that may run though they are not among
+            `controllers`, but named by a policy's folder or a file.
 
     Raises:
         ConfigError: anything named does not exist or is not valid; nothing is written then.

@@ -6,13 +6,14 @@ import base64
 import json
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import jinja2
 from rich.console import Console
 
+from poise.baselines.allowance import allowing
 from poise.envs.config import write_atomic
 from poise.envs.errors import PoiseError
 from poise.envs.reading import TABLE_BYTES, read_text
@@ -37,6 +38,7 @@ def write_report(
     *,
     films: bool = True,
     console: Console | None = None,
+    allow: str | Iterable[str] = (),
 ) -> Path:
     """Write the report of a finished evaluation or benchmark; returns its path.
 
@@ -49,6 +51,7 @@ def write_report(
         out: the file; `folder`/report.html if not given.
         films: play the worst trials again, for pictures and plots over time (seconds for each).
         console: where progress and the path are printed; None: nowhere.
+        allow: controllers from outside (``module:Class``) that may run; others are not played.
 
     Raises:
         ConfigError: the folder holds no finished evaluation, or its files are not whole.
@@ -57,8 +60,8 @@ def write_report(
     console = console or Console(quiet=True)
     path = Path(folder) / REPORT if out is None else Path(out)
     results = load_results(folder)
-    page = render(results, films=films, console=console)
-    write_atomic(path, page)
+    with allowing(allow):
+        write_atomic(path, render(results, films=films, console=console))
     print_paths([path], console)
     return path
 
@@ -137,7 +140,8 @@ def _cases(
             if films and key not in done:
                 console.print(f"playing trial {k} of {len(cases)} again: {record.controller}",
                               markup=False, highlight=False)  # fmt: skip
-                done[key] = _film(results, record, frame_times(case.record), not problem, notes)
+                times = frame_times(case.record)
+                done[key] = _film(results, record, times, not problem, notes, console)
             found = done.get(key)
             if found is not None:
                 played.append(found)
@@ -146,7 +150,12 @@ def _cases(
 
 
 def _film(
-    results: Results, record: Record, times: Sequence[float], draw: bool, notes: list[str]
+    results: Results,
+    record: Record,
+    times: Sequence[float],
+    draw: bool,
+    notes: list[str],
+    console: Console,
 ) -> Film | None:
     try:
         return film(results, record, times, draw)
@@ -157,6 +166,7 @@ def _film(
     note = f"{record.controller} was not played again: {reason}."
     if note not in notes:
         notes.append(note)
+        console.print(note, markup=False, highlight=False, soft_wrap=True)
     return None
 
 

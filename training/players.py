@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.outside import find_outside, is_outside, make_outside, outside_config
+from poise.baselines.allowance import is_outside
+from poise.baselines.outside import find_outside, make_outside, outside_config
 from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.baselines.residual_step_env import ResidualStepEnv
@@ -52,7 +53,8 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
         overrides: arguments of the environment, or fields of its `EnvConfig`.
 
     Raises:
-        ConfigError: no such controller, or one that is not valid or is for another robot.
+        ConfigError: no such controller, or one that is not valid or is for another robot; or one
+            from outside that the user has not allowed, see `allowing`.
     """
     if name == NO_CONTROL:
         return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
@@ -70,8 +72,8 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
             field="controller",
             choices=(*names, *policies, NO_CONTROL),
         )
-    env = ResidualBalanceEnv(robot, controller=name, **overrides)
-    return _idle(name, env, to_yaml(controller_config(name)))
+    config = controller_config(name)
+    return _idle(name, ResidualBalanceEnv(robot, controller=config, **overrides), to_yaml(config))
 
 
 def _idle(name: str, env: BalanceEnv, content: str) -> Player:

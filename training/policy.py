@@ -1,11 +1,13 @@
 """A trained policy, ready to use: observation in, action out, plain NumPy."""
 
+from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from poise.baselines.allowance import allowing, carried
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build, packaged, packaged_folder, read_yaml
 from poise.envs.errors import ConfigError
@@ -54,6 +56,7 @@ class Policy:
         self.layers = layers
         self._mean, self._scale = mean, 1.0 / np.sqrt(var + epsilon)
         self._clip = clip
+        self._make_env = carried(config.make_env)
 
     def act(self, observation: np.ndarray) -> np.ndarray:
         """Deterministic action (..., na) for raw observations (..., no).
@@ -83,19 +86,31 @@ class Policy:
 
     def make_env(self, **overrides: Any) -> BalanceEnv:
         """The environment that the policy was trained in; `overrides` as in `EnvConfig`."""
-        return self.config.make_env(**overrides)
+        return self._make_env(**overrides)
 
 
-def load_policy(folder: str | Path | None = None, robot: Robot | None = None) -> Policy:
+def load_policy(
+    folder: str | Path | None = None,
+    robot: Robot | None = None,
+    *,
+    allow: str | Iterable[str] = (),
+) -> Policy:
     """A packaged policy, a policy folder, or the best checkpoint of a run folder.
 
-    None is the packaged policy ``residual``.
+    None is the packaged policy ``residual``. No code from the files is executed, nor any that they
+    name: a policy on a controller from outside needs `allow`, the names (``module:Class``) that may
+    run.
 
     Raises ConfigError naming the file when it is missing, truncated, made for another robot
-    (of `robot`, or of the configuration's own) or has another number of observations or actions.
-    No code from the files is executed.
+    (of `robot`, or of the configuration's own), has another number of observations or actions, or
+    names a controller from outside that is not allowed.
     """
     path = locate_policy(folder)
+    with allowing(allow, source=path / CONFIG):
+        return _read_policy(path, robot)
+
+
+def _read_policy(path: Path, robot: Robot | None) -> Policy:
     config = build(TrainConfig, read_yaml(path / CONFIG), str(path / CONFIG))
     state = read_state(path / STATE)
     mean, var, clip, epsilon = _read_statistics(path / STATISTICS)

@@ -1,10 +1,11 @@
 """Playing one trial of an evaluation again, exactly, from its folder."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from poise.baselines.allowance import allowing
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build
 from poise.envs.errors import ConfigError, shown
@@ -13,7 +14,7 @@ from poise.envs.reading import is_file, parse_json, parsing, read_table
 from poise.envs.robot import load_robot
 
 from .benchmark.reading import is_benchmark, load_benchmark_data, player_of, read_case
-from .evaluation_folder import SUMMARY, TRIALS, Settings, read_settings
+from .evaluation_folder import SETTINGS, SUMMARY, TRIALS, Settings, read_settings
 from .players import Player, load_player
 from .signals import Signals
 from .suites import build_suite
@@ -45,6 +46,7 @@ def replay(
     video: str | Path | None = None,
     plot: str | Path | None = None,
     watch: Callable[[BalanceEnv], Any] | None = None,
+    allow: str | Iterable[str] = (),
 ) -> Replay:
     """Play a trial of an evaluation or a benchmark again and compare it with what was recorded.
 
@@ -55,14 +57,16 @@ def replay(
         video: an MP4 file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
         watch: called with the environment after the reset and after every step.
+        allow: controllers from outside (``module:Class``) that may run.
 
     Raises:
         ConfigError: no evaluation there, no such trial or controller, or a controller or robot
-            that is no longer the one that was evaluated.
+            that is no longer the one that was evaluated, or may not run.
         PoiseError: nothing can be drawn here, or a file cannot be written.
     """
     find = _of_benchmark if is_benchmark(folder) else _of_evaluation
-    name, line, again, player = find(Path(folder), trial, controller)
+    with allowing(allow, source=Path(folder) / SETTINGS):
+        name, line, again, player = find(Path(folder), trial, controller)
     signals = Signals() if plot is not None else None
     watches = [each for each in (signals, watch) if each is not None]
     outcome = run_trial(player, again, lambda env: [each(env) for each in watches])

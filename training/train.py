@@ -1,5 +1,6 @@
 """Training a residual policy with Stable-Baselines3's PPO on the CPU."""
 
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecNormalize
 
+from poise.baselines.allowance import allows
 from poise.baselines.warmup import prepare
 from poise.envs.balance import BalanceEnv
 from poise.envs.batch import replicate
@@ -28,8 +30,14 @@ from .vec_env import ThreadedVecEnv
 LAST, BEST = "last", "best"
 
 
+@allows()
 def train(
-    config: TrainConfig, out: str | Path, resume: bool = False, progress: bool = True
+    config: TrainConfig,
+    out: str | Path,
+    resume: bool = False,
+    progress: bool = True,
+    *,
+    allow: str | Iterable[str] = (),
 ) -> Path:
     """Train into the folder `out`; returns the folder of the best checkpoint.
 
@@ -38,11 +46,12 @@ def train(
     the same but for `steps` and `threads`. A new run begins with the policy `config.start_from`,
     if there is one, of the same robot; its network may be smaller (`widened`). The same
     configuration gives the same weights, whatever the number of threads; a resumed run starts new
-    episodes, and so differs.
+    episodes, and so differs. A controller from outside (``module:Class``) that the configuration
+    names must be among `allow`.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
     round; when the configurations or robots differ; when a file of last/ cannot be read; for
-    pushes that do not fit the robot.
+    pushes that do not fit the robot; for a controller from outside that is not allowed.
     """
     out = Path(out)
     checkpoint = check_folder(config, out, resume)

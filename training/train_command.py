@@ -10,6 +10,7 @@ from typing import Annotated
 
 import tyro
 
+from poise.baselines.allowance import named
 from poise.envs.config import build, resolve, to_dict
 from poise.envs.errors import ConfigError
 
@@ -39,6 +40,7 @@ class Command:
         backend: of runs with several seeds: local (processes of this machine), joblib (the same
             by joblib), ray (a cluster).
         workers: with several seeds, runs at a time; all cores if not given.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
 
     settings: Annotated[TrainConfig, tyro.conf.arg(name="")]  # no prefix
@@ -48,18 +50,21 @@ class Command:
     seeds: tuple[int, ...] = ()
     backend: Backend = "local"
     workers: int | None = None
+    allow: Annotated[
+        tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="MODULE:CLASS")
+    ] = ()
 
 
 def run(args: Sequence[str]) -> None:
     """Parse and train; raises ConfigError, and SystemExit as command lines do."""
     command = parse(args)
-    out = command.out
+    out, allow = command.out, [*named(_peek(args).controller), *command.allow]
     if not command.seeds and not (out / SEEDS).exists():
-        print(train(command.settings, out, command.resume))
+        print(train(command.settings, out, command.resume, allow=allow))
         return
     try:
         train_seeds(
-            command.settings, command.seeds, out, resume=command.resume,
+            command.settings, command.seeds, out, resume=command.resume, allow=allow,
             workers=command.workers, backend=command.backend, console=terminal(),
         )  # fmt: skip
     except KeyboardInterrupt:
@@ -85,21 +90,26 @@ def parse(args: Sequence[str]) -> Command:
 
 def _base(args: Sequence[str]) -> str | Path:
     """Where the defaults of the flags come from: looked up before the flags are read."""
-    peek = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
-    peek.add_argument("--config")
-    peek.add_argument("--robot", default=HUMANOID)
-    peek.add_argument("--out")
-    peek.add_argument("--resume", action="store_true")
-    try:
-        known, _ = peek.parse_known_args(list(args))
-    except argparse.ArgumentError as error:
-        raise ConfigError(str(error), source="command line") from None
+    known = _peek(args)
     if known.config is not None:
         return known.config
     own = Path(known.out or ".") / "config.yaml"
     if known.resume and own.is_file():
         return own
     return DEFAULT if _is_humanoid(known.robot) else ANY_ROBOT
+
+
+def _peek(args: Sequence[str]) -> argparse.Namespace:
+    """The flags that matter by being there, which a parsed command does not tell."""
+    peek = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    for name in ("--config", "--out", "--controller"):
+        peek.add_argument(name)
+    peek.add_argument("--robot", default=HUMANOID)
+    peek.add_argument("--resume", action="store_true")
+    try:
+        return peek.parse_known_args(list(args))[0]
+    except argparse.ArgumentError as error:
+        raise ConfigError(str(error), source="command line") from None
 
 
 def _is_humanoid(robot: str) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from poise.baselines.allowance import allows
 from poise.envs.config import to_yaml, write_atomic
 from poise.envs.errors import ConfigError, PoiseError
 
@@ -34,6 +35,7 @@ class SeedRun:
     resume: bool
 
 
+@allows()
 def train_seeds(
     config: TrainConfig,
     seeds: Sequence[int],
@@ -43,6 +45,7 @@ def train_seeds(
     workers: int | None = None,
     backend: str = "local",
     console: Console | None = None,
+    allow: str | Iterable[str] = (),
 ) -> dict[str, Any]:
     """Train one run per seed into `out`/seed-SEED; returns what seeds.json holds.
 
@@ -58,6 +61,7 @@ def train_seeds(
         workers: number of runs at a time; None for all cores.
         backend: local, joblib or ray, as of `poise benchmark`.
         console: where progress and the table are printed; None: nowhere.
+        allow: as of `train`.
 
     Raises:
         ConfigError: as `train`, before any run starts and anything is written.

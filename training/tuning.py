@@ -5,6 +5,7 @@ gains are not fitted to a few trials. Needs the `cma` package (`pip install pois
 """
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from poise.baselines.allowance import allows
 from poise.envs.config import build, on_base, read_yaml, resolve, to_dict, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
 from poise.envs.reading import is_file, parse_json, read_lines
@@ -70,20 +72,23 @@ def tune_config(name_or_path: str | Path, **fields: Any) -> TuneConfig:
     return build(TuneConfig, {**on_base(read_yaml(path), "tuning", path), **fields}, str(path))
 
 
+@allows()
 def tune(
     config: TuneConfig,
     out: Path,
     workers: int = 2,
     resume: bool = False,
     console: Console | None = None,
+    allow: str | Iterable[str] = (),
 ) -> dict[str, Any]:
     """Search; returns the controller's configuration at the mean of the last candidates.
 
     Writes `out/gains.yaml`, that controller, after each generation, and `out/history.jsonl` with
-    all that was tried, from which `resume` goes on as if nothing had happened.
+    all that was tried, from which `resume` goes on as if nothing had happened. A controller from
+    outside (``module:Class``) that the configuration or the policy names must be among `allow`.
 
-    Raises ConfigError for a configuration that is not valid, a folder that holds another search, or
-    where the library `cma` is missing.
+    Raises ConfigError for a configuration that is not valid or names what is not allowed, a folder
+    that holds another search, or where the library `cma` is missing.
     """
     gains = Gains(config.controller, config.gains, config.robot)
     if config.policy is not None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.push_schedule import push_bodies
 from poise.envs.pushes import Push
@@ -76,7 +77,8 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
     """`worth` of each trial, alone and under the policy."""
     robot = _robot(candidate.robot)
     settings: dict[str, Any] = {
-        "controller": dict(candidate.controller), "duration": candidate.seconds, "pushes": None,
+        "controller": controller_config(candidate.controller),
+        "duration": candidate.seconds, "pushes": None,
     }  # fmt: skip
     alone, below = [], []
     if candidate.alone:

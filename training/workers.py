@@ -17,6 +17,7 @@ from multiprocessing import resource_tracker
 from types import TracebackType
 from typing import Any
 
+from poise.baselines.allowance import carried
 from poise.envs.errors import PoiseError
 from poise.envs.robot import load_robot
 
@@ -24,6 +25,8 @@ from .players import Player, load_player
 from .trials import Outcome, Trial, run_trial
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+# A new process would search the current folder before the libraries; instead it is sent `sys.path`.
+FOR_CHILDREN = (*THREADS, "PYTHONSAFEPATH")
 
 DIED = (
     "a worker process has died (out of memory?); what is finished is kept: "
@@ -52,7 +55,7 @@ class Workers:
     def __enter__(self) -> "Workers":
         self._open = ExitStack()
         self._open.enter_context(single_threaded())
-        self.pool = process_pool(self.count, _load, self.arguments)
+        self.pool = process_pool(self.count, carried(_load), self.arguments)
         return self
 
     def __exit__(
@@ -79,8 +82,8 @@ class Workers:
 @contextmanager
 def single_threaded() -> Iterator[None]:
     """Processes started inside use one thread each for linear algebra; sums keep their order."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
+    before = {name: os.environ.get(name) for name in FOR_CHILDREN}
+    os.environ.update(dict.fromkeys(FOR_CHILDREN, "1"))
     try:
         yield
     finally:

@@ -6,15 +6,24 @@ Importing it registers the environments ``poise/TorqueBalance-v0``, ``poise/Resi
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import TYPE_CHECKING, Any
 
 from gymnasium.envs.registration import register
 
 if TYPE_CHECKING:
+    from poise.baselines.allowance import allowing
     from poise.training.policy import load_policy
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "load_policy"]
+__all__ = ["__version__", "allowing", "load_policy"]
+
+if "numba" not in sys.modules:
+    # Numba takes these from a .numba_config.yaml of the current folder, too, wherever that came
+    # from: it would unpickle kernels, or import a class. The environment goes before that file.
+    for _name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
+        os.environ.setdefault(_name, "")
 
 # No max_episode_steps: the environments end their episodes themselves, from their own config.
 register(
@@ -39,4 +48,8 @@ def __getattr__(name: str) -> Any:
         from poise.training.policy import load_policy
 
         return load_policy
+    if name == "allowing":
+        from poise.baselines.allowance import allowing
+
+        return allowing
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from poise.baselines.allowance import allowing
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build
 from poise.envs.errors import ConfigError, shown
@@ -14,7 +15,7 @@ from poise.envs.pushes import Push
 from poise.envs.reading import is_file, parsing, read_json, read_table
 from poise.envs.robot import load_robot
 
-from ..evaluation_folder import SUMMARY, TRIALS
+from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS
 from ..players import Player, load_player
 from ..trials import PUSH_COLUMNS
 from .case import COLUMNS, Case, Result
@@ -127,7 +128,10 @@ def player_of(data: BenchmarkData, controller: str) -> BenchmarkPlayer:
         raise ConfigError(f"the robot {shown(settings.robot)} has changed since",
                           source=data.folder, field="robot_fingerprint")  # fmt: skip
     suite = build(BenchmarkSuite, settings.suite, str(data.folder))
-    player = load_player(controller, robot, duration=suite.duration, pushes=None, noise=suite.noise)
+    with allowing(source=data.folder / SETTINGS):
+        player = load_player(
+            controller, robot, duration=suite.duration, pushes=None, noise=suite.noise
+        )
     if player.fingerprint != settings.controllers[controller]:
         raise ConfigError(f"the controller {shown(controller)} has changed since",
                           source=data.folder, field="controllers")  # fmt: skip

@@ -10,13 +10,14 @@ from typing import Any
 
 from rich.console import Console
 
+from poise.baselines.allowance import allowing, allows
 from poise.baselines.warmup import prepare
 from poise.envs.config import packaged, to_dict
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot, load_robot
 
 from ..backends import Crew, check_backend
-from ..evaluation_folder import SUMMARY, TRIALS
+from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS
 from ..players import Player, load_player
 from ..progress import progress_bar
 from ..provenance import circumstances, versions
@@ -37,6 +38,7 @@ REFERENCE = "momentum-qp"
 RESTLESS = ("simbicon",)  # always marks time, and so never counts as recovered
 
 
+@allows("controllers")
 def benchmark(
     controllers: Sequence[str] = (),
     suite: str | Path = "standard",
@@ -49,6 +51,7 @@ def benchmark(
     trials: int | None = None,
     overwrite: bool = False,
     console: Console | None = None,
+    allow: str | Iterable[str] = (),
 ) -> dict[str, Any]:
     """Play a suite with every controller and write what came of it; returns the summary.
 
@@ -68,6 +71,8 @@ def benchmark(
         trials: at most as many in every cell of the suite.
         overwrite: replace what `out` holds.
         console: where progress and tables are printed; None: nowhere.
+        allow: controllers from outside (``module:Class``) that may run though they are not among
+            `controllers`, but named by what `out` holds, a policy's folder or a file.
 
     Raises:
         ConfigError: anything named does not exist or is not valid; nothing is written then.
@@ -157,7 +162,8 @@ def _load(name: str, robot: Robot, stage: Stage) -> Player:
 
 def _load_again(name: str, robot: Robot, stage: Stage, folder: BenchmarkFolder) -> Player:
     """A controller that the folder has besides; raises ConfigError if it is no longer the same."""
-    player = _load(name, robot, stage)
+    with allowing(source=folder.path / SETTINGS):
+        player = _load(name, robot, stage)
     if player.fingerprint != folder.settings.controllers[name]:
         raise ConfigError(
             f"holds trials of {name!r}, which has changed since: choose another folder",

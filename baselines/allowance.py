@@ -1,0 +1,157 @@
+"""Whose code may run: what the user has named, never what a file has.
+
+Files that are read (policies, results, configurations) may name a class from outside, and to find
+it is to run its module. `find_outside`, the one function that imports what has been named, asks
+`check_allowed` first. Nothing is allowed to begin with; a scope is opened with
+
+- what the user types as a controller, or hands to an environment (`named`), and
+- what the user allows besides: ``--allow`` of a command, ``allow=`` in Python.
+
+A scope ends with its block, in its thread; processes are sent it with their work (`carried`).
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import os
+import re
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, ParamSpec, TypeVar
+
+from poise.envs.config import read_yaml
+from poise.envs.errors import ConfigError
+
+NAME = re.compile(r"(?P<place>[^:\s]+):(?P<name>[A-Za-z_]\w*)")
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Allowance:
+    """What may run: `names` as of `_key`; `source`, the file that is being read, for errors."""
+
+    names: frozenset[str] = frozenset()
+    source: str | None = None
+
+
+NOTHING = Allowance()
+_current: ContextVar[Allowance] = ContextVar("allowance", default=NOTHING)
+
+
+def is_outside(name: Any) -> bool:
+    """Whether a name has the form ``module:Class``."""
+    return isinstance(name, str) and name.isprintable() and NAME.fullmatch(name) is not None
+
+
+def check_allowed(name: str) -> None:
+    """Raise ConfigError, which says how to allow it, unless the user has named ``module:Class``."""
+    allowance = _current.get()
+    if _key(name) not in allowance.names:
+        raise ConfigError(
+            f"wants to run code from outside, {name!r}: if you trust it, allow it by --allow "
+            f"{shlex.quote(name)}, or poise.allowing({name!r}) in Python",
+            source=allowance.source, field="controller",
+        )  # fmt: skip
+
+
+@contextmanager
+def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) -> Iterator[None]:
+    """Inside, these classes may run, besides those that already may; a context.
+
+    Args:
+        names: ``module:Class`` or ``file.py:Class``; a file is the same by any path to it.
+        source: the file that is read inside, which errors then name.
+
+    Raises:
+        ConfigError: a name of another form.
+    """
+    names = [names] if isinstance(names, str) else list(names)
+    for name in names:
+        if not is_outside(name):
+            raise ConfigError(f"{name!r} is not of the form module:Class", field="allow")
+    with _opened(frozenset(map(_key, names)), None if source is None else str(source)):
+        yield
+
+
+def allows(*handed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Makes a function run with what its argument `allow` allows, and what `handed` ones name."""
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(function)
+
+        @functools.wraps(function)
+        def inside(*args: P.args, **kwargs: P.kwargs) -> R:
+            given = signature.bind(*args, **kwargs)
+            given.apply_defaults()
+            values = given.arguments
+            with allowing(values["allow"]), allowing(named(*(values[key] for key in handed))):
+                return function(*args, **kwargs)
+
+        return inside
+
+    return decorate
+
+
+def named(*controllers: Any) -> list[str]:
+    """Names of classes from outside among what a user has typed or handed over as controllers.
+
+    That is ``module:Class``, and what a mapping or a file of ``kind: outside`` names: the mapping
+    or the file itself, not what its `base` says. Of a list, its members are looked at.
+    """
+    found: list[str] = []
+    for controller in controllers:
+        if isinstance(controller, (list, tuple)):
+            found += named(*controller)
+            continue
+        if isinstance(controller, (str, Path)) and not is_outside(controller):
+            controller = _file(Path(controller))
+        if isinstance(controller, Mapping):
+            controller = controller.get("name") if controller.get("kind") == "outside" else None
+        if is_outside(controller):
+            found.append(controller)
+    return found
+
+
+@dataclass(frozen=True)
+class Carried(Generic[R]):
+    """A function that may run what was allowed where it was made; other processes are sent it."""
+
+    function: Callable[..., R]
+    allowance: Allowance
+
+    def __call__(self, *arguments: Any, **options: Any) -> R:
+        with _opened(self.allowance.names, self.allowance.source):
+            return self.function(*arguments, **options)
+
+
+def carried(function: Callable[..., R]) -> Carried[R]:
+    """The function, taking what is allowed here to wherever it is called."""
+    return Carried(function, _current.get())
+
+
+@contextmanager
+def _opened(names: frozenset[str], source: str | None) -> Iterator[None]:
+    before = _current.get()
+    token = _current.set(Allowance(before.names | names, source or before.source))
+    try:
+        yield
+    finally:
+        _current.reset(token)
+
+
+def _file(path: Path) -> Mapping[str, Any] | None:
+    """The fields of a controller's file; of anything else nothing."""
+    is_yaml = path.suffix in (".yaml", ".yml") and os.path.isfile(path)
+    return read_yaml(path) if is_yaml else None
+
+
+def _key(name: str) -> str:
+    """What a name stands for: a file by its whole path, links followed."""
+    place, _, attribute = name.rpartition(":")
+    return f"{Path(place).resolve()}:{attribute}" if place.endswith(".py") else name
