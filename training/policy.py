@@ -11,6 +11,7 @@ import torch
 
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build, packaged, packaged_folder, read_yaml
+from poise.envs.copies import Copyable
 from poise.envs.errors import ConfigError
 from poise.envs.mirror import Mirror
 from poise.envs.robot import Robot, load_robot
@@ -34,7 +35,7 @@ SHIPPED = "residual"
 ACTOR = "mlp_extractor.policy_net."  # SB3's name of the actor's hidden layers
 
 
-class Policy:
+class Policy(Copyable):
     """The mean of a Gaussian actor: a = clip(W₃ tanh(W₂ tanh(W₁ ô + b₁) + b₂) + b₃, −1, 1).
 
     ô = clip((o − mean)/√(var + ε), ±clip) is the normalised observation. `config` is the run's
