@@ -2,13 +2,14 @@
 
 import numpy as np
 
+from poise.envs.copies import Copyable
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .momentum_qp import MomentumQP, MomentumQPConfig
 
 
-class AroundQP:
+class AroundQP(Copyable):
     """Holds the QP in `qp` and tells what it tells: period, CoM offset, failures, root wrench."""
 
     def __init__(self, robot: Robot, qp: MomentumQPConfig):

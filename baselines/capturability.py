@@ -7,6 +7,7 @@ import numpy as np
 
 from poise.envs.arrays import apart
 from poise.envs.block import Block
+from poise.envs.copies import Copyable
 from poise.envs.hull import convex_hull
 from poise.envs.jit import compiled
 from poise.envs.robot import Robot
@@ -172,7 +173,7 @@ def stacked(polygons: list[np.ndarray]) -> np.ndarray:
     return np.array([np.pad(p, ((0, most - len(p)), (0, 0)), "edge") for p in polygons])
 
 
-class Reach:
+class Reach(Copyable):
     """Where soles can put the centre of pressure, with the torques that their ankles have.
 
     Both soles together reach p = λ p_0 + (1 − λ) p_1, p_i what sole i reaches under its share of

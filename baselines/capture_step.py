@@ -148,9 +148,6 @@ class CaptureStep(AroundQP):
         self._tick: CaptureTick | None = None
         self.reset()
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.robot, self.config)  # a copy has memory and addresses of its own
-
     def _planner(self, reach: Reach) -> StepPlanner:
         c = self.config
         return StepPlanner(self.robot, reach, c.limits, c.foothold, c.feedback, c.falls)

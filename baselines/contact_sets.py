@@ -11,6 +11,7 @@ import numpy as np
 
 from poise.envs.arrays import RobotArrays, apart, robot_arrays
 from poise.envs.block import Block, address_of, call
+from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy
 from poise.envs.robot import Robot
@@ -160,7 +161,7 @@ def contact_tick(t: ContactTick):
     solve_contacts(t)
 
 
-class ContactSet:
+class ContactSet(Copyable):
     """Arrays, parameters and scratch for one subset of the soles (its indices, in order)."""
 
     def __init__(
@@ -209,7 +210,7 @@ class ContactSet:
         return self.block
 
 
-class ContactSets:
+class ContactSets(Copyable):
     """Solves the momentum QP for whichever soles are in contact; remembers torques between ticks.
 
     `tick` gives torques; after a call `workspace` holds the solution of the set that was used.

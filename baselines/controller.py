@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from poise.envs.arrays import apart
+from poise.envs.copies import Copyable
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
@@ -14,7 +15,7 @@ from .reduced_qp import TargetArrays
 
 
 @dataclass
-class Targets:
+class Targets(Copyable):
     """References of one tick, world axes; nj = nv−6 joints.
 
     Writing into the arrays changes what the controller sees at its next tick.

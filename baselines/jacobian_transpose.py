@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from poise.envs.arrays import robot_arrays
+from poise.envs.copies import Copyable
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
@@ -30,7 +31,7 @@ class JacobianTransposeConfig:
     posture: PDGains = field(default_factory=lambda: PDGains(leg=0.1, trunk=0.5, damping=0.3))
 
 
-class JacobianTranspose:
+class JacobianTranspose(Copyable):
     """τ = h − J_soleᵀ w + posture PD, w the smallest sole wrenches of the virtual wrench.
 
         F = m g e_z + m (s (c_ref − c) + 2 ζ √s (ċ_ref − ċ))       on the CoM

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from poise.envs.copies import Copyable
 from poise.envs.robot import Robot
 
 
@@ -16,7 +17,7 @@ class LevelPosture(NamedTuple):
     root_axes: np.ndarray  # (3, 3) root orientation
 
 
-class LevelKinematics:
+class LevelKinematics(Copyable):
     """Forward kinematics of joint positions alone: the feet, not the root, say where it is.
 
     `data` holds MuJoCo's kinematics of the last posture, with the root where it stands.

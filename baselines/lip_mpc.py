@@ -1,12 +1,13 @@
 """Receding horizon on the linear inverted pendulum, CoP inside the support polygon [Wieber06]."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import osqp
 from scipy import sparse
 
+from poise.envs.errors import PoiseError
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
@@ -75,12 +76,29 @@ class LIPMPC(Guided):
         """Forget the last trial and its plan."""
         super().reset(state)
         self._tick, self._planned = 0, np.zeros(2)
-        self._solver = osqp.OSQP()  # anew: its step size, too, is of the last trial
+        self._solver = self._new_solver()  # its step size, too, is of the last trial
+        self._used = False
+
+    def _new_solver(self) -> osqp.OSQP:
+        solver = osqp.OSQP()
         # the interval is in iterations, so that the plan does not depend on the clock
-        self._solver.setup(
+        solver.setup(
             P=self._P, q=self._q, A=self._A, l=self._low, u=self._high, verbose=False,
             eps_abs=1e-5, eps_rel=1e-5, max_iter=4000, polishing=False, adaptive_rho_interval=50,
         )  # fmt: skip
+        return solver
+
+    def __getstate__(self) -> dict[str, Any]:
+        if self._used:
+            raise PoiseError(
+                "lip-mpc cannot be copied within an episode, for OSQP does not tell what it "
+                "remembers: copy it after its reset"
+            )
+        return {**super().__getstate__(), "_solver": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._solver = self._new_solver()
 
     def _build(self) -> None:
         n, c = self.config.steps, self.config
@@ -136,6 +154,7 @@ class LIPMPC(Guided):
         start[1] /= self.omega
         self._low[:4] = self._high[:4] = (self.A @ start).ravel()
         self._high[4 * n :] = np.tile(offsets, n)
+        self._used = True
         self._solver.update(Ax=self._values, l=self._low, u=self._high)
         result = self._solver.solve(raise_error=False)
         if result.info.status_val not in (

@@ -1,12 +1,13 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from poise.envs.arrays import apart, robot_arrays
 from poise.envs.block import Block, address_of, call
+from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy
 from poise.envs.robot import Robot
@@ -151,7 +152,7 @@ def momentum_tick(t: Tick):
     accept(a.state, a.parameters, a.workspace, t.memory)
 
 
-class MomentumQP:
+class MomentumQP(Copyable):
     """Tracks a posture, the CoM through linear and the CoP through angular momentum.
 
     `torques` solves the reduced problem of `reduced_qp.py`, whose readable form is
@@ -176,9 +177,6 @@ class MomentumQP:
         self._motor_joints = self.arrays.motor_dofs - 6
         self._assembly: Assembly | None = None
         self._tick: Tick | None = None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.robot, self.config)  # a copy has memory and addresses of its own
 
     @property
     def failures(self) -> int:

@@ -12,6 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from poise.envs.config import build, read_yaml, resolve
+from poise.envs.copies import Copyable
 from poise.envs.description import match_names
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
@@ -85,7 +86,7 @@ class MotionSample(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class ReferenceMotion:
+class ReferenceMotion(Copyable):
     """A motion of one robot, C² in time, as a table of cubic polynomials.
 
     Columns of `coeffs` (k, 4, nj+6): joint positions, CoM offset (3), root rotation φ (3); see

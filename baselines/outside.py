@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from poise.envs.copies import Copyable
 from poise.envs.errors import ConfigError, PoiseError
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
@@ -81,7 +82,7 @@ def make_outside(name: str, robot: Robot, arguments: dict[str, Any] | None = Non
         ) from error
 
 
-class OutsideController:
+class OutsideController(Copyable):
     """A controller from outside, whose torques are checked before they act.
 
     A wrong shape or a number that is not finite is an error: MuJoCo would act on zeros instead.
@@ -104,9 +105,12 @@ class OutsideController:
                               source=config.name, field="period")  # fmt: skip
 
     def __getattr__(self, name: str) -> Any:  # failures, root_wrench, com_offset
-        if name == "inner":
+        if name == "inner" or name.startswith("__"):  # a copy in the making has none yet
             raise AttributeError(name)
         return getattr(self.inner, name)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _blank, (type(self), self.config.name), self.__getstate__()
 
     def reset(self, state: RobotState) -> None:
         """Forget everything; a new trial starts at `state`."""
@@ -121,6 +125,12 @@ class OutsideController:
         if not np.all(np.isfinite(tau)):
             raise PoiseError(f"{self.config.name}: torques are not finite")
         return tau
+
+
+def _blank(kind: type[OutsideController], name: str) -> OutsideController:
+    """A controller still without anything, once its module is there to find its class in."""
+    find_outside(name)
+    return kind.__new__(kind)
 
 
 def _module(place: str) -> ModuleType:

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from poise.envs.arrays import RobotArrays, robot_arrays
+from poise.envs.copies import Copyable
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
@@ -51,7 +52,7 @@ def holding_torques(state: RobotState) -> np.ndarray:
     return joint_torques(state, sole_wrenches(state, state.A_bias))
 
 
-class PD:
+class PD(Copyable):
     """τ = τ_hold + K (q_ref − q) + D (v_ref − v), clipped to the motors' limits."""
 
     def __init__(self, robot: Robot, config: PDConfig | None = None):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from poise.envs.balance import BalanceEnv
+from poise.envs.copies import Copyable
 from poise.envs.episode import judge_step, record_tick
 from poise.envs.robot import Robot
 from poise.envs.sensed import SensedSimulation
@@ -20,7 +21,7 @@ from .residual_balance import ResidualBalanceEnv
 from .residual_step_env import ResidualStepEnv
 
 
-class SensingController:
+class SensingController(Copyable):
     """Hands the believed state to a controller, whatever state it is called with."""
 
     def __init__(self, controller: Any):
@@ -28,6 +29,8 @@ class SensingController:
         self.simulation: SensedSimulation | None = None
 
     def __getattr__(self, name: str) -> Any:  # failures, root_wrench, com_offset, robot, ...
+        if name == "inner" or name.startswith("__"):  # a copy in the making has none yet
+            raise AttributeError(name)
         return getattr(self.inner, name)
 
     def _believed(self) -> RobotState:

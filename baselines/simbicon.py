@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from poise.envs.arrays import robot_arrays
+from poise.envs.copies import Copyable
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
@@ -68,7 +69,7 @@ class SimbiconConfig:
     joints: PDGains = field(default_factory=PDGains)  # of waist and arms
 
 
-class Simbicon:
+class Simbicon(Copyable):
     """Marks time: left and right foot in turn, each lifted for a time, then lowered to the ground.
 
     Four states, two for each foot [Yin07; Notes, lecture 11]. In each

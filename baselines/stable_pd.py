@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from poise.envs.arrays import robot_arrays
+from poise.envs.copies import Copyable
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
@@ -26,7 +27,7 @@ class StablePDConfig:
     feedforward: bool = True
 
 
-class StablePD:
+class StablePD(Copyable):
     """τ = τ_hold + K (q_ref − q − Δt v) + D (v_ref − v − Δt v̇), soles at rest.
 
     v̇ solves, with K and D on the joints only,

@@ -8,6 +8,7 @@ import numpy as np
 
 from poise.envs.arrays import apart
 from poise.envs.block import address_of
+from poise.envs.copies import Copyable
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
@@ -67,7 +68,7 @@ class Plan(NamedTuple):
     shift: float = 0.0  # of the time, by a policy [s]
 
 
-class StepPlanner:
+class StepPlanner(Copyable):
     """Weighs steps of both feet, of several durations, by what of the fall they leave.
 
     A subclass may have another `law`; limits and choice count as they are at the first search.

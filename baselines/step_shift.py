@@ -10,6 +10,7 @@ import numpy as np
 
 from poise.envs.arrays import apart
 from poise.envs.block import Block
+from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
 
@@ -38,7 +39,7 @@ def _pair(first: int, doc: str) -> property:
     return property(get, put, doc=doc)
 
 
-class StepShift:
+class StepShift(Copyable):
     """Added to a stepping controller's own choices; axes of the step's heading. Zero: nothing."""
 
     com = _pair(COM, "(2,) where the capture point is to rest [m]")

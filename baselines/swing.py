@@ -6,6 +6,7 @@ import numpy as np
 
 from poise.envs.arrays import RobotArrays, apart
 from poise.envs.block import Block
+from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import copy
 from poise.envs.state import RobotState
@@ -116,7 +117,7 @@ def advance_swing(w: SwingArrays, dt: float):
     w.time[0] += dt
 
 
-class Swing:
+class Swing(Copyable):
     """Reference of one swing foot, planned anew each tick from its own last value: C² always.
 
     Vertically it rises to the clearance in `lift` of the time, then comes down and, where the

@@ -1,16 +1,18 @@
 """What compiled code sees of a robot and of one simulation: blocks of arrays.
 
-`RobotArrays` is constant and shared; `Plant` holds views into one `MjData`, so a kernel reads
-and writes the simulation itself. Whoever holds a `Plant` must keep its `MjData` alive.
+`RobotArrays` is constant and shared; `Plant` holds views into one `MjData`, which it keeps alive,
+so a kernel reads and writes the simulation itself.
 """
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from .block import Block
+from .copies import portable
 from .robot import Robot
 
 GAP = 64  # 512 bytes: more than a vector loop handles at once
@@ -83,6 +85,13 @@ class Plant(Block):
     sensordata: np.ndarray
     warnings: np.ndarray  # (13,) int: each second one counts a kind of `mujoco.mjtWarning`
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        data = self.data  # type: ignore[attr-defined]
+        return plant_views, (portable(data.model), portable(data))
+
+    def __copy__(self) -> "Plant":
+        return self  # views can be of this data only
+
 
 MAX_VERTICES = 8
 
@@ -132,7 +141,9 @@ def plant_views(model: mujoco.MjModel, data: mujoco.MjData) -> Plant:
     views = {field.name: getattr(data, field.name) for field in fields(Plant)[2:-1]}
     counts = data.warning.number  # with something else between any two
     every = as_strided(counts, (2 * len(counts) - 1,), (counts.strides[0] // 2,))
-    return Plant(model._address, data._address, **views, warnings=every)
+    plant = Plant(model._address, data._address, **views, warnings=every)
+    object.__setattr__(plant, "data", data)
+    return plant
 
 
 def _chain(model: mujoco.MjModel, body: int) -> list[int]:

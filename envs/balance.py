@@ -10,6 +10,7 @@ from gymnasium import spaces
 
 from .arrays import RobotArrays
 from .compiled_steps import CompiledStep
+from .copies import Copyable
 from .env_config import EnvConfig as EnvConfig
 from .env_config import env_config
 from .episode import (
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 RESET_OPTIONS = ("push", "noise", "qpos", "qvel")
 
 
-class BalanceEnv(gymnasium.Env):
+class BalanceEnv(Copyable, gymnasium.Env):
     """Base of `ResidualBalanceEnv` and `TorqueBalanceEnv`: subclasses say what an action does."""
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
@@ -84,6 +85,11 @@ class BalanceEnv(gymnasium.Env):
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
         self._described: tuple[Any, list[dict[str, Any]]] = None, []  # pushes, their infos
         self._renderer: SceneRenderer | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        if self._renderer is not None and self._renderer.viewer is not None:
+            raise PoiseError("an environment whose window is open cannot be copied: close() first")
+        return {**super().__getstate__(), "_renderer": None}  # the copy draws with one of its own
 
     @property
     def steps(self) -> int:
@@ -338,7 +344,7 @@ class BalanceEnv(gymnasium.Env):
             self._renderer = None
 
 
-class InfoColumns:
+class InfoColumns(Copyable):
     """What `BalanceEnv.info` says of each of `envs`, one array for each key.
 
     `record` holds their rows. The lists of pushes are the same ones until the next episode.

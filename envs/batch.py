@@ -13,6 +13,7 @@ import numpy as np
 from .arrays import apart
 from .balance import BalanceEnv
 from .compiled_steps import NOTHING, CompiledStep, Turns
+from .copies import Copyable
 from .episode import FALLEN, EpisodeArrays
 from .errors import ConfigError
 from .helpers import Helpers
@@ -28,7 +29,7 @@ def replicate(env: BalanceEnv, count: int) -> list[BalanceEnv]:
     return [env, *(type(env)(**env.arguments()) for _ in range(count - 1))]
 
 
-class EnvBatch:
+class EnvBatch(Copyable):
     """`len(envs)` environments of one kind; what they report lies in arrays, one row for each.
 
     These arrays are new ones with every call: whoever holds them keeps what they were.
@@ -64,6 +65,9 @@ class EnvBatch:
         self._helpers = Helpers()
         self._nothing = Turns(NOTHING, self.threads)
         self._turns: tuple[list[CompiledStep], Turns] = [], self._nothing  # of those steps
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**super().__getstate__(), "_turns": ([], self._nothing)}  # they hold addresses
 
     @property
     def ended(self) -> np.ndarray:

@@ -5,6 +5,8 @@ compiles all of them. A `Block` is handed over as a pointer: its arrays' address
 its numbers, lie one after the other in memory, and only what a function uses is read.
 """
 
+import importlib
+import sys
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -23,6 +25,9 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
+
+from .copies import portable
+from .errors import PoiseError
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +65,10 @@ class Block:
         return tuple(getattr(self, field.name) for field in fields(self))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), self.members()  # addresses are not copied
+        return type(self), tuple(portable(member) for member in self.members())
+
+    def __copy__(self) -> Any:
+        return type(self)(*self.members())
 
 
 def _words(value: Any) -> tuple[types.Type, list[int]]:
@@ -175,16 +183,49 @@ class Erased(Block):
         object.__setattr__(self, "_type", BlockType("Erased", ()))
 
 
-def address_of(kernel: Any, block: Block) -> int:
+class Address(int):
+    """Where the function `kernel` lies, compiled for blocks of the type `kind`.
+
+    In another process it lies elsewhere: what is pickled is its name, and the type.
+    """
+
+    kernel: Any
+    kind: BlockType
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Address":
+        return self
+
+    def __copy__(self) -> "Address":
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        function = self.kernel.py_func
+        module, name = function.__module__, function.__qualname__
+        if getattr(sys.modules.get(module), name, None) is not self.kernel:
+            raise PoiseError(f"cannot be pickled: {name!r} is no compiled function of {module!r}")
+        return _address, (module, name, self.kind)
+
+
+def _address(module: str, name: str, kind: BlockType) -> Address:
+    """The address of a module's function, in this process."""
+    return _compiled(getattr(importlib.import_module(module), name), kind)
+
+
+def _compiled(kernel: Any, kind: BlockType) -> Address:
+    kernel.compile((kind,))
+    result = kernel.overloads[kind,]
+    address = Address(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+    address.kernel, address.kind = kernel, kind
+    return address
+
+
+def address_of(kernel: Any, block: Block) -> Address:
     """The address of the compiled function `kernel(block)`, which returns nothing, for `call`.
 
     A function called by its address is compiled apart from its caller: neither waits for the
     other, and it is not optimised once more within all that it is called from.
     """
-    arguments = (block.numba_type,)
-    kernel.compile(arguments)
-    result = kernel.overloads[arguments]
-    return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+    return _compiled(kernel, block.numba_type)
 
 
 @intrinsic

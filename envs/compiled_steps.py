@@ -9,7 +9,8 @@ from numba.core import types
 from numba.extending import intrinsic
 
 from .block import Block, call
-from .helpers import Helpers
+from .errors import PoiseError
+from .helpers import Helpers, tell_of_fork
 from .jit import compiled
 
 SPLIT = 1  # steps for each thread that are shared out tick by tick at the end
@@ -30,7 +31,7 @@ class CompiledStep(NamedTuple):
 
     def row(self) -> tuple[int, int, int]:
         """What `play` reads."""
-        return self.kernel, self.block.address, self.ticks
+        return int(self.kernel), self.block.address, self.ticks
 
     def play(self) -> None:
         """Take the step."""
@@ -100,6 +101,17 @@ class Turns:
         # of each helper, in a line of its own: AWAY, WAITING or CALLED; 1 once it has played
         self.calls = np.zeros(LINE * threads, dtype=np.int64)
         self.played = np.zeros(LINE * threads, dtype=np.int64)
+        tell_of_fork(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if len(self.steps):
+            raise PoiseError("turns hold addresses: copy the environments that they are of")
+        return Turns, (NOTHING, len(self.turns))
+
+    def forget_threads(self) -> None:
+        """Nobody plays or waits: those who did are threads of another process."""
+        self.calls[:] = AWAY
+        self.taken[:] = 0
 
     def begin(self) -> None:
         """All are to be played, once more."""

@@ -1,5 +1,6 @@
 """Threads that wait for work, without the futures and locks of an executor."""
 
+import os
 import threading
 import weakref
 from collections.abc import Callable
@@ -8,14 +9,42 @@ from typing import Any
 
 from .errors import PoiseError
 
+_watchers: weakref.WeakSet[Any] = weakref.WeakSet()
+
+
+def tell_of_fork(watcher: Any) -> None:
+    """Have `watcher.forget_threads()` called in a forked process: it has none but its own."""
+    _watchers.add(watcher)
+
+
+def _forget() -> None:
+    for watcher in list(_watchers):
+        watcher.forget_threads()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(after_in_child=_forget)
+
 
 class Helpers:
-    """Threads that share some work with the one that asks for it; they start when first asked."""
+    """Threads that share some work with the one that asks for it; they start when first asked.
+
+    A copy, and what a forked process has of it, starts threads of its own.
+    """
 
     def __init__(self) -> None:
         self._calls: list[SimpleQueue[Any]] = []
         self._threads: list[threading.Thread] = []
         self._end = weakref.finalize(self, _end, self._calls)
+        tell_of_fork(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Helpers, ()
+
+    def forget_threads(self) -> None:
+        """As if none had been asked: they are threads of another process."""
+        self._calls.clear()
+        self._threads.clear()
 
     def share(self, work: Callable[[int], None], helpers: int) -> None:
         """`work(0)` in this thread, `work(1)`, `work(2)`… in some helpers; returns when all have.
@@ -56,9 +85,9 @@ class Helpers:
         self._calls[helper - 1].put((work, helper, done))
 
     def expect_alive(self) -> None:
-        """Raises PoiseError if a helper has died, as in a process that was forked."""
+        """Raises PoiseError if a helper has died."""
         if not all(thread.is_alive() for thread in self._threads):
-            raise PoiseError("a thread has ended: environments do not survive a fork")
+            raise PoiseError("a thread has ended that was to help")
 
     def close(self) -> None:
         """End the threads."""

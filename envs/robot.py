@@ -11,6 +11,7 @@ import numpy as np
 
 from .actuators import install_motors
 from .config import build, read_yaml, resolve
+from .copies import Copyable
 from .description import RobotDescription
 from .errors import ConfigError
 from .ground import (
@@ -38,7 +39,7 @@ DYNAMICS = (  # arrays of the model that its motion depends on
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(Copyable):
     """A biped and what does not change while it moves.
 
     Every actuator of ``model`` is a torque motor on one joint: ``data.ctrl`` is the joint torque in

@@ -8,6 +8,7 @@ import numpy as np
 
 from .arrays import Plant, RobotArrays, apart, plant_views, robot_arrays
 from .block import Block
+from .copies import Copyable
 from .jit import compiled
 from .kinematics import StateArrays, allocate_state, update_state
 from .native import mj_step1, mj_step2
@@ -53,7 +54,7 @@ def advance_world(world: World):
     update_state(world.robot, world.plant, world.state)
 
 
-class Simulation:
+class Simulation(Copyable):
     """A robot on flat ground. `state` is current after `reset` and after every `step`."""
 
     def __init__(self, robot: Robot):

@@ -3,10 +3,11 @@
 import numpy as np
 
 from .arrays import RobotArrays
+from .copies import Copyable
 from .kinematics import StateArrays, support_distance, update_support
 
 
-class RobotState:
+class RobotState(Copyable):
     """Every kinematic and centroidal quantity of one tick; read-only views, world axes.
 
     The arrays are those of a running `Simulation` and change when it moves on; `copy()` keeps

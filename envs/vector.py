@@ -12,6 +12,7 @@ from gymnasium.vector.utils import batch_space
 
 from .balance import BalanceEnv, InfoColumns
 from .batch import EnvBatch, replicate
+from .copies import Copyable
 from .errors import ConfigError
 
 try:
@@ -26,7 +27,7 @@ except ImportError:  # Gymnasium 1.0, which knows the first mode only
         DISABLED = "Disabled"
 
 
-class BalanceVectorEnv(VectorEnv):
+class BalanceVectorEnv(Copyable, VectorEnv):
     """`len(envs)` environments of one kind, stepped by `threads` threads.
 
     Row i of every array, and every `info`, is what `gymnasium.vector.SyncVectorEnv` would give of

@@ -10,6 +10,7 @@ import numpy as np
 from poise.baselines.allowance import allowing, carried
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build, packaged, packaged_folder, read_yaml
+from poise.envs.copies import Copyable
 from poise.envs.errors import ConfigError
 from poise.envs.mirror import Mirror
 from poise.envs.reading import is_file, is_folder, parsing
@@ -32,7 +33,7 @@ SHIPPED = "residual"
 ACTOR = "mlp_extractor.policy_net."  # SB3's name of the actor's hidden layers
 
 
-class Policy:
+class Policy(Copyable):
     """The mean of a Gaussian actor: a = clip(W₃ tanh(W₂ tanh(W₁ ô + b₁) + b₂) + b₃, −1, 1).
 
     ô = clip((o − mean)/√(var + ε), ±clip) is the normalised observation. `config` is the run's

@@ -8,9 +8,10 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from poise.envs.balance import BalanceEnv
 from poise.envs.batch import EnvBatch
+from poise.envs.copies import Copyable
 
 
-class ThreadedVecEnv(VecEnv):
+class ThreadedVecEnv(Copyable, VecEnv):
     """An `EnvBatch` as SB3 sees it; the same bits for any number of threads.
 
     At an episode's end `infos[i]` holds "episode" (return r, length l), "is_success",

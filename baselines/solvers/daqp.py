@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import Any
 
 import daqp
 import numpy as np
 
-from .problem import QP, Solution, Status, failed, refusal
+from .problem import QP, Solution, Status, failed, refusal, uncopyable
 
 EQUALITY = 5  # DAQP's `sense` of a row
 STATUS = {  # of its exit flags; what is not here is a breakdown
@@ -38,6 +39,11 @@ class DAQPSolver:
     def __init__(self, options: DAQPOptions | None = None):
         self.options = options or DAQPOptions()
         self.reset()
+
+    def __getstate__(self) -> dict[str, Any]:
+        if self._model is not None and self.options.warm_start:
+            raise uncopyable("daqp")
+        return {**vars(self), "_model": None, "_data": ()}
 
     def reset(self) -> None:
         """Forget the active set."""

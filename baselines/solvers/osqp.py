@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 import osqp
 from scipy import sparse
 from scipy.linalg import solve_triangular
 
-from .problem import QP, Solution, Status, failed, refusal, residuals
+from .problem import QP, Solution, Status, failed, refusal, residuals, uncopyable
 
 STATUS = {  # of OSQP's status_val; what is not here is a breakdown
     osqp.SolverStatus.OSQP_SOLVED: Status.SOLVED,
@@ -53,6 +54,11 @@ class OSQPSolver:
     def __init__(self, options: OSQPOptions | None = None):
         self.options = options or OSQPOptions()
         self.reset()
+
+    def __getstate__(self) -> dict[str, Any]:
+        if self._solver is not None:
+            raise uncopyable("osqp")
+        return vars(self).copy()
 
     def reset(self) -> None:
         """Forget the workspace: the last solution and the step size."""

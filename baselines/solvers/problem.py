@@ -9,6 +9,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from poise.envs.errors import PoiseError
+
 
 @dataclass(frozen=True, eq=False)
 class QP:
@@ -99,6 +101,14 @@ def failed(qp: QP, status: Status, start: float, iterations: int = 0) -> Solutio
     """No solution: x and lam are NaN. `start` is the `time.perf_counter` of the beginning."""
     x, lam = np.full(len(qp.g), np.nan), np.full(len(qp.l), np.nan)
     return Solution(x, lam, status, iterations, time.perf_counter() - start)
+
+
+def uncopyable(name: str) -> PoiseError:
+    """Why a library's solver cannot be copied between its problems."""
+    return PoiseError(
+        f"solver {name!r} cannot be copied within an episode, for its library does not tell what "
+        "it remembers: copy after the reset"
+    )
 
 
 def refusal(qp: QP) -> Status | None:
