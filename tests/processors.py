@@ -1,6 +1,6 @@
 """The suite as other processors would run it: `make test-processors`.
 
-    python -m tests.processors [--repeat 3] [--only NAME] [--workers 2] [--folder FOLDER] [PYTEST_ARGS]
+    python -m tests.processors [--repeat 3] [--only NAME] [--folder FOLDER] [PYTEST_ARGS]
 
 What a processor decides is set apart: whom Numba compiles for, OpenBLAS's kernels, the SIMD of
 NumPy and torch, whether the C library's sines are fused, threads, `fastmath`. Every setting has a
