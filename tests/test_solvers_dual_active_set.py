@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 
 from poise.baselines.solvers import QP
 from poise.baselines.solvers.dual_active_set import (
+    CONSISTENT,
     INFEASIBLE,
     INVALID,
     ITERATION_LIMIT,
@@ -279,7 +280,10 @@ def test_a_warm_start_changes_nothing_but_the_way(kind):
         rng = np.random.default_rng(seed)
         n, m = int(rng.integers(1, 25)), int(rng.integers(1, 80))
         qp = random_qp(rng, kind, n, m)
-        status, x, _, _, _ = run(qp)
+        status, x, _, _, active = run(qp)
+        # rows are held to CONSISTENT; a gradient whose sums of k products are rounded moves x by
+        # 2ku cond(H), see `rounding`: 1e-6 for "stiff", where adding in another order shows
+        close = CONSISTENT + 2 * (n + len(active)) * 2.0**-53 * np.linalg.cond(qp.H)
         iscratch = rng.integers(-2, m + 2, iscratch_size(n, m))
         iscratch[1] = rng.integers(-1, n + 2)
         for _ in range(3):  # at random first, then from its own solution
@@ -287,7 +291,7 @@ def test_a_warm_start_changes_nothing_but_the_way(kind):
             assert warm_status == status, seed
             if status == SOLVED:
                 assert optimality(qp, x_warm, lam_warm) < 1e-9, seed
-                np.testing.assert_allclose(x_warm, x, rtol=0, atol=1e-9 * (1e-9 + abs(x).max()))
+                np.testing.assert_allclose(x_warm, x, rtol=0, atol=close * (1e-9 + abs(x).max()))
 
 
 def test_a_warm_start_saves_iterations():
