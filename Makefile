@@ -3,6 +3,7 @@
 # make check   format, lint and types       make format  put the format and imports right
 # make build   the wheel, tried alone       make bench   time the parts of a control tick
 # make clean   remove what was built (not .venv)
+# make test-processors   the tests as other processors would run them, three times each: an hour
 #
 # PYTHON311 names another interpreter; PIP_ARGS and PYTEST_ARGS are passed on, as in
 # make test PYTEST_ARGS="-x tests/test_robot.py".
@@ -13,7 +14,7 @@ PYTEST_ARGS ?=
 PYTHON := .venv/bin/python
 STAMP := .venv/.poise-setup
 
-.PHONY: setup test demo check format build bench clean types-tree
+.PHONY: setup test test-processors demo check format build bench clean types-tree
 
 setup: $(STAMP)
 
@@ -25,6 +26,9 @@ $(STAMP): pyproject.toml setup.py constraints.txt
 
 test: setup
 	$(PYTHON) -m pytest -q $(PYTEST_ARGS)
+
+test-processors: setup
+	$(PYTHON) -m tests.processors --repeat 3 $(PYTEST_ARGS)
 
 demo: setup
 	.venv/bin/poise demo

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from poise.envs import jit
 from poise.envs.config import write_atomic
 from poise.envs.errors import PoiseError
+from poise.envs.kernel_cache import stamp
 
-_READY = jit.CACHE_STAMP.with_name("kernels.ready")  # the digest of the sources, then shares
+_READY = "kernels.ready"  # beside the kernels: the digest of the sources, then shares
 _SHARES = ("assembly", "solver", "steps")  # of `compilation.py`, one process for each
 _compiling = False  # whether this is one of them
 _tried: set[str] = set()  # shares that this process has had compiled, or could not have
@@ -24,12 +25,13 @@ def prepare(*further: str) -> None:
 
     `further` shares of `compilation.py` follow, for ten more; they use the kernels of the first.
     """
-    if _compiling:
+    if _compiling or jit.CACHE is None:
         return
+    ready = jit.CACHE / _READY
     try:
-        sources = jit.CACHE_STAMP.read_text()
+        sources = stamp(jit.CACHE).read_text()
         for shares in (_SHARES, further):
-            digest, *done = _READY.read_text().split() if _READY.is_file() else [""]
+            digest, *done = ready.read_text().split() if ready.is_file() else [""]
             done = done if digest == sources else []
             missing = [share for share in shares if share not in done and share not in _tried]
             if not missing:
@@ -38,7 +40,7 @@ def prepare(*further: str) -> None:
             jit.tell()
             if not _compile_apart(missing):
                 return
-            write_atomic(_READY, "\n".join([sources, *done, *missing]))
+            write_atomic(ready, "\n".join([sources, *done, *missing]))
     except (OSError, PoiseError):
         return  # a folder that cannot be written has no cache: nothing to share
 

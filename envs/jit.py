@@ -1,23 +1,56 @@
-"""The one Numba decorator of this package, and a cache that notices changed sources."""
+"""The one Numba decorator of this package, and what a user sees when it compiles."""
 
-import contextlib
-import hashlib
+import os
 import sys
 import time
-from pathlib import Path
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numba
 from numba.core import event
 
-#: Cached on disk, without the GIL, NumPy's rules for division by zero. Sums may be reordered
-#: (SIMD), but NaN and infinity keep their meaning: checks rely on them.
-compiled = numba.njit(
-    cache=True,
-    nogil=True,
-    no_cfunc_wrapper=True,  # of which nobody makes use; a twentieth of the compilation
-    error_model="numpy",
-    fastmath={"contract", "reassoc", "nsz", "arcp"},
-)
+from .errors import ConfigError
+from .kernel_cache import drop_stale_kernels, kept_in, kernel_folder
+
+#: Sums may be reordered (SIMD) and products fused into them, but NaN and infinity keep their
+#: meaning: checks rely on them.
+FAST = ("arcp", "contract", "nsz", "reassoc")
+
+
+def fastmath(environment: Mapping[str, str]) -> set[str]:
+    """LLVM's flags for floating-point numbers: none if `POISE_FASTMATH` is 0.
+
+    Then every operation is rounded as the sources write it, as IEEE 754 has it. That is slower, and
+    makes kernels of different processors agree to the bit, up to sines and the like.
+
+    Raises:
+        ConfigError: it is neither 0 nor 1.
+    """
+    switch = environment.get("POISE_FASTMATH", "1")
+    if switch not in ("0", "1"):
+        raise ConfigError(f"not a switch: {switch!r}", source="the environment",
+                          field="POISE_FASTMATH", choices=("0", "1"))  # fmt: skip
+    return set(FAST) if switch == "1" else set()
+
+
+_FLAGS = fastmath(os.environ)
+#: Of the cache of compiled kernels; None where nothing can be written.
+CACHE = kernel_folder(sorted(_FLAGS))
+if CACHE is not None:
+    drop_stale_kernels(CACHE)
+
+
+def compiled(function: Callable) -> Any:
+    """Numba's decorator: cached on disk, without the GIL, NumPy's rules for division by zero."""
+    with kept_in(CACHE):
+        return numba.njit(
+            cache=CACHE is not None,
+            nogil=True,
+            no_cfunc_wrapper=True,  # of which nobody makes use; a twentieth of the compilation
+            error_model="numpy",
+            fastmath=_FLAGS,
+        )(function)
+
 
 PATIENCE = 1.0  # [s] of compilation before the user is told
 MESSAGE = "poise: compiling for the first use; this takes twenty to thirty seconds, once"
@@ -61,34 +94,3 @@ def tell() -> None:
 def quiet() -> None:
     """No message from this process: the one that started it has told."""
     _patience.told = True
-
-
-_ROOM = Path(__file__).resolve().parent
-#: Holds the digest of the sources that the cached kernels were compiled from.
-CACHE_STAMP = _ROOM / "__pycache__" / "kernels.sha256"
-
-
-def drop_stale_kernels(packages: list[Path]) -> bool:
-    """Delete compiled kernels that sources of `packages` have outdated; True if any were.
-
-    Numba looks only at the file of the cached function itself, not at the functions that were
-    compiled into it from other files: after an update it would run the old code.
-    """
-    digest = hashlib.sha256(numba.__version__.encode())
-    for package in packages:
-        for path in sorted(package.rglob("*.py")):
-            digest.update(path.read_bytes())
-    stamp = packages[0] / "__pycache__" / CACHE_STAMP.name
-    with contextlib.suppress(OSError):
-        if stamp.is_file() and stamp.read_text() == digest.hexdigest():
-            return False
-        for package in packages:
-            for pattern in ("*.nbi", "*.nbc"):
-                for path in package.rglob(pattern):
-                    path.unlink(missing_ok=True)
-        stamp.parent.mkdir(exist_ok=True)
-        stamp.write_text(digest.hexdigest())
-    return True
-
-
-drop_stale_kernels([_ROOM, _ROOM.parent / "baselines"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from poise.baselines.solvers import QP
+from poise.baselines.solvers.dual_active_set import FEASIBLE
 
 #: Kinds of `random_qp`; all but "crossed" are feasible.
 KINDS = ("plain", "scaled", "stiff", "degenerate", "integer", "repeated", "equalities", "crossed")
@@ -28,6 +29,26 @@ def solved_qp(
         lam[i] = rng.normal() * 3
         (upper if lam[i] > 0 else lower)[i] = C[i] @ x
     return QP(H, -H @ x - C.T @ lam, C, lower, upper), x, lam
+
+
+def rounding(qp: QP, x: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far from the solution rounding may move x (n,) and lam (m,), on any processor.
+
+    With K = [H Cᵀ; C 0] of the q active rows and z = (x, lam), a residual of at most r moves z by
+    at most |K⁻¹| r, entry by entry [Higham02 §7.2]. Sums of k = n + q products leave r = ku |K||z|
+    with u = 2⁻⁵³, in whatever order they are taken, fused or not: once where the problem is made
+    from z, once where the solver takes its last step with the true residual. Beside it the solver
+    holds its rows to 0.01 FEASIBLE ‖x‖, each in units of its norm.
+    """
+    active, n = np.flatnonzero(lam), len(x)
+    C, k = qp.C[active], n + len(active)
+    K = np.zeros((k, k))
+    K[:n, :n], K[:n, n:], K[n:, :n] = qp.H, C.T, C
+    residual = 2.0 * k * 2.0**-53 * np.abs(K) @ np.abs(np.append(x, lam[active]))
+    residual[n:] += 0.01 * FEASIBLE * np.linalg.norm(x) * np.linalg.norm(C, axis=1)
+    moved, of_lam = np.abs(np.linalg.inv(K)) @ residual, np.zeros(len(lam))
+    of_lam[active] = moved[n:]
+    return moved[:n], of_lam
 
 
 def random_qp(rng: np.random.Generator, kind: str, n: int, m: int) -> QP:

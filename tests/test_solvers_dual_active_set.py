@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 
 from poise.baselines.solvers import QP
 from poise.baselines.solvers.dual_active_set import (
+    CONSISTENT,
     INFEASIBLE,
     INVALID,
     ITERATION_LIMIT,
@@ -18,7 +19,7 @@ from poise.baselines.solvers.dual_active_set import (
     solve_dual,
 )
 
-from .qp_problems import KINDS, random_qp, solved_qp
+from .qp_problems import KINDS, random_qp, rounding, solved_qp
 
 
 def run(qp: QP, max_iter: int = 1000, offset: int = 0):
@@ -73,15 +74,24 @@ def test_solutions_are_optimal_and_infeasibility_is_true(kind):
     assert (30 < refused < 120) == (kind == "crossed")
 
 
+def assert_close(qp: QP, found, expected, computed: int = 1):
+    """(x, lam) differ by no more than rounding accounts for; `computed`: how many of both are."""
+    for one, other, bound in zip(found, expected, rounding(qp, *expected), strict=True):
+        assert (np.abs(one - other) <= computed * bound).all(), (one - other, bound)
+
+
 def test_known_solutions_are_found():
-    """Where the solution is known by construction, x and lam are it, to 1e-10."""
+    """Where the solution is known by construction, x and lam are it, up to rounding.
+
+    With as many active rows as variables K has a condition number of up to 3e9, and multipliers
+    move by 1e-8 where a processor adds in another order.
+    """
     for seed in range(100):
         rng = np.random.default_rng(seed)
         qp, x, lam = solved_qp(rng, active=int(rng.integers(0, 22)))
         status, x_found, lam_found, _, _ = run(qp)
         assert status == SOLVED
-        np.testing.assert_allclose(x_found, x, rtol=0, atol=1e-10)
-        np.testing.assert_allclose(lam_found, lam, rtol=0, atol=1e-8)
+        assert_close(qp, (x_found, lam_found), (x, lam))
 
 
 def test_quadprog_agrees():
@@ -270,7 +280,10 @@ def test_a_warm_start_changes_nothing_but_the_way(kind):
         rng = np.random.default_rng(seed)
         n, m = int(rng.integers(1, 25)), int(rng.integers(1, 80))
         qp = random_qp(rng, kind, n, m)
-        status, x, _, _, _ = run(qp)
+        status, x, _, _, active = run(qp)
+        # rows are held to CONSISTENT; a gradient whose sums of k products are rounded moves x by
+        # 2ku cond(H), see `rounding`: 1e-6 for "stiff", where adding in another order shows
+        close = CONSISTENT + 2 * (n + len(active)) * 2.0**-53 * np.linalg.cond(qp.H)
         iscratch = rng.integers(-2, m + 2, iscratch_size(n, m))
         iscratch[1] = rng.integers(-1, n + 2)
         for _ in range(3):  # at random first, then from its own solution
@@ -278,7 +291,7 @@ def test_a_warm_start_changes_nothing_but_the_way(kind):
             assert warm_status == status, seed
             if status == SOLVED:
                 assert optimality(qp, x_warm, lam_warm) < 1e-9, seed
-                np.testing.assert_allclose(x_warm, x, rtol=0, atol=1e-9 * (1e-9 + abs(x).max()))
+                np.testing.assert_allclose(x_warm, x, rtol=0, atol=close * (1e-9 + abs(x).max()))
 
 
 def test_a_warm_start_saves_iterations():
