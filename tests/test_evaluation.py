@@ -15,8 +15,8 @@ from rich.console import Console
 
 from poise.envs.errors import ConfigError, PoiseError
 from poise.training import demo, evaluation
+from poise.training.backends import Crew
 from poise.training.evaluation import evaluate, measured_limits
-from poise.training.workers import Workers
 
 from .evaluations import ENVELOPE, RANDOM, InProcess, write_suite
 
@@ -26,7 +26,7 @@ BOTH = ("momentum-qp", "zero")
 @pytest.fixture
 def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcess]:
     """Trials are played in this process."""
-    monkeypatch.setattr(evaluation, "Workers", InProcess)
+    monkeypatch.setattr(evaluation, "Crew", InProcess)
     InProcess.played, InProcess.stop_after = 0, None
     return InProcess
 
@@ -42,7 +42,7 @@ def test_results_do_not_depend_on_the_number_of_workers(
     """trials.csv has the same bytes from two processes and from one, in whatever order."""
     suite = write_suite(tmp_path, RANDOM)
     evaluate(BOTH, suite, out=tmp_path / "one", seed=3)
-    monkeypatch.setattr(evaluation, "Workers", Workers)
+    monkeypatch.setattr(evaluation, "Crew", Crew)
     evaluate(BOTH, suite, out=tmp_path / "two", seed=3, workers=2)
     one, two = ((tmp_path / name / "trials.csv").read_bytes() for name in ("one", "two"))
     assert one == two
