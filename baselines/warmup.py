@@ -45,9 +45,9 @@ def prepare(*further: str) -> None:
 
 # Ends with the process that holds the other end of its standard input, even if that is killed.
 _WATCH = """
-import os, sys, threading
+import os, threading
 def watch():
-    sys.stdin.buffer.read()
+    os.read(0, 1)
     os._exit(1)
 threading.Thread(target=watch, daemon=True).start()
 """

@@ -94,8 +94,8 @@ def uninterrupted() -> Iterator[None]:
 def _handled_by(handler: Any) -> Iterator[dict[int, Any]]:
     """`handler` in the place of Python's handlers of the signals, if this is the main thread."""
     main = threading.current_thread() is threading.main_thread()
-    before = {number: signal.getsignal(number) for number in SIGNALS if main}
-    before = {number: old for number, old in before.items() if callable(old)}
+    found = {number: signal.getsignal(number) for number in SIGNALS if main}
+    before: dict[int, Any] = {number: old for number, old in found.items() if callable(old)}
     try:
         for number in before:
             signal.signal(number, handler)
