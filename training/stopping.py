@@ -138,8 +138,11 @@ def _watch(read: int) -> None:
 
 def end_now(number: int) -> None:
     """End this process and all that it has started, whatever they are at."""
-    for child in multiprocessing.active_children():
+    children = multiprocessing.active_children()
+    for child in children:
         child.kill()
+    for child in children:
+        child.join(GRACE / 10)
     with contextlib.suppress(OSError):
         if sys.stdout is not None and sys.stdout.isatty():
             os.write(1, b"\x1b[?25h")  # a progress bar hides the cursor
