@@ -45,18 +45,36 @@ def prepare(*further: str) -> None:
         return  # a folder that cannot be written has no cache: nothing to share
 
 
+# Ends with the process that holds the other end of its standard input, even if that is killed.
+_WATCH = """
+import os, threading
+def watch():
+    os.read(0, 1)
+    os._exit(1)
+threading.Thread(target=watch, daemon=True).start()
+"""
+
+
 def _compile_apart(shares: Sequence[str]) -> bool:
-    """Whether the processes have all finished without an error."""
-    jobs = []
+    """Whether the processes have all finished without an error; Ctrl-C reaches this one alone."""
+    jobs: list[subprocess.Popen] = []
     try:
         for share in shares:
-            code = f"from poise.baselines.compilation import *; begin(); {share}()"
-            # -P: no modules from the current folder
-            jobs.append(subprocess.Popen([sys.executable, "-P", "-c", code]))
+            code = f"{_WATCH}from poise.baselines.compilation import *; begin(); {share}()"
+            jobs.append(
+                subprocess.Popen(  # -P: no modules from the current folder
+                    [sys.executable, "-P", "-c", code],
+                    stdin=subprocess.PIPE,
+                    start_new_session=True,
+                )
+            )
         return all([job.wait() == 0 for job in jobs])
     finally:
         for job in jobs:
             job.kill()
+            job.wait()
+            assert job.stdin is not None  # a pipe
+            job.stdin.close()
 
 
 def begin() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,8 @@ import pytest
 import yaml
 
 from poise.training.benchmark import run
-from poise.training.benchmark.case import Result
-from poise.training.benchmark.play import Job
+
+from .evaluations import InProcess
 
 SMALL: dict[str, Any] = {
     "duration": 1.6,
@@ -43,26 +42,5 @@ def play_in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
     return InProcessCrew
 
 
-class InProcessCrew:
-    """Works like `Crew`, without processes; `played` counts, `stop_after` interrupts."""
-
-    played = 0
-    stop_after: int | None = None
-
-    def __init__(self, backend: str, workers: int | None):
-        self.workers = 1
-
-    def __enter__(self) -> InProcessCrew:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    def each(
-        self, function: Callable[[Job], Result], jobs: Sequence[Job]
-    ) -> Iterator[tuple[Job, Result]]:
-        for job in reversed(jobs):  # any order must do
-            if InProcessCrew.played == InProcessCrew.stop_after:
-                raise KeyboardInterrupt
-            InProcessCrew.played += 1
-            yield job, function(job)
+class InProcessCrew(InProcess):
+    """With a count of its own."""

@@ -1,16 +1,12 @@
-"""Small evaluations for tests: short suites, and trials played in this process."""
+"""Small evaluations for tests: short suites, and a crew that plays in this process."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import yaml
-
-from poise.envs.robot import load_robot
-from poise.training.players import load_player
-from poise.training.trials import Outcome, Trial, run_trial
 
 RANDOM = {
     "kind": "random",
@@ -37,26 +33,26 @@ def write_suite(folder: Path, fields: dict[str, Any], name: str = "suite") -> Pa
 
 
 class InProcess:
-    """Plays like `Workers`, without processes; `played` counts trials, `stop_after` interrupts."""
+    """Works like `Crew`, without processes; `played` counts jobs, `stop_after` interrupts."""
 
     played = 0
     stop_after: int | None = None
 
-    def __init__(
-        self, controllers: Sequence[str], robot: str, overrides: dict[str, Any], count: int
-    ):
-        loaded = load_robot(robot)
-        self.players = [load_player(name, loaded, **overrides) for name in controllers]
+    def __init__(self, backend: str, workers: int | None):
+        self.backend, self.workers = backend, 1
 
-    def __enter__(self) -> InProcess:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         pass
 
-    def play(self, trials: Sequence[Trial]) -> Iterator[tuple[Trial, list[Outcome]]]:
-        for trial in reversed(trials):  # any order must do
-            if InProcess.stop_after is not None and InProcess.played >= InProcess.stop_after:
+    def each(
+        self, function: Callable[[Any], Any], jobs: Sequence[Any]
+    ) -> Iterator[tuple[Any, Any]]:
+        counted = type(self)
+        for job in reversed(jobs):  # any order must do
+            if counted.stop_after is not None and counted.played >= counted.stop_after:
                 raise KeyboardInterrupt
-            InProcess.played += 1
-            yield trial, [run_trial(player, trial) for player in self.players]
+            counted.played += 1
+            yield job, function(job)

@@ -42,7 +42,7 @@ def finished(kind: str) -> Path:
         return path / "out"
     fields = {"random": {**RANDOM, "trials": 8}, "envelope": ENVELOPE}[kind]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evaluation, "Workers", InProcess)
+        patch.setattr(evaluation, "Crew", InProcess)
         InProcess.stop_after = None
         suite = write_suite(path, fields)
         evaluate(names, suite, out=path / "out", seed=4)

@@ -19,12 +19,13 @@ from poise.envs.env_config import StartNoise
 from poise.envs.errors import ConfigError
 from poise.training.benchmark import run
 from poise.training.benchmark.case import Case
-from poise.training.benchmark.play import BenchmarkPlayer, Job, Stage, play, play_case
+from poise.training.benchmark.play import BenchmarkPlayer, Job, play, play_case
 from poise.training.benchmark.reading import load_benchmark_data, read_case, replay_case
 from poise.training.benchmark.run import benchmark, default_controllers
 from poise.training.cli import main
 from poise.training.players import load_player
 from poise.training.replay import replay
+from poise.training.stage import Stage
 from poise.training.trials import Trial, run_trial
 
 from .benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -111,7 +112,7 @@ def test_two_runs_do_not_write_to_one_folder(tmp_path: Path) -> None:
     """The second is refused until the first has stopped, also with --overwrite."""
     first = start(tmp_path)
     for overwrite in (False, True):
-        with pytest.raises(PoiseError, match="another poise benchmark is writing there"):
+        with pytest.raises(PoiseError, match=f"process {os.getpid()} .*is writing there"):
             BenchmarkFolder(tmp_path, SETTINGS, overwrite)
     first.append("pd", 0, RESULT)
     first.close()

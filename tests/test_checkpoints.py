@@ -81,6 +81,7 @@ def test_the_folder_is_replaced_as_a_whole(folder, trained, monkeypatch):
         with pytest.raises(PoiseError, match="No space left"):
             save(folder, trained, timesteps=128)
     assert read_state(folder / STATE)["timesteps"] == 64 and find_checkpoint(folder) == folder
+    assert [path.name for path in folder.parent.iterdir()] == ["last"]
     save(folder, trained, timesteps=128)
     assert read_state(folder / STATE)["timesteps"] == 128
     assert sorted(path.name for path in folder.parent.iterdir()) == ["last"]

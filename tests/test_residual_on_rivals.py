@@ -28,7 +28,7 @@ def test_a_residual_on_a_rival_end_to_end(
     controller: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Trained, it learns; evaluated, replayed and a row of the benchmark like any other."""
-    monkeypatch.setattr(evaluation, "Workers", InProcess)
+    monkeypatch.setattr(evaluation, "Crew", InProcess)
     monkeypatch.setattr(run, "Crew", InProcessCrew)
     InProcess.stop_after = InProcessCrew.stop_after = None
     train(tiny_config(controller=controller, steps=64), tmp_path / "run", progress=False)

@@ -226,7 +226,7 @@ def test_an_evaluation_of_a_folder_of_seeds(
 
     from .evaluations import InProcess
 
-    monkeypatch.setattr(evaluation, "Workers", InProcess)
+    monkeypatch.setattr(evaluation, "Crew", InProcess)
     InProcess.played, InProcess.stop_after = 0, None
     runs, text = tmp_path / "runs", io.StringIO()
     train_seeds(tiny_config(steps=SHORT), [0, 1], runs)

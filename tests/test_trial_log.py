@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import errno
+import resource
 from pathlib import Path
 
 import pytest
@@ -32,20 +32,22 @@ def test_spoiled_lines_cost_no_other(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_is_one_line_and_keeps_what_was_written(tmp_path: Path) -> None:
-    """The error names the file and says what to do; the entries before are there."""
+    """The error names the file and says what to do; the entries before are there, and no half one.
+
+    The system's limit for a file's size refuses like a full disk: it takes a part of the line.
+    """
     path = tmp_path / "log"
     log = TrialLog(path, {1: "a"})
-
-    class Full:
-        def write(self, text: str) -> None:
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-        def close(self) -> None:
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-    log._file.close()
-    log._file = Full()
-    with pytest.raises(PoiseError, match="log: cannot be written .No space.*are kept.*go on"):
-        log.append(2, "b")
+    size = path.stat().st_size
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size + 5, before[1]))
+    try:
+        for _ in range(2):
+            with pytest.raises(PoiseError, match="log: cannot be written .*are kept.*go on"):
+                log.append(2, "b")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert path.stat().st_size == size
+    log.append(3, "c")
     log.close()
-    assert read_log(path) == ([(1, "a")], 0)
+    assert read_log(path) == ([(1, "a"), (3, "c")], 0)

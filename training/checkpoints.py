@@ -48,8 +48,10 @@ def save_checkpoint(
             os.replace(folder, old)
         os.replace(new, folder)
         shutil.rmtree(old, ignore_errors=True)
-    except OSError as error:
-        raise PoiseError(f"{folder}: cannot be written ({error.strerror})") from None
+    except (OSError, RuntimeError) as error:  # torch has errors of its own for a full disk
+        shutil.rmtree(new, ignore_errors=True)
+        reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
+        raise PoiseError(f"{folder}: cannot be written ({reason})") from None
 
 
 def find_checkpoint(folder: Path) -> Path | None:

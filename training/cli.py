@@ -1,5 +1,6 @@
 """The command `poise`. What is heavy (MuJoCo, Numba, torch) is imported by the sub-commands."""
 
+import errno
 import os
 import select
 import sys
@@ -12,6 +13,9 @@ import tyro
 from poise.envs.errors import ConfigError, PoiseError
 
 from .progress import terminal
+from .stopping import Stopped, stop_message, stoppable
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
 Names = Annotated[
     tuple[str, ...],
@@ -24,21 +28,18 @@ Allow = Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(meta
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run a sub-command; returns 0, 1 (see `benchmark`), 2 after bad input, 130 after Ctrl-C, 141
-    if nobody reads the output any more."""
+    """Run a sub-command; returns 0, 1 (see `benchmark`), 2 after bad input or on a full disk, 130
+    after Ctrl-C, 143 after SIGTERM, 141 if nobody reads the output any more."""
     args = list(sys.argv[1:] if args is None else args)
     # Small matrices lose time to threads, and sums may change their order. Read at import.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     try:
         try:
-            return _run(args)
+            return _stoppable(args)
         except PoiseError as error:
             print(f"poise: {error}", file=sys.stderr)
             return 2
-        except KeyboardInterrupt:
-            print("poise: stopped", file=sys.stderr)
-            return 130
         finally:
             if sys.stdout is not None:  # poise list >&-
                 sys.stdout.flush()
@@ -50,6 +51,20 @@ def main(args: Sequence[str] | None = None) -> int:
             for stream in unread:
                 os.dup2(nowhere.fileno(), stream.fileno())
         return 141
+
+
+def _stoppable(args: list[str]) -> int:
+    try:
+        with stoppable():
+            return _run(args)
+    except KeyboardInterrupt as stop:
+        print(stop_message(), file=sys.stderr)
+        return stop.code if isinstance(stop, Stopped) else 130
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        place = "" if error.filename is None else f"{error.filename}: "
+        raise PoiseError(f"{place}cannot be written ({error.strerror})") from None
 
 
 def _unread(stream: TextIO | None) -> bool:
@@ -138,18 +153,10 @@ def evaluate(
     from .evaluation import evaluate, measured_limits
 
     folder = Path("out") / Path(suite).stem if out is None else out
-    try:
-        summary = evaluate(
-            controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, trials=trials,
-            limits=limits, overwrite=overwrite, console=terminal(), allow=allow,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        if (folder / "trials.partial.jsonl").exists():
-            print(
-                f"poise: the finished trials are kept in {folder}; the same command goes on",
-                file=sys.stderr,
-            )
-        raise
+    summary = evaluate(
+        controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, trials=trials,
+        limits=limits, overwrite=overwrite, console=terminal(), allow=allow,
+    )  # fmt: skip
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)
         print(write_limits)
@@ -196,16 +203,10 @@ def benchmark(
 
     from .benchmark.run import benchmark, errors
 
-    try:
-        summary = benchmark(
-            controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
-            trials=trials, overwrite=overwrite, console=terminal(), allow=allow,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        if (out / "trials.jsonl").exists():
-            print(f"poise: the finished trials are kept in {out}; the same command goes on",
-                  file=sys.stderr)  # fmt: skip
-        raise
+    summary = benchmark(
+        controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
+        trials=trials, overwrite=overwrite, console=terminal(), allow=allow,
+    )  # fmt: skip
     if failed := errors(summary):
         print(f"poise: a controller raised an error in {failed} trials; see the column error of "
               f"{out / 'trials.csv'}", file=sys.stderr)  # fmt: skip

@@ -9,6 +9,7 @@ from .evaluation import evaluate
 from .evaluation_folder import PLOTS
 from .players import SHIPPED
 from .report import print_paths
+from .stopping import ANEW, keeps
 
 CONTROLLERS = ("momentum-qp", SHIPPED, "capture-step", "residual-step", "feedback-step")
 SUITES = ("demo-envelope", "demo-random")
@@ -31,6 +32,7 @@ def demo(
     """
     console = console or Console(quiet=True)
     summaries = []
+    keeps(Path(out), ANEW)  # it replaces what there is
     for suite in SUITES:
         summary = evaluate(
             controllers,

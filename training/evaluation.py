@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +16,22 @@ from poise.envs.errors import ConfigError
 from poise.envs.push_schedule import LimitTable
 from poise.envs.robot import load_robot
 
-from .evaluation_folder import SUMMARY, TRIALS, EvaluationFolder, Settings
+from .backends import Crew
+from .evaluation_folder import PARTIAL, SUMMARY, TRIALS, EvaluationFolder, Settings
+from .evaluation_job import EvaluationJob, play
 from .limits import PushLimits, load_limits, write_limits
-from .players import Player, load_player
+from .players import Player
 from .progress import progress_bar
 from .provenance import circumstances, usable_cores, versions
 from .report import draw_plots, print_paths, print_summary
 from .seed_groups import expand_seeds, seed_groups
+from .stage import Stage
 from .step_limits import stepping_limits
+from .stopping import keeps
 from .suite import Suite
 from .suites import load_suite
 from .summary import plain, summarise
 from .trials import Trial, row
-from .workers import Workers
 
 
 @allows("controllers")
@@ -79,9 +83,9 @@ def evaluate(
         chosen = chosen.resized(trials)
     loaded = load_robot(robot)
     pushed = load_limits(loaded, limits)
-    overrides = {"duration": chosen.duration, "pushes": None, "noise": chosen.noise}
+    stage = Stage(robot, chosen.duration, chosen.noise)
     prepare()
-    players = [load_player(name, loaded, **overrides) for name in controllers]
+    players = [stage.load(name, loaded) for name in controllers]
     first = chosen.first(pushed, seed)
     _warm_up(players)
     settings = Settings(
@@ -95,34 +99,33 @@ def evaluate(
         versions=versions(("mujoco", "numpy", "numba")),
     )
     folder = EvaluationFolder(Path(out), settings, overwrite)
-    if folder.finished:
-        console.print(f"going on after {len(folder.finished)} finished trials")
-    count = workers or usable_cores()
-    try:
-        with Workers(controllers, str(robot), overrides, min(count, len(first))) as pool:
-            done = _play(pool, folder, chosen, pushed, first, controllers, console)
-    finally:
-        folder.close()
-    outcomes = {
-        name: [folder.finished[trial.number][i] for trial in done]
-        for i, name in enumerate(controllers)
-    }
-    steps = stepping_limits(players, outcomes, pushed)
-    figures = summarise(chosen, done, outcomes, pushed, steps)
-    summary = plain(
-        {
-            "suite": str(suite),
-            "seed": seed,
-            "robot": loaded.name,
-            **figures,
-            "seeds": seed_groups(controllers, figures["controllers"]),
-            **circumstances(started, count),
+    keeps(folder.path / PARTIAL, f"the finished trials are kept in {out}; the same command goes on")
+    with closing(folder):
+        if folder.finished:
+            console.print(f"going on after {len(folder.finished)} finished trials")
+        count = workers or usable_cores()
+        crew = Crew("local", min(count, len(first)))
+        done = _play(crew, folder, chosen, pushed, first, stage, console)
+        outcomes = {
+            name: [folder.finished[trial.number][i] for trial in done]
+            for i, name in enumerate(controllers)
         }
-    )
-    plots = draw_plots(Path(out), chosen, done, outcomes, pushed, steps)
-    rows = [row(trial, name, outcomes[name][k])
-            for k, trial in enumerate(done) for name in controllers]  # fmt: skip
-    folder.finish(rows, summary)
+        steps = stepping_limits(players, outcomes, pushed)
+        figures = summarise(chosen, done, outcomes, pushed, steps)
+        summary = plain(
+            {
+                "suite": str(suite),
+                "seed": seed,
+                "robot": loaded.name,
+                **figures,
+                "seeds": seed_groups(controllers, figures["controllers"]),
+                **circumstances(started, count),
+            }
+        )
+        plots = draw_plots(Path(out), chosen, done, outcomes, pushed, steps)
+        rows = [row(trial, name, outcomes[name][k])
+                for k, trial in enumerate(done) for name in controllers]  # fmt: skip
+        folder.finish(rows, summary)
     print_summary(summary, console)
     print_paths([*plots, Path(out) / TRIALS, Path(out) / SUMMARY], console)
     return summary
@@ -155,18 +158,19 @@ def _check(controllers: Sequence[str], seed: int, workers: int | None, trials: i
 
 
 def _play(
-    pool: Workers,
+    crew: Crew,
     folder: EvaluationFolder,
     suite: Suite,
     limits: PushLimits,
     first: list[Trial],
-    controllers: Sequence[str],
+    stage: Stage,
     console: Console,
 ) -> list[Trial]:
     """Play all stages of the suite; returns the trials in order, `folder` has their outcomes."""
     trials: list[Trial] = []
-    stage = first
-    with progress_bar(console) as bar:
+    controllers = tuple(folder.settings.controllers)
+    following = first
+    with crew, progress_bar(console) as bar:
         task = bar.add_task("", total=suite.count(len(controllers)), rates="")
 
         def show() -> None:
@@ -174,17 +178,21 @@ def _play(
             text = "  ".join(f"{n} {r:.0%}" for n, r in zip(controllers, rates, strict=True))
             bar.update(task, completed=len(folder.finished), rates=text)
 
-        while stage:
-            missing = [trial for trial in stage if trial.number not in folder.finished]
-            for trial, outcomes in pool.play(missing):
-                folder.append(trial.number, outcomes)
+        while following:
+            missing = [
+                EvaluationJob(stage, controllers, trial)
+                for trial in following
+                if trial.number not in folder.finished
+            ]
+            for job, outcomes in crew.each(play, missing):
+                folder.append(job.trial.number, outcomes)
                 show()
-            trials += stage
+            trials += following
             recovered = {
                 name: [folder.finished[trial.number][i].recovered for trial in trials]
                 for i, name in enumerate(controllers)
             }
-            stage = suite.more(limits, folder.settings.seed, trials, recovered)
+            following = suite.more(limits, folder.settings.seed, trials, recovered)
         if folder.finished:
             show()
     return trials

@@ -19,6 +19,7 @@ from poise.envs.errors import ConfigError
 from poise.envs.push_schedule import LimitTable
 from poise.envs.reading import exists, is_folder
 
+from .folder_lock import FolderLock
 from .trial_log import TrialLog, read_log
 from .trials import COLUMNS, Outcome
 
@@ -65,7 +66,7 @@ class EvaluationFolder:
 
     Raises:
         ConfigError: the folder holds another or a finished evaluation, and `overwrite` is off.
-        PoiseError: the folder cannot be written.
+        PoiseError: the folder cannot be written, or another process writes there.
     """
 
     def __init__(self, path: Path, settings: Settings, overwrite: bool = False):
@@ -74,13 +75,22 @@ class EvaluationFolder:
         self._partial: TrialLog | None = None
         if exists(path) and not is_folder(path):
             raise ConfigError("is not a folder", source=path, field="out")
+        self._lock = FolderLock(path)
+        try:
+            self._open(overwrite)
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def _open(self, overwrite: bool) -> None:
+        path = self.path
         if overwrite:
             for name in (*FILES, REPORT):
                 (path / name).unlink(missing_ok=True)
         elif any(exists(path / name) for name in FILES):
             self._check()
             self._read_partial()
-        write_atomic(path / SETTINGS, to_yaml(settings))
+        write_atomic(path / SETTINGS, to_yaml(self.settings))
         entries = {number: _plain(outcomes) for number, outcomes in self.finished.items()}
         self._partial = TrialLog(path / PARTIAL, entries)
 
@@ -94,13 +104,14 @@ class EvaluationFolder:
         """Stop; what is finished stays."""
         if self._partial is not None:
             self._partial.close()
+        self._lock.release()
 
     def finish(self, rows: Sequence[dict[str, Any]], summary: dict[str, Any]) -> None:
         """Write the trials and, last, the summary."""
-        self.close()
         write_atomic(self.path / TRIALS, csv_text(rows))
         write_atomic(self.path / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
         (self.path / PARTIAL).unlink(missing_ok=True)
+        self.close()
 
     def _check(self) -> None:
         """Refuse to go on from anything but an interrupted evaluation with equal settings."""

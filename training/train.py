@@ -22,8 +22,10 @@ from poise.envs.errors import ConfigError
 from .callbacks import Checkpoints, Progress, Throughput
 from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
+from .folder_lock import FolderLock
 from .policy import locate_policy
 from .schedules import CurriculumCallback, ExplorationCallback
+from .stopping import keeps
 from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
 
@@ -51,10 +53,12 @@ def train(
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
     round; when the configurations or robots differ; when a file of last/ cannot be read; for
-    pushes that do not fit the robot; for a controller from outside that is not allowed.
+    pushes that do not fit the robot; for a controller from outside that is not allowed. Raises
+    PoiseError when another process writes to `out`, or a file cannot be written.
     """
     out = Path(out)
     checkpoint = check_folder(config, out, resume)
+    keeps(out / LAST, f"what is trained is kept in {out}; go on with --resume")
     start = None if checkpoint or config.start_from is None else locate_policy(config.start_from)
     torch.set_num_threads(1)
     prepare()
@@ -65,6 +69,8 @@ def train(
         normalize.seed(_env_seed(config.seed))
         state: dict[str, Any] = {}
         fingerprint = normalize.get_attr("robot")[0].fingerprint
+        stack.enter_context(FolderLock(out))
+        checkpoint = check_folder(config, out, resume)  # another run may have ended since
         if start is not None:
             restore(start, model, normalize, fingerprint, wider=True)
         if checkpoint is not None:

@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -62,15 +61,10 @@ def run(args: Sequence[str]) -> None:
     if not command.seeds and not (out / SEEDS).exists():
         print(train(command.settings, out, command.resume, allow=allow))
         return
-    try:
-        train_seeds(
-            command.settings, command.seeds, out, resume=command.resume, allow=allow,
-            workers=command.workers, backend=command.backend, console=terminal(),
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        if (out / SEEDS).exists():
-            print(f"poise: what is trained is kept in {out}; go on with --resume", file=sys.stderr)
-        raise
+    train_seeds(
+        command.settings, command.seeds, out, resume=command.resume, allow=allow,
+        workers=command.workers, backend=command.backend, console=terminal(),
+    )  # fmt: skip
     print(out / SEEDS)
 
 

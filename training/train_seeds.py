@@ -19,10 +19,12 @@ from poise.envs.errors import ConfigError, PoiseError
 from .backends import Crew, check_backend
 from .checkpoints import CONFIG, STATE, find_checkpoint
 from .config import TrainConfig
+from .folder_lock import FolderLock
 from .policy_files import read_state
 from .provenance import circumstances
 from .seed_groups import SEEDS, read_seeds, seed_figures, seed_folder
 from .seed_progress import SeedProgress, print_seeds
+from .stopping import keeps
 from .train import LAST, check_folder, check_pushes, train
 
 
@@ -71,16 +73,33 @@ def train_seeds(
     check_backend(backend)
     if workers is not None and workers < 1:
         raise ConfigError(f"must be at least 1, not {workers}", field="workers")
-    seeds = _all_seeds(seeds, out, resume)
+    given, seeds = seeds, _all_seeds(seeds, out, resume)
     runs = [_run(replace(config, seed=seed, threads=1), seed_folder(out, seed)) for seed in seeds]
     missing = [run for run in runs if not _finished(run)]
     env = config.make_env()  # compiles all that the runs need, once
     check_pushes(config, env)
     env.close()
+    keeps(out / SEEDS, f"what is trained is kept in {out}; go on with --resume")
+    with FolderLock(out):
+        _all_seeds(given, out, resume)  # another process may have begun since
+        return _train(config, runs, missing, out, Crew(backend, workers), console, started)
+
+
+def _train(
+    config: TrainConfig,
+    runs: Sequence[SeedRun],
+    missing: Sequence[SeedRun],
+    out: Path,
+    crew: Crew,
+    console: Console,
+    started: float,
+) -> dict[str, Any]:
+    """Train what is missing; writes seeds.json at the start, and whole at the end."""
+    seeds = [run.config.seed for run in runs]
     write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
     write_atomic(out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n")
     failed: list[str] = []
-    with SeedProgress(runs, console), Crew(backend, workers) as crew:
+    with SeedProgress(runs, console), crew:
         for run, error in crew.each(train_run, missing):
             if error is None and not _finished(run):
                 error = f"{run.folder} is not finished here: do all machines see it?"
@@ -95,7 +114,7 @@ def train_seeds(
     summary = {
         "runs": entries,
         "recovered": recovered,
-        **circumstances(started, crew.workers, backend=backend),
+        **circumstances(started, crew.workers, backend=crew.backend),
     }
     write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
     print_seeds(summary, console)
@@ -103,9 +122,15 @@ def train_seeds(
 
 
 def train_run(run: SeedRun) -> str | None:
-    """Train one run; returns what went wrong, on one line, if anything did."""
+    """Train one run; returns what went wrong, on one line, if anything did.
+
+    A run whose process has died goes on from its last rollout.
+    """
     try:
-        train(run.config, run.folder, run.resume, progress=False)
+        resume = find_checkpoint(run.folder / LAST) is not None
+        train(run.config, run.folder, resume, progress=False)
+    except MemoryError:  # of this process: another one may have enough
+        raise
     except Exception as error:  # the other seeds go on
         text = str(error) if isinstance(error, PoiseError) else f"{type(error).__name__}: {error}"
         return " ".join(text.split())

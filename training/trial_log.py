@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO
 
 from poise.envs.config import write_atomic
 from poise.envs.errors import PoiseError
@@ -39,25 +41,25 @@ class TrialLog:
         self.path = path
         write_atomic(path, "".join(_line(key, value) for key, value in entries.items()))
         try:
-            self._file: TextIO = path.open("a")
+            self._file: BinaryIO = path.open("ab", buffering=0)
         except OSError as error:
             raise self._error(error) from None
 
     def append(self, key: Any, value: Any) -> None:
-        """Write an entry to the disk; raises PoiseError, and what was written before stays."""
+        """Write an entry to the disk, whole or not at all; raises PoiseError."""
+        line, size = _line(key, value).encode(), os.stat(self.path).st_size
         try:
-            self._file.write(_line(key, value))
-            self._file.flush()
+            if self._file.write(line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             os.fsync(self._file.fileno())
         except OSError as error:
+            with contextlib.suppress(OSError):
+                os.truncate(self.path, size)
             raise self._error(error) from None
 
     def close(self) -> None:
         """Stop; what was appended stays."""
-        try:
-            self._file.close()
-        except OSError:
-            pass  # the line that could not be written, once more
+        self._file.close()
 
     def _error(self, error: OSError) -> PoiseError:
         return PoiseError(

@@ -20,6 +20,8 @@ from poise.envs.reading import is_file, parse_json, read_lines
 from poise.envs.robot import load_robot
 
 from .backends import Crew
+from .folder_lock import FolderLock
+from .stopping import keeps
 from .tuning_gains import Gains
 from .tuning_trials import Candidate, TuningPushes, follow, play
 
@@ -88,7 +90,8 @@ def tune(
     outside (``module:Class``) that the configuration or the policy names must be among `allow`.
 
     Raises ConfigError for a configuration that is not valid or names what is not allowed, a folder
-    that holds another search, or where the library `cma` is missing.
+    that holds another search, or where the library `cma` is missing; PoiseError when another
+    process searches there, or a file cannot be written.
     """
     gains = Gains(config.controller, config.gains, config.robot)
     if config.policy is not None:
@@ -96,12 +99,14 @@ def tune(
 
         load_policy(config.policy, load_robot(config.robot))
     search = _Search(config, gains)
-    rows = _known(config, out, resume)
-    for row in rows:
-        search.again(row, out / HISTORY)
-    write_atomic(out / CONFIG, to_yaml(config))
+    _known(config, out, resume)  # what is refused makes no folder
     console = console or Console(quiet=True)
-    with Crew("local", workers) as crew:
+    keeps(out / HISTORY, f"the finished generations are kept in {out}; go on with --resume")
+    with FolderLock(out), Crew("local", workers) as crew:
+        rows = _known(config, out, resume)  # another search may have ended since
+        for row in rows:
+            search.again(row, out / HISTORY)
+        write_atomic(out / CONFIG, to_yaml(config))
         while search.generation < config.generations:
             rows.append(search.step(crew))
             write_atomic(out / GAINS, to_yaml(gains.at(search.mean)))

@@ -8,19 +8,18 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
-from poise.envs.errors import ConfigError, PoiseError
+from poise.envs.errors import ConfigError
 from poise.envs.reading import exists, is_folder
 
 from ..evaluation_folder import REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
+from ..folder_lock import FolderLock
 from ..trial_log import TrialLog, read_log
 from .case import COLUMNS, Result
 
@@ -136,36 +135,6 @@ class BenchmarkFolder:
         if (path / SUMMARY).exists() and not (path / LOG).exists():
             raise ConfigError(f"is missing, and with it the trials: {ADVICE}", source=path / LOG)
         return before
-
-
-class FolderLock:
-    """One process at a time writes to a folder: two would lose each other's trials.
-
-    The folder is made if missing. The lock ends with `release`, or with the process.
-
-    Raises PoiseError when another process holds it, or the folder cannot be made.
-    """
-
-    def __init__(self, path: Path):
-        self._file: int | None = None
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            self._file = os.open(path, os.O_RDONLY)
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self.release()
-            raise PoiseError(f"{path}: another poise benchmark is writing there") from None
-        except OSError as error:
-            self.release()
-            raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
-
-    def release(self) -> None:
-        """Let others write."""
-        if self._file is not None:
-            os.close(self._file)
-            self._file = None
-
-    __del__ = release
 
 
 def read_results(folder: Path) -> tuple[dict[Key, Result], int]:

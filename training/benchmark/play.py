@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,29 +10,13 @@ import numpy as np
 from poise.baselines.sensed_env import SensedResidualEnv, SensedTorqueEnv, sensed_env
 from poise.envs.altered import altered_robot
 from poise.envs.balance import BalanceEnv
-from poise.envs.env_config import StartNoise
-from poise.envs.robot import load_robot
 from poise.envs.simulation import Simulation
 
 from ..eurobench import body_sway, recovery_time, sway_angle
-from ..players import Player, load_player
+from ..players import Player
+from ..stage import Stage
 from ..trials import run_trial
 from .case import Case, Result, failed
-
-
-@dataclass(frozen=True)
-class Stage:
-    """Where all cases are played.
-
-    Attributes:
-        robot: name or path.
-        duration: of a trial [s].
-        noise: of the start.
-    """
-
-    robot: str | Path
-    duration: float
-    noise: StartNoise
 
 
 @dataclass(frozen=True)
@@ -53,6 +36,8 @@ def play(job: Job) -> Result:
     player = _player(job.stage, job.controller)
     try:
         return play_case(player, job.case)
+    except MemoryError:  # of this process, not of the controller
+        raise
     except Exception as error:  # a controller from outside may raise anything
         del _players[job.stage, job.controller]  # it may be broken: the next trial gets a new one
         return failed(error)
@@ -110,11 +95,7 @@ _players: dict[tuple[Stage, str], BenchmarkPlayer] = {}  # of this process
 def _player(stage: Stage, controller: str) -> BenchmarkPlayer:
     key = (stage, controller)
     if key not in _players:
-        robot = load_robot(stage.robot)
-        player = load_player(
-            controller, robot, duration=stage.duration, pushes=None, noise=stage.noise
-        )
-        _players[key] = BenchmarkPlayer(player)
+        _players[key] = BenchmarkPlayer(stage.load(controller))
     return _players[key]
 
 

@@ -18,18 +18,20 @@ from poise.envs.robot import Robot, load_robot
 
 from ..backends import Crew, check_backend
 from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS
-from ..players import Player, load_player
+from ..players import Player
 from ..progress import progress_bar
 from ..provenance import circumstances, versions
 from ..report import print_paths
 from ..seed_groups import expand_seeds, seed_groups
+from ..stage import Stage
 from ..step_limits import curves, stepping_limits
+from ..stopping import keeps
 from ..summary import plain
 from .case import Case, case_row
 from .cases import Cases
 from .figures import controller_figures, pair_figures, robot_figures
-from .folder import FORMAT, BenchmarkFolder, BenchmarkSettings
-from .play import Job, Stage, play
+from .folder import FORMAT, LOG, BenchmarkFolder, BenchmarkSettings
+from .play import Job, play
 from .suite import load_benchmark
 from .table import print_benchmark
 from .ticks import tick_times
@@ -90,7 +92,7 @@ def benchmark(
     cases = Cases(chosen, loaded, seed)
     prepare()
     stage = Stage(robot, chosen.duration, chosen.noise)
-    players = {name: _load(name, loaded, stage) for name in names}
+    players = {name: stage.load(name, loaded) for name in names}
     settings = BenchmarkSettings(
         benchmark=FORMAT,
         suite_name=str(suite),
@@ -102,6 +104,7 @@ def benchmark(
         controllers={name: player.fingerprint for name, player in players.items()},
     )
     folder = BenchmarkFolder(Path(out), settings, overwrite)
+    keeps(folder.path / LOG, f"the finished trials are kept in {out}; the same command goes on")
     with closing(folder):
         _announce(folder, console)
         names = tuple(folder.settings.controllers)
@@ -156,14 +159,10 @@ def errors(summary: dict[str, Any]) -> int:
     return sum(entry["errors"] for entry in summary["controllers"].values())
 
 
-def _load(name: str, robot: Robot, stage: Stage) -> Player:
-    return load_player(name, robot, duration=stage.duration, pushes=None, noise=stage.noise)
-
-
 def _load_again(name: str, robot: Robot, stage: Stage, folder: BenchmarkFolder) -> Player:
     """A controller that the folder has besides; raises ConfigError if it is no longer the same."""
     with allowing(source=folder.path / SETTINGS):
-        player = _load(name, robot, stage)
+        player = stage.load(name, robot)
     if player.fingerprint != folder.settings.controllers[name]:
         raise ConfigError(
             f"holds trials of {name!r}, which has changed since: choose another folder",

@@ -1,0 +1,174 @@
+"""Kills at random moments, then the same command: `python -m tests.endurance.kills --count 100`.
+
+A case is a command, a signal (SIGKILL, SIGTERM, SIGINT), the main process or a worker, a moment.
+Then the same command goes on (with --resume where it wants that), and its result must be that of an
+undisturbed run, byte by byte but for what `commands.py` names. A resumed training starts new
+episodes, by design: it must be, byte by byte, what an undisturbed run gives that was resumed from
+its own checkpoint of that step. After a kill of a worker the command itself must end well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from .commands import Command, commands
+from .processes import Running, kill
+from .resumed import Resumed
+
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+ORPHANS = 5.0  # [s] within which the processes of a killed main process end
+
+
+class Undisturbed:
+    """What each command gives if it is left alone, and how long it takes."""
+
+    def __init__(self, room: Path):
+        self.room, self.resumed = room, Resumed(room)
+        self.results: dict[str, Any] = {}
+        self.seconds: dict[str, float] = {}
+
+    def run(self, command: Command) -> None:
+        out, start = self.room / "whole" / command.name, time.monotonic()
+        running = Running(command.line(out))
+        assert running.wait() == 0, running.output
+        self.seconds[command.name] = time.monotonic() - start
+        self.results[command.name] = command.result(out)
+
+    def result(self, command: Command, stopped: dict[str, Path]) -> Any:
+        """What must come of it; `stopped` are the runs of a training as the kill has left them."""
+        result = self.results[command.name]
+        if command.name == "train":
+            return self.resumed.result(stopped["."], 0) if stopped else result
+        if command.name == "train --seeds":
+            runs = {f"seed-{s}": self.resumed.result(stopped.get(f"seed-{s}"), s) for s in (0, 1)}
+            return runs  # seeds.json says what their states say
+        return result
+
+
+def main(arguments: list[str] | None = None) -> int:
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--count", type=int, default=100)
+    options.add_argument("--seed", type=int, default=0)
+    options.add_argument("--only", nargs="*", default=[])
+    given = options.parse_args(arguments)
+    with tempfile.TemporaryDirectory(prefix="poise-kills-") as folder:
+        room = Path(folder)
+        chosen = [c for c in commands(room) if not given.only or c.name in given.only]
+        whole = Undisturbed(room)
+        for command in chosen:
+            whole.run(command)
+            print(f"undisturbed {command.name}: {whole.seconds[command.name]:.1f} s", flush=True)
+        failed = 0
+        for number in range(given.count):
+            failed += not _case(number, chosen, whole, np.random.default_rng([given.seed, number]))
+    print(f"{given.count - failed} of {given.count} as if nothing had happened")
+    return 1 if failed else 0
+
+
+def _case(n: int, chosen: list[Command], whole: Undisturbed, rng: np.random.Generator) -> bool:
+    command = chosen[n % len(chosen)]
+    number = SIGNALS[int(rng.integers(len(SIGNALS)))]
+    worker = command.has_workers and bool(rng.random() < 0.5)
+    moment = float(rng.uniform(0.0, whole.seconds[command.name]))
+    out = whole.room / f"case-{n}"
+    words = f"{n}: {command.name}, {number.name} of {'a worker' if worker else 'the main process'}"
+    try:
+        told = _kill_and_go_on(command, out, number, worker, moment, whole, rng)
+    except Exception as error:
+        print(f"{words} at {moment:.1f} s: FAILED: {type(error).__name__}: {error}", flush=True)
+        return False
+    print(f"{words} at {moment:.1f} s: {told}", flush=True)
+    shutil.rmtree(out)
+    return True
+
+
+def _kill_and_go_on(
+    command: Command,
+    out: Path,
+    number: signal.Signals,
+    worker: bool,
+    moment: float,
+    whole: Undisturbed,
+    rng: np.random.Generator,
+) -> str:
+    """Raises AssertionError for whatever is not as it should be."""
+    running = Running(command.line(out))
+    time.sleep(moment)
+    target = _a_worker(running, rng) if worker else running.process.pid
+    hit = target is not None and kill(target, number)
+    stopped = _stopped_runs(command, out, worker and hit and number != signal.SIGINT)
+    code = running.wait()
+    if worker or code == 0:
+        assert code == 0, f"exit code {code}: {running.output[-2000:]}"
+        told = "went on" if hit else "had ended"
+    else:
+        told = _look_at_the_stop(command, out, number, code, running)
+        stopped = _stopped_runs(command, out, True)
+        kept = command.kept(out)
+        again = Running(command.line(out))
+        assert again.wait() == 0, again.output[-2000:]
+        if command.name in ("evaluate", "benchmark") and kept:
+            assert f"going on after {kept} finished" in again.output, again.output
+        told += f", {kept} kept"
+    result, expected = command.result(out), whole.result(command, stopped)
+    differing = [key for key in expected if result[key] != expected[key]]
+    assert not differing, f"differ: {differing}"
+    left = [path.name for path in out.rglob(".*")]
+    assert not left, f"left behind: {left}"
+    return told
+
+
+def _look_at_the_stop(
+    command: Command, out: Path, number: signal.Signals, code: int, running: Running
+) -> str:
+    """Exit code, processes, one line of text, and whole files."""
+    codes = {-number} if number == signal.SIGKILL else {128 + number, -number}
+    assert code in codes, f"exit code {code}: {running.output[-2000:]}"
+    left = running.left(ORPHANS if number == signal.SIGKILL else 0.0)
+    assert left == 0, f"{left} processes left"
+    if code > 0:
+        assert running.output.count("poise: stopped; ") == 1, running.output
+        assert "Traceback" not in running.output, running.output
+    for path in out.rglob("*.json"):
+        json.loads(path.read_text())
+    for path in out.rglob("*.yaml"):
+        assert isinstance(yaml.safe_load(path.read_text()), dict), path
+    return "stopped"
+
+
+def _a_worker(running: Running, rng: np.random.Generator) -> int | None:
+    """One of them, as soon as there is one; None if the command ends before."""
+    while running.process.poll() is None:
+        if workers := running.workers():
+            return int(rng.choice(workers))
+        time.sleep(0.02)
+    return None
+
+
+def _stopped_runs(command: Command, out: Path, stopped: bool) -> dict[str, Path]:
+    """Copies of a training's runs as they are now, whose processes have just died."""
+    if not stopped or not command.name.startswith("train"):
+        return {}
+    folders = [out] if command.name == "train" else sorted(out.glob("seed-*"))
+    copies = {}
+    for folder in folders:
+        name = "." if folder == out else folder.name
+        copies[name] = out.with_name(f"{out.name}-{name.strip('.')}-stopped")
+        shutil.rmtree(copies[name], ignore_errors=True)
+        shutil.copytree(folder, copies[name], ignore=shutil.ignore_patterns("tensorboard"))
+    return copies
+
+
+if __name__ == "__main__":
+    sys.exit(main())

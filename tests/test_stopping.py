@@ -1,0 +1,97 @@
+"""training/stopping.py: Ctrl-C and SIGTERM; `tests.endurance.ctrl_c` tries all commands."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from poise.training.cli import main
+from poise.training.stopping import Stopped, stoppable, uninterrupted
+
+from .endurance.processes import Running, heed_interrupts, kill
+from .evaluations import RANDOM, write_suite
+
+# A native call of minutes that no signal interrupts, as a compilation is.
+DEAF = """
+import hashlib, multiprocessing, time
+from poise.training.stopping import stoppable
+if __name__ == "__main__":
+    with stoppable():
+        child = multiprocessing.get_context("fork").Process(target=time.sleep, args=(600,))
+        child.start()
+        print(child.pid, flush=True)
+        hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
+"""
+LATE = 20.0  # [s] for what takes one, on a machine that is busy with other tests
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_process_that_cannot_listen_is_ended(number: signal.Signals) -> None:
+    """With its children, the line and the code of a stop."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", DEAF], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=heed_interrupts,
+    )  # fmt: skip
+    assert process.stdout is not None
+    child = int(process.stdout.readline())
+    process.send_signal(number)
+    _, told = process.communicate(timeout=LATE)
+    assert process.returncode == 128 + number
+    assert told == "poise: stopped; the same command begins anew\n"
+    assert not kill(child, 0)
+
+
+@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="processes are found in /proc")
+def test_a_stopped_evaluation_leaves_no_process_and_says_how_to_go_on(tmp_path: Path) -> None:
+    """SIGTERM while two processes play: the finished trials stay, and the code is 143."""
+    suite = write_suite(tmp_path, {**RANDOM, "trials": 5000})
+    out = tmp_path / "out"
+    running = Running(
+        ["evaluate", "zero", "--suite", str(suite), "--out", str(out), "--workers", "2"]
+    )
+    log = out / "trials.partial.jsonl"
+    while not log.exists() or log.stat().st_size == 0:
+        assert running.process.poll() is None, running.wait() or running.output
+        time.sleep(0.05)
+    kill(running.process.pid, signal.SIGTERM)
+    assert running.wait(LATE) == 143 and running.left(0.0) == 0
+    last = running.output.rstrip().splitlines()[-1]
+    assert last == (
+        f"poise: stopped; the finished trials are kept in {out}; the same command goes on"
+    )
+    assert "Traceback" not in running.output
+    assert {path.name for path in out.iterdir()} == {"settings.yaml", "trials.partial.jsonl"}
+
+
+def test_signals_wait_while_processes_are_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take effect once all processes are known; new ones never see Ctrl-C."""
+    done = []
+    with pytest.raises(Stopped) as stop, stoppable():
+        with uninterrupted():
+            os.kill(os.getpid(), signal.SIGTERM)
+            assert signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+            done.append("started")
+        done.append("never")
+    assert done == ["started"] and stop.value.code == 143
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+def test_handlers_are_put_back_and_ignored_signals_stay_ignored() -> None:
+    """As in a background job of a shell, which Ctrl-C is not meant for."""
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    assert main(["list"]) == 0
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
+    assert signal.set_wakeup_fd(-1) == -1
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with stoppable():
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)
+    finally:
+        signal.signal(signal.SIGINT, before[0])

@@ -1,0 +1,150 @@
+"""Ctrl-C and SIGTERM: a command unwinds, and where it cannot within a second, it is ended.
+
+Python runs its signal handlers between byte codes: a long native call, such as a compilation by
+LLVM, holds them up, and what they raise is lost inside a callback. The handler in C, however,
+writes to the wake-up descriptor at once, and a thread waits there. All files are written so that a
+kill at any moment spoils none, so ending the process loses no more than its last trial.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import select
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+GRACE = 1.0  # [s] to unwind in
+ANEW = "the same command begins anew"
+_END = b"\0"  # no signal has this number
+_kept: list[tuple[Path, str]] = []  # of the command that runs
+
+
+class Stopped(KeyboardInterrupt):
+    """The signal `number` has asked the command to stop; `code` is what it exits with."""
+
+    def __init__(self, number: int):
+        super().__init__()
+        self.code = 128 + number
+
+
+def keeps(path: Path, words: str) -> None:
+    """From now on, a stop says `words`, what is kept and how to go on, once `path` exists.
+
+    Of several, the first counts: that of the outermost caller.
+    """
+    _kept.append((path, words))
+
+
+def stop_message() -> str:
+    """The line for a command that was stopped."""
+    words = [words for path, words in _kept if path.exists()]
+    return f"poise: stopped; {words[0] if words else ANEW}"
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Inside, SIGINT and SIGTERM raise `Stopped`, and end the process if that does not end it.
+
+    A second signal ends the process at once. A signal that is ignored, as in a background job of a
+    shell, stays ignored. Outside the main thread, which alone has handlers, nothing changes.
+    """
+    _kept.clear()
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with ExitStack() as stack:
+        stack.enter_context(_watched())
+        for number in SIGNALS:
+            before = signal.getsignal(number)
+            if before in (signal.SIG_DFL, signal.default_int_handler):
+                stack.callback(signal.signal, number, before)
+                signal.signal(number, _raise)
+        yield
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Processes are started inside: a signal that comes takes effect when they are all known.
+
+    They never see Ctrl-C: this process alone answers it.
+    """
+    resource_tracker.ensure_running()  # its start would undo the block
+    came: list[int] = []
+    with _handled_by(lambda number, frame: came.append(number)) as before:
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    for number in came:
+        before[number](number, None)
+
+
+@contextmanager
+def _handled_by(handler: Any) -> Iterator[dict[int, Any]]:
+    """`handler` in the place of Python's handlers of the signals, if this is the main thread."""
+    main = threading.current_thread() is threading.main_thread()
+    found = {number: signal.getsignal(number) for number in SIGNALS if main}
+    before: dict[int, Any] = {number: old for number, old in found.items() if callable(old)}
+    try:
+        for number in before:
+            signal.signal(number, handler)
+        yield before
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+
+
+def _raise(number: int, frame: FrameType | None) -> None:
+    raise Stopped(number)
+
+
+@contextmanager
+def _watched() -> Iterator[None]:
+    """A thread hears of signals that the main thread has no time for."""
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    before = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
+    thread = threading.Thread(target=_watch, args=(read,), name="stopping", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        os.write(write, _END)
+        thread.join()
+        os.close(read)
+        os.close(write)
+
+
+def _watch(read: int) -> None:
+    while (byte := os.read(read, 1)) != _END:
+        if byte[0] in SIGNALS:
+            second, _, _ = select.select([read], [], [], GRACE)
+            if not second or os.read(read, 1) != _END:
+                end_now(byte[0])
+            return
+
+
+def end_now(number: int) -> None:
+    """End this process and all that it has started, whatever they are at."""
+    children = multiprocessing.active_children()
+    for child in children:
+        child.kill()
+    for child in children:
+        child.join(GRACE / 10)
+    with contextlib.suppress(OSError):
+        if sys.stdout is not None and sys.stdout.isatty():
+            os.write(1, b"\x1b[?25h")  # a progress bar hides the cursor
+        os.write(2, f"{stop_message()}\n".encode())
+    os._exit(128 + number)
