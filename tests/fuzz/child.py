@@ -63,10 +63,11 @@ def _take(connection: Connection, name: str, first: int, seconds: float, known: 
     def tell(what: str, value: Any) -> None:
         connection.send((what, value))
 
-    played, end, number = kind(name), time.monotonic() + seconds, first
+    played, number = kind(name), first
     _warm_up(played)
     memory.bound(MEBIBYTES + ARENAS)
     tell("ready", None)
+    end = time.monotonic() + seconds
     while time.monotonic() < end:
         _batch(played, number, end, known, tell)
         number += 1

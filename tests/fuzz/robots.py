@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 import xml.etree.ElementTree as ET
 from functools import cache
 from pathlib import Path
@@ -66,6 +67,8 @@ ELEMENTS = [
     '<actuator><general joint="nowhere" dyntype="user"/></actuator>',
     '<visual><global offwidth="100000000" offheight="100000000"/></visual>',
 ]
+CHANGES = ["scale", "scale", "scale", "set", "set", "add", "move", "drop", "rename"]
+FACTORS = [-1.0, 0.0, 0.5, 2.0, 10.0, 0.1, 1e3, 1e-3, 1e6, 1e-6, 1e12, 1e-12, 1e300]
 
 
 @cache
@@ -77,10 +80,13 @@ def _edit_element(draw: Draw, root: ET.Element) -> None:
     """One change of one element."""
     nodes = list(root.iter())
     node, other = draw(st.sampled_from(nodes)), draw(st.sampled_from(nodes))
-    change = draw(st.sampled_from(["set", "set", "set", "move", "add", "add", "drop", "rename"]))
+    change = draw(st.sampled_from(CHANGES))
     if change == "set":
         names = sorted({*node.attrib, "name", "pos", "type", "class", "mass"})
         node.set(draw(st.sampled_from(names)), draw(st.sampled_from(ATTRIBUTES)))
+    elif change == "scale" and node.attrib:
+        name = draw(st.sampled_from(sorted(node.attrib)))
+        node.set(name, _scaled(draw, node.attrib[name]))
     elif change == "add":
         node.append(ET.fromstring(draw(st.sampled_from(ELEMENTS))))
     elif change == "drop":
@@ -90,6 +96,16 @@ def _edit_element(draw: Draw, root: ET.Element) -> None:
         node.append(copy.deepcopy(other))
     else:
         node.tag = other.tag
+
+
+def _scaled(draw: Draw, text: str) -> str:
+    """An attribute with one of its numbers multiplied."""
+    words = text.split()
+    numbers = [i for i, word in enumerate(words) if re.fullmatch(r"[-+.\deE]*\d[-+.\deE]*", word)]
+    if numbers:
+        i = draw(st.sampled_from(numbers))
+        words[i] = repr(float(words[i]) * draw(st.sampled_from(FACTORS)))
+    return " ".join(words)
 
 
 def _edit_xml(draw: Draw, content: bytes) -> bytes:

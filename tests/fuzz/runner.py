@@ -144,9 +144,14 @@ class Runner:
         known = self.faults.get(outcome.what)
         if known is None:
             print(f"found: {outcome.verdict}: {outcome.what}", flush=True)
-        if known is None or len(json.dumps(case)) < len(json.dumps(known[1])):
+        if known is None or _size(case) < _size(known[1]):
             self.faults[outcome.what] = kind, case, outcome
             keep(self._found, kind, case, outcome)
+
+
+def _size(case: Json) -> tuple[int, str]:
+    text = json.dumps(case)
+    return len(text), text
 
 
 def keep(folder: Path, kind: str, case: Json, outcome: Outcome) -> Path:
