@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from poise.envs.config import build, on_base, packaged, read_yaml, resolve
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 from poise.envs.robot import Robot
 
 from .abe07 import Abe07, Abe07Config
@@ -62,7 +62,7 @@ def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
     config = controller_config(name_or_path)
     if not isinstance(config, MomentumQPConfig):
         raise ConfigError(
-            f"{str(name_or_path)!r} is of kind {config.kind!r}, not a momentum QP",
+            f"{shown(str(name_or_path))} is of kind {config.kind!r}, not a momentum QP",
             field="controller",
             choices=[
                 name
@@ -89,7 +89,7 @@ def load_controller(controller: Any, robot: Robot) -> Any:
     if all(hasattr(controller, name) for name in ("period", "reset", "torques")):
         return controller
     raise ConfigError(
-        f"must be a name, a .yaml file, a mapping or a controller, not {controller!r}",
+        f"must be a name, a .yaml file, a mapping or a controller, not {shown(controller)}",
         field="controller",
         choices=packaged("controllers"),
     )
@@ -104,7 +104,7 @@ def _build(data: dict[str, Any], source: str) -> Any:
     kind = data.get("kind", "momentum-qp")
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigError(
-            f"no such kind of controller: {kind!r}", source=source, field="kind", choices=KINDS
+            f"no such kind of controller: {shown(kind)}", source=source, field="kind", choices=KINDS
         )
     if isinstance(data.get("qp"), str):
         inner = resolve("controllers", data["qp"])

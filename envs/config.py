@@ -14,32 +14,11 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 import numpy as np
 import yaml
 
-from .errors import ConfigError, PoiseError
-from .yaml_loader import Loader
+from .errors import ConfigError, PoiseError, shown
+from .reading import is_file, read_yaml
 
 T = TypeVar("T")
-
-
-def read_yaml(path: str | Path) -> dict[str, Any]:
-    """The mapping in a YAML file.
-
-    Raises:
-        ConfigError: the file is missing, does not parse, or holds something else than a mapping.
-    """
-    try:
-        data = yaml.load(Path(path).read_bytes(), Loader=Loader)
-    except OSError as error:
-        raise ConfigError(f"cannot be read ({error.strerror})", source=path) from None
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        raise ConfigError(f"not valid YAML: {place}{error.problem}", source=path) from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"not valid YAML: {error}", source=path) from None
-    if not isinstance(data, dict):
-        found = "nothing" if data is None else type(data).__name__
-        raise ConfigError(f"must hold a mapping of fields, found {found}", source=path)
-    return data
+MOST_BASES = 32  # a file, its base, the base of that
 
 
 def on_base(
@@ -53,9 +32,13 @@ def on_base(
         return data
     if not isinstance(data["base"], str):
         raise ConfigError("must be a name", source=source, field="base", choices=packaged(kind))
+    if len(above) > MOST_BASES:
+        raise ConfigError(f"more than {MOST_BASES} on each other", source=source, field="base")
     path = resolve(kind, data["base"])
     if path in above:
-        raise ConfigError(f"{data['base']!r} leads back to itself", source=source, field="base")
+        raise ConfigError(
+            f"{shown(data['base'])} leads back to itself", source=source, field="base"
+        )
     base = on_base(read_yaml(path), kind, path, (*above, path))
     return _merged(base, {key: value for key, value in data.items() if key != "base"})
 
@@ -133,14 +116,16 @@ def resolve(kind: str, name: str | Path) -> Path:
         ConfigError: there is no such name or file; its text lists the packaged names.
     """
     names = packaged(kind)
+    if not isinstance(name, (str, Path)):
+        raise ConfigError(f"must be a name or a path, not {shown(name)}", field=kind, choices=names)
     if str(name) in names:
         return packaged_folder(kind) / f"{name}.yaml"
     path = Path(name)
-    if path.suffix in (".yaml", ".yml") and path.is_file():
+    if path.suffix in (".yaml", ".yml") and is_file(path):
         return path
     problem = "no such file" if path.suffix or len(path.parts) > 1 else "no such name"
     raise ConfigError(
-        f"{problem}: {str(name)!r}; give a path to a .yaml file or a packaged name",
+        f"{problem}: {shown(str(name))}; give a path to a .yaml file or a packaged name",
         field=kind,
         choices=names,
     )
@@ -165,8 +150,10 @@ def write_atomic(path: str | Path, content: str | bytes) -> None:
         os.replace(part, path)
     except OSError as error:
         raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
+    except ValueError:  # a NUL in its name
+        raise PoiseError(f"{path}: cannot be written (no name of a file)") from None
     finally:
-        with contextlib.suppress(OSError):  # its folder may be a file
+        with contextlib.suppress(OSError, ValueError):  # its folder may be a file
             part.unlink(missing_ok=True)
 
 
@@ -174,7 +161,7 @@ def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:
     """The value as the type hint wants it; `path` is the dotted field, `bounds` its metadata."""
 
     def wrong(expected: str) -> ConfigError:
-        return ConfigError(f"must be {expected}, not {value!r}", source=source, field=path)
+        return ConfigError(f"must be {expected}, not {shown(value)}", source=source, field=path)
 
     origin, args = get_origin(hint), get_args(hint)
     if hint is Any:
@@ -185,7 +172,9 @@ def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:
         return _build_union(args, value, source, path, bounds)
     if origin is Literal:
         if not any(value == arg and type(value) is type(arg) for arg in args):
-            raise ConfigError(f"unknown value {value!r}", source=source, field=path, choices=args)
+            raise ConfigError(
+                f"unknown value {shown(value)}", source=source, field=path, choices=args
+            )
         return value
     if origin in (tuple, list) or hint in (tuple, list):
         if not isinstance(value, (list, tuple)):
@@ -222,7 +211,10 @@ def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
     fields = {field.name: field for field in dataclasses.fields(cls) if field.init}
     if not isinstance(data, dict):
         raise ConfigError(
-            f"must be a mapping of fields, not {data!r}", source=source, field=path, choices=fields
+            f"must be a mapping of fields, not {shown(data)}",
+            source=source,
+            field=path,
+            choices=fields,
         )
     prefix = f"{path}." if path else ""
     for key in data:
@@ -267,7 +259,7 @@ def _build_union(args: tuple, value: Any, source: str, path: str, bounds: Any) -
 
 def _build_number(kind: type, value: Any, source: str, path: str, bounds: Any) -> int | float:
     def wrong(expected: str) -> ConfigError:
-        return ConfigError(f"must be {expected}, not {value!r}", source=source, field=path)
+        return ConfigError(f"must be {expected}, not {shown(value)}", source=source, field=path)
 
     allowed = int if kind is int else (int, float)
     if isinstance(value, bool) or not isinstance(value, allowed):

@@ -7,7 +7,7 @@ from typing import Any
 
 from .config import build, read_yaml, resolve, to_dict
 from .episode import FallLimits, RewardWeights
-from .errors import ConfigError
+from .errors import ConfigError, shown
 from .push_schedule import PushSampler
 
 
@@ -61,7 +61,7 @@ def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: Any
     fields = {} if config is None else to_dict(config)
     if not isinstance(fields, Mapping):
         raise ConfigError(
-            f"must be an EnvConfig, a file or a mapping, not {config!r}",
+            f"must be an EnvConfig, a file or a mapping, not {shown(config)}",
             source=source,
             field="config",
             choices=EnvConfig.__dataclass_fields__,

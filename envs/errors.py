@@ -2,8 +2,46 @@
 
 from __future__ import annotations
 
+import re
+import reprlib
 from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
+
+LONGEST_TEXT = 1000  # characters of each part of an error
+LONGEST_VALUE = 160  # characters of a value in an error
+MOST_CHOICES = 60
+_BREAKS = re.compile(r"\s*[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]\s*")
+
+
+def one_line(text: str, limit: int = LONGEST_TEXT) -> str:
+    """The text in one line that can be printed, its middle left out beyond `limit` characters."""
+    if len(text) > limit:
+        text = f"{text[: 2 * limit // 3]} … {text[-(limit // 3) :]}"
+    text = _BREAKS.sub(" ", text)
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def shown(value: object) -> str:
+    """The value for an error, as `repr` but short, and quick for whatever anybody may give."""
+    return one_line(_short.repr(value), LONGEST_VALUE)
+
+
+class _Short(reprlib.Repr):
+    """Three levels of a value, the first few entries of each."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxstring, self.maxother = 3, 100, 140
+
+    def repr_int(self, x: int, level: int) -> str:
+        digits = int(x.bit_length() * 0.30103) + 1  # log10(2)
+        return repr(x) if digits <= 40 else f"a whole number of about {digits} digits"
+
+
+_short = _Short()
 
 
 class PoiseError(Exception):
@@ -11,6 +49,9 @@ class PoiseError(Exception):
 
     Its text is one line for a person to read; the command line prints it and exits with code 2.
     """
+
+    def __init__(self, text: object = "") -> None:
+        super().__init__(one_line(str(text), 4 * LONGEST_TEXT))
 
 
 class ConfigError(PoiseError):
@@ -33,11 +74,18 @@ class ConfigError(PoiseError):
         field: str | None = None,
         choices: Iterable[object] | None = None,
     ) -> None:
-        self.message = " ".join(message.split())
+        self.message = one_line(message)
         self.source = None if source is None else str(source)
         self.field = field
         self.choices = None if choices is None else tuple(str(choice) for choice in choices)
-        text = ": ".join(part for part in (self.source, self.field, self.message) if part)
+        parts = (self.source, self.field, self.message)
+        text = ": ".join(one_line(part) for part in parts if part)
         if self.choices is not None:
-            text += f" (choices: {', '.join(self.choices) or 'none'})"
+            text += f" (choices: {_listed(self.choices)})"
         super().__init__(text)
+
+
+def _listed(choices: tuple[str, ...]) -> str:
+    names = [one_line(choice, LONGEST_VALUE) for choice in islice(choices, MOST_CHOICES)]
+    more = [f"and {len(choices) - MOST_CHOICES} more"] if len(choices) > MOST_CHOICES else []
+    return one_line(", ".join(names + more) or "none")

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from .errors import ConfigError
+from .reading import is_file
 
 
 def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
@@ -25,11 +26,11 @@ def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
     Raises:
         ConfigError: the file is missing or does not parse, or a missing mesh matters.
     """
-    if not path.is_file():
+    if not is_file(path):
         raise ConfigError(f"no such file: {path}", source=source, field="source.mjcf")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
+    except Exception as error:  # of the XML, of MuJoCo, of the text in it
         raise ConfigError(
             f"{path} is not valid MJCF: {error}", source=source, field="source.mjcf"
         ) from None

@@ -229,7 +229,7 @@ def _check_bodies(model: mujoco.MjModel, description: RobotDescription, source: 
 def _compile(spec: mujoco.MjSpec, source: str) -> mujoco.MjModel:
     try:
         return spec.compile()
-    except ValueError as error:
+    except Exception as error:  # whatever MuJoCo has
         raise ConfigError(
             f"the model does not compile: {error}", source=source, field="source"
         ) from None

@@ -162,7 +162,7 @@ def test_the_leaderboard_ranks_and_says_where_it_comes_from(tmp_path: Path) -> N
     file = folder / "summary.json"
     write_leaderboard([file], page)
     assert page.read_text() == leaderboard({str(file): json.loads(file.read_text())})
-    (folder / "summary.json").write_text("[]")
+    (folder / "summary.json").write_text("{}")
     with pytest.raises(ConfigError, match="is not a benchmark's summary"):
         write_leaderboard([folder], page)
     assert main(["leaderboard", "--page", str(page)]) == 2

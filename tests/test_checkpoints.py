@@ -14,10 +14,10 @@ from poise.training.checkpoints import (
     STATE,
     STATISTICS,
     find_checkpoint,
-    read_state,
     restore,
     save_checkpoint,
 )
+from poise.training.policy_files import read_state
 from poise.training.train import _training_envs, make_model
 
 from .shared import finished_run, robot, tiny_config

@@ -70,7 +70,7 @@ def summary(**changes: object) -> Callable[[Path], None]:
         (lambda folder: (folder / "trials.csv").write_bytes(b"\xff\xfe\0"), "trials.csv: "),
         (lambda folder: (folder / "summary.json").write_text("[]"), "must be a mapping"),
         (lambda folder: (folder / "summary.json").write_text("{}"), "suite: must be a text"),
-        (cut("summary.json", 0.5), "summary.json: cannot be read"),
+        (cut("summary.json", 0.5), "summary.json: is not valid JSON"),
         (cut("trials.csv", 0.5), "trials.csv"),
         (cut("trials.csv", 0.0), "trials.csv: lacks the columns"),
         (edit("trials.csv", ",recovered,", ",won,"), "lacks the columns recovered"),

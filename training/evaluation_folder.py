@@ -17,6 +17,7 @@ from typing import Any
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
 from poise.envs.push_schedule import LimitTable
+from poise.envs.reading import exists, is_folder
 
 from .trial_log import TrialLog, read_log
 from .trials import COLUMNS, Outcome
@@ -71,12 +72,12 @@ class EvaluationFolder:
         self.path, self.settings = path, settings
         self.finished: dict[int, list[Outcome]] = {}
         self._partial: TrialLog | None = None
-        if path.exists() and not path.is_dir():
+        if exists(path) and not is_folder(path):
             raise ConfigError("is not a folder", source=path, field="out")
         if overwrite:
             for name in (*FILES, REPORT):
                 (path / name).unlink(missing_ok=True)
-        elif any((path / name).exists() for name in FILES):
+        elif any(exists(path / name) for name in FILES):
             self._check()
             self._read_partial()
         write_atomic(path / SETTINGS, to_yaml(settings))

@@ -15,6 +15,7 @@ from rich.console import Console
 
 from poise.envs.config import write_atomic
 from poise.envs.errors import PoiseError
+from poise.envs.reading import TABLE_BYTES, read_text
 
 from . import factor_tables, report_plots, report_tables, report_words
 from .evaluation_folder import REPORT, TRIALS
@@ -231,7 +232,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
 
 def _trials(results: Results) -> Download | None:
     """trials.csv, packed where it is long; None where it is too long for a page."""
-    text = (results.folder / TRIALS).read_text(encoding="utf-8")
+    text = read_text(results.folder / TRIALS, TABLE_BYTES)
     if len(text) <= EMBEDDED:
         return download(TRIALS, text)
     packed = download(TRIALS, text, pack=True)

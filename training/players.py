@@ -14,7 +14,8 @@ from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.baselines.residual_step_env import ResidualStepEnv
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import packaged, to_dict, to_yaml
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
+from poise.envs.reading import is_file, is_folder
 from poise.envs.robot import Robot
 from poise.envs.torque_balance import TorqueBalanceEnv
 
@@ -56,15 +57,15 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
     if name == NO_CONTROL:
         return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
     policies = packaged("policies")
-    if name in policies or Path(name).is_dir():
+    if name in policies or is_folder(name):
         return _policy(name, robot, overrides)
     if is_outside(name) and not _is_controller(name, robot):
         return _outside_policy(name, robot, overrides)
     names = packaged("controllers")
-    is_file = Path(name).is_file() and Path(name).suffix in (".yaml", ".yml")
-    if name not in names and not is_file and not is_outside(name):
+    found = is_file(name) and Path(name).suffix in (".yaml", ".yml")
+    if name not in names and not found and not is_outside(name):
         raise ConfigError(
-            f"no such controller: {name!r}; give a name, a .yaml file of a controller, "
+            f"no such controller: {shown(name)}; give a name, a .yaml file of a controller, "
             "a folder written by poise train, or module:Class",
             field="controller",
             choices=(*names, *policies, NO_CONTROL),
@@ -124,8 +125,8 @@ def _outside_policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Playe
     else:
         kind = getattr(policy, "environment", "torque")
         if kind not in ENVIRONMENTS:
-            raise ConfigError(f"no such environment: {kind!r}", source=name, field="environment",
-                              choices=ENVIRONMENTS)  # fmt: skip
+            raise ConfigError(f"no such environment: {shown(kind)}", source=name,
+                              field="environment", choices=ENVIRONMENTS)  # fmt: skip
         env = ENVIRONMENTS[kind](robot, **overrides)
     content = to_yaml(outside_config(name)).encode()
     return Player(name, env, policy.act, _hash(content), getattr(policy, "reset", None))

@@ -1,18 +1,16 @@
 """A trained policy, ready to use: observation in, action out, plain NumPy."""
 
-import io
-import zipfile
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build, packaged, packaged_folder, read_yaml
 from poise.envs.errors import ConfigError
 from poise.envs.mirror import Mirror
+from poise.envs.reading import is_file, is_folder, parsing
 from poise.envs.robot import Robot, load_robot
 
 from .checkpoints import (
@@ -21,14 +19,12 @@ from .checkpoints import (
     POLICY,
     STATE,
     STATISTICS,
-    UNREADABLE,
     check_controller,
     check_robot,
     find_checkpoint,
-    read_state,
-    unreadable,
 )
 from .config import TrainConfig
+from .policy_files import read_state, read_statistics, read_weights
 
 SHIPPED = "residual"
 ACTOR = "mlp_extractor.policy_net."  # SB3's name of the actor's hidden layers
@@ -130,12 +126,12 @@ def locate_policy(folder: str | Path | None) -> Path:
     else:
         path = Path(name)
         path = find_checkpoint(path / "best") or find_checkpoint(path) or path
-        if not path.exists():
+        if not is_folder(path):
             raise ConfigError(
                 "no such folder, and no packaged policy", source=path, choices=packaged("policies")
             )
     for name in FILES:
-        if not (path / name).is_file():
+        if not is_file(path / name):
             raise ConfigError(
                 f"no {name}: a policy folder holds {', '.join(FILES)}", source=path, field=name
             )
@@ -143,26 +139,18 @@ def locate_policy(folder: str | Path | None) -> Path:
 
 
 def _read_statistics(path: Path) -> tuple[np.ndarray, np.ndarray, float, float]:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            values = [np.asarray(data[k], dtype=float) for k in ("obs_mean", "obs_var")]
-            clip, epsilon = float(data["clip_obs"]), float(data["epsilon"])
-    except UNREADABLE as error:
-        raise unreadable(path, error) from None
-    mean, var = values
-    numbers = np.concatenate([mean.ravel(), var.ravel(), [clip, epsilon]])
-    good = mean.ndim == 1 and mean.shape == var.shape and np.isfinite(numbers).all()
-    if not good or var.min() < 0.0 or clip <= 0.0 or epsilon <= 0.0:
-        raise ConfigError("holds numbers that are not statistics", source=path)
-    return mean, var, clip, epsilon
+    found = read_statistics(path, ("obs_mean", "obs_var", "clip_obs", "epsilon"))
+    mean, var, clip, epsilon = found.values()
+    if mean.ndim != 1 or mean.shape != var.shape or clip.shape or epsilon.shape:
+        raise ConfigError("holds numbers that are not statistics: they have other shapes",
+                          source=path)  # fmt: skip
+    return mean, var, float(clip), float(epsilon)
 
 
 def _read_weights(path: Path) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(weight (in, out), bias) of the actor's layers, by torch's weights-only reader."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            blob = io.BytesIO(archive.read("policy.pth"))
-        weights = torch.load(blob, map_location="cpu", weights_only=True)
+    """(weight (in, out), bias) of the actor's layers."""
+    weights = read_weights(path)
+    with parsing(path):
         actor = [key.rsplit(".", 1)[0] for key in weights if key.startswith(ACTOR)]
         names = sorted(set(actor), key=lambda name: int(name.rsplit(".", 1)[1]))
         layers = [
@@ -170,12 +158,10 @@ def _read_weights(path: Path) -> list[tuple[np.ndarray, np.ndarray]]:
              weights[f"{name}.bias"].double().numpy().copy())
             for name in [*names, "action_net"]
         ]  # fmt: skip
+        if any(weight.ndim != 2 for weight, _ in layers):
+            raise ValueError("a layer is no matrix")
         if any(a[0].shape[1] != b[0].shape[0] for a, b in pairwise(layers)):
             raise ValueError("layers do not fit each other")
         if any(bias.shape != (weight.shape[1],) for weight, bias in layers):
             raise ValueError("a bias does not fit its layer")
-    except UNREADABLE as error:
-        raise unreadable(path, error) from None
-    if not all(np.all(np.isfinite(array)) for layer in layers for array in layer):
-        raise ConfigError("holds weights that are not finite", source=path)
     return layers

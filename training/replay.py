@@ -1,7 +1,5 @@
 """Playing one trial of an evaluation again, exactly, from its folder."""
 
-import csv
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -9,8 +7,9 @@ from typing import Any
 
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 from poise.envs.pushes import Push
+from poise.envs.reading import is_file, parse_json, parsing, read_table
 from poise.envs.robot import load_robot
 
 from .benchmark.reading import is_benchmark, load_benchmark_data, player_of, read_case
@@ -103,7 +102,7 @@ def _choose(folder: Path, names: Mapping[str, str], controller: str | None) -> s
     """The controller asked for, else the last."""
     name = tuple(names)[-1] if controller is None else controller
     if name not in names:
-        raise ConfigError(f"{name!r} was not evaluated", source=folder, field="controller",
+        raise ConfigError(f"{shown(name)} was not evaluated", source=folder, field="controller",
                           choices=names)  # fmt: skip
     return name
 
@@ -111,17 +110,16 @@ def _choose(folder: Path, names: Mapping[str, str], controller: str | None) -> s
 def _find(folder: Path, trial: int, controller: str) -> Mapping[str, str]:
     """The line of trials.csv."""
     path = folder / TRIALS
-    if not (folder / SUMMARY).exists() or not path.exists():
+    if not is_file(folder / SUMMARY) or not is_file(path):
         raise ConfigError("holds no finished evaluation", source=folder)
-    with path.open(newline="") as file:
-        reader = csv.DictReader(file)
-        if tuple(reader.fieldnames or ()) != COLUMNS:
-            raise ConfigError("has other columns than poise evaluate writes", source=path)
-        lines = list(reader)
+    columns, lines = read_table(path)
+    if columns != COLUMNS:
+        raise ConfigError("has other columns than poise evaluate writes", source=path)
     for line in lines:
         if line["trial"] == str(trial) and line["controller"] == controller:
             return line
-    last = max((int(line["trial"]) for line in lines), default=-1)
+    with parsing(path):
+        last = max((int(line["trial"]) for line in lines), default=-1)
     raise ConfigError(f"no trial {trial}; they are numbered from 0 to {last}", source=path,
                       field="trial")  # fmt: skip
 
@@ -138,11 +136,11 @@ def _trial(line: Mapping[str, str], path: Path) -> Trial:
             data["point"] = [data.pop(key) for key in ("point_x", "point_y", "point_z")]
             push = build(Push, data, str(path))
         fraction = float(line["limit_fraction"]) if line["limit_fraction"] else None
-        rest = json.loads(line["later"]) if line["later"] else []
+        rest = parse_json(line["later"]) if line["later"] else []
         later = tuple(build(Push, push, str(path)) for push in rest)
         number, seed, stage = (int(line[key]) for key in ("trial", "seed", "stage"))
         return Trial(number, seed, push, fraction, stage, later)
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None
 
 
@@ -150,12 +148,12 @@ def _player(settings: Settings, name: str, folder: Path) -> Player:
     """The controller as it was evaluated."""
     robot = load_robot(settings.robot)
     if robot.fingerprint != settings.robot_fingerprint:
-        raise ConfigError(f"the robot {settings.robot!r} has changed since", source=folder,
+        raise ConfigError(f"the robot {shown(settings.robot)} has changed since", source=folder,
                           field="robot_fingerprint")  # fmt: skip
     suite = build_suite(settings.suite, str(folder))
     player = load_player(name, robot, duration=suite.duration, pushes=None, noise=suite.noise)
     if player.fingerprint != settings.controllers[name]:
-        raise ConfigError(f"the controller {name!r} has changed since", source=folder,
+        raise ConfigError(f"the controller {shown(name)} has changed since", source=folder,
                           field="controllers")  # fmt: skip
     return player
 

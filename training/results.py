@@ -1,14 +1,12 @@
 """The folder of a finished evaluation or benchmark, read back and checked."""
 
-import csv
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from poise.envs.config import read_yaml
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
+from poise.envs.reading import is_file, is_folder, read_json, read_table, read_yaml
 
 from .benchmark.flat import flat
 from .benchmark.folder import LOG, BenchmarkSettings, read_benchmark_settings
@@ -113,9 +111,9 @@ def load_results(folder: str | Path) -> Results:
             do not belong together.
     """
     folder = Path(folder)
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise ConfigError("no such folder", source=folder)
-    missing = [name for name in (SETTINGS, SUMMARY, TRIALS) if not (folder / name).is_file()]
+    missing = [name for name in (SETTINGS, SUMMARY, TRIALS) if not is_file(folder / name)]
     if missing:
         stopped = (folder / PARTIAL).exists() or (folder / LOG).exists()
         why = "it was stopped: the command that began it goes on" if stopped else (
@@ -124,7 +122,7 @@ def load_results(folder: str | Path) -> Results:
         raise ConfigError(why, source=folder)
     path, records = folder / SUMMARY, _records(folder / TRIALS)
     settings: Settings | BenchmarkSettings
-    source = summary = _mapping(path)
+    source = summary = read_json(path)
     if "benchmark" in read_yaml(folder / SETTINGS):
         settings = read_benchmark_settings(folder)
         summary = flat(source, [record.line for record in records], str(path))
@@ -133,16 +131,6 @@ def load_results(folder: str | Path) -> Results:
     _check_summary(summary, path)
     _check(folder, settings, summary, records)
     return Results(folder, settings, summary, records, source)
-
-
-def _mapping(path: Path) -> dict[str, Any]:
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"cannot be read ({error})", source=path) from None
-    if not isinstance(summary, dict):
-        raise ConfigError("must be a mapping", source=path)
-    return summary
 
 
 def _check_summary(summary: Mapping[str, Any], path: Path) -> None:
@@ -166,28 +154,21 @@ def _check_counts(entry: Mapping[str, Any], where: str) -> None:
     trials, recovered = (number(entry, key, where, needed=True) for key in ("trials", "recovered"))
     number(entry, "recovered_rate", where, needed=True)
     if not (isinstance(trials, int) and isinstance(recovered, int) and 0 <= recovered <= trials):
-        raise ConfigError(f"must be a whole number from 0 to trials, not {recovered}",
+        raise ConfigError(f"must be a whole number from 0 to trials, not {shown(recovered)}",
                           source=where, field="recovered")  # fmt: skip
     if trials == 0:
         raise ConfigError("must be at least 1", source=where, field="trials")
 
 
 def _records(path: Path) -> tuple[Record, ...]:
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            lacking = [name for name in NEEDED if name not in (reader.fieldnames or ())]
-            if lacking:
-                raise ConfigError(f"lacks the columns {', '.join(lacking)}", source=path)
-            return tuple(_record(line, reader.line_num, path) for line in reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ConfigError(f"cannot be read ({error})", source=path) from None
+    columns, lines = read_table(path)
+    lacking = [name for name in NEEDED if name not in columns]
+    if lacking:
+        raise ConfigError(f"lacks the columns {', '.join(lacking)}", source=path)
+    return tuple(_record(line, number, path) for number, line in enumerate(lines, 2))
 
 
 def _record(line: Mapping[str, Any], number: int, path: Path) -> Record:
-    if None in line or None in line.values():
-        raise ConfigError(f"line {number} has another number of columns than the first",
-                          source=path)  # fmt: skip
     try:
         impulse, direction, duration, fraction, fall_time = (
             float(line[name] or "nan")
@@ -216,13 +197,14 @@ def _check(
     counts = dict.fromkeys(entries, 0)
     for record in records:
         if record.controller not in counts:
-            raise ConfigError(f"{record.controller!r} is not in {SUMMARY}", source=folder / TRIALS,
-                              field="controller")  # fmt: skip
+            raise ConfigError(f"{shown(record.controller)} is not in {SUMMARY}",
+                              source=folder / TRIALS, field="controller")  # fmt: skip
         counts[record.controller] += 1
     for name, entry in entries.items():
         expected = entry.get("played", entry["trials"])
         if counts[name] != expected:
             raise ConfigError(
-                f"has {counts[name]} trials of {name!r}, but {SUMMARY} has {expected}: cut off?",
+                f"has {counts[name]} trials of {shown(name)}, but {SUMMARY} has "
+                f"{shown(expected)}: cut off?",
                 source=folder / TRIALS,
             )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from poise.envs.config import to_yaml
 from poise.envs.errors import ConfigError
+from poise.envs.reading import is_file, is_folder, read_json
 
 from .statistics import seed_aggregate
 
@@ -26,15 +26,13 @@ def seed_folder(out: Path, seed: int) -> Path:
 def read_seeds(out: Path) -> list[dict[str, Any]]:
     """The runs of seeds.json; raises ConfigError naming the file."""
     path = out / SEEDS
-    try:
-        runs = json.loads(path.read_text())["runs"]
-        if not all(type(run["seed"]) is int and run["folder"] for run in runs):
-            raise ValueError("a run without a seed or a folder")
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ConfigError(
-            f"cannot be read ({type(error).__name__}: {error})", source=path
-        ) from None
-    return list(runs)
+    runs = read_json(path).get("runs")
+    if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
+        raise ConfigError("must be a list of mappings", source=path, field="runs")
+    for run in runs:
+        if type(run.get("seed")) is not int or not isinstance(run.get("folder"), str):
+            raise ConfigError("a run without a seed or a folder", source=path, field="runs")
+    return runs
 
 
 def expand_seeds(names: Sequence[str]) -> tuple[str, ...]:
@@ -44,7 +42,7 @@ def expand_seeds(names: Sequence[str]) -> tuple[str, ...]:
     """
     expanded: list[str] = []
     for name in names:
-        if not (Path(name) / SEEDS).is_file():
+        if not is_file(Path(name) / SEEDS):
             expanded.append(name)
             continue
         for run in read_seeds(Path(name)):
@@ -67,7 +65,7 @@ def seed_groups(names: Sequence[str], entries: Mapping[str, Any]) -> list[dict[s
     """
     groups: dict[str, list[tuple[str, int]]] = {}
     for name in names:
-        if Path(name).is_dir():
+        if is_folder(name):
             configuration, seed = _configuration(name)
             groups.setdefault(configuration, []).append((name, seed))
     return [
@@ -130,7 +128,7 @@ def _configuration(folder: str) -> tuple[str, int]:
 def _aggregate(members: list[str], seeds: list[int], entries: Mapping[str, Any]) -> dict[str, Any]:
     here = [entries[name] for name in members]
     parents = {str(Path(name).parent) for name in members}
-    together = len(parents) == 1 and (Path(members[0]).parent / SEEDS).is_file()
+    together = len(parents) == 1 and is_file(Path(members[0]).parent / SEEDS)
     scores: dict[str, list[list[float]]] = {}
     if all(entry.get("directions") for entry in here):
         scores["j50_mean"] = [[entry["j50_mean"]] for entry in here]

@@ -12,7 +12,8 @@ from rich.table import Table
 
 from poise.envs.errors import ConfigError
 
-from .checkpoints import STATE, find_checkpoint, read_state
+from .checkpoints import STATE, find_checkpoint
+from .policy_files import read_state
 
 if TYPE_CHECKING:
     from .train_seeds import SeedRun

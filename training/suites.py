@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from poise.envs.config import build, read_yaml, resolve
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 from poise.envs.push_schedule import PushSampler, push_bodies
 from poise.envs.pushes import Push
 
@@ -102,6 +102,6 @@ def build_suite(data: dict[str, Any], source: str) -> Suite:
     """A suite from the fields of its kind; raises ConfigError."""
     kind = data.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
-        raise ConfigError(f"no such kind of suite: {kind!r}", source=source, field="kind",
+        raise ConfigError(f"no such kind of suite: {shown(kind)}", source=source, field="kind",
                           choices=KINDS)  # fmt: skip
     return build(KINDS[kind], data, source)

@@ -16,8 +16,9 @@ from poise.envs.config import to_yaml, write_atomic
 from poise.envs.errors import ConfigError, PoiseError
 
 from .backends import Crew, check_backend
-from .checkpoints import CONFIG, STATE, find_checkpoint, read_state
+from .checkpoints import CONFIG, STATE, find_checkpoint
 from .config import TrainConfig
+from .policy_files import read_state
 from .provenance import circumstances
 from .seed_groups import SEEDS, read_seeds, seed_figures, seed_folder
 from .seed_progress import SeedProgress, print_seeds

@@ -10,17 +10,19 @@ from typing import Any, TextIO
 
 from poise.envs.config import write_atomic
 from poise.envs.errors import PoiseError
+from poise.envs.reading import is_file, parse_json, read_lines
 
 
 def read_log(path: Path) -> tuple[list[tuple[Any, Any]], int]:
     """(key, value) of every line, and how many lines could not be read; a missing file is empty.
 
     A kill cuts off the last line; lines that a broken disk spoils are left out alike.
+    Raises ConfigError for a file of more than 128 MiB.
     """
     entries, damaged = [], 0
-    for line in path.read_bytes().splitlines() if path.exists() else []:
+    for line in read_lines(path) if is_file(path) else []:
         try:
-            key, value = json.loads(line)
+            key, value = parse_json(line)
             entries.append((key, value))
         except (ValueError, TypeError):
             damaged += 1

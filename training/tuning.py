@@ -14,6 +14,7 @@ from rich.console import Console
 
 from poise.envs.config import build, on_base, read_yaml, resolve, to_dict, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
+from poise.envs.reading import is_file, parse_json, read_lines
 from poise.envs.robot import load_robot
 
 from .backends import Crew
@@ -106,7 +107,7 @@ def tune(
 
 def _known(config: TuneConfig, out: Path, resume: bool) -> list[dict[str, Any]]:
     """What an earlier call has tried."""
-    if not (out / CONFIG).is_file():
+    if not is_file(out / CONFIG):
         if resume:
             raise ConfigError("holds no search to resume", source=out, field="resume")
         return []
@@ -119,11 +120,10 @@ def _known(config: TuneConfig, out: Path, resume: bool) -> list[dict[str, Any]]:
     for name, value in to_dict(config).items():
         if name != "generations" and before[name] != value:
             raise ConfigError("is not that of the search here", source=out / CONFIG, field=name)
-    if not (out / HISTORY).is_file():
+    if not is_file(out / HISTORY):
         return []
-    lines = (out / HISTORY).read_text().splitlines()
     try:
-        return [json.loads(line) for line in lines]
+        return [parse_json(line) for line in read_lines(out / HISTORY)]
     except ValueError as error:
         raise ConfigError(f"not valid JSON: {error}", source=out / HISTORY) from None
 

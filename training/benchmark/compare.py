@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from poise.envs.config import read_yaml
 from poise.envs.errors import ConfigError
+from poise.envs.reading import is_file, read_json, read_table, read_yaml
 
 from ..differences import difference, paired_rates
 from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS
@@ -120,19 +119,18 @@ class _Result:
 
     def __init__(self, folder: Path):
         self.folder = folder
-        try:
-            self.summary = json.loads((folder / SUMMARY).read_text())
-            self.controllers: dict[str, Any] = self.summary["controllers"]
-        except OSError as error:
+        if not is_file(folder / SUMMARY):
             raise ConfigError(
-                f"cannot be read ({error.strerror}): not a finished result", source=folder / SUMMARY
-            ) from None
-        except (ValueError, KeyError, TypeError) as error:
-            raise ConfigError(f"is no summary of a result: {error}",
-                              source=folder / SUMMARY) from None  # fmt: skip
+                "cannot be read (no such file): not a finished result", source=folder / SUMMARY
+            )
+        self.summary = read_json(folder / SUMMARY)
+        self.controllers: dict[str, Any] = self.summary.get("controllers")
+        if not isinstance(self.controllers, dict):
+            raise ConfigError("is no summary of a result: it has no controllers",
+                              source=folder / SUMMARY)  # fmt: skip
         self.settings = read_yaml(folder / SETTINGS)
         self.is_benchmark = "benchmark" in self.summary
-        self.trials = self._trials() if (folder / TRIALS).exists() else {}
+        self.trials = self._trials() if is_file(folder / TRIALS) else {}
 
     def outcomes(self, name: str) -> dict[tuple[str, ...], bool]:
         """The trials of a controller."""
@@ -140,16 +138,11 @@ class _Result:
 
     def _trials(self) -> dict[tuple[str, ...], bool]:
         """What both must share to be a pair → whether it was recovered."""
-        import csv
-
-        with (self.folder / TRIALS).open(newline="") as file:
-            reader = csv.DictReader(file)
-            columns = list(reader.fieldnames or ())
-            if "recovered" not in columns:
-                raise ConfigError("has no column 'recovered'", source=self.folder / TRIALS)
-            shared = columns[: columns.index("recovered")]
-            return {tuple(row[c] or "" for c in shared): row["recovered"] == "True"
-                    for row in reader}  # fmt: skip
+        columns, rows = read_table(self.folder / TRIALS)
+        if "recovered" not in columns:
+            raise ConfigError("has no column 'recovered'", source=self.folder / TRIALS)
+        shared = columns[: columns.index("recovered")]
+        return {tuple(row[c] for c in shared): row["recovered"] == "True" for row in rows}
 
 
 def _changes(name: str, a: _Result, b: _Result) -> Iterator[Change]:

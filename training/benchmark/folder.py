@@ -18,6 +18,7 @@ from typing import Any
 
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
 from poise.envs.errors import ConfigError, PoiseError
+from poise.envs.reading import exists, is_folder
 
 from ..evaluation_folder import REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
 from ..trial_log import TrialLog, read_log
@@ -72,7 +73,7 @@ class BenchmarkFolder:
     def __init__(self, path: Path, settings: BenchmarkSettings, overwrite: bool = False):
         self.path, self.settings, self.damaged = path, settings, 0
         self.finished: dict[Key, Result] = {}
-        if path.exists() and not path.is_dir():
+        if exists(path) and not is_folder(path):
             raise ConfigError("is not a folder", source=path, field="out")
         self._lock = FolderLock(path)
         try:
@@ -86,7 +87,7 @@ class BenchmarkFolder:
         if overwrite:
             for name in (*FILES, REPORT):
                 (path / name).unlink(missing_ok=True)
-        elif any((path / name).exists() for name in FILES):
+        elif any(exists(path / name) for name in FILES):
             before = self._check()
             self.settings = replace(
                 settings, controllers={**before.controllers, **settings.controllers}

@@ -8,6 +8,7 @@ from typing import Any
 
 from poise.envs.config import write_atomic
 from poise.envs.errors import ConfigError
+from poise.envs.reading import is_folder
 
 from ..seed_groups import seed_lines
 from .reading import read_summary
@@ -37,7 +38,7 @@ def write_leaderboard(sources: Sequence[str | Path], page: str | Path) -> None:
     summaries = {}
     for source in sources:
         path = Path(source)
-        path = path / "summary.json" if path.is_dir() else path
+        path = path / "summary.json" if is_folder(path) else path
         summaries[str(source)] = read_summary(path)
     write_atomic(page, leaderboard(summaries))
 

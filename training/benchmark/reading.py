@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +9,9 @@ from typing import Any
 
 from poise.envs.balance import BalanceEnv
 from poise.envs.config import build
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 from poise.envs.pushes import Push
+from poise.envs.reading import is_file, parsing, read_json, read_table
 from poise.envs.robot import load_robot
 
 from ..evaluation_folder import SUMMARY, TRIALS
@@ -45,9 +44,10 @@ class BenchmarkData:
         for line in self.rows:
             if line["controller"] == controller and line["trial"] == str(trial):
                 return line
-        numbers = [int(row["trial"]) for row in self.rows if row["controller"] == controller]
+        with parsing(self.folder / TRIALS):
+            numbers = [int(row["trial"]) for row in self.rows if row["controller"] == controller]
         if not numbers:
-            raise ConfigError(f"{controller!r} took no part", source=self.folder,
+            raise ConfigError(f"{shown(controller)} took no part", source=self.folder,
                               field="controller", choices=self.settings.controllers)  # fmt: skip
         raise ConfigError(f"no trial {trial}; they are numbered from 0 to {max(numbers)}",
                           source=self.folder, field="trial")  # fmt: skip
@@ -68,39 +68,23 @@ def load_benchmark_data(folder: str | Path) -> BenchmarkData:
     settings = read_benchmark_settings(folder)
     summary = read_summary(folder / SUMMARY)
     path = folder / TRIALS
-    try:
-        with path.open(newline="") as file:
-            reader = csv.DictReader(file)
-            columns, rows = tuple(reader.fieldnames or ()), list(reader)
-    except OSError as error:
-        raise ConfigError(f"cannot be read ({error.strerror})", source=path) from None
-    except (csv.Error, UnicodeDecodeError) as error:
-        raise ConfigError(f"is not a table of trials: {error}", source=path) from None
+    again = "run the same poise benchmark again, it writes the file anew without playing a trial"
+    columns, rows = read_table(path, f": {again}")
     if columns != COLUMNS:
         raise ConfigError("has other columns than poise benchmark writes", source=path)
     expected = sum(entry["trials"] for entry in summary["controllers"].values())
-    cut = any(value is None for row in rows[-1:] for value in row.values())
-    if len(rows) != expected or cut:
-        raise ConfigError(
-            f"has {len(rows)} trials instead of {expected}: run the same poise benchmark again, "
-            "it writes the file anew without playing a trial",
-            source=path,
-        )
+    if len(rows) != expected:
+        raise ConfigError(f"has {len(rows)} trials instead of {expected}: {again}", source=path)
     return BenchmarkData(folder, settings, summary, rows)
 
 
 def read_summary(path: str | Path) -> dict[str, Any]:
     """A summary.json of a benchmark; raises ConfigError."""
     path = Path(path)
-    try:
-        summary = json.loads(path.read_text())
-    except OSError as error:
-        raise ConfigError(
-            f"cannot be read ({error.strerror}): not a finished benchmark", source=path
-        ) from None
-    except ValueError as error:
-        raise ConfigError(f"is not valid JSON: {error}", source=path) from None
-    if not isinstance(summary, dict) or summary.get("benchmark") != FORMAT:
+    if not is_file(path):
+        raise ConfigError("cannot be read (no such file): not a finished benchmark", source=path)
+    summary = read_json(path)
+    if summary.get("benchmark") != FORMAT:
         raise ConfigError(f"is not a benchmark's summary of format {FORMAT}", source=path)
     return summary
 
@@ -136,17 +120,17 @@ def player_of(data: BenchmarkData, controller: str) -> BenchmarkPlayer:
     """A controller as it took part; raises ConfigError if it or the robot has changed since."""
     settings = data.settings
     if controller not in settings.controllers:
-        raise ConfigError(f"{controller!r} took no part", source=data.folder, field="controller",
-                          choices=settings.controllers)  # fmt: skip
+        raise ConfigError(f"{shown(controller)} took no part", source=data.folder,
+                          field="controller", choices=settings.controllers)  # fmt: skip
     robot = load_robot(settings.robot)
     if robot.fingerprint != settings.robot_fingerprint:
-        raise ConfigError(f"the robot {settings.robot!r} has changed since", source=data.folder,
-                          field="robot_fingerprint")  # fmt: skip
+        raise ConfigError(f"the robot {shown(settings.robot)} has changed since",
+                          source=data.folder, field="robot_fingerprint")  # fmt: skip
     suite = build(BenchmarkSuite, settings.suite, str(data.folder))
     player = load_player(controller, robot, duration=suite.duration, pushes=None, noise=suite.noise)
     if player.fingerprint != settings.controllers[controller]:
-        raise ConfigError(f"the controller {controller!r} has changed since", source=data.folder,
-                          field="controllers")  # fmt: skip
+        raise ConfigError(f"the controller {shown(controller)} has changed since",
+                          source=data.folder, field="controllers")  # fmt: skip
     return BenchmarkPlayer(player)
 
 
