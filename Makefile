@@ -4,6 +4,7 @@
 # make build   the wheel, tried alone       make bench   time the parts of a control tick
 # make clean   remove what was built (not .venv)
 # make test-processors   the tests as other processors would run them, three times each: an hour
+# make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
 #
 # PYTHON311 names another interpreter; PIP_ARGS and PYTEST_ARGS are passed on, as in
 # make test PYTEST_ARGS="-x tests/test_robot.py".
@@ -11,10 +12,14 @@
 PYTHON311 ?= $(shell command -v python3.11 || command -v python3)
 PIP_ARGS ?=
 PYTEST_ARGS ?=
+MINUTES ?= 30
+WORKERS ?= 1
+SEED ?=
+FUZZ_ARGS ?=
 PYTHON := .venv/bin/python
 STAMP := .venv/.poise-setup
 
-.PHONY: setup test test-processors demo check format build bench clean types-tree
+.PHONY: setup test test-processors demo check format build bench fuzz clean types-tree
 
 setup: $(STAMP)
 
@@ -64,5 +69,9 @@ build: setup
 bench: setup
 	$(PYTHON) -m tests.benchmarks
 
+fuzz: setup
+	$(PYTHON) -m tests.fuzz --minutes $(MINUTES) --workers $(WORKERS) \
+		$(if $(SEED),--seed $(SEED)) $(FUZZ_ARGS)
+
 clean:
-	rm -rf build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache
+	rm -rf build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis

@@ -60,6 +60,14 @@ class ResidualScales:
         }
 
 
+@dataclass(frozen=True)
+class _Lag:
+    """How the targets follow the action."""
+
+    smoothing: float = field(metadata={"min": 0.0})  # τ [s]
+    gate: float = field(metadata={"min": 0.0})  # d₀ [m]
+
+
 def _action_term(name: str) -> Term:
     """What the action `name` is to a mirror."""
     if name[-2:] not in ("_x", "_y", "_z"):
@@ -239,13 +247,11 @@ class ResidualBalanceEnv(BalanceEnv):
         if len(self._moved) == 0:
             raise ConfigError("at least one scale must be above 0", field="residual")
         super().__init__(robot, config, render_mode=render_mode, **overrides)
-        if not 0.0 <= smoothing < np.inf:
-            raise ConfigError(f"must be a time of at least 0 s, not {smoothing}", field="smoothing")
-        if not 0.0 <= gate < np.inf:
-            raise ConfigError(f"must be a distance of at least 0 m, not {gate}", field="gate")
-        self.smoothing, self.gate = float(smoothing), float(gate)
+        lag = build(_Lag, to_dict({"smoothing": smoothing, "gate": gate}), "environment")
+        self.smoothing, self.gate = lag.smoothing, lag.gate
         # share of the way that the residual goes to the action in one policy step
-        share = 1.0 if smoothing == 0.0 else -np.expm1(-self.config.policy_period / smoothing)
+        period = self.config.policy_period
+        share = 1.0 if lag.smoothing == 0.0 else -np.expm1(-period / lag.smoothing)
         scale[7:9] *= 10.0 * self.scales.momentum
         self._offsets = apart(len(scale))
         self._residual = Residual(

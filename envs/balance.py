@@ -27,6 +27,7 @@ from .episode import (
 )
 from .errors import ConfigError, PoiseError
 from .mirror import Mirror, mirror_robot, mirror_terms
+from .numbers import finite_array, option_mapping, real_array, seed_number
 from .observation import Term, observation_terms, observe, scales
 from .push_info import push_info
 from .push_options import parse_pushes
@@ -169,9 +170,9 @@ class BalanceEnv(Copyable, gymnasium.Env):
 
         Raises ConfigError naming the option that is unknown or wrong, and what it may be.
         """
-        super().reset(seed=seed)
         self.episode.running[0] = 0  # until this one has succeeded
-        options = dict(options or {})
+        options = option_mapping(options)
+        super().reset(seed=seed_number(seed))
         for name in options:
             if name not in RESET_OPTIONS:
                 raise ConfigError(
@@ -217,11 +218,8 @@ class BalanceEnv(Copyable, gymnasium.Env):
 
     @staticmethod
     def _numbers(value: Any, shape: tuple[int, ...], name: str) -> np.ndarray:
-        try:
-            numbers = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
-            numbers = np.array([np.nan])
-        if numbers.shape != shape or not np.all(np.isfinite(numbers)):
+        numbers = finite_array(value, shape)
+        if numbers is None:
             expected = f"{shape[0]} finite numbers" if shape else "a finite number"
             raise ConfigError(f"must be {expected}", source="reset", field=name)
         return numbers
@@ -240,16 +238,16 @@ class BalanceEnv(Copyable, gymnasium.Env):
 
         Raises ConfigError naming the entries: all for a wrong shape, else those out of bounds.
         """
-        try:
-            vector = np.asarray(action, dtype=float)
-        except (TypeError, ValueError):
-            raise ConfigError(f"must be numbers, not {action!r}", field="action") from None
+        vector = real_array(action)
+        if vector is None:
+            raise ConfigError(f"must be numbers, not {type(action).__name__}", field="action")
         names = self.action_names
         if vector.shape != (len(names),):
             raise ConfigError(
                 f"has shape {vector.shape}, expected {(len(names),)}: {', '.join(names)}",
                 field="action",
             )
+        vector = vector.astype(float, copy=False)
         good = np.abs(vector) <= 1.0 + 1e-6  # NaN is not
         if not good.all():
             bad = [f"{names[i]} is {vector[i]:g}" for i in np.flatnonzero(~good)]

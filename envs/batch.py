@@ -17,6 +17,7 @@ from .copies import Copyable
 from .episode import FALLEN, EpisodeArrays
 from .errors import ConfigError
 from .helpers import Helpers
+from .numbers import real_array, whole_number
 
 
 def replicate(env: BalanceEnv, count: int) -> list[BalanceEnv]:
@@ -24,8 +25,7 @@ def replicate(env: BalanceEnv, count: int) -> list[BalanceEnv]:
 
     Raises ConfigError if `count` is below 1, or the environment's controller cannot be shared.
     """
-    if count < 1:
-        raise ConfigError(f"must be at least 1, not {count}", field="num_envs")
+    count = whole_number(count, 1, "num_envs")
     return [env, *(type(env)(**env.arguments()) for _ in range(count - 1))]
 
 
@@ -167,15 +167,14 @@ class EnvBatch(Copyable):
     def _set_actions(self, actions: np.ndarray, live: Any) -> None:
         """What `BalanceEnv.set_action` does, for these rows at once."""
         record = self.episodes
-        try:
-            vectors = np.asarray(actions, dtype=float)
-        except (TypeError, ValueError):
-            raise ConfigError(f"must be numbers, not {actions!r}", field="action") from None
+        vectors = real_array(actions)
+        if vectors is None:
+            raise ConfigError(f"must be numbers, not {type(actions).__name__}", field="action")
         if vectors.shape != record.action.shape:
             raise ConfigError(
                 f"has shape {vectors.shape}, expected {record.action.shape}", field="action"
             )
-        vectors = vectors[live]
+        vectors = vectors[live].astype(float, copy=False)
         good = np.abs(vectors) <= 1.0 + 1e-6  # NaN is not
         if not good.all():
             for env, vector in zip(np.array(self.envs, dtype=object)[live], vectors, strict=True):

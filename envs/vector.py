@@ -3,7 +3,6 @@
 import os
 from collections.abc import Sequence
 from enum import Enum
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from .balance import BalanceEnv, InfoColumns
 from .batch import EnvBatch, replicate
 from .copies import Copyable
 from .errors import ConfigError
+from .numbers import option_mapping, seed_number, whole_number
 
 try:
     from gymnasium.vector import AutoresetMode
@@ -58,9 +58,7 @@ class BalanceVectorEnv(Copyable, VectorEnv):
                 field="autoreset_mode",
                 choices=[mode.value for mode in AutoresetMode],
             ) from None
-        if not isinstance(threads, Integral) or threads < 1:
-            raise ConfigError(f"must be at least 1, not {threads!r}", field="threads")
-        self.batch = EnvBatch(envs, int(threads))
+        self.batch = EnvBatch(envs, whole_number(threads, 1, "threads"))
         self.envs = self.batch.envs
         first = self.envs[0]
         self.num_envs = len(self.envs)
@@ -84,11 +82,8 @@ class BalanceVectorEnv(Copyable, VectorEnv):
         `options` are those of a single environment, for each; "reset_mask" (n,) bool besides them
         resets only some. Raises ConfigError for a wrong number of seeds, mask or option.
         """
-        n, options = self.num_envs, dict(options or {})
-        if isinstance(seed, (int, np.integer)):
-            seeds: Sequence[int | None] = [int(seed) + i for i in range(n)]
-        else:
-            seeds = [None] * n if seed is None else seed
+        n, options = self.num_envs, option_mapping(options)
+        seeds = self._seeds(seed)
         mask = options.pop("reset_mask", None)
         if mask is None:
             mask = np.ones(n, dtype=bool)
@@ -98,6 +93,15 @@ class BalanceVectorEnv(Copyable, VectorEnv):
             raise ConfigError("needs at least one True", source="reset", field="reset_mask")
         observations = self.batch.reset(seeds, [options] * n, mask)
         return observations, stack_infos([env.info() for env in self.envs], mask)
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        """A seed for each environment; the batch checks their number."""
+        if isinstance(seed, np.ndarray):
+            seed = seed.tolist()
+        if isinstance(seed, (list, tuple)):
+            return [seed_number(each, f"seed[{i}]") for i, each in enumerate(seed)]
+        first = seed_number(seed)
+        return [None if first is None else first + i for i in range(self.num_envs)]
 
     def step(
         self, actions: np.ndarray

@@ -1,0 +1,57 @@
+"""Numbers that a caller hands over, looked at before anything is computed with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+
+from .errors import ConfigError
+
+
+def real_array(value: Any) -> np.ndarray | None:
+    """`value` as an array of real numbers, of its own type; None for what is none.
+
+    Text, complex numbers, dates and objects are none, nor is what cannot be turned into an array.
+    """
+    try:
+        array = np.asarray(value)
+    except Exception:  # an object's own __array__ may raise whatever it likes
+        return None
+    return array if array.dtype.kind in "biuf" else None
+
+
+def finite_array(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
+    """`value` as finite floats of this shape; None for what they are not."""
+    array = real_array(value)
+    if array is None or array.shape != shape:
+        return None
+    numbers = array.astype(float)
+    return numbers if np.isfinite(numbers).all() else None
+
+
+def whole_number(value: Any, least: int, field: str, source: str | None = None) -> int:
+    """`value` as an int; raises ConfigError unless it is a whole number of at least `least`."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Integral):
+        problem = f"must be a whole number, not {type(value).__name__}"
+        raise ConfigError(problem, source=source, field=field)
+    if value < least:
+        raise ConfigError(f"must be at least {least}, not {value}", source=source, field=field)
+    return int(value)
+
+
+def seed_number(seed: Any, field: str = "seed") -> int | None:
+    """A seed of `reset`; raises ConfigError unless it is None or a whole number from 0 on."""
+    return None if seed is None else whole_number(seed, 0, field, "reset")
+
+
+def option_mapping(options: Any) -> dict[Any, Any]:
+    """A copy of the options of `reset`; raises ConfigError unless they are a mapping or None."""
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        problem = f"must be a mapping, not {type(options).__name__}"
+        raise ConfigError(problem, source="reset", field="options")
+    return dict(options)

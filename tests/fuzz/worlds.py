@@ -1,0 +1,41 @@
+"""Environments that the cases of a process share."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.baselines.residual_step_env import ResidualStepEnv
+from poise.envs.balance import BalanceEnv
+from poise.envs.torque_balance import TorqueBalanceEnv
+from poise.envs.vector import BalanceVectorEnv
+
+from ..shared import robot
+
+CLASSES: dict[str, type[BalanceEnv]] = {
+    "torque": TorqueBalanceEnv,
+    "residual": ResidualBalanceEnv,
+    "step": ResidualStepEnv,
+}
+
+
+@cache
+def world(name: str) -> BalanceEnv:
+    """An environment of each class."""
+    return CLASSES[name](robot())
+
+
+@cache
+def worlds() -> BalanceVectorEnv:
+    """Two of them at once."""
+    return BalanceVectorEnv([TorqueBalanceEnv(robot()) for _ in range(2)])
+
+
+def play_on(env: BalanceEnv, observation: np.ndarray, steps: int = 2) -> None:
+    """A few policy steps from here; raises AssertionError for an observation that is none."""
+    for _ in range(steps):
+        assert observation in env.observation_space, "an observation outside its space"
+        if env.episode.running[0]:
+            observation = env.step(np.zeros(len(env.action_names)))[0]

@@ -1,0 +1,73 @@
+"""YAML of all kinds: the packaged files, changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from hypothesis import strategies as st
+
+from poise.baselines.motions import load_motion
+from poise.baselines.registry import load_controller
+from poise.envs.config import packaged_folder, to_yaml
+from poise.envs.env_config import EnvConfig, env_config
+from poise.envs.robot import load_robot
+from poise.training.benchmark.suite import load_benchmark
+from poise.training.config import train_config
+from poise.training.limits import load_limits
+from poise.training.suites import load_suite
+from poise.training.tuning import tune_config
+from poise.training.tuning_gains import Gains
+
+from ..shared import robot
+from .texts import Draw, changed
+from .values import Json, decode, packed
+
+
+def _suite(path: Path) -> None:
+    suite = load_suite(path).resized(2)
+    if suite.count(1) <= 100:
+        suite.first(load_limits(robot()), 0)
+
+
+def _tuning(path: Path) -> None:
+    config = tune_config(path)
+    Gains(config.controller, config.gains, config.robot)
+
+
+LOADERS: dict[str, Callable[[Path], Any]] = {
+    "robots": load_robot,
+    "controllers": lambda path: load_controller(path, robot()),
+    "policies": lambda path: train_config(path).make_env(robot()),
+    "training": lambda path: train_config(path).make_env(robot()),
+    "suites": _suite,
+    "benchmarks": load_benchmark,
+    "motions": lambda path: load_motion(path, robot()),
+    "tuning": _tuning,
+    "limits": lambda path: load_limits(robot(), path),
+    "envs": env_config,
+}
+
+
+def contents(kind: str) -> list[bytes]:
+    """The packaged files of a kind."""
+    if kind == "envs":  # of which none is packaged
+        return [to_yaml(EnvConfig()).encode()]
+    folder = packaged_folder(kind)
+    found = sorted([*folder.glob("*.yaml"), *folder.glob("*/config.yaml")])
+    return [path.read_bytes() for path in found]
+
+
+@st.composite
+def cases(draw: Draw) -> Json:
+    """A kind of configuration and the file."""
+    kind = draw(st.sampled_from(sorted(LOADERS)))
+    return {"of": kind, "file": packed(changed(draw, draw(st.sampled_from(contents(kind)))))}
+
+
+def play(case: Json, folder: Path) -> None:
+    """Load it."""
+    path = folder / "case.yaml"
+    path.write_bytes(decode(case["file"]))
+    LOADERS[case["of"]](path)
