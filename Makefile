@@ -4,13 +4,16 @@
 # make build   the wheel, tried alone       make bench   time the parts of a control tick
 # make clean   remove what was built (not .venv)
 # make test-processors   the tests as other processors would run them, three times each: an hour
+# make lock    requirements.lock from constraints.txt      make audit   known holes in either
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
 #
 # PYTHON311 names another interpreter; PIP_ARGS and PYTEST_ARGS are passed on, as in
-# make test PYTEST_ARGS="-x tests/test_robot.py".
+# make test PYTEST_ARGS="-x tests/test_robot.py". LOCKED=1 lets setup take no file whose hash is not in
+# requirements.lock.
 
 PYTHON311 ?= $(shell command -v python3.11 || command -v python3)
 PIP_ARGS ?=
+LOCKED ?=
 PYTEST_ARGS ?=
 MINUTES ?= 30
 WORKERS ?= 1
@@ -19,12 +22,13 @@ FUZZ_ARGS ?=
 PYTHON := .venv/bin/python
 STAMP := .venv/.poise-setup
 
-.PHONY: setup test test-processors demo check format build bench fuzz clean types-tree
+.PHONY: setup test test-processors demo check format build bench fuzz lock audit clean types-tree
 
 setup: $(STAMP)
 
 $(STAMP): pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m pip --version >/dev/null 2>&1 || $(PYTHON311) -m venv .venv
+	$(if $(LOCKED),$(PYTHON) -m pip install -q $(PIP_ARGS) --require-hashes -r requirements.lock)
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt setuptools
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt --no-build-isolation -e ".[dev]"
 	touch $@
@@ -46,6 +50,23 @@ check: setup types-tree
 format: setup
 	.venv/bin/ruff check --fix .
 	.venv/bin/ruff format .
+
+# Not in .venv: these two are no part of what they look at.
+build/audit:
+	$(PYTHON311) -m venv $@
+	$@/bin/python -m pip install -q $(PIP_ARGS) pip-audit pip-tools
+
+lock: build/audit
+	cp constraints.txt build/audit/constraints.in
+	build/audit/bin/pip-compile -q --generate-hashes --allow-unsafe --strip-extras --no-annotate \
+		--no-header --no-emit-find-links --no-emit-index-url --no-emit-trusted-host \
+		-o build/audit/hashes.txt build/audit/constraints.in
+	{ sed -n '/^#/p' requirements.lock; sed 's/+cpu / /; /^#/d; /^--/d' build/audit/hashes.txt; } \
+		> build/audit/requirements.lock
+	mv build/audit/requirements.lock requirements.lock
+
+audit: build/audit
+	build/audit/bin/pip-audit -r requirements.lock --disable-pip
 
 # mypy cannot follow the map of folders to packages, so it gets the map as links.
 types-tree:
