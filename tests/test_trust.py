@@ -141,6 +141,8 @@ LOADERS: dict[str, Callable[[Ground, str], Any]] = {
     "train, seeds": lambda g, n: train_seeds(_train_config(g, n), [0], g.here / "out", workers=1),
     "replay": lambda g, n: replay(evaluation(g, n), 0),
     "replay, chosen": lambda g, n: replay(evaluation(g, n), 0, n),
+    "replay, YAML": lambda g, n: replay(evaluation(g, NAMES["YAML"](g)), 0),
+    "replay, YAML in a benchmark": lambda g, n: replay(finished(g, NAMES["YAML"](g)), 0),
     "replay, of a policy": lambda g, n: replay(evaluation(g, str(policy(g, n))), 0),
     "replay, of a benchmark": lambda g, n: replay(finished(g, n), 0),
     "replay_case": lambda g, n: replay_case(load_benchmark_data(finished(g, n)), n, 0),
