@@ -138,4 +138,5 @@ def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
 
 
 def _beside(folder: Path, suffix: str) -> Path:
-    return folder.with_name(f".{folder.name}.{suffix}")
+    folder = Path(os.path.abspath(folder))  # "." has no name
+    return folder.parent / f".{folder.name}.{suffix}"
