@@ -86,5 +86,7 @@ def _array(data: bytes, name: str) -> np.ndarray:
     shape, fortran, dtype = np.lib.format.read_array_header_1_0(file)
     if dtype.kind != "f" or dtype.itemsize not in (4, 8):
         raise ValueError(f"{name} must be of 32- or 64-bit floats, not {dtype}")
+    if any(length < 0 for length in shape):
+        raise ValueError(f"{name} has the shape {shape}")
     values = np.frombuffer(data, dtype, offset=file.tell())
     return values.reshape(shape, order="F" if fortran else "C").astype(float)

@@ -233,6 +233,66 @@ def test_statistics_that_are_none_are_refused(folder, wrong):
         load_policy(folder)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("obs_mean", lambda x: x.astype(complex)),
+        ("obs_mean", lambda x: x.astype("M8[s]")),
+        ("obs_mean", lambda x: x.astype([("a", float)])),
+        ("obs_var", lambda x: x > 0.0),
+        ("obs_mean", lambda x: x + 1e308),
+        ("obs_var", lambda x: x + 1e38),
+        ("epsilon", lambda x: np.array(5e-324)),
+        ("clip_obs", lambda x: np.array(1e300)),
+        ("clip_obs", lambda x: np.ones(3)),
+    ],
+)
+def test_statistics_are_floats_of_a_sane_size(folder, name, value):
+    """Complex numbers, dates, records, flags, and numbers that no training gives."""
+    with np.load(folder / STATISTICS) as data:
+        arrays = dict(data)
+    np.savez(folder / STATISTICS, **{**arrays, name: value(arrays[name])})
+    with pytest.raises(ConfigError, match=f"{STATISTICS}.*({name}|other shapes)"):
+        load_policy(folder)
+
+
+@pytest.mark.parametrize("reader", ["load_policy", "restore"])
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda w: w.to(torch.complex64), "torch.complex64"),
+        (lambda w: w > 0.0, "torch.bool"),
+        (lambda w: w.to(torch.int64), "torch.int64"),
+        (lambda w: w + 1e38, "at most 1e"),
+        (lambda w: torch.zeros(1).expand(100_000, 100_000), "larger than their file"),
+    ],
+)
+def test_weights_are_floats_of_a_sane_size(folder, model, reader, change, named):
+    """Complex numbers, flags, whole numbers, huge ones, and a number that is repeated 10^10 times,
+    by evaluation and by resuming."""
+    key = "action_net.weight"
+    rewrite(folder, policy_pth=weights(folder, lambda w: w.update({key: change(w[key])})))
+    with pytest.raises(ConfigError, match=f"{POLICY}.*{named}"):
+        if reader == "load_policy":
+            load_policy(folder)
+        else:
+            restore(folder, model, model.get_env(), robot().fingerprint)
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_weights_that_unpack_to_too_much_are_refused(folder, inside):
+    """200 MiB of zeros in 200 kB: as policy.pth, and in the archive that policy.pth is."""
+    blob = io.BytesIO()
+    with zipfile.ZipFile(blob, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("archive/data/0", bytes(200 << 20))
+    if inside:
+        rewrite(folder, policy_pth=blob.getvalue())
+    else:
+        (folder / POLICY).write_bytes(blob.getvalue())
+    with pytest.raises(ConfigError, match=f"{POLICY}.*more than 128 MiB"):
+        load_policy(folder)
+
+
 class Bomb:
     """Writes a file when it is unpickled."""
 
