@@ -1,5 +1,6 @@
 """Steps that threads share out: each is played whole, in order, by one thread at a time."""
 
+import os
 import time
 from dataclasses import dataclass
 from threading import Barrier, Thread
@@ -123,7 +124,8 @@ def test_helpers_stay_for_the_next_call(threads, pause, monkeypatch):
     assert [step.block.ticks[0] for step in steps] == [2 * rounds] * len(steps)
     assert not any(step.block.clashes[0] for step in steps)
     assert set(woken) == set(range(1, threads))
-    if threads > 1 and pause == 0.0:
+    # where other jobs hold the cores, a helper has waited in vain before its caller comes back
+    if threads > 1 and pause == 0.0 and os.getloadavg()[0] < (os.cpu_count() or 1):
         assert len(woken) < rounds * (threads - 1)
     if threads > 1 and pause > 0.0:
         assert len(woken) > threads - 1
