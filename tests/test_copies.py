@@ -277,6 +277,7 @@ def test_a_controller_from_outside_is_copied_with_its_environment(tmp_path):
     ours, theirs = context.Pipe()
     worker = context.Process(target=play_own, args=(data, theirs), daemon=True)
     worker.start()
+    theirs.close()
     assert ours.poll(PATIENCE)
     assert ours.recv() == (expected, 1)
     worker.join(PATIENCE)
