@@ -17,14 +17,17 @@ import numpy as np
 import pytest
 
 from poise.baselines.momentum_qp import MomentumQPConfig
+from poise.baselines.outside import OutsideController
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.envs.block import Block, address_of
 from poise.envs.compiled_steps import CompiledStep, Turns
 from poise.envs.errors import PoiseError
 from poise.envs.jit import compiled
+from poise.envs.simulation import Simulation
 from poise.envs.torque_balance import TorqueBalanceEnv
 
 from .copied import BEFORE, KEEPS_TO_ITSELF, KINDS, digest, env_of, outcome, play_env
+from .shared import robot
 
 PATIENCE = 120.0  # [s] until a process counts as hung
 
@@ -191,6 +194,28 @@ def test_solvers_that_keep_their_memory_to_themselves_say_so(name, way):
         WAYS[way](env)
 
 
+def numbers(data: mujoco.MjData) -> dict[str, bytes]:
+    """All that it holds, but for the hash of the model's source, which MuJoCo does not pickle."""
+    found = {}
+    for name in dir(data):
+        value = None if name.startswith("_") or name == "signature" else getattr(data, name)
+        if isinstance(value, (int, float, np.ndarray)):
+            found[name] = np.asarray(value).tobytes()
+    return found
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_copy_has_all_of_the_data(way):
+    """Contacts, forces and counts of the last step, too."""
+    simulation, qpos = Simulation(robot()), robot().standing_qpos.copy()
+    qpos[7] = robot().joint_range[0, 1] + 0.02  # a joint limit is at work
+    simulation.reset(qpos, np.full(robot().model.nv, 0.1))
+    simulation.step(0.1 * robot().torque_limit, 3)
+    before, after = (numbers(each.data) for each in (simulation, WAYS[way](simulation)))
+    assert len(before) > 100 and simulation.data.nl > 0
+    assert before == after
+
+
 @pytest.mark.parametrize("way", WAYS)
 def test_an_open_window_is_not_copied(way):
     """Nor is what draws without one: the copy makes one of its own."""
@@ -207,11 +232,18 @@ def test_an_open_window_is_not_copied(way):
 
 
 OWN = """
+import copy
+
 class Own:
     period = 0.004
 
     def __init__(self, robot):
         self.robot, self.state, self.ticks = robot, None, 0
+
+    def __deepcopy__(self, memo):
+        twin = Own.__new__(Own)
+        vars(twin).update(copy.deepcopy(vars(self), memo))
+        return twin
 
     def reset(self, state):
         self.state, self.ticks = state, 0
@@ -238,12 +270,14 @@ def test_a_controller_from_outside_is_copied_with_its_environment(tmp_path):
     for _ in range(BEFORE):
         env.step(np.zeros(4))
     data, twins = pickle.dumps(env), [make(env) for make in WAYS.values()]
+    assert all(type(twin.controller) is OutsideController for twin in twins)
     expected = digest(play_env(env))
     assert [digest(play_env(twin)) for twin in twins] == [expected] * len(twins)
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     worker = context.Process(target=play_own, args=(data, theirs), daemon=True)
     worker.start()
+    theirs.close()
     assert ours.poll(PATIENCE)
     assert ours.recv() == (expected, 1)
     worker.join(PATIENCE)

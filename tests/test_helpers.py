@@ -65,7 +65,7 @@ def test_threads_end(how):
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_the_dead_are_not_waited_for():
-    """As in a process that was forked, which has none of the threads: an error instead."""
+    """An error instead."""
     before = set(threading.enumerate())
     helpers = Helpers()
     helpers.ask(lambda number: 1 // 0, 1)
