@@ -32,7 +32,8 @@ class EnvConfig:
     """Everything about an environment that is not its robot or its controller."""
 
     policy_period: float = field(default=0.02, metadata={"above": 0.0, "max": 1.0})  # [s]
-    duration: float = field(default=6.0, metadata={"above": 0.0})  # of an episode [s]
+    # of an episode [s]; steps are counted in whole numbers
+    duration: float = field(default=6.0, metadata={"above": 0.0, "max": 1e6})
     pushes: PushSampler | None = field(
         default_factory=lambda: PushSampler(magnitude=(0.2, 0.5), unit="specific_impulse")
     )
