@@ -26,9 +26,8 @@ class EnvelopeSuite(Suite):
     """
 
     kind: Literal["envelope"] = "envelope"
-    directions: int = field(
-        default=16, metadata={"min": 1, "max": 3600}
-    )  # evenly around the circle
+    # evenly around the circle
+    directions: int = field(default=16, metadata={"min": 1, "max": 3600})
     body: str | None = None  # the robot's first push body
     push_duration: float = field(default=0.1, metadata={"above": 0.0})  # square [s]
     start: float = field(default=0.5, metadata={"min": 0.0})  # [s]

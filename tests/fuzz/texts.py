@@ -42,7 +42,8 @@ WORDS = [
     *("x" * 300, "true", "null", "{}", "[]", "''", "[1, 2]", "{a: 1}", "1e9", "1e300", "-1", "0"),
 ]
 DOCUMENTS = ["", "null", "[]", "1", "- a", "{a: 1, a: 2}", BOMB, "base: &a\n  b: *a",
-             "--- a\n--- b", "\x00", "a: b: c", "? [a]\n: 1", "1: 2", "null: 1", "[a]: 1", "{}", "base: base.yaml",
+             "--- a\n--- b", "\x00", "a: b: c", "? [a]\n: 1", "1: 2", "null: 1", "[a]: 1", "{}",
+             "base: base.yaml",
              "kind: outside\nname: nosuch:Class", "a: &x {b: &y [*x, *x]}\nc: *y"]  # fmt: skip
 
 
