@@ -16,9 +16,11 @@ import yaml
 
 from .errors import ConfigError, PoiseError, shown
 from .reading import is_file, read_yaml
+from .yaml_loader import DEPTH
 
 T = TypeVar("T")
 MOST_BASES = 32  # a file, its base, the base of that
+MOST_ENTRIES = 1_000_000  # of an array among the values of a configuration
 
 
 def on_base(
@@ -72,15 +74,23 @@ def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
     return _build(cls, data, str(source), "", {})
 
 
-def to_dict(obj: Any) -> Any:
-    """A dataclass as plain dicts, lists, strings and numbers; the inverse of :func:`build`."""
+def to_dict(obj: Any, levels: int = DEPTH) -> Any:
+    """A dataclass as plain dicts, lists, strings and numbers; the inverse of :func:`build`.
+
+    Raises ConfigError for more `levels` than a file may have, and an array of more entries.
+    """
+    if levels < 0:
+        raise ConfigError(f"more than {DEPTH} levels")
     if dataclasses.is_dataclass(obj) and not isinstance(obj, type):
-        return {f.name: to_dict(getattr(obj, f.name)) for f in dataclasses.fields(obj) if f.init}
+        fields = [f.name for f in dataclasses.fields(obj) if f.init]
+        return {name: to_dict(getattr(obj, name), levels - 1) for name in fields}
     if isinstance(obj, dict):
-        return {key: to_dict(value) for key, value in obj.items()}
+        return {key: to_dict(value, levels - 1) for key, value in obj.items()}
     if isinstance(obj, (list, tuple)):
-        return [to_dict(value) for value in obj]
+        return [to_dict(value, levels - 1) for value in obj]
     if isinstance(obj, (np.ndarray, np.generic)):
+        if obj.size > MOST_ENTRIES:
+            raise ConfigError(f"an array of more than {MOST_ENTRIES} entries")
         return obj.tolist()
     return str(obj) if isinstance(obj, Path) else obj
 

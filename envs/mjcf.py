@@ -9,7 +9,10 @@ import mujoco
 import numpy as np
 
 from .errors import ConfigError
-from .reading import is_file
+from .model_check import check_copies
+from .reading import MIB, is_file, read_text
+
+MJCF_BYTES = 16 * MIB
 
 
 def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
@@ -28,6 +31,8 @@ def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
     """
     if not is_file(path):
         raise ConfigError(f"no such file: {path}", source=source, field="source.mjcf")
+    text = read_text(path, MJCF_BYTES)  # MuJoCo itself takes names that are no text
+    check_copies(text, source)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except Exception as error:  # of the XML, of MuJoCo, of the text in it

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .config import build
+from .config import build, to_dict
 from .errors import ConfigError
 from .pushes import Kick, Profile, Push, ankle_limit
 from .robot import Robot
@@ -104,7 +104,7 @@ def _parse_one(item: Any, robot: Robot, margin: Margin | None, source: str) -> P
         item = asdict(item)
     if not isinstance(item, Mapping):
         raise ConfigError(f"must be a mapping, not {type(item).__name__}", source=source)
-    data = {key: _plain(entry) for key, entry in item.items()}
+    data = {key: to_dict(entry) for key, entry in item.items()}
     if "delta_v" in data:
         _check_keys(data, KICK_KEYS, source)
         return build(Kick, {"start": 0.0, "direction": 0.0, **data}, source)
@@ -130,11 +130,6 @@ def _parse_one(item: Any, robot: Robot, margin: Margin | None, source: str) -> P
         raise ConfigError("needs a support margin, unknown here", source=source, field=unit)
     impulse = to_impulse(unit, value, robot, push.direction, push.duration, push.profile, margin)
     return build(Push, {**data, "impulse": impulse}, source)
-
-
-def _plain(value: Any) -> Any:
-    """NumPy scalars and arrays as plain Python values."""
-    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
 def _check_keys(data: Mapping, known: tuple[str, ...], source: str) -> None:

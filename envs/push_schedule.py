@@ -69,7 +69,7 @@ class PushSampler:
     offset: float = field(default=0.0, metadata={"min": 0.0})  # half side of the cube of points [m]
     profile: Profile = "square"
     start: Range = field(default=(0.5, 0.5), metadata={"min": 0.0})  # of the first push [s]
-    count: tuple[int, int] = field(default=(1, 1), metadata={"min": 1})
+    count: tuple[int, int] = field(default=(1, 1), metadata={"min": 1, "max": 1000})
     interval: Range = field(default=(1.0, 1.0), metadata={"min": 0.0})  # end to next start [s]
     no_push: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0})  # probability
     limit_table: LimitTable | None = None  # for controller_fraction

@@ -12,11 +12,13 @@ from typing import Literal
 
 import numpy as np
 
+from .errors import ConfigError
 from .jit import compiled
 from .robot import Robot
 
 Profile = Literal["square", "half-sine"]
 TABLE_COLUMNS = 12
+LARGEST_FORCE = 1e12  # [N] beyond which numbers overflow
 
 
 def unit_vector(direction: float, elevation: float = 0.0) -> np.ndarray:
@@ -42,6 +44,10 @@ class Push:
     # offset from the body's centre of mass, in the body frame [m]
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     profile: Profile = "square"
+
+    def __post_init__(self):
+        if not self.peak_force <= LARGEST_FORCE:
+            raise ConfigError(f"its force must be at most {LARGEST_FORCE:g} N", field="impulse")
 
     @property
     def peak_force(self) -> float:

@@ -23,6 +23,7 @@ from .ground import (
 )
 from .humanoid import humanoid_spec
 from .mjcf import read_mjcf
+from .model_check import check_numbers, check_standing
 from .soles import Sole, build_sole, find_sole_plane, sole_geoms
 from .standing import described_qpos, level_soles, turn_forward
 
@@ -120,6 +121,7 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
 
+    check_standing(data, root, source)
     limited = model.jnt_limited[1:, None].astype(bool)
     standing_qpos = data.qpos.copy()
     robot = Robot(
@@ -175,6 +177,7 @@ def _prepare(
         joint.name = joint.name or f"joint{i}"
     ground = install_ground(spec, description.ground, source)
     model = _compile(spec, source)
+    check_numbers(model, DYNAMICS, source)
     _check_bodies(model, description, source)
     keyframes = {model.key(i).name: model.key_qpos[i].copy() for i in range(model.nkey)}
     for element in [*spec.keys, *spec.sensors]:  # they need not fit the new actuators

@@ -13,12 +13,15 @@ from poise.envs.push_schedule import PushSampler
 from poise.envs.robot import Robot
 from poise.envs.torque_balance import TorqueBalanceEnv
 
+MOST_STEPS = 4_000_000  # of a rollout, which is kept in memory
+MOST_SEED = 2**31 - 1  # that torch and NumPy take, also with a run's steps added
+
 
 @dataclass(frozen=True)
 class PPOConfig:
     """Stable-Baselines3's PPO, its names."""
 
-    n_envs: int = field(default=32, metadata={"min": 1})
+    n_envs: int = field(default=32, metadata={"min": 1, "max": 4096})
     n_steps: int = field(default=128, metadata={"min": 1})  # per environment and rollout
     batch_size: int = field(default=1024, metadata={"min": 2})
     n_epochs: int = field(default=8, metadata={"min": 1})
@@ -42,8 +45,10 @@ class PPOConfig:
             raise ValueError("symmetric: not with use_sde")
         if self.n_envs * self.n_steps < 2:
             raise ValueError("n_envs × n_steps must be at least 2")
-        if any(width < 1 for width in self.net_arch):
-            raise ValueError("net_arch: widths must be at least 1")
+        if self.n_envs * self.n_steps > MOST_STEPS:
+            raise ValueError(f"n_envs × n_steps must be at most {MOST_STEPS}")
+        if len(self.net_arch) > 16 or not all(1 <= width <= 4096 for width in self.net_arch):
+            raise ValueError("net_arch: at most 16 widths from 1 to 4096")
 
 
 @dataclass(frozen=True)
@@ -59,8 +64,9 @@ class EvaluationConfig:
     """Held-out pushes that the deterministic policy meets during training."""
 
     every: int = field(default=200_000, metadata={"min": 1})  # [environment steps]
-    trials: int = field(default=128, metadata={"min": 1})
-    seed: int = 1_000_003  # never used for training
+    trials: int = field(default=128, metadata={"min": 1, "max": 100_000})
+    # never used for training
+    seed: int = field(default=1_000_003, metadata={"min": 0, "max": MOST_SEED})
     pushes: PushSampler | None = None  # None: those of training
 
 
@@ -77,7 +83,7 @@ class TrainConfig:
     action: Literal["residual", "step", "torque"] = "residual"
     controller: str = "momentum-qp"
     motion: str = "standing"
-    seed: int = 0
+    seed: int = field(default=0, metadata={"min": 0, "max": MOST_SEED})
     steps: int = field(default=3_000_000, metadata={"min": 1})  # [environment steps]
     threads: int = field(default=2, metadata={"min": 1})
     start_from: str | None = None  # a policy whose weights and statistics are the first ones

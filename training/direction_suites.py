@@ -12,7 +12,7 @@ from poise.envs.pushes import Push
 
 from .fits import fit_logistic
 from .limits import PushLimits
-from .suite import Recovered, Suite, generator, make_trial
+from .suite import MOST_TRIALS, Recovered, Suite, generator, make_trial
 from .trials import Trial
 
 
@@ -26,13 +26,16 @@ class EnvelopeSuite(Suite):
     """
 
     kind: Literal["envelope"] = "envelope"
-    directions: int = field(default=16, metadata={"min": 1})  # evenly around the circle
+    # evenly around the circle
+    directions: int = field(default=16, metadata={"min": 1, "max": 3600})
     body: str | None = None  # the robot's first push body
     push_duration: float = field(default=0.1, metadata={"above": 0.0})  # square [s]
     start: float = field(default=0.5, metadata={"min": 0.0})  # [s]
     impulses: Range = field(default=(0.12, 0.9), metadata={"above": 0.0})  # [N·s/kg]
-    first_trials: int = field(default=12, metadata={"min": 2})  # per direction
-    trials: int = field(default=24, metadata={"min": 1})  # per direction and controller
+    first_trials: int = field(default=12, metadata={"min": 2, "max": MOST_TRIALS})  # per direction
+    trials: int = field(
+        default=24, metadata={"min": 1, "max": MOST_TRIALS}
+    )  # per direction and controller
     spread: float = field(default=0.3, metadata={"above": 0.0, "max": 1.0})
     by_direction: ClassVar[bool] = True
 
@@ -96,12 +99,12 @@ class GridSuite(Suite):
     """Every magnitude in every direction, `repeats` times from differently disturbed starts."""
 
     kind: Literal["grid"] = "grid"
-    directions: int = field(default=8, metadata={"min": 1})
+    directions: int = field(default=8, metadata={"min": 1, "max": 3600})
     magnitudes: tuple[float, ...] = field(
         default=(0.2, 0.3, 0.4, 0.5, 0.6), metadata={"above": 0.0}
     )
     unit: Literal["impulse", "force", "specific_impulse", "ankle_fraction"] = "specific_impulse"
-    repeats: int = field(default=5, metadata={"min": 1})
+    repeats: int = field(default=5, metadata={"min": 1, "max": MOST_TRIALS})
     body: str | None = None
     push_duration: float = field(default=0.1, metadata={"above": 0.0})
     start: float = field(default=0.5, metadata={"min": 0.0})

@@ -28,7 +28,7 @@ from .seed_groups import expand_seeds, seed_groups
 from .stage import Stage
 from .step_limits import stepping_limits
 from .stopping import keeps
-from .suite import Suite
+from .suite import MOST_TRIALS, Suite
 from .suites import load_suite
 from .summary import plain, summarise
 from .trials import Trial, row
@@ -155,6 +155,8 @@ def _check(controllers: Sequence[str], seed: int, workers: int | None, trials: i
     for value, name, least in ((seed, "seed", 0), (workers, "workers", 1), (trials, "trials", 1)):
         if value is not None and value < least:
             raise ConfigError(f"must be at least {least}, not {value}", field=name)
+    if trials is not None and trials > MOST_TRIALS:
+        raise ConfigError(f"must be at most {MOST_TRIALS}", field="trials")
 
 
 def _play(

@@ -7,7 +7,7 @@ from poise.envs.push_schedule import PushSampler, Range, push_bodies
 from poise.envs.pushes import Push
 
 from .limits import PushLimits
-from .suite import Suite, generator, start_seed
+from .suite import MOST_TRIALS, Suite, generator, start_seed
 from .trials import Trial
 
 
@@ -23,7 +23,7 @@ class SequenceSuite(Suite):
 
     kind: Literal["sequence"] = "sequence"
     duration: float = field(default=64.0, metadata={"above": 1.0})
-    trials: int = field(default=50, metadata={"min": 1})
+    trials: int = field(default=50, metadata={"min": 1, "max": MOST_TRIALS})
     until: float = field(default=60.0, metadata={"above": 0.0})  # [s] no push begins later
     later: Range = field(default=(1.0, 1.0), metadata={"min": 0.0})
     pushes: PushSampler = field(

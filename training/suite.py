@@ -12,6 +12,7 @@ from poise.envs.pushes import Push
 from .limits import PushLimits
 from .trials import Trial
 
+MOST_TRIALS = 100_000  # all are drawn before the first is played
 Recovered = Mapping[str, Sequence[bool]]  # controller → outcome of each trial
 
 
@@ -20,7 +21,7 @@ class Suite:
     """What all suites have: how long a trial lasts and how far its start is disturbed."""
 
     kind: str = ""
-    duration: float = field(default=6.0, metadata={"above": 1.0})  # of a trial [s]
+    duration: float = field(default=6.0, metadata={"above": 1.0, "max": 1e6})  # of a trial [s]
     noise: StartNoise = field(default_factory=StartNoise)
     by_direction: ClassVar[bool] = False  # whether J50 is fitted for each direction
 

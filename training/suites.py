@@ -16,7 +16,7 @@ from poise.envs.pushes import Push
 from .direction_suites import EnvelopeSuite, GridSuite
 from .limits import PushLimits
 from .sequence_suite import SequenceSuite
-from .suite import Suite, generator, make_trial, start_seed
+from .suite import MOST_TRIALS, Suite, generator, make_trial, start_seed
 from .trials import Trial
 
 
@@ -29,7 +29,7 @@ class RandomSuite(Suite):
     """
 
     kind: Literal["random"] = "random"
-    trials: int = field(default=1000, metadata={"min": 1})
+    trials: int = field(default=1000, metadata={"min": 1, "max": MOST_TRIALS})
     pushes: PushSampler = field(
         default_factory=lambda: PushSampler(
             magnitude=(0.5, 1.6), unit="controller_fraction", duration=(0.05, 0.3)
@@ -67,8 +67,8 @@ class QuietSuite(Suite):
     """No push at all, for a long time."""
 
     kind: Literal["quiet"] = "quiet"
-    duration: float = field(default=60.0, metadata={"above": 1.0})
-    trials: int = field(default=20, metadata={"min": 1})
+    duration: float = field(default=60.0, metadata={"above": 1.0, "max": 1e6})
+    trials: int = field(default=20, metadata={"min": 1, "max": MOST_TRIALS})
 
     def count(self, controllers: int) -> int:
         return self.trials

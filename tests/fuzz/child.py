@@ -15,8 +15,10 @@ from typing import Any
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
+from poise.baselines.warmup import prepare
+
 from . import memory
-from .kinds import Kind, kind
+from .kinds import NAMES, Kind, kind
 from .playing import MEBIBYTES, Outcome, play
 from .values import Json
 
@@ -76,6 +78,8 @@ def _take(connection: Connection, name: str, first: int, seconds: float, known: 
 
 def _warm_up(played: Kind) -> None:
     """The first cases load and compile what the others use; a fault will be met again."""
+    if played.name in NAMES:
+        prepare("contacts", "planner")
 
     @seed(0)
     @settings(SETTINGS, max_examples=5, phases=(Phase.generate,))

@@ -25,8 +25,9 @@ def play(case: Json, folder: Path) -> None:
     if case < 5:
         raise PoiseError("refused")
     if case >= 10:
-        {"traceback": _raise, "crash": os.abort, "hang": _hang, "memory": _fill,
-         "half-written": lambda: (folder / "a.part").touch(), "lines": _lines}[os.environ[WAY]]()  # fmt: skip
+        ways = {"traceback": _raise, "crash": os.abort, "hang": _hang, "memory": _fill,
+                "half-written": lambda: (folder / "a.part").touch(), "lines": _lines}  # fmt: skip
+        ways[os.environ[WAY]]()
 
 
 def _raise() -> None:

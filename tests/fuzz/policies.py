@@ -125,5 +125,3 @@ def play(case: Json, folder: Path) -> None:
     policy = load_policy(path, robot())
     action = policy.act(np.zeros(len(policy._mean)))
     assert np.isfinite(action).all() and np.abs(action).max() <= 1.0, "no action"
-
-

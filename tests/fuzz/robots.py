@@ -22,7 +22,18 @@ NAMES = ("compact", "tall", "toddler")
 ATTRIBUTES = [
     *("0", "1", "-1", "1e-300", "1e300", "1e9", "2147483648", "99999999999999999999", "nan", "inf"),
     *("", "a", "0 0 0", "1 2", "1 1 1 1", "0 0 0 0", "true", "auto", "1e-9 1e-9 1e-9", "1 nan 1"),
-    *("1 " * 500, "x" * 300, "x" * 70_000, "box", "sphere", "mesh", "plane", "hfield", "sdf", "ball"),
+    *(
+        "1 " * 500,
+        "x" * 300,
+        "x" * 70_000,
+        "box",
+        "sphere",
+        "mesh",
+        "plane",
+        "hfield",
+        "sdf",
+        "ball",
+    ),
     *("free", "slide", "hinge", "../../nowhere.obj", "/dev/null", "ground", "pelvis", "world"),
     *("radian", "degree", "-1 1", "1 -1", "1000000", "100000000", "\u00e9"),
 ]

@@ -22,6 +22,7 @@ from .case import COLUMNS, Case, Result
 from .folder import FORMAT, BenchmarkSettings, read_benchmark_settings
 from .play import BenchmarkPlayer, play_case
 from .suite import BenchmarkSuite
+from .summary_form import check_form
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ def read_summary(path: str | Path) -> dict[str, Any]:
     summary = read_json(path)
     if summary.get("benchmark") != FORMAT:
         raise ConfigError(f"is not a benchmark's summary of format {FORMAT}", source=path)
+    check_form(summary, path)
     return summary
 
 

@@ -26,6 +26,7 @@ from ..seed_groups import expand_seeds, seed_groups
 from ..stage import Stage
 from ..step_limits import curves, stepping_limits
 from ..stopping import keeps
+from ..suite import MOST_TRIALS
 from ..summary import plain
 from .case import Case, case_row
 from .cases import Cases
@@ -178,6 +179,8 @@ def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | N
     for value, name, least in ((seed, "seed", 0), (workers, "workers", 1), (trials, "trials", 1)):
         if value is not None and value < least:
             raise ConfigError(f"must be at least {least}, not {value}", field=name)
+    if trials is not None and trials > MOST_TRIALS:
+        raise ConfigError(f"must be at most {MOST_TRIALS}", field="trials")
 
 
 def _announce(folder: BenchmarkFolder, console: Console) -> None:

@@ -44,11 +44,11 @@ COLUMNS = (
 
 def ranking_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     """A row of texts per controller, best first; intervals are 95 %."""
-    pairs = {pair["b"]: pair["mix"] for pair in summary["pairs"]}
+    pairs = {pair["b"]: pair.get("mix") for pair in summary["pairs"]}
     rows = []
     for name in summary["ranking"]:
         entry = summary["controllers"][name]
-        mix, pair = entry["mix"], pairs.get(name)
+        mix, pair = entry.get("mix"), pairs.get(name)
         rows.append([
             name,
             with_range(entry["j50_mean"], entry["j50_mean_ci95"], ".1f") + _bounds(entry),
