@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from poise.training import cli
 from poise.training.cli import main
-from poise.training.stopping import Stopped, stoppable, uninterrupted
+from poise.training.stopping import Stopped, stop_code, stoppable, uninterrupted
 
 from .endurance.processes import Running, heed_interrupts, kill
 from .evaluations import RANDOM, write_suite
@@ -72,13 +73,13 @@ def test_a_stopped_evaluation_leaves_no_process_and_says_how_to_go_on(tmp_path: 
 def test_signals_wait_while_processes_are_started(monkeypatch: pytest.MonkeyPatch) -> None:
     """They take effect once all processes are known; new ones never see Ctrl-C."""
     done = []
-    with pytest.raises(Stopped) as stop, stoppable():
+    with pytest.raises(Stopped, match="SIGTERM"), stoppable():
         with uninterrupted():
             os.kill(os.getpid(), signal.SIGTERM)
             assert signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
             done.append("started")
         done.append("never")
-    assert done == ["started"] and stop.value.code == 143
+    assert done == ["started"] and stop_code() == 143
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
@@ -95,3 +96,23 @@ def test_handlers_are_put_back_and_ignored_signals_stay_ignored() -> None:
             time.sleep(0.01)
     finally:
         signal.signal(signal.SIGINT, before[0])
+
+
+def test_an_error_that_a_library_makes_of_a_stop_is_a_stop(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As an extension module does that is interrupted while it is imported."""
+
+    def imports(_: object) -> int:
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(LATE)
+        except KeyboardInterrupt:
+            raise ImportError("initialization failed") from None
+        return 0
+
+    monkeypatch.setattr(cli, "_run", imports)
+    assert main(["list"]) == 143
+    assert capsys.readouterr().err == "poise: stopped; the same command begins anew\n"
+    monkeypatch.setattr(cli, "_run", lambda _: 0)
+    assert main(["list"]) == 0 and stop_code() is None

@@ -13,7 +13,7 @@ import tyro
 from poise.envs.errors import ConfigError, PoiseError
 
 from .progress import terminal
-from .stopping import Stopped, stop_message, stoppable
+from .stopping import stop_code, stop_message, stoppable
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
@@ -57,14 +57,24 @@ def _stoppable(args: list[str]) -> int:
     try:
         with stoppable():
             return _run(args)
-    except KeyboardInterrupt as stop:
-        print(stop_message(), file=sys.stderr)
-        return stop.code if isinstance(stop, Stopped) else 130
-    except OSError as error:
-        if error.errno not in FULL:
-            raise
-        place = "" if error.filename is None else f"{error.filename}: "
-        raise PoiseError(f"{place}cannot be written ({error.strerror})") from None
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) or stop_code() is not None:
+            # a library may have made another error of the interrupt
+            print(stop_message(), file=sys.stderr)
+            return stop_code() or 130
+        if isinstance(error, OSError) and error.errno in FULL:
+            place = "" if error.filename is None else f"{error.filename}: "
+            raise PoiseError(f"{place}cannot be written ({error.strerror})") from None
+        raise
+
+
+def command() -> None:
+    """`main` as a process: after a stop, the interpreter takes no time for an end of its own."""
+    code = main()
+    if stop_code() is not None:
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def _unread(stream: TextIO | None) -> bool:
@@ -420,4 +430,4 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command()

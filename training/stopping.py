@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: a command unwinds, and where it cannot within a second, it is ended.
+"""Ctrl-C and SIGTERM: a command unwinds, and where it cannot in half a second, it is ended.
 
 Python runs its signal handlers between byte codes: a long native call, such as a compilation by
 LLVM, holds them up, and what they raise is lost inside a callback. The handler in C, however,
@@ -23,18 +23,15 @@ from types import FrameType
 from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-GRACE = 1.0  # [s] to unwind in
+GRACE = 0.5  # [s] to unwind in
 ANEW = "the same command begins anew"
 _END = b"\0"  # no signal has this number
 _kept: list[tuple[Path, str]] = []  # of the command that runs
+_asked: list[int] = []  # signals that it has been sent
 
 
 class Stopped(KeyboardInterrupt):
-    """The signal `number` has asked the command to stop; `code` is what it exits with."""
-
-    def __init__(self, number: int):
-        super().__init__()
-        self.code = 128 + number
+    """A signal has asked the command to stop."""
 
 
 def keeps(path: Path, words: str) -> None:
@@ -51,6 +48,11 @@ def stop_message() -> str:
     return f"poise: stopped; {words[0] if words else ANEW}"
 
 
+def stop_code() -> int | None:
+    """What a command exits with that was asked to stop; None if it was not."""
+    return 128 + _asked[0] if _asked else None
+
+
 @contextmanager
 def stoppable() -> Iterator[None]:
     """Inside, SIGINT and SIGTERM raise `Stopped`, and end the process if that does not end it.
@@ -59,6 +61,7 @@ def stoppable() -> Iterator[None]:
     shell, stays ignored. Outside the main thread, which alone has handlers, nothing changes.
     """
     _kept.clear()
+    _asked.clear()
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -106,7 +109,8 @@ def _handled_by(handler: Any) -> Iterator[dict[int, Any]]:
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    raise Stopped(number)
+    _asked.append(number)
+    raise Stopped(signal.Signals(number).name)
 
 
 @contextmanager
@@ -142,7 +146,7 @@ def end_now(number: int) -> None:
     for child in children:
         child.kill()
     for child in children:
-        child.join(GRACE / 10)
+        child.join(0.1)
     with contextlib.suppress(OSError):
         if sys.stdout is not None and sys.stdout.isatty():
             os.write(1, b"\x1b[?25h")  # a progress bar hides the cursor

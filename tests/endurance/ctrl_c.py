@@ -79,7 +79,7 @@ def _measure(
         number = (signal.SIGINT, signal.SIGTERM)[k % 2]
         limit = COLD if cold else longest
         running = Running([part.replace("OUT", str(out)) for part in line], environment)
-        time.sleep(0.3 + rng.uniform(0.0, limit))  # Python itself starts before that
+        time.sleep(rng.uniform(0.0, limit))
         start = time.monotonic()
         ended = running.process.poll() is not None
         if k % 4 < 2:
@@ -89,7 +89,8 @@ def _measure(
         code = running.wait()
         seconds.append(time.monotonic() - start)
         left += running.left(0.0)
-        if not ended and (code != 128 + number or "Traceback" in running.output):
+        early = code == -number and not out.exists()  # Python itself was still starting
+        if not (ended or early) and (code != 128 + number or "Traceback" in running.output):
             odd += 1
             print(f"{name}: code {code}\n{running.output[-1500:]}", file=sys.stderr, flush=True)
         for folder in (out, path):
