@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -205,7 +206,7 @@ for _name in packaged("controllers"):
     if _name not in KEEPS_TO_ITSELF:
         KINDS[f"env of {_name}"] = _with(_name)
 for _name in ("momentum-qp", "capture-step", "feedback-step", "ipm-step", "kudoh02", "lqr-lip"):
-    KINDS[_name] = (lambda name=_name: make_loop(name)), play_loop
+    KINDS[_name] = partial(make_loop, _name), play_loop
 
 
 def digest(seen: Any) -> str:

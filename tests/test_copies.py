@@ -116,7 +116,8 @@ def sharing(arrays: dict[str, np.ndarray]) -> set[tuple[str, str, int]]:
         for begin, _, other in spans[i + 1 :]:
             if begin >= end:
                 break
-            pairs.add((*sorted((path, other)), begin - start))
+            first, second = sorted((path, other))
+            pairs.add((first, second, begin - start))
     return pairs
 
 

@@ -10,6 +10,7 @@ import os
 import time
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -130,7 +131,7 @@ def test_every_kind_refuses_all_of_them(tmp_path: Path, kind: str) -> None:
         if len(content) > 50_000:  # a second each
             continue
         path = write(tmp_path / "bad.yaml", content)
-        text = message(lambda path=path: LOADERS[kind](path))
+        text = message(partial(LOADERS[kind], path))
         assert text.startswith(f"{path}: "), (what, text)
         assert problem in text or "|" in problem, (what, text)
 
@@ -143,7 +144,7 @@ NAMES = ["x" * 300, "x" * 300 + ".yaml", "a\0b.yaml", "a\nb.yaml", "x/" * 3000 +
 def test_names_that_no_file_can_have(kind: str) -> None:
     """Too long, with a NUL, a line break or half a character: no such name, by each loader."""
     for name in NAMES:
-        assert "no such" in message(lambda name=name: LOADERS[kind](name))
+        assert "no such" in message(partial(LOADERS[kind], name))
 
 
 @pytest.mark.parametrize("kind", ["controllers", "training", "tuning"])
@@ -152,7 +153,7 @@ def test_names_of_bases(tmp_path: Path, kind: str) -> None:
     for name in NAMES:
         if name.isprintable():
             path = write(tmp_path / "bad.yaml", f"base: {name or chr(34) * 2}\n")
-            assert "no such" in message(lambda path=path: LOADERS[kind](path))
+            assert "no such" in message(partial(LOADERS[kind], path))
     for k in range(40):
         write(tmp_path / f"{k}.yaml", f"base: {tmp_path}/{k + 1}.yaml\n")
     assert "more than 32" in message(lambda: LOADERS[kind](tmp_path / "0.yaml"))
@@ -241,7 +242,7 @@ def test_archives_unpack_within_bounds() -> None:
     assert "more than 1000 files" in message(lambda: Archive(zipped(**many), "a.zip"))
     for method in (zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2):
         data = zipped(method, a=b"x" * 1000)
-        assert "another method" in message(lambda data=data: Archive(data, "a.zip"))
+        assert "another method" in message(partial(Archive, data, "a.zip"))
     assert "BadZipFile" in message(lambda: Archive(b"x", "a.zip"))
     assert "KeyError" in message(lambda: Archive(zipped(), "a.zip").read("none"))
 
@@ -310,7 +311,7 @@ def test_values_in_errors_are_short() -> None:
                   np.zeros(10**6), b"x" * 10**6):  # fmt: skip
         text = shown(value)
         assert len(text) <= 170 and text.isprintable()
-        assert len(message(lambda value=value: build(EnvConfig, {"duration": value}, "a"))) < 300
+        assert len(message(partial(build, EnvConfig, {"duration": value}, "a"))) < 300
     assert shown(10**5000) == "a whole number of about 5001 digits"
     assert [shown(value) for value in ("a", 1.5, None, [1, "b"])] == ["'a'", "1.5", "None",
                                                                       "[1, 'b']"]  # fmt: skip

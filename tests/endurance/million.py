@@ -49,7 +49,7 @@ def _run(name: str, steps: int, rng: np.random.Generator) -> bool:
                 observation, _ = env.reset(seed=int(rng.integers(2**31)), options=None)
                 _disturb(env.unwrapped, kind, rng)
                 count["episodes"] += 1
-                signs = np.ones(env.action_space.shape)
+                signs = np.ones_like(env.action_space.high)
             if kind == "bang-bang":
                 signs = np.where(rng.random(signs.shape) < 0.1, -signs, signs)
                 action = np.where(signs > 0, env.action_space.high, env.action_space.low)

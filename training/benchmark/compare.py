@@ -124,10 +124,11 @@ class _Result:
                 "cannot be read (no such file): not a finished result", source=folder / SUMMARY
             )
         self.summary = read_json(folder / SUMMARY)
-        self.controllers: dict[str, Any] = self.summary.get("controllers")
-        if not isinstance(self.controllers, dict):
+        controllers = self.summary.get("controllers")
+        if not isinstance(controllers, dict):
             raise ConfigError("is no summary of a result: it has no controllers",
                               source=folder / SUMMARY)  # fmt: skip
+        self.controllers: dict[str, Any] = controllers
         self.settings = read_yaml(folder / SETTINGS)
         self.is_benchmark = "benchmark" in self.summary
         self.trials = self._trials() if is_file(folder / TRIALS) else {}
