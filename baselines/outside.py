@@ -128,8 +128,13 @@ class OutsideController(Copyable):
 
 
 def _blank(kind: type[OutsideController], name: str) -> OutsideController:
-    """A controller still without anything, once its module is there to find its class in."""
-    find_outside(name)
+    """A controller still without anything, once its module is there to find its class in.
+
+    Whoever copied it had been allowed to make it, and to unpickle is to run code anyway: Poise itself
+    unpickles nothing that it reads from a folder.
+    """
+    with allowing(name):
+        find_outside(name)
     return kind.__new__(kind)
 
 
