@@ -46,7 +46,7 @@ class Push:
     profile: Profile = "square"
 
     def __post_init__(self):
-        if not self.peak_force <= LARGEST_FORCE:
+        if self.duration > 0.0 and self.peak_force > LARGEST_FORCE:
             raise ConfigError(f"its force must be at most {LARGEST_FORCE:g} N", field="impulse")
 
     @property

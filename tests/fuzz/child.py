@@ -79,7 +79,10 @@ def _take(connection: Connection, name: str, first: int, seconds: float, known: 
 def _warm_up(played: Kind) -> None:
     """The first cases load and compile what the others use; a fault will be met again."""
     if played.name in NAMES:
+        from .worlds import warm_up  # loads MuJoCo
+
         prepare("contacts", "planner")
+        warm_up()
 
     @seed(0)
     @settings(SETTINGS, max_examples=5, phases=(Phase.generate,))
