@@ -51,7 +51,6 @@ from poise.training.tuning import TuneConfig, tune, tune_config
 from poise.training.tuning_gains import Gains
 from poise.training.tuning_trials import Candidate
 from poise.training.tuning_trials import play as play_candidate
-from poise.training.workers import Workers
 
 from .report_folders import copied
 from .shared import robot, tiny_config
@@ -467,8 +466,8 @@ def test_workers_load_what_is_allowed(ground: Ground) -> None:
         "class Zero:\n    period = 0.004\n    def __init__(self, robot): pass\n"
         "    def reset(self, state): pass\n    def torques(self, state, targets): return 0\n"
     )
-    with poise.allowing("fine:Zero"), Workers(["fine:Zero"], "humanoid", {}, 1) as workers:
-        assert workers.pool.submit(loaded_there).result() == ["fine:Zero"]
+    with poise.allowing("fine:Zero"), Crew("local", 1) as crew:
+        assert dict(crew.each(loaded_there, ["fine:Zero"])) == {"fine:Zero": "fine:Zero"}
 
 
 def test_the_current_folder_plants_nothing(ground: Ground) -> None:

@@ -13,8 +13,8 @@ import yaml
 
 from poise.baselines.allowance import check_allowed
 from poise.envs.config import packaged_folder, to_dict, to_yaml
+from poise.envs.env_config import StartNoise
 from poise.envs.errors import ConfigError
-from poise.training import workers
 from poise.training.benchmark.case import COLUMNS as CASE_COLUMNS
 from poise.training.benchmark.case import case_row, failed
 from poise.training.benchmark.cases import Cases
@@ -22,6 +22,7 @@ from poise.training.benchmark.folder import FORMAT, BenchmarkSettings
 from poise.training.benchmark.suite import load_benchmark
 from poise.training.evaluation_folder import Settings, csv_text
 from poise.training.provenance import versions
+from poise.training.stage import Stage
 from poise.training.suites import load_suite
 from poise.training.trials import Trial, row
 
@@ -133,9 +134,9 @@ def allowed_there(name: str) -> bool:
     return True
 
 
-def loaded_there() -> list[str]:
-    """The players of a worker process."""
-    return [player.name for player in workers._players]
+def loaded_there(name: str) -> str:
+    """The name of a player that the process that is asked has loaded."""
+    return Stage("humanoid", 6.0, StartNoise()).load(name).name
 
 
 #: ways to say a controller in a file: description → what is written there

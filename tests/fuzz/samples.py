@@ -36,7 +36,7 @@ def samples() -> Path:
 def make_samples(path: Path) -> None:
     """Play both in this process."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evaluation, "Workers", InProcess)
+        patch.setattr(evaluation, "Crew", InProcess)
         patch.setattr(run, "Crew", InProcessCrew)
         patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
         suite = write_suite(path, RANDOM)
