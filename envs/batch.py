@@ -14,7 +14,7 @@ from .arrays import apart
 from .balance import BalanceEnv
 from .compiled_steps import NOTHING, CompiledStep, Turns
 from .episode import FALLEN, EpisodeArrays
-from .errors import ConfigError
+from .errors import ConfigError, shown
 from .helpers import Helpers
 from .numbers import real_array, whole_number
 
@@ -165,7 +165,7 @@ class EnvBatch:
         record = self.episodes
         vectors = real_array(actions)
         if vectors is None:
-            raise ConfigError(f"must be numbers, not {type(actions).__name__}", field="action")
+            raise ConfigError(f"must be numbers, not {shown(actions)}", field="action")
         if vectors.shape != record.action.shape:
             raise ConfigError(
                 f"has shape {vectors.shape}, expected {record.action.shape}", field="action"
