@@ -25,7 +25,7 @@ from .episode import (
     begin_episode,
     judge,
 )
-from .errors import ConfigError, PoiseError
+from .errors import ConfigError, PoiseError, shown
 from .mirror import Mirror, mirror_robot, mirror_terms
 from .numbers import finite_array, option_mapping, real_array, seed_number
 from .observation import Term, observation_terms, observe, scales
@@ -239,9 +239,13 @@ class BalanceEnv(Copyable, gymnasium.Env):
         Raises ConfigError naming the entries: all for a wrong shape, else those out of bounds.
         """
         vector = real_array(action)
-        if vector is None:
-            raise ConfigError(f"must be numbers, not {type(action).__name__}", field="action")
         names = self.action_names
+        if vector is None:
+            raise ConfigError(
+                f"must be numbers of shape {(len(names),)}, not {shown(action)}: "
+                f"{', '.join(names)}",
+                field="action",
+            )
         if vector.shape != (len(names),):
             raise ConfigError(
                 f"has shape {vector.shape}, expected {(len(names),)}: {', '.join(names)}",

@@ -15,7 +15,7 @@ from .balance import BalanceEnv
 from .compiled_steps import NOTHING, CompiledStep, Turns
 from .copies import Copyable
 from .episode import FALLEN, EpisodeArrays
-from .errors import ConfigError
+from .errors import ConfigError, shown
 from .helpers import Helpers
 from .numbers import real_array, whole_number
 
@@ -169,7 +169,7 @@ class EnvBatch(Copyable):
         record = self.episodes
         vectors = real_array(actions)
         if vectors is None:
-            raise ConfigError(f"must be numbers, not {type(actions).__name__}", field="action")
+            raise ConfigError(f"must be numbers, not {shown(actions)}", field="action")
         if vectors.shape != record.action.shape:
             raise ConfigError(
                 f"has shape {vectors.shape}, expected {record.action.shape}", field="action"

@@ -18,7 +18,7 @@ from .robot import Robot
 
 Profile = Literal["square", "half-sine"]
 TABLE_COLUMNS = 12
-LARGEST_FORCE = 1e12  # [N] mean of a push, beyond which numbers overflow
+LARGEST_FORCE = 1e12  # [N] beyond which numbers overflow
 
 
 def unit_vector(direction: float, elevation: float = 0.0) -> np.ndarray:
@@ -46,8 +46,8 @@ class Push:
     profile: Profile = "square"
 
     def __post_init__(self):
-        if self.impulse > LARGEST_FORCE * self.duration:
-            raise ConfigError(f"its mean force must be at most {LARGEST_FORCE:g} N", field="impulse")
+        if self.duration > 0.0 and self.peak_force > LARGEST_FORCE:
+            raise ConfigError(f"its force must be at most {LARGEST_FORCE:g} N", field="impulse")
 
     @property
     def peak_force(self) -> float:

@@ -3,68 +3,53 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import yaml
 
+from .errors import shown
+
 DEPTH = 64  # of lists and mappings in each other
-NODES = 50_000  # with aliases expanded; a second of reading
+NODES = 50_000  # with aliases expanded
+ENTRIES = 1000  # of a mapping: keys may be chosen so that each is compared with all others
 SCALAR = 100  # characters that count as one node
 DIGITS = 308  # of a number: any such whole number is a finite float
 
+MANY_ENTRIES = f"a mapping of more than {ENTRIES} entries"
 
-class Loader(yaml.SafeLoader):
+# libyaml's parser takes a tenth of the time of Python's; not every PyYAML has it
+_Safe: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class Loader(_Safe):
     """PyYAML's safe loader, with ``1e-3`` read as a number and repeated keys refused.
 
-    An alias counts as what it stands for: a text of few lines may hold millions of nodes.
+    Nothing is built before the whole text is found to be within the bounds. An alias counts as
+    what it stands for: a text of few lines may hold millions of nodes.
     """
 
-    def __init__(self, stream: Any) -> None:
+    def __init__(self, stream: str | bytes) -> None:
+        Bounds().check(stream)
         super().__init__(stream)
-        self._depth = 0
-        self._sizes: dict[int, tuple[int, int]] = {}  # finished node → (nodes, height)
 
-    def compose_node(self, parent: Any, index: Any) -> yaml.Node | None:
-        """A node, its size and its depth within the bounds."""
-        event = self.peek_event()
-        self._depth += 1
-        if self._depth > DEPTH:
-            raise _error(f"more than {DEPTH} levels", event.start_mark)
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        if node is not None:
-            self._measure(node, isinstance(event, yaml.AliasEvent), event.start_mark)
-        return node
+    def get_single_node(self) -> yaml.Node | None:
+        """The root of the only document, in which no mapping repeats a key."""
+        root = super().get_single_node()
+        for node in _mappings(root):
+            seen = set()
+            for key, _ in node.value:
+                if isinstance(key, yaml.ScalarNode):
+                    if key.value in seen:
+                        raise _error(f"key {shown(key.value)} occurs twice", key.start_mark)
+                    seen.add(key.value)
+        return root
 
-    def _measure(self, node: yaml.Node, alias: bool, mark: Any) -> None:
-        if alias and id(node) not in self._sizes:
-            raise _error("an alias of what it stands in", mark)
-        if not alias:
-            self._sizes[id(node)] = self._size(node)
-        nodes, height = self._sizes[id(node)]
-        if nodes > NODES or len(self._sizes) > NODES:
-            raise _error(f"more than {NODES} values, aliases counted as what they repeat", mark)
-        if height > DEPTH:
-            raise _error(f"more than {DEPTH} levels", mark)
-
-    def _size(self, node: yaml.Node) -> tuple[int, int]:
-        """How many nodes, and how many levels, there are from this one on."""
-        if isinstance(node, yaml.ScalarNode):
-            return 1 + len(node.value) // SCALAR, 1
-        pairs = isinstance(node, yaml.MappingNode)
-        children = [each for pair in node.value for each in pair] if pairs else node.value
-        sizes = [self._sizes[id(child)] for child in children]
-        return 1 + sum(n for n, _ in sizes), 1 + max((height for _, height in sizes), default=0)
-
-    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
-        node = super().compose_mapping_node(anchor)
-        seen = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode):
-                if key.value in seen:
-                    raise _error(f"key {key.value!r} occurs twice", key.start_mark)
-                seen.add(key.value)
-        return node
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Put what ``<<`` merges into a mapping, which stays within the bounds."""
+        super().flatten_mapping(node)
+        if len(node.value) > ENTRIES:
+            raise _error(MANY_ENTRIES, node.start_mark)
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         """The value of a node; whatever a scalar's text makes of its tag is an error with a place.
@@ -81,11 +66,83 @@ class Loader(yaml.SafeLoader):
         except yaml.YAMLError:
             raise
         except Exception as error:
-            text = f"{node.value[:100]!r} is no {kind} ({error})"
-            raise _error(text, node.start_mark) from None
+            raise _error(f"{shown(node.value)} is no {kind} ({error})", node.start_mark) from None
         if isinstance(value, int) and abs(value) >= 10**DIGITS:
             raise _error(f"a number of more than {DIGITS} digits", node.start_mark)
         return value
+
+
+class Bounds:
+    """Counts the nodes of a text while it is parsed, event by event."""
+
+    def __init__(self) -> None:
+        self._open: list[tuple[yaml.Event, list[tuple[int, int]]]] = []  # with sizes of children
+        self._sizes: dict[str, tuple[int, int] | None] = {}  # by anchor; None: not yet ended
+        self._events = 0
+
+    def check(self, stream: str | bytes) -> None:
+        """Raise a MarkedYAMLError at the first place that is beyond the bounds."""
+        for event in yaml.parse(stream, Loader=_Safe):
+            if isinstance(event, yaml.DocumentStartEvent):
+                self._sizes.clear()
+            elif isinstance(event, yaml.CollectionStartEvent):
+                self._begin(event)
+            elif isinstance(event, yaml.CollectionEndEvent):
+                self._end()
+            elif isinstance(event, yaml.NodeEvent):
+                self._leaf(event)
+
+    def _begin(self, event: yaml.CollectionStartEvent) -> None:
+        if len(self._open) == DEPTH:
+            raise _error(f"more than {DEPTH} levels", event.start_mark)
+        if event.anchor:
+            self._sizes[event.anchor] = None
+        self._open.append((event, [(1, 0)]))
+
+    def _end(self) -> None:
+        event, sizes = self._open.pop()
+        size = sum(nodes for nodes, _ in sizes), 1 + max(height for _, height in sizes)
+        self._add(event, size)
+
+    def _leaf(self, event: yaml.NodeEvent) -> None:
+        if isinstance(event, yaml.ScalarEvent):
+            return self._add(event, (1 + len(event.value) // SCALAR, 1))
+        size = self._sizes.get(event.anchor, (1, 1))  # an unknown alias is the composer's to refuse
+        if size is None:
+            raise _error("an alias of what it stands in", event.start_mark)
+        return self._add(event, size)
+
+    def _add(self, event: yaml.NodeEvent, size: tuple[int, int]) -> None:
+        """Take a node that has ended as a child of the one that it stands in."""
+        self._events += 1
+        if max(size[0], self._events) > NODES:
+            raise _error(f"more than {NODES} values, aliases counted as what they repeat",
+                         event.start_mark)  # fmt: skip
+        if size[1] > DEPTH:
+            raise _error(f"more than {DEPTH} levels", event.start_mark)
+        if event.anchor:
+            self._sizes[event.anchor] = size
+        if self._open:
+            parent, sizes = self._open[-1]
+            sizes.append(size)
+            if isinstance(parent, yaml.MappingStartEvent) and len(sizes) > 2 * ENTRIES + 1:
+                raise _error(MANY_ENTRIES, parent.start_mark)
+
+
+def _mappings(root: yaml.Node | None) -> Iterator[yaml.MappingNode]:
+    """All mappings from a node on, each once."""
+    waiting: list[Any] = [root]
+    seen = set()
+    while waiting:
+        node = waiting.pop()
+        if not isinstance(node, yaml.CollectionNode) or id(node) in seen:
+            continue
+        seen.add(id(node))
+        if isinstance(node, yaml.MappingNode):
+            yield node
+            waiting += [each for pair in node.value for each in pair]
+        else:
+            waiting += node.value
 
 
 def _error(problem: str, mark: Any) -> yaml.MarkedYAMLError:

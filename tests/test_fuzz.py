@@ -49,7 +49,6 @@ def test_what_was_found_stays_mended(path: Path) -> None:
         ("crash", "crash"),
         ("hang", "hang"),
         ("half-written", "traceback"),
-        ("lines", "traceback"),
         pytest.param("memory", "memory", marks=LINUX),
     ],
 )
@@ -66,7 +65,7 @@ def test_the_fuzzer_sees_what_goes_wrong(
     finally:
         fuzzer.close()
     count = fuzzer.counts["faulty"]
-    assert count.verdicts[verdict] >= 2 and count.cases > count.verdicts[verdict]
+    assert count.verdicts[verdict] >= 1 and count.cases > count.verdicts[verdict]
     (path,) = tmp_path.glob(f"faulty-{verdict}-*.json")
     entry = json.loads(path.read_text())
     assert entry["kind"] == "faulty" and entry["case"] >= 10

@@ -66,7 +66,7 @@ def _take(connection: Connection, name: str, first: int, seconds: float, known: 
         connection.send((what, value))
 
     played, number = kind(name), first
-    _warm_up(played)
+    _warm_up(played, tell)
     memory.bound(MEBIBYTES + ARENAS)
     tell("ready", None)
     end = time.monotonic() + seconds
@@ -76,20 +76,25 @@ def _take(connection: Connection, name: str, first: int, seconds: float, known: 
     tell("over", number)
 
 
-def _warm_up(played: Kind) -> None:
+def _warm_up(played: Kind, tell: Tell) -> None:
     """The first cases load and compile what the others use; a fault will be met again."""
-    if played.name in NAMES:
+    if played.name in _warm or played.name not in NAMES:
+        return
+    if not _warm:
+        from .worlds import warm_up  # loads MuJoCo
+
         prepare("contacts", "planner")
+        warm_up()
 
     @seed(0)
     @settings(SETTINGS, max_examples=5, phases=(Phase.generate,))
     @given(played.cases)
     def some(case: Json) -> None:
+        tell("case", (played.name, case))
         play(played, case)
 
-    if played.name not in _warm:
-        some()
-        _warm.add(played.name)
+    _warm.add(played.name)
+    some()
 
 
 _warm: set[str] = set()

@@ -33,6 +33,14 @@ def worlds() -> BalanceVectorEnv:
     return BalanceVectorEnv([TorqueBalanceEnv(robot()) for _ in range(2)])
 
 
+def warm_up() -> None:
+    """Load and compile what a first step of each would."""
+    for name in CLASSES:
+        play_on(world(name), world(name).reset(seed=0)[0], 1)
+    worlds().reset(seed=0)
+    worlds().step(np.zeros(worlds().action_space.shape))
+
+
 def play_on(env: BalanceEnv, observation: np.ndarray, steps: int = 2) -> None:
     """A few policy steps from here; raises AssertionError for an observation that is none."""
     for _ in range(steps):
