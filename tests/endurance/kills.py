@@ -25,6 +25,8 @@ from typing import Any
 import numpy as np
 import yaml
 
+from poise.envs.errors import PoiseError
+
 from .commands import Command, commands
 from .processes import Running, kill
 from .resumed import Resumed
@@ -45,15 +47,13 @@ class Undisturbed:
         self.kept: dict[str, int] = {}  # the most that was seen
 
     def run(self, command: Command) -> None:
-        """Twice: the first time, caches of files and kernels may be cold."""
-        for name in (f"{command.name} before", command.name):
-            out, start = self.room / "whole" / name, time.monotonic()
-            running = Running(command.line(out))
-            seen = [0]
-            while running.process.poll() is None:
-                seen.append(command.kept(out))
-                time.sleep(GLANCE)
-            assert running.wait() == 0, running.output
+        out, start = self.room / "whole" / command.name, time.monotonic()
+        running = Running(command.line(out))
+        seen = [0]
+        while running.process.poll() is None:
+            seen.append(_kept(command, out))
+            time.sleep(GLANCE)
+        assert running.wait() == 0, running.output
         self.kept[command.name] = max(seen)
         self.seconds[command.name] = time.monotonic() - start
         self.results[command.name] = command.result(out)
@@ -125,9 +125,17 @@ class Moment:
         end = time.monotonic() + self.fraction * whole.seconds[command.name]
         work = self.fraction * whole.kept[command.name]
         while running.process.poll() is None:
-            if command.kept(out) > work if self.of_work else time.monotonic() > end:
+            if _kept(command, out) > work if self.of_work else time.monotonic() > end:
                 return
             time.sleep(GLANCE)
+
+
+def _kept(command: Command, out: Path) -> int:
+    """While it runs: a checkpoint may be just being replaced."""
+    try:
+        return command.kept(out)
+    except (PoiseError, OSError):
+        return 0
 
 
 def _kill_and_go_on(
@@ -144,14 +152,16 @@ def _kill_and_go_on(
     moment.wait(running, command, out, whole)
     target = _a_worker(running, rng) if worker else running.process.pid
     hit = target is not None and kill(target, number)
-    stopped = _stopped_runs(command, out, worker and hit and number != signal.SIGINT)
+    copied = out.with_name(f"{out.name}-stopped")
+    died = worker and hit and number != signal.SIGINT  # which workers leave to the main process
+    stopped = stopped_runs(command, out, copied) if died else {}
     code = running.wait()
     if worker or code == 0:
         assert code == 0, f"exit code {code}: {running.output[-2000:]}"
         told = "went on" if hit else "had ended"
     else:
         told = _look_at_the_stop(command, out, number, code, running)
-        stopped = _stopped_runs(command, out, True)
+        stopped = stopped_runs(command, out, copied)
         kept = command.kept(out)
         again = Running(command.line(out))
         assert again.wait() == 0, again.output[-2000:]
@@ -177,11 +187,16 @@ def _look_at_the_stop(
     if code > 0:
         assert running.output.count("poise: stopped; ") == 1, running.output
         assert "Traceback" not in running.output, running.output
+    look_at_files(out)
+    return "stopped"
+
+
+def look_at_files(out: Path) -> None:
+    """They are whole."""
     for path in out.rglob("*.json"):
         json.loads(path.read_text())
     for path in out.rglob("*.yaml"):
         assert isinstance(yaml.safe_load(path.read_text()), dict), path
-    return "stopped"
 
 
 def _a_worker(running: Running, rng: np.random.Generator) -> int | None:
@@ -193,18 +208,15 @@ def _a_worker(running: Running, rng: np.random.Generator) -> int | None:
     return None
 
 
-def _stopped_runs(command: Command, out: Path, stopped: bool) -> dict[str, Path]:
+def stopped_runs(command: Command, out: Path, to: Path) -> dict[str, Path]:
     """Copies of a training's runs as they are now, whose processes have just died."""
-    if not stopped or not command.name.startswith("train"):
+    if not (command.name.startswith("train") and out.exists()):
         return {}
-    folders = [out] if command.name == "train" else sorted(out.glob("seed-*"))
-    copies = {}
-    for folder in folders:
-        name = "." if folder == out else folder.name
-        copies[name] = out.with_name(f"{out.name}-{name.strip('.')}-stopped")
-        shutil.rmtree(copies[name], ignore_errors=True)
-        shutil.copytree(folder, copies[name], ignore=shutil.ignore_patterns("tensorboard"))
-    return copies
+    shutil.rmtree(to, ignore_errors=True)
+    shutil.copytree(out, to, ignore=shutil.ignore_patterns("tensorboard"))
+    if command.name == "train":
+        return {".": to}
+    return {folder.name: folder for folder in to.glob("seed-*")}
 
 
 if __name__ == "__main__":
