@@ -11,5 +11,6 @@ for folder in FOLDERS:
 
 setup(
     packages=packages,
-    package_dir={"poise": "src/poise", **{f"poise.{folder}": folder for folder in FOLDERS}},
+    py_modules=["poise_command"],
+    package_dir={"": "src", **{f"poise.{folder}": folder for folder in FOLDERS}},
 )

@@ -116,3 +116,57 @@ def test_an_error_that_a_library_makes_of_a_stop_is_a_stop(
     assert capsys.readouterr().err == "poise: stopped; the same command begins anew\n"
     monkeypatch.setattr(cli, "_run", lambda _: 0)
     assert main(["list"]) == 0 and stop_code() is None
+
+
+# Whatever the package imports first brings the signal.
+IMPORTING = """
+import os, signal, sys
+import poise_command
+class Finder:
+    def find_spec(self, name, path, target=None):
+        os.kill(os.getpid(), {number})
+sys.argv[1:] = ["list"]
+sys.meta_path.insert(0, Finder())
+poise_command.command()
+"""
+# The interpreter's end takes its time.
+ENDING = """
+import atexit, os, sys, time
+import poise_command
+atexit.register(lambda: (os.kill(os.getpid(), {number}), time.sleep(600)))
+sys.argv[1:] = ["list"]
+poise_command.command()
+"""
+# The signal comes while processes are started, which takes longer than there is time to unwind.
+STARTING = """
+import os, time
+from poise.training.stopping import GRACE, stoppable, uninterrupted
+with stoppable(), uninterrupted():
+    os.kill(os.getpid(), {number})
+    time.sleep(1.4 * GRACE)
+    print("started", flush=True)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("code", "exit_code", "out", "told"),
+    [
+        (IMPORTING, None, "", "poise: stopped; the same command begins anew\n"),
+        (ENDING, 0, "robots: ", ""),
+        (STARTING, None, "started\n", None),
+    ],
+    ids=["importing", "ending", "starting"],
+)
+def test_a_stop_at_an_odd_moment(
+    number: signal.Signals, code: str, exit_code: int | None, out: str, told: str | None
+) -> None:
+    """Before `main`, after it, and while processes are started: no traceback, and no waiting."""
+    command = [sys.executable, "-P", "-c", code.format(number=int(number))]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=2 * LATE, preexec_fn=heed_interrupts
+    )
+    if told is not None:
+        assert done.returncode == (128 + number if exit_code is None else exit_code), done.stderr
+        assert done.stderr == told
+    assert done.stdout.startswith(out)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
 
 from poise.envs.errors import ConfigError, PoiseError
 from poise.training.backends import Crew
-from poise.training.workers import WorkerTraceback
+from poise.training.workers import Task, Worker, WorkerTraceback
 
 
 class Unportable(Exception):
@@ -32,6 +33,10 @@ def work(job: tuple[str, Path | int]) -> tuple[str, int]:
     if what == "memory" and isinstance(more, Path) and not more.exists():
         more.touch()
         raise MemoryError
+    if what == "wait" and isinstance(more, Path):
+        more.touch()
+        while more.exists():
+            time.sleep(0.02)
     if what == "config":
         raise ConfigError("is not there", field="robot", choices=("a", "b"))
     if what == "unportable":
@@ -68,6 +73,21 @@ def test_a_job_that_kills_two_workers_is_an_error(tmp_path: Path) -> None:
                 done.append(job)
     assert done == [("plain", 0)] and (tmp_path / "die").read_text() == "xx"
     assert not multiprocessing.active_children()
+
+
+def test_a_worker_whose_main_process_has_gone_just_ends(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Nobody takes its result: it says nothing."""
+    worker = Worker()
+    worker.give(Task(work, ("wait", tmp_path / "there")))
+    while not (tmp_path / "there").exists():
+        time.sleep(0.02)
+    worker.connection.close()
+    (tmp_path / "there").unlink()
+    worker.process.join(60)
+    assert worker.process.exitcode == 0
+    assert capfd.readouterr().err == ""
 
 
 def test_joblib_does_the_work_of_the_dead_again(

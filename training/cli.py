@@ -13,7 +13,7 @@ import tyro
 from poise.envs.errors import ConfigError, PoiseError
 
 from .progress import terminal
-from .stopping import stop_code, stop_message, stoppable
+from .stopping import exit_at_once, stop_code, stop_message, stoppable
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
@@ -69,11 +69,13 @@ def _stoppable(args: list[str]) -> int:
 
 
 def command() -> None:
-    """`main` as a process: after a stop, the interpreter takes no time for an end of its own."""
+    """`main` as a process: after a stop, or at one that comes when all is done, the interpreter
+    takes no time for an end of its own."""
     code = main()
     if stop_code() is not None:
         sys.stderr.flush()
         os._exit(code)
+    exit_at_once(code)
     sys.exit(code)
 
 

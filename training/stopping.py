@@ -28,6 +28,7 @@ ANEW = "the same command begins anew"
 _END = b"\0"  # no signal has this number
 _kept: list[tuple[Path, str]] = []  # of the command that runs
 _asked: list[int] = []  # signals that it has been sent
+_starting = threading.Lock()  # held while processes are started
 
 
 class Stopped(KeyboardInterrupt):
@@ -69,10 +70,17 @@ def stoppable() -> Iterator[None]:
         stack.enter_context(_watched())
         for number in SIGNALS:
             before = signal.getsignal(number)
-            if before in (signal.SIG_DFL, signal.default_int_handler):
+            if before not in (signal.SIG_IGN, None):
                 stack.callback(signal.signal, number, before)
                 signal.signal(number, _raise)
         yield
+
+
+def exit_at_once(code: int) -> None:
+    """From now on a signal ends this process with `code`: its work is done and written."""
+    for number in SIGNALS:
+        if signal.getsignal(number) not in (signal.SIG_IGN, None):
+            signal.signal(number, lambda number, frame: os._exit(code))
 
 
 @contextmanager
@@ -83,7 +91,7 @@ def uninterrupted() -> Iterator[None]:
     """
     resource_tracker.ensure_running()  # its start would undo the block
     came: list[int] = []
-    with _handled_by(lambda number, frame: came.append(number)) as before:
+    with _starting, _handled_by(lambda number, frame: came.append(number)) as before:
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
@@ -136,6 +144,7 @@ def _watch(read: int) -> None:
         if byte[0] in SIGNALS:
             second, _, _ = select.select([read], [], [], GRACE)
             if not second or os.read(read, 1) != _END:
+                _starting.acquire(timeout=GRACE)  # half-started processes would complain
                 end_now(byte[0])
             return
 

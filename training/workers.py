@@ -6,6 +6,7 @@ once. Who else works goes on undisturbed, and what is done stays done.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import multiprocessing
 import multiprocessing.connection
@@ -184,12 +185,9 @@ def _serve(connection: multiprocessing.connection.Connection) -> None:
     """What a worker does until the main process closes the pipe, or ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    while True:
-        try:
-            content = connection.recv_bytes()
-        except EOFError:
-            return
-        connection.send_bytes(_answer(content))
+    with contextlib.suppress(EOFError, OSError):  # the main process has closed the pipe, or died
+        while True:
+            connection.send_bytes(_answer(connection.recv_bytes()))
 
 
 def _answer(content: bytes) -> bytes:

@@ -24,7 +24,8 @@ from .commands import commands
 from .processes import Running, kill
 
 BAR = 2.0  # [s]
-COLD = 25.0  # [s] of compilation, at most, in which a cold command is stopped
+LONGEST = 25.0  # [s] into a command, which is about how long a cold one compiles
+ENDING = ("replay", "report")  # before the latest moment
 HOUR = 10**7  # more trials or steps than anybody waits for
 
 
@@ -32,7 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--moments", type=int, default=20)
     options.add_argument("--seed", type=int, default=0)
-    options.add_argument("--longest", type=float, default=25.0, help="latest moment [s]")
+    options.add_argument("--longest", type=float, default=LONGEST, help="latest moment [s]")
     options.add_argument("--only", nargs="*", default=[])
     given = options.parse_args(arguments)
     rng = np.random.default_rng(given.seed)
@@ -72,14 +73,14 @@ def _measure(
     """Print a row; returns how many moments have missed the bar."""
     seconds, left, odd = [], 0, 0
     cold = name.endswith("cold")
+    latest = min(longest, _undisturbed(line, room)) if name in ENDING else longest
     for k in range(moments):
         out = room / f"out-{k}"
         path = room / f"package-{k}"
         environment = {"PYTHONPATH": str(package(path))} if cold else {}
         number = (signal.SIGINT, signal.SIGTERM)[k % 2]
-        limit = COLD if cold else longest
         running = Running([part.replace("OUT", str(out)) for part in line], environment)
-        time.sleep(rng.uniform(0.0, limit))
+        time.sleep(rng.uniform(0.0, latest))
         start = time.monotonic()
         ended = running.process.poll() is not None
         if k % 4 < 2:
@@ -90,14 +91,23 @@ def _measure(
         seconds.append(time.monotonic() - start)
         left += running.left(0.0)
         early = code == -number and not out.exists()  # Python itself was still starting
-        if not (ended or early) and (code != 128 + number or "Traceback" in running.output):
+        done = code == 0 and name in ENDING  # it was writing its last words
+        if not (ended or early or done) and (code != 128 + number or "Traceback" in running.output):
             odd += 1
-            print(f"{name}: code {code}\n{running.output[-1500:]}", file=sys.stderr, flush=True)
+            print(f"{name}: code {code} after {seconds[-1]:.2f} s\n{running.output[-1500:]}", file=sys.stderr, flush=True)
         for folder in (out, path):
             shutil.rmtree(folder, ignore_errors=True)
     worst, median = max(seconds), float(np.median(seconds))
     print(f"| {name} | {worst:.2f} | {median:.2f} | {left} | {odd} |", flush=True)
     return sum(s > BAR for s in seconds) + left + odd
+
+
+def _undisturbed(line: list[str], room: Path) -> float:
+    """How long a command takes that ends [s]."""
+    start, out = time.monotonic(), room / "undisturbed"
+    running = Running([part.replace("OUT", str(out)) for part in line])
+    assert running.wait() == 0, running.output
+    return time.monotonic() - start
 
 
 if __name__ == "__main__":

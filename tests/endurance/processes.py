@@ -22,7 +22,7 @@ class Running:
     def __init__(self, arguments: Sequence[str], environment: Mapping[str, str] | None = None):
         self.mark = uuid.uuid4().hex
         self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "poise.training.cli", *arguments],
+            [sys.executable, "-P", "-m", "poise_command", *arguments],
             cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env={**os.environ, **(environment or {}), MARK: self.mark},
             start_new_session=True, preexec_fn=heed_interrupts,
