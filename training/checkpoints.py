@@ -4,6 +4,7 @@ The folder is replaced as a whole: a reader, or a kill, finds the old one or the
 Nothing in it is unpickled on loading, see `policy_files.py`.
 """
 
+import copy
 import hashlib
 import json
 import os
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from stable_baselines3 import PPO
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import Tensor
 
@@ -28,6 +30,8 @@ from .widening import widened
 
 POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.yaml", "state.json"
 FILES = (POLICY, STATISTICS, CONFIG, STATE)
+#: made anew by `PPO.load`, or of the running process alone
+LEFT_OUT = ("ep_info_buffer", "ep_success_buffer", "lr_schedule")
 
 
 def save_checkpoint(
@@ -38,7 +42,7 @@ def save_checkpoint(
     try:
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir(parents=True)
-        model.save(new / POLICY, exclude=["ep_info_buffer", "ep_success_buffer"])
+        plain(model).save(new / POLICY, exclude=LEFT_OUT)
         arrays: dict[str, Any] = statistics(normalize)
         np.savez(new / STATISTICS, **arrays)
         (new / CONFIG).write_text(to_yaml(config))
@@ -52,6 +56,19 @@ def save_checkpoint(
         shutil.rmtree(new, ignore_errors=True)
         reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
         raise PoiseError(f"{folder}: cannot be written ({reason})") from None
+
+
+def plain(model: PPO) -> PPO:
+    """The model with nothing in it that is defined by Poise, so that SB3 alone can load it.
+
+    It shares the weights. Its learning rate is the one at the start. Of a symmetric policy it is
+    the ordinary one, f, whose weights these are: see `symmetry.py` for what is made of it.
+    """
+    stock = copy.copy(model)
+    stock.learning_rate = float(model.lr_schedule(1.0))
+    stock.policy_class = ActorCriticPolicy
+    stock.policy_kwargs = {k: v for k, v in model.policy_kwargs.items() if k != "mirrors"}
+    return stock
 
 
 def find_checkpoint(folder: Path) -> Path | None:
