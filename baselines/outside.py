@@ -130,8 +130,8 @@ class OutsideController(Copyable):
 def _blank(kind: type[OutsideController], name: str) -> OutsideController:
     """A controller still without anything, once its module is there to find its class in.
 
-    Whoever copied it had been allowed to make it, and to unpickle is to run code anyway: Poise itself
-    unpickles nothing that it reads from a folder.
+    Whoever copied it had been allowed to make it, and to unpickle is to run code anyway: Poise
+    itself unpickles nothing that it reads from a folder.
     """
     with allowing(name):
         find_outside(name)
