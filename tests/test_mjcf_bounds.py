@@ -59,8 +59,8 @@ BOMBS = {
     "itself": (world('<replicate count="2"><include file="bomb.xml"/></replicate>'), "include"),
     "parts": ('<include file="part0.xml"/>' + '<include file="part1.xml"/>', "together larger"),
     "attached": (asset('<model name="m" file="model.xml"/>')
-                 + world('<replicate count="100"><attach model="m" body="b" prefix="p"/></replicate>'),
-                 "20000 elements"),
+                 + world('<replicate count="100"><attach model="m" body="b" prefix="p"/>'
+                         "</replicate>"), "20000 elements"),
     "unclosed": ("<!--" * 900_000, "not valid MJCF"),
     "quotes": ("<a x='" * 600_000, "not valid MJCF"),
 }  # fmt: skip
@@ -95,10 +95,8 @@ def test_copies_within_the_bounds_are_made(tmp_path: Path) -> None:
     """Replicate, include and attach are counted as MuJoCo makes them."""
     (tmp_path / "part.xml").write_text(f"<mujoco>{world(BODY)}</mujoco>")
     path = tmp_path / "model.xml"
-    path.write_text(
-        '<mujoco><include file="part.xml"/><asset><hfield name="h" nrow="9" ncol="9" '
-        f'size="1 1 1 1"/></asset>{world(f"<replicate count=`40`>{BODY}</replicate>")}</mujoco>'
-        .replace("`", '"')
-    )
+    field = '<asset><hfield name="h" nrow="9" ncol="9" size="1 1 1 1"/></asset>'
+    copies = world(f'<replicate count="40">{BODY}</replicate>')
+    path.write_text(f'<mujoco><include file="part.xml"/>{field}{copies}</mujoco>')
     model: mujoco.MjModel = read_mjcf(path, (), "robot.yaml").compile()
     assert model.nbody == 42 and model.nhfield == 1

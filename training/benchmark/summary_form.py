@@ -91,7 +91,9 @@ def _check(value: Any, form: Any, path: Path, field: str) -> None:
         _expect(value, dict, path, field)
         for name in value if EACH in form else form:
             inner = f"{field}.{name}" if field else name
-            _check(value.get(name), form.get(EACH, form.get(name)), path, inner)
+            if name not in value:
+                raise ConfigError("is missing", source=path, field=inner)
+            _check(value[name], form.get(EACH, form.get(name)), path, inner)
     else:
         _expect(value, form, path, field)
 
