@@ -14,7 +14,7 @@ import numpy as np
 from poise.envs.config import build, read_yaml, resolve
 from poise.envs.copies import Copyable
 from poise.envs.description import match_names
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 from poise.envs.robot import Robot
 
 from .level_kinematics import LevelKinematics
@@ -159,7 +159,7 @@ def _posture(roles: dict[str, float], robot: Robot, source: str) -> np.ndarray:
     for role, degrees in roles.items():
         if role not in known:
             raise ConfigError(
-                f"robot {robot.name!r} has no role {role!r}",
+                f"robot {robot.name!r} has no role {shown(role)}",
                 source=source,
                 field="roles",
                 choices=known,

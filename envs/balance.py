@@ -57,7 +57,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
     ):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ConfigError(
-                f"unknown render mode {render_mode!r}",
+                f"unknown render mode {shown(render_mode)}",
                 field="render_mode",
                 choices=tuple(self.metadata["render_modes"]),
             )

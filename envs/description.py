@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Literal, TypeVar
 
-from .errors import ConfigError
+from .errors import ConfigError, shown
 
 Value = TypeVar("Value")
 
@@ -140,7 +140,7 @@ def match_names(
         hits = [pattern] if pattern in names else [n for n in names if fnmatchcase(n, pattern)]
         if not hits:
             raise ConfigError(
-                f"no joint is called {pattern!r}", source=source, field=field, choices=names
+                f"no joint is called {shown(pattern)}", source=source, field=field, choices=names
             )
         for name in hits:
             matched.setdefault(name, patterns[pattern])

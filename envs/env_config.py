@@ -50,7 +50,7 @@ def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: Any
     for name in overrides:
         if name not in EnvConfig.__dataclass_fields__:
             raise UnknownArgument(
-                f"unexpected keyword argument {name!r}",
+                f"unexpected keyword argument {shown(name)}",
                 source="environment",
                 choices=EnvConfig.__dataclass_fields__,
             )

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from .description import OptionDescription, RobotDescription
-from .errors import ConfigError
+from .errors import ConfigError, shown
 
 GROUND = "ground"  # name of a plane that has none
 CONTACT_SENSOR = "contact_"  # prefix of the sensors' names
@@ -48,7 +48,7 @@ def install_ground(spec: mujoco.MjSpec, name: str | None, source: str) -> str:
     names = [geom.name for geom in planes]
     if name is not None and name not in names:
         raise ConfigError(
-            f"the model has no plane {name!r}", source=source, field="ground", choices=names
+            f"the model has no plane {shown(name)}", source=source, field="ground", choices=names
         )
     ground = planes[0 if name is None else names.index(name)]
     ground.name = ground.name or GROUND

@@ -9,10 +9,8 @@ import mujoco
 import numpy as np
 
 from .errors import ConfigError
-from .model_check import check_copies
-from .reading import MIB, is_file, read_text
-
-MJCF_BYTES = 16 * MIB
+from .mjcf_bounds import MjcfText, check_spec
+from .reading import is_file
 
 
 def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
@@ -27,18 +25,19 @@ def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
         source: the description file, for errors.
 
     Raises:
-        ConfigError: the file is missing or does not parse, or a missing mesh matters.
+        ConfigError: the file is missing or does not parse, is larger than a robot's model is, or
+            a missing mesh matters.
     """
     if not is_file(path):
         raise ConfigError(f"no such file: {path}", source=source, field="source.mjcf")
-    text = read_text(path, MJCF_BYTES)  # MuJoCo itself takes names that are no text
-    check_copies(text, source)
+    MjcfText(path, source)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except Exception as error:  # of the XML, of MuJoCo, of the text in it
         raise ConfigError(
             f"{path} is not valid MJCF: {error}", source=source, field="source.mjcf"
         ) from None
+    check_spec(spec, path.parent, source)
     _drop_missing_textures(spec, path)
     _drop_missing_meshes(spec, path, feet, source)
     return spec

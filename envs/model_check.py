@@ -2,43 +2,15 @@
 
 from __future__ import annotations
 
-import re
-
 import mujoco
 import numpy as np
 
 from .errors import ConfigError
 
-MOST_COPIES = 10_000  # that replicate elements may make
 LARGEST = 1e9  # of a number that the motion depends on, SI units
 MOST_ITERATIONS = 1000  # of a solver, in a physics step
 ITERATIONS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations",
               "sdf_iterations", "sdf_initpoints")  # fmt: skip
-_TAG = re.compile(r"<(/?)replicate\b([^>]*)>")
-_COUNT = re.compile(r"\bcount\s*=\s*[\"']\s*\+?(\d+)")
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
-
-
-def check_copies(text: str, source: str) -> None:
-    """Raise ConfigError for MJCF whose replicate elements, also inside each other, make too many.
-
-    MuJoCo makes them while it reads the file, and nothing stops it.
-    """
-    factors, copies = [1], 0
-    for closing, attributes in _TAG.findall(_COMMENT.sub("", text)):
-        if closing:
-            factors = factors[:-1] or [1]
-            continue
-        count = _COUNT.search(attributes)
-        digits = count[1][:20] if count else "1"
-        product = factors[-1] * int(digits)
-        copies += product
-        if not attributes.endswith("/"):
-            factors.append(product)
-    if copies > MOST_COPIES:
-        raise ConfigError(
-            f"replicate would make more than {MOST_COPIES} copies", source=source, field="source"
-        )
 
 
 def check_numbers(model: mujoco.MjModel, dynamics: tuple[str, ...], source: str) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .config import build, to_dict
-from .errors import ConfigError
+from .errors import ConfigError, shown
 from .pushes import Kick, Profile, Push, ankle_limit
 from .robot import Robot
 
@@ -68,7 +68,7 @@ def to_impulse(
     if unit == "specific_impulse":
         return value * robot.mass
     if unit != "ankle_fraction":
-        raise ConfigError(f"unknown unit {unit!r}", field="unit", choices=MAGNITUDES)
+        raise ConfigError(f"unknown unit {shown(unit)}", field="unit", choices=MAGNITUDES)
     if margin is None:
         raise ConfigError("needs a support margin, unknown here", field=unit)
     limit = ankle_limit(pendulum_rate(robot), margin(direction), duration, profile)
@@ -142,7 +142,7 @@ def check_body(body: str, robot: Robot, source: str) -> None:
     """Raise ConfigError, listing the robot's bodies, unless `body` is one of them."""
     if body not in body_names(robot):
         raise ConfigError(
-            f"no body {body!r} in robot {robot.name!r}",
+            f"no body {shown(body)} in robot {robot.name!r}",
             source=source,
             field="body",
             choices=body_names(robot),

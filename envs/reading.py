@@ -71,10 +71,14 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
     """
     try:
         # without O_NONBLOCK a pipe would be waited for
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            if not stat.S_ISREG(os.fstat(number).st_mode):
                 raise ConfigError("cannot be read (not a regular file)", source=path)
-            data = file.read(limit + 1)
+            with open(number, "rb", closefd=False) as file:
+                data = file.read(limit + 1)
+        finally:
+            os.close(number)
     except OSError as error:
         raise ConfigError(f"cannot be read ({error.strerror})", source=path) from None
     except ValueError:

@@ -13,7 +13,7 @@ from .actuators import install_motors
 from .config import build, read_yaml, resolve
 from .copies import Copyable
 from .description import RobotDescription
-from .errors import ConfigError
+from .errors import ConfigError, shown
 from .ground import (
     CONTACT_SENSOR,
     add_contact_sensors,
@@ -196,7 +196,7 @@ def _check_bodies(model: mujoco.MjModel, description: RobotDescription, source: 
     for field, name in named.items():
         if name not in bodies:
             raise ConfigError(
-                f"the model has no body {name!r}", source=source, field=field, choices=bodies
+                f"the model has no body {shown(name)}", source=source, field=field, choices=bodies
             )
     free = [i for i in range(model.njnt) if model.jnt_type[i] == int(mujoco.mjtJoint.mjJNT_FREE)]
     floating = [model.body(model.jnt_bodyid[i]).name for i in free]
@@ -224,7 +224,7 @@ def _check_bodies(model: mujoco.MjModel, description: RobotDescription, source: 
             body = model.body_parentid[body]
         if body == 0 or not joints:
             raise ConfigError(
-                f"the body {name!r} is no limb of the root {description.root!r}",
+                f"the body {shown(name)} is no limb of the root {description.root!r}",
                 source=source,
                 field=field,
             )

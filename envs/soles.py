@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from .errors import ConfigError
+from .errors import ConfigError, shown
 from .ground import can_touch
 
 FLATNESS = 0.005  # [m] a point of the foot this close to the sole plane belongs to the sole
@@ -78,7 +78,7 @@ def sole_geoms(
     for name in names:
         if name not in solid:
             raise ConfigError(
-                f"{name!r} is no geom of the foot that collides with the ground",
+                f"{shown(name)} is no geom of the foot that collides with the ground",
                 source=source,
                 field=f"{field}.geoms",
                 choices=solid,

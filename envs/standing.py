@@ -9,7 +9,7 @@ import numpy as np
 
 from .actuators import SIMPLE_JOINTS
 from .description import RobotDescription, match_names
-from .errors import ConfigError
+from .errors import ConfigError, shown
 from .soles import SolePlane
 
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
@@ -41,7 +41,7 @@ def described_qpos(
     if posture.keyframe is not None:
         if posture.keyframe not in keyframes:
             raise ConfigError(
-                f"no keyframe is called {posture.keyframe!r}",
+                f"no keyframe is called {shown(posture.keyframe)}",
                 source=source,
                 field="posture.keyframe",
                 choices=keyframes,

@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 from .balance import BalanceEnv, InfoColumns
 from .batch import EnvBatch, replicate
 from .copies import Copyable
-from .errors import ConfigError
+from .errors import ConfigError, shown
 from .numbers import option_mapping, seed_number, whole_number
 
 try:
@@ -54,7 +54,7 @@ class BalanceVectorEnv(Copyable, VectorEnv):
             self.autoreset_mode = AutoresetMode(autoreset_mode)
         except ValueError:
             raise ConfigError(
-                f"unknown mode {autoreset_mode!r}",
+                f"unknown mode {shown(autoreset_mode)}",
                 field="autoreset_mode",
                 choices=[mode.value for mode in AutoresetMode],
             ) from None

@@ -139,6 +139,9 @@ def test_reading_names_what_is_wrong(finished: Path, tmp_path: Path) -> None:
     table = copy / "trials.csv"
     text = table.read_text()
     table.write_text(text[: len(text) // 2])
+    with pytest.raises(ConfigError, match=r"trials.csv: line \d+ has another number.*: run the"):
+        load_benchmark_data(copy)
+    table.write_text(text[: text.rindex("\n", 0, len(text) // 2) + 1])
     with pytest.raises(ConfigError, match=r"trials.csv: has \d+ trials instead of 34: run the"):
         load_benchmark_data(copy)
     table.write_text(text.replace("mass_error", "weight_error", 1))

@@ -244,7 +244,12 @@ def test_resume_takes_the_runs_own_configuration(tmp_path: Path) -> None:
 def test_train_trains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The sub-command hands configuration, folder and resume on."""
     seen = []
-    monkeypatch.setattr(train_command, "train", lambda *args: seen.append(args) or tmp_path)
+
+    def train(*args: object, allow: object) -> Path:
+        seen.append(args)
+        return tmp_path
+
+    monkeypatch.setattr(train_command, "train", train)
     assert main(["train", "--out", str(tmp_path), "--steps", "9"]) == 0
     ((config, out, resume),) = seen
     assert config.steps == 9 and out == tmp_path and resume is False

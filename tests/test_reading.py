@@ -66,15 +66,17 @@ MERGES = "a0: &a0 {x: 1}\n" + "".join(
 CHAIN = "a0: &a0 []\n" + "".join(f"a{k}: &a{k} [*a{k - 1}]\n" for k in range(1, 2000))
 COLLIDING = "\n".join(f"{k * (2**61 - 1)}: 1" for k in range(1, 20_000))  # equal as hashes
 MERGED = "".join(
-    f"a{n}: &a{n} {{" + ", ".join(f"{(2**61 - 1) * (900 * n + k)}: 1" for k in range(1, 900)) + "}\n"
+    f"a{n}: &a{n} {{{', '.join(f'{(2**61 - 1) * (900 * n + k)}: 1' for k in range(1, 900))}}}\n"
     for n in range(8)
 )
 MALFORMED = {
     "comments": (("#" * 500 + "\n") * 2000 + "{", "not valid YAML"),
     "blanks": (" " * 1_000_000 + "{", "not valid YAML"),
     "colliding": (COLLIDING, "more than 1000 entries"),
-    "colliding merged": (f"{MERGED}<<: [{', '.join(f'*a{n}' for n in range(8))}]\n",
-                         "more than 1000 entries"),
+    "colliding merged": (
+        f"{MERGED}<<: [{', '.join(f'*a{n}' for n in range(8))}]\n",
+        "more than 1000 entries",
+    ),
     "aliases": (BOMB, "more than 50000 values"),
     "merged": (MERGES, "more than 50000 values"),
     "chained": (CHAIN, "more than 64 levels"),

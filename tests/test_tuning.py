@@ -157,10 +157,20 @@ def test_a_search_resumes_as_if_nothing_had_happened(tmp_path):
     lines = [json.loads(line) for line in (once / HISTORY).read_text().splitlines()]
     assert len({str(line["units"]) for line in lines}) == 3  # a generation is not the one before
 
+    def changed(name, value):
+        return json.dumps({**lines[1], name: value})
+
     lines[1]["units"][0][0] += 0.1
     (twice / HISTORY).write_text("".join(json.dumps(line) + "\n" for line in lines))
     with pytest.raises(ConfigError, match="line 2"):
         tune(small(generations=4), twice, resume=True)
+    for wrong in ("5", "[]", "null", '{"units": 1}', changed("alone", [[1.0]]),
+                  changed("alone", None), changed("alone", [[2.0, 0.0]] * 4),
+                  changed("below", [{}] * 4)):  # fmt: skip
+        text = (once / HISTORY).read_text().splitlines()
+        (twice / HISTORY).write_text("\n".join([text[0], wrong]))
+        with pytest.raises(ConfigError, match="line 2"):
+            tune(small(generations=4), twice, resume=True)
     assert read_yaml(twice / GAINS) == found  # nothing lost
     with pytest.raises(ConfigError, match="no search"):
         tune(small(), tmp_path / "none", resume=True)

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from typing import Any, Literal, TypeVar
 
 from poise.baselines.allowance import carried
-from poise.envs.errors import ConfigError, PoiseError
+from poise.envs.errors import ConfigError, PoiseError, shown
 
 from .provenance import usable_cores
 from .stopping import uninterrupted
@@ -29,7 +29,7 @@ Result = TypeVar("Result")
 def check_backend(backend: str) -> None:
     """Raise ConfigError unless the backend exists and its libraries are installed."""
     if backend not in BACKENDS:
-        raise ConfigError(f"no such backend: {backend!r}", field="backend", choices=BACKENDS)
+        raise ConfigError(f"no such backend: {shown(backend)}", field="backend", choices=BACKENDS)
     if backend == "ray":
         try:
             import ray  # noqa: F401

@@ -24,6 +24,7 @@ def difference(
         a, b: estimates, with intervals of one confidence.
         correlation: ρ of the two estimates; 0: independent.
     """
+    (a, b), a_ci, b_ci = (float(a), float(b)), list(map(float, a_ci)), list(map(float, b_ci))
     below_b, above_b = b - b_ci[0], b_ci[1] - b
     below_a, above_a = a - a_ci[0], a_ci[1] - a
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from poise.baselines.allowance import allows
 from poise.baselines.warmup import prepare
 from poise.envs.config import to_dict
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 from poise.envs.push_schedule import LimitTable
 from poise.envs.robot import load_robot
 
@@ -151,7 +151,7 @@ def _check(controllers: Sequence[str], seed: int, workers: int | None, trials: i
         raise ConfigError("give at least one", field="controller")
     for name in controllers:
         if list(controllers).count(name) > 1:
-            raise ConfigError(f"{name!r} is given twice", field="controller")
+            raise ConfigError(f"{shown(name)} is given twice", field="controller")
     for value, name, least in ((seed, "seed", 0), (workers, "workers", 1), (trials, "trials", 1)):
         if value is not None and value < least:
             raise ConfigError(f"must be at least {least}, not {value}", field=name)

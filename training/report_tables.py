@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 
 from .html_table import Cell, Column, Table, cell, name_cell, p_cell
 from .results import Results
@@ -204,7 +204,7 @@ def _against(results: Results, baseline: str) -> dict[str, tuple[float, float, f
 
 def _member(name: Any, names: tuple[str, ...], where: str) -> str:
     if name not in names:
-        raise ConfigError(f"no such controller: {name!r}", source=where, choices=names)
+        raise ConfigError(f"no such controller: {shown(name)}", source=where, choices=names)
     return str(name)
 
 

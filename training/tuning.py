@@ -133,9 +133,13 @@ def _known(config: TuneConfig, out: Path, resume: bool) -> list[dict[str, Any]]:
     if not is_file(out / HISTORY):
         return []
     try:
-        return [parse_json(line) for line in read_lines(out / HISTORY)]
+        rows = [parse_json(line) for line in read_lines(out / HISTORY)]
     except ValueError as error:
         raise ConfigError(f"not valid JSON: {error}", source=out / HISTORY) from None
+    for number, row in enumerate(rows, 1):
+        if not isinstance(row, dict):
+            raise ConfigError(f"line {number} must be a mapping", source=out / HISTORY)
+    return rows
 
 
 class _Search:
@@ -195,15 +199,23 @@ class _Search:
         """A generation that has been played before."""
         units = [np.asarray(u) for u in self.cma.ask()]
         try:
-            same = np.allclose(units, row["units"], rtol=0.0, atol=1e-12)
             values = [row["alone"], row["below"]]
-        except (KeyError, TypeError, ValueError):
+            same = np.allclose(units, row["units"], rtol=0.0, atol=1e-12)
+            same = same and all(self._are_worths(each) for each in values)
+        except (KeyError, TypeError, ValueError, OverflowError):
             same = False
         if not same:
             raise ConfigError(
                 f"line {self.generation + 1} is not what this search tries there", source=source
             )
         self._take(units, values)
+
+    def _are_worths(self, values: Any) -> bool:
+        """Whether these are values of all candidates and pushes, or of no pushes."""
+        found, pushes = np.asarray(values, float), self.config.pushes
+        trials = len(pushes.directions) * len(pushes.levels)
+        sizes = [(self.config.population, count) for count in (0, trials)]
+        return found.shape in sizes and bool(np.all((found >= 0.0) & (found <= 1.0)))
 
     def _take(self, units: list[np.ndarray], values: list[list[list[float]]]) -> None:
         share = self.config.policy_share if values[1][0] else 0.0

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from poise.envs.config import build
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 
 from .problem import Solver
 
@@ -28,7 +28,7 @@ def make_solver(name: str, **options: Any) -> Solver:
         ConfigError: an unknown name or option, or a value that is not valid.
     """
     if name not in SOLVERS:
-        raise ConfigError(f"unknown solver {name!r}", field="solver", choices=SOLVERS)
+        raise ConfigError(f"unknown solver {shown(name)}", field="solver", choices=SOLVERS)
     module_name, solver_class, options_class = SOLVERS[name]
     module = import_module(f".{module_name}", __package__)
     cls = getattr(module, options_class)

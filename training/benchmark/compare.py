@@ -17,6 +17,8 @@ from poise.envs.reading import is_file, read_json, read_table, read_yaml
 from ..differences import difference, paired_rates
 from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS
 from ..statistics import mcnemar
+from ..values import interval, number
+from .summary_form import check_compared
 
 IGNORED = ("controllers",)  # of settings: compared one by one
 
@@ -128,8 +130,11 @@ class _Result:
         if not isinstance(controllers, dict):
             raise ConfigError("is no summary of a result: it has no controllers",
                               source=folder / SUMMARY)  # fmt: skip
+        check_compared(self.summary, folder / SUMMARY)
         self.controllers: dict[str, Any] = controllers
         self.settings = read_yaml(folder / SETTINGS)
+        if not isinstance(self.settings.get("controllers"), dict):
+            raise ConfigError("must be a mapping", source=folder / SETTINGS, field="controllers")
         self.is_benchmark = "benchmark" in self.summary
         self.trials = self._trials() if is_file(folder / TRIALS) else {}
 
@@ -143,6 +148,8 @@ class _Result:
         if "recovered" not in columns:
             raise ConfigError("has no column 'recovered'", source=self.folder / TRIALS)
         shared = columns[: columns.index("recovered")]
+        if shared[1:2] != ("controller",):
+            raise ConfigError("its second column must be 'controller'", source=self.folder / TRIALS)
         return {tuple(row[c] for c in shared): row["recovered"] == "True" for row in rows}
 
 
@@ -170,10 +177,13 @@ def _by_intervals(
     name: str, title: str, one: Mapping, two: Mapping, key: str, ends: str
 ) -> Iterator[Change]:
     """A figure with an interval of its own in both."""
-    if one.get(ends) is None or two.get(ends) is None:
+    where = f"controllers.{name}"
+    before, after = (number(entry, key, where) for entry in (one, two))
+    around = [interval(entry, ends, where) for entry in (one, two)]
+    if before is None or after is None or around[0] is None or around[1] is None:
         return
-    change, (low, high) = difference(one[key], one[ends], two[key], two[ends])
-    yield Change(name, title, one[key], two[key], change, low, high)
+    change, (low, high) = difference(before, around[0], after, around[1])
+    yield Change(name, title, before, after, change, low, high)
 
 
 def _rates(

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 from poise.envs.reading import exists, is_folder
 
 from ..evaluation_folder import REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
@@ -129,7 +129,7 @@ class BenchmarkFolder:
         for name, mark in self.settings.controllers.items():
             if before.controllers.get(name, mark) != mark:
                 raise ConfigError(
-                    f"holds trials of another {name!r}, which has changed since: {ADVICE}",
+                    f"holds trials of another {shown(name)}, which has changed since: {ADVICE}",
                     source=path / SETTINGS, field="controllers",
                 )  # fmt: skip
         if (path / SUMMARY).exists() and not (path / LOG).exists():
@@ -171,4 +171,4 @@ def _difference(name: str, old: Any, new: Any) -> str:
         keys = [k for k in {**old, **new} if old.get(k) != new.get(k)]
         what = ", ".join(f"{k} {old.get(k)}, not {new.get(k)}" for k in keys)
         return f"other {name} ({what if name == 'versions' else ', '.join(keys)})"
-    return f"{name} {old!r}, not {new!r}"
+    return f"{name} {shown(old)}, not {shown(new)}"

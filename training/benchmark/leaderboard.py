@@ -12,6 +12,7 @@ from poise.envs.reading import is_folder
 
 from ..seed_groups import seed_lines
 from .reading import read_summary
+from .summary_form import shape
 from .table import COLUMNS, ranking_rows
 
 HEAD = """# Leaderboard
@@ -59,6 +60,9 @@ def merged(summaries: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], 
                 raise ConfigError(f"is not that of {first}", source=source, field=key)
         names = [name for name in other["controllers"] if name != whole["reference"]]
         for name in names:
+            if shape(other["controllers"][name]) != shape(entries[whole["reference"]]):
+                raise ConfigError(f"has other directions or levels than {first}", source=source,
+                                  field=f"controllers.{name}")  # fmt: skip
             entries[name], origin[name] = other["controllers"][name], source
             pairs.pop(name, None)
         pairs |= {pair["b"]: pair for pair in other["pairs"] if pair["b"] in names}

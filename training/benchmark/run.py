@@ -13,7 +13,7 @@ from rich.console import Console
 from poise.baselines.allowance import allowing, allows
 from poise.baselines.warmup import prepare
 from poise.envs.config import packaged, to_dict
-from poise.envs.errors import ConfigError
+from poise.envs.errors import ConfigError, shown
 from poise.envs.robot import Robot, load_robot
 
 from ..backends import Crew, check_backend
@@ -166,7 +166,7 @@ def _load_again(name: str, robot: Robot, stage: Stage, folder: BenchmarkFolder) 
         player = stage.load(name, robot)
     if player.fingerprint != folder.settings.controllers[name]:
         raise ConfigError(
-            f"holds trials of {name!r}, which has changed since: choose another folder",
+            f"holds trials of {shown(name)}, which has changed since: choose another folder",
             source=folder.path, field="controllers",
         )  # fmt: skip
     return player
@@ -175,7 +175,7 @@ def _load_again(name: str, robot: Robot, stage: Stage, folder: BenchmarkFolder) 
 def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | None) -> None:
     for name in names:
         if list(names).count(name) > 1:
-            raise ConfigError(f"{name!r} is given twice", field="controllers")
+            raise ConfigError(f"{shown(name)} is given twice", field="controllers")
     for value, name, least in ((seed, "seed", 0), (workers, "workers", 1), (trials, "trials", 1)):
         if value is not None and value < least:
             raise ConfigError(f"must be at least {least}, not {value}", field=name)

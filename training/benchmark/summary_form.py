@@ -9,9 +9,11 @@ from typing import Any
 
 from poise.envs.errors import ConfigError, shown
 
+from ..seed_groups import FIGURES
 from ..values import number
 
 NUMBER, INTERVAL, EACH = "number", "interval", "each"  # EACH: of a mapping with any keys
+BOTH = "both"  # ends of an interval, which INTERVAL may lack
 OPTIONAL = (float, int, NoneType)
 DIRECTION = {"direction": NUMBER, "eta": NUMBER}
 LEVEL = {"level": str, "standard": bool, "recovered_rate": NUMBER}
@@ -28,6 +30,25 @@ FORM: dict[str, Any] = {
     "controllers": {EACH: ENTRY}, "pairs": [{"b": str}], "seeds": [{"name": str, "members": list}],
     "versions": dict, "machine": {"processor": str, "cores": int}, "commit": (str, NoneType),
 }  # fmt: skip
+RATE = {"trials": int, "recovered_rate": NUMBER, "recovered_ci95": BOTH}
+RATES = [{"factor": str, "levels": [{"level": str, "standard": bool, **RATE}]}]
+SEEDS = {"iqm": NUMBER, "iqm_ci95": BOTH, "worst": NUMBER, "worst_seed": int}
+
+
+def check_compared(summary: Mapping[str, Any], path: Path) -> None:
+    """Raise ConfigError, naming the field, where a benchmark's or an evaluation's summary lacks
+    what a comparison of two needs."""
+    for name, entry in summary["controllers"].items():
+        field = f"controllers.{name}"
+        _expect(entry, dict, path, field)
+        parts: dict[str, Any] = {}
+        if "benchmark" not in summary:
+            _check(entry, RATE, path, field)
+        else:
+            parts["factors"] = RATES
+            parts |= {"mix": RATE} if entry.get("mix") is not None else {}
+        parts |= {"directions": [{"direction": NUMBER}]} if "directions" in entry else {}
+        _check(entry, parts, path, field)
 
 
 def check_form(summary: Mapping[str, Any], path: Path) -> None:
@@ -41,23 +62,27 @@ def check_form(summary: Mapping[str, Any], path: Path) -> None:
     for i, pair in enumerate(summary["pairs"]):
         if pair.get("mix") is not None:
             _check(pair["mix"], PAIR, path, f"pairs[{i}].mix")
+    for i, group in enumerate(summary["seeds"]):
+        for key in (key for key, _, _ in FIGURES if key in group):
+            _check(group[key], SEEDS, path, f"seeds[{i}].{key}")
     for name, entry in entries.items():
         if entry.get("mix") is not None:
             _check(entry["mix"], MIX, path, f"controllers.{name}.mix")
-        if _shape(entry) != _shape(next(iter(entries.values()))):
+        if shape(entry) != shape(next(iter(entries.values()))):
             raise ConfigError("has other directions or levels than the first", source=path,
                               field=f"controllers.{name}")  # fmt: skip
 
 
-def _shape(entry: Mapping[str, Any]) -> tuple[int, list[int]]:
+def shape(entry: Mapping[str, Any]) -> tuple[int, list[int]]:
+    """How many directions, and how many levels of each factor, a controller has."""
     return len(entry["directions"]), [len(factor["levels"]) for factor in entry["factors"]]
 
 
 def _check(value: Any, form: Any, path: Path, field: str) -> None:
-    if form in (NUMBER, INTERVAL):
+    if form in (NUMBER, INTERVAL, BOTH):
         ends = {field: value} if form == NUMBER else _ends(value, path, field)
         for name in ends:
-            number(ends, name, str(path), needed=form == NUMBER)
+            number(ends, name, str(path), needed=form != INTERVAL)
     elif isinstance(form, list):
         _expect(value, list, path, field)
         for i, each in enumerate(value):
@@ -66,7 +91,9 @@ def _check(value: Any, form: Any, path: Path, field: str) -> None:
         _expect(value, dict, path, field)
         for name in value if EACH in form else form:
             inner = f"{field}.{name}" if field else name
-            _check(value.get(name), form.get(EACH, form.get(name)), path, inner)
+            if name not in value:
+                raise ConfigError("is missing", source=path, field=inner)
+            _check(value[name], form.get(EACH, form.get(name)), path, inner)
     else:
         _expect(value, form, path, field)
 
