@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import subprocess
@@ -170,3 +171,21 @@ def test_a_stop_at_an_odd_moment(
         assert done.returncode == (128 + number if exit_code is None else exit_code), done.stderr
         assert done.stderr == told
     assert done.stdout.startswith(out)
+
+
+def test_a_stop_that_a_callback_loses_prints_no_traceback(capfd: pytest.CaptureFixture[str]) -> None:
+    """As in one of LLVM's; what else is lost is told as ever."""
+    call = ctypes.CFUNCTYPE(None, ctypes.c_int)
+
+    def lose(number: int) -> None:
+        if not number:
+            raise ValueError("told")
+        os.kill(os.getpid(), number)
+        time.sleep(LATE)
+
+    callback = call(lose)
+    with stoppable():
+        callback(signal.SIGTERM)
+        callback(0)
+    told = capfd.readouterr().err
+    assert "Stopped" not in told and "told" in told and stop_code() == 143
