@@ -14,6 +14,9 @@ def choose_gl_backend() -> str | None:
     draws in software the same pictures on every machine; EGL comes next. On a machine with a GPU
     ``MUJOCO_GL=egl`` is faster. With a display, or on another system, MuJoCo's own choice is good.
     """
+    # Mesa's cache of shaders is a thread of least priority: on a busy machine it ends seconds late
+    # (sched(7): nice 19), and the process with it. To do without costs a report a second.
+    os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
     chosen = os.environ.get("MUJOCO_GL")
     if chosen or not sys.platform.startswith("linux") or "mujoco" in sys.modules or _has_display():
         return chosen

@@ -22,6 +22,7 @@ def bare(monkeypatch):
 
     installed("OSMesa", "EGL")
     monkeypatch.setenv("MUJOCO_GL", "")  # so that what a test sets is undone
+    monkeypatch.setenv("MESA_SHADER_CACHE_DISABLE", "")
     return installed
 
 
@@ -39,6 +40,16 @@ def test_choice_of_the_user_stays(bare, monkeypatch):
     """A value of MUJOCO_GL is returned, not replaced."""
     monkeypatch.setenv("MUJOCO_GL", "egl")
     assert gl.choose_gl_backend() == "egl"
+
+
+def test_no_thread_of_least_priority_is_started(bare, monkeypatch):
+    """It would hold up the end of the process; a value of the user stays."""
+    monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)
+    gl.choose_gl_backend()
+    assert os.environ["MESA_SHADER_CACHE_DISABLE"] == "true"
+    monkeypatch.setenv("MESA_SHADER_CACHE_DISABLE", "false")
+    gl.choose_gl_backend()
+    assert os.environ["MESA_SHADER_CACHE_DISABLE"] == "false"
 
 
 @pytest.mark.parametrize("situation", ["display", "macOS", "too late"])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -170,3 +172,22 @@ def test_a_stop_at_an_odd_moment(
         assert done.returncode == (128 + number if exit_code is None else exit_code), done.stderr
         assert done.stderr == told
     assert done.stdout.startswith(out)
+
+
+def test_a_stop_that_a_callback_loses_prints_no_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in one of LLVM's; what else is lost is told as ever."""
+    told: list[Any] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda lost: told.append(lost.exc_type))
+    call = ctypes.CFUNCTYPE(None, ctypes.c_int)
+
+    def lose(number: int) -> None:
+        if not number:
+            raise ValueError("told")
+        os.kill(os.getpid(), number)
+        time.sleep(LATE)
+
+    callback = call(lose)
+    with stoppable():
+        callback(signal.SIGTERM)
+        callback(0)
+    assert told == [ValueError] and stop_code() == 143

@@ -15,8 +15,9 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from multiprocessing import resource_tracker
 from pathlib import Path
 from types import FrameType
@@ -68,6 +69,8 @@ def stoppable() -> Iterator[None]:
         return
     with ExitStack() as stack:
         stack.enter_context(_watched())
+        stack.callback(setattr, sys, "unraisablehook", sys.unraisablehook)
+        sys.unraisablehook = partial(_unraisable, sys.unraisablehook)
         for number in SIGNALS:
             before = signal.getsignal(number)
             if before not in (signal.SIG_IGN, None):
@@ -119,6 +122,12 @@ def _handled_by(handler: Any) -> Iterator[dict[int, Any]]:
 def _raise(number: int, frame: FrameType | None) -> None:
     _asked.append(number)
     raise Stopped(signal.Signals(number).name)
+
+
+def _unraisable(otherwise: Callable[[Any], Any], lost: Any) -> None:
+    """A stop that is lost in a callback, of which Python would print a traceback."""
+    if not isinstance(lost.exc_value, Stopped):
+        otherwise(lost)
 
 
 @contextmanager

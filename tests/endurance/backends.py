@@ -17,30 +17,31 @@ from .commands import Command, commands
 from .processes import Running
 
 BACKENDS = ("local", "joblib", "ray")
-COUNTS = (1, 2, 3)
 
 
 def main(arguments: list[str] | None = None) -> int:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--seed", type=int, default=2)
+    options.add_argument("--only", nargs="*", default=["evaluate", "benchmark"])
+    options.add_argument("--counts", nargs="*", type=int, default=[1, 2, 3])
     given = options.parse_args(arguments)
     missed = 0
     with tempfile.TemporaryDirectory(prefix="poise-backends-") as folder:
         room = Path(folder)
         chosen = {command.name: command for command in commands(room)}
-        for name in ("evaluate", "benchmark"):
-            missed += _compare(chosen[name], room / name, given.seed)
+        for name in given.only:
+            missed += _compare(chosen[name], room / name, given.seed, given.counts)
     return 1 if missed else 0
 
 
-def _compare(command: Command, room: Path, seed: int) -> bool:
+def _compare(command: Command, room: Path, seed: int, counts: list[int]) -> bool:
     """Print the digest of each; whether they differ."""
     digests = set()
     for backend in BACKENDS if command.name == "benchmark" else BACKENDS[:1]:
         if backend == "ray" and importlib.util.find_spec("ray") is None:
             print(f"{command.name}, ray: skipped, it is not installed")
             continue
-        for count in COUNTS:
+        for count in counts:
             out = room / f"{backend}-{count}"
             line = [*command.line(out), "--workers", str(count), "--seed", str(seed)]
             line += ["--backend", backend] if command.name == "benchmark" else []

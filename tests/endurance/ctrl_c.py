@@ -94,7 +94,11 @@ def _measure(
         done = code == 0 and name in ENDING  # it was writing its last words
         if not (ended or early or done) and (code != 128 + number or "Traceback" in running.output):
             odd += 1
-            print(f"{name}: code {code} after {seconds[-1]:.2f} s\n{running.output[-1500:]}", file=sys.stderr, flush=True)
+            print(
+                f"{name}: code {code} after {seconds[-1]:.2f} s\n{running.output[-1500:]}",
+                file=sys.stderr,
+                flush=True,
+            )
         for folder in (out, path):
             shutil.rmtree(folder, ignore_errors=True)
     worst, median = max(seconds), float(np.median(seconds))
