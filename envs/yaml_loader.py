@@ -73,10 +73,10 @@ class Loader(_Safe):
 
 
 class Bounds:
-    """Counts the nodes of a text while it is parsed, event by event."""
+    """Counts the nodes of a text while it is parsed, event by event; keeps sizes of children."""
 
     def __init__(self) -> None:
-        self._open: list[tuple[yaml.Event, list[tuple[int, int]]]] = []  # with sizes of children
+        self._open: list[tuple[yaml.NodeEvent, list[tuple[int, int]]]] = []
         self._sizes: dict[str, tuple[int, int] | None] = {}  # by anchor; None: not yet ended
         self._events = 0
 
@@ -107,7 +107,8 @@ class Bounds:
     def _leaf(self, event: yaml.NodeEvent) -> None:
         if isinstance(event, yaml.ScalarEvent):
             return self._add(event, (1 + len(event.value) // SCALAR, 1))
-        size = self._sizes.get(event.anchor, (1, 1))  # an unknown alias is the composer's to refuse
+        # an unknown alias is the composer's to refuse
+        size = self._sizes.get(str(event.anchor), (1, 1))
         if size is None:
             raise _error("an alias of what it stands in", event.start_mark)
         return self._add(event, size)

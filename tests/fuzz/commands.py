@@ -83,7 +83,7 @@ def cases(draw: Draw) -> Json:
 def _stops() -> tuple[tuple[Any, str], ...]:
     """What long runs begin with."""
     return (
-        (evaluation, "Workers"), (run, "Crew"), (tuning, "Crew"), (train_seeds, "Crew"),
+        (evaluation, "Crew"), (run, "Crew"), (tuning, "Crew"), (train_seeds, "Crew"),
         (stable_baselines3.PPO, "learn"), (qp_set, "recoveries"), (html_report, "film"),
         (video, "record"),
     )  # fmt: skip
