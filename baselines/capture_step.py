@@ -15,8 +15,8 @@ from .around_qp import AroundQP
 from .capturability import Reach, ReachArrays
 from .capture_tick import CaptureTick, StepGains, StepMemory, capture_tick
 from .contact_sets import ContactSets, contact_tick
-from .controller import Targets
-from .momentum_qp import COMPILED_SOLVER, MomentumQPConfig, Outputs, momentum_tick
+from .controller import Outputs, Targets
+from .momentum_qp import COMPILED_SOLVER, MomentumQPConfig, momentum_tick
 from .reduced_qp import QPParameters
 from .step_feedback import FallFeedback, StepFeedback
 from .step_home import StepHome, home_arrays, leave_home

@@ -11,8 +11,8 @@ from poise.envs.kinematics import StateArrays, copy
 
 from .capturability import distance_beyond, reach_of_one, reach_of_two
 from .contact_sets import ContactTick
+from .controller import TargetArrays
 from .momentum_qp import Tick
-from .reduced_qp import TargetArrays
 from .step_home import (
     AWAY,
     SWINGING,

@@ -17,17 +17,10 @@ from poise.envs.kinematics import StateArrays, copy
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
-from .controller import Targets
+from .controller import TargetArrays, Targets
 from .momentum_qp import Memory, MomentumQPConfig, accept, allocate_memory, forget, solve
 from .parameters import qp_parameters
-from .reduced_qp import (
-    Assembly,
-    QPParameters,
-    TargetArrays,
-    Workspace,
-    allocate_workspace,
-    assemble,
-)
+from .reduced_qp import Assembly, QPParameters, Workspace, allocate_workspace, assemble
 from .solvers import QP
 from .task_rows import Rows
 

@@ -2,16 +2,41 @@
 
 from dataclasses import dataclass, field, fields
 from operator import is_not
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from poise.envs.arrays import apart
+from poise.envs.block import Block
 from poise.envs.copies import Copyable
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
-from .reduced_qp import TargetArrays
+
+class Outputs(NamedTuple):
+    """Where compiled code finds what a controller's tick gave."""
+
+    tau: np.ndarray  # (nv−6,) joint torques [N·m]
+    root_wrench: np.ndarray  # (6,) of a soft root
+    failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
+    soft_root: bool
+
+
+@dataclass(frozen=True, eq=False)
+class TargetArrays(Block):
+    """What the controller is asked to reach (nj = nv−6 joints), world axes."""
+
+    q_ref: np.ndarray  # (nj,)
+    v_ref: np.ndarray  # (nj,)
+    a_ref: np.ndarray  # (nj,)
+    root_axes: np.ndarray  # (3, 3) desired root orientation
+    root_vel: np.ndarray  # (3,) desired angular velocity of the root, body axes
+    root_acc: np.ndarray  # (3,)
+    com: np.ndarray  # (3,) c_ref
+    com_vel: np.ndarray  # (3,)
+    com_acc: np.ndarray  # (3,)
+    cop: np.ndarray  # (2,) p_ref
+    angular_momentum: np.ndarray  # (3,) L_ref that the posture is to carry; zero: none
 
 
 @dataclass

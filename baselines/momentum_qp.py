@@ -1,7 +1,7 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from poise.envs.kinematics import StateArrays, copy
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
-from .controller import Targets
+from .controller import Outputs, Targets
 from .parameters import qp_parameters
 from .reduced_qp import (
     Assembly,
@@ -78,15 +78,6 @@ def forget(memory: Memory) -> None:
     """As before the first tick."""
     memory.torques[:] = 0.0
     memory.streak[0] = memory.failures[0] = 0
-
-
-class Outputs(NamedTuple):
-    """Where compiled code finds what a controller's tick gave."""
-
-    tau: np.ndarray  # (nv−6,) joint torques [N·m]
-    root_wrench: np.ndarray  # (6,) of a soft root
-    failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
-    soft_root: bool
 
 
 FALLBACK_DECAY = 0.8  # per tick: share that the last good torques keep

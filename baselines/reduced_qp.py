@@ -21,6 +21,7 @@ from poise.envs.block import Block
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy, cross
 
+from .controller import TargetArrays
 from .null_space import NullSpace, allocate_null_space, solve_soles
 from .solvers.dual_active_set import iscratch_size, scratch_size
 
@@ -54,23 +55,6 @@ class QPParameters(Block):
     brake_floor: float  # [rad/s²] braking is never asked to exceed
     soft_root: bool
     root_weight: np.ndarray  # (6,) ω_root per N² and per (N·m)²
-
-
-@dataclass(frozen=True, eq=False)
-class TargetArrays(Block):
-    """What the controller is asked to reach (nj = nv−6 joints), world axes."""
-
-    q_ref: np.ndarray  # (nj,)
-    v_ref: np.ndarray  # (nj,)
-    a_ref: np.ndarray  # (nj,)
-    root_axes: np.ndarray  # (3, 3) desired root orientation
-    root_vel: np.ndarray  # (3,) desired angular velocity of the root, body axes
-    root_acc: np.ndarray  # (3,)
-    com: np.ndarray  # (3,) c_ref
-    com_vel: np.ndarray  # (3,)
-    com_acc: np.ndarray  # (3,)
-    cop: np.ndarray  # (2,) p_ref
-    angular_momentum: np.ndarray  # (3,) L_ref that the posture is to carry; zero: none
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from poise.envs.kinematics import StateArrays, copy, update_state
 from poise.envs.observation import Scales, observe
 from poise.envs.simulation import advance
 
-from .reduced_qp import TargetArrays
+from .controller import TargetArrays
 from .targets import Motion, update_targets
 
 

@@ -9,7 +9,7 @@ from poise.envs.block import Block
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy
 
-from .reduced_qp import TargetArrays
+from .controller import TargetArrays
 from .splines import evaluate
 
 

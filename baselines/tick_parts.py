@@ -13,7 +13,7 @@ from poise.envs.episode import EpisodeArrays, record_tick
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
 
-from .reduced_qp import TargetArrays
+from .controller import TargetArrays
 from .targets import Motion, update_targets
 
 
