@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from poise.envs.arrays import apart
 from poise.envs.block import Block
 from poise.envs.copies import Copyable
 from poise.envs.hull import convex_hull
 from poise.envs.jit import compiled
+from poise.envs.memory import apart
 from poise.envs.robot import Robot
 
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)

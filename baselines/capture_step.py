@@ -5,9 +5,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from poise.envs.arrays import apart
 from poise.envs.block import address_of
 from poise.envs.errors import ConfigError
+from poise.envs.memory import apart
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 

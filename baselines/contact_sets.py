@@ -9,11 +9,12 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from poise.envs.arrays import RobotArrays, apart, robot_arrays
+from poise.envs.arrays import RobotArrays, robot_arrays
 from poise.envs.block import Block, address_of, call
 from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy
+from poise.envs.memory import apart
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 

@@ -5,11 +5,12 @@ from typing import Literal
 
 import numpy as np
 
-from poise.envs.arrays import apart, robot_arrays
+from poise.envs.arrays import robot_arrays
 from poise.envs.block import Block, address_of, call
 from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy
+from poise.envs.memory import apart
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 

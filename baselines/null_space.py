@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.envs.arrays import RobotArrays, apart
+from poise.envs.arrays import RobotArrays
 from poise.envs.block import Block
 from poise.envs.jit import compiled
+from poise.envs.memory import apart
 
 DEPENDENT = 1e-6  # pivot, relative to the first, below which a row of J follows from the others
 

@@ -16,10 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.envs.arrays import RobotArrays, apart
+from poise.envs.arrays import RobotArrays
 from poise.envs.block import Block
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays, copy, cross
+from poise.envs.memory import apart
 
 from .controller import TargetArrays
 from .null_space import NullSpace, allocate_null_space, solve_soles

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from poise.envs.arrays import apart
 from poise.envs.balance import BalanceEnv, EnvConfig
 from poise.envs.block import Block, Erased, address_of
 from poise.envs.compiled_steps import CompiledStep
 from poise.envs.config import build, to_dict
 from poise.envs.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.errors import ConfigError
+from poise.envs.memory import apart
 from poise.envs.mirror import Mirror, mirror_terms
 from poise.envs.observation import Term
 from poise.envs.robot import Robot

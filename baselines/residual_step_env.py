@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from poise.envs.arrays import apart
 from poise.envs.block import Block, Erased, address_of, call
 from poise.envs.compiled_steps import CompiledStep
 from poise.envs.env_config import EnvConfig
 from poise.envs.errors import ConfigError
 from poise.envs.jit import compiled
+from poise.envs.memory import apart
 from poise.envs.observation import Term
 from poise.envs.robot import Robot
 from poise.envs.vector import make_vector_env

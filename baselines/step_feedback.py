@@ -20,10 +20,11 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from poise.envs.arrays import apart, robot_arrays
+from poise.envs.arrays import robot_arrays
 from poise.envs.block import Block
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
+from poise.envs.memory import apart
 from poise.envs.robot import Robot
 
 AHEAD, OUTWARD, TIME, HEIGHT = range(4)

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from poise.envs.arrays import apart
 from poise.envs.block import Block, call
 from poise.envs.jit import compiled
+from poise.envs.memory import apart
 from poise.envs.robot import Robot
 
 from .capturability import standing_feet

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from poise.envs.arrays import apart
 from poise.envs.block import address_of
 from poise.envs.copies import Copyable
+from poise.envs.memory import apart
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from poise.envs.arrays import apart
 from poise.envs.block import Block
 from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
+from poise.envs.memory import apart
 
 # entries of `StepShift.values`: the order of `StepScales.entries`
 COM, COP, HEIGHT, LEAN, FOOTHOLD, TIME, TRIGGER = 0, 2, 4, 5, 9, 11, 12

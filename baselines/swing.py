@@ -4,11 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from poise.envs.arrays import RobotArrays, apart
+from poise.envs.arrays import RobotArrays
 from poise.envs.block import Block
 from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import copy
+from poise.envs.memory import apart
 from poise.envs.state import RobotState
 
 from .task_rows import Rows

@@ -15,19 +15,6 @@ from .block import Block
 from .copies import portable
 from .robot import Robot
 
-GAP = 64  # 512 bytes: more than a vector loop handles at once
-
-
-def apart(shape: int | tuple[int, ...], dtype: type = float) -> np.ndarray:
-    """Zeros with unused room on both sides, for whatever compiled code writes to.
-
-    A vector loop first looks how far apart its arrays lie, and where one follows another within a
-    few dozen numbers, as small arrays of one heap may, it adds up one by one instead: the last
-    bit of a result would depend on where the arrays happen to lie.
-    """
-    size = int(np.prod(shape))
-    return np.zeros(size + 2 * GAP, dtype=dtype)[GAP : GAP + size].reshape(shape)
-
 
 @dataclass(frozen=True, eq=False)
 class RobotArrays(Block):

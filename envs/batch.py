@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import apart
 from .balance import BalanceEnv
 from .compiled_steps import NOTHING, CompiledStep, Turns
 from .copies import Copyable
 from .episode import FALLEN, EpisodeArrays
 from .errors import ConfigError, shown
 from .helpers import Helpers
+from .memory import apart
 from .numbers import real_array, whole_number
 
 

@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from .arrays import Plant, RobotArrays, apart
+from .arrays import Plant, RobotArrays
 from .block import Block
 from .jit import compiled
 from .kinematics import StateArrays, support_distance, update_support
+from .memory import apart
 from .observation import Scales
 
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import GAP, MAX_VERTICES, Plant, RobotArrays, apart
+from .arrays import MAX_VERTICES, Plant, RobotArrays
 from .block import Block
 from .hull import convex_hull
 from .jit import compiled
+from .memory import GAP, apart
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from .arrays import Plant, RobotArrays, apart, plant_views, robot_arrays
+from .arrays import Plant, RobotArrays, plant_views, robot_arrays
 from .block import Block
 from .copies import Copyable
 from .jit import compiled
 from .kinematics import StateArrays, allocate_state, update_state
+from .memory import apart
 from .native import mj_step1, mj_step2
 from .pushes import TABLE_COLUMNS, Kick, Push, apply_kicks, apply_pushes, pack
 from .robot import Robot
