@@ -11,17 +11,12 @@ from poise.envs.hull import convex_hull
 from poise.envs.jit import compiled
 from poise.envs.memory import apart
 from poise.envs.robot import Robot
+from poise.envs.vectors import turn
 
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
 LINE = 1e-12  # [m] a corner of the reach that is nearer to the line of its neighbours is none
-
-
-def turn(yaw: float) -> np.ndarray:
-    """(2, 2) rotation by `yaw` in the plane."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.array([[c, -s], [s, c]])
 
 
 def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float | np.ndarray) -> np.ndarray:

@@ -7,7 +7,8 @@ import numpy as np
 from poise.envs.arrays import RobotArrays
 from poise.envs.block import Block, call
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays, copy
+from poise.envs.kinematics import StateArrays
+from poise.envs.vectors import copy
 
 from .capturability import distance_beyond, reach_of_one, reach_of_two
 from .contact_sets import ContactTick

@@ -13,10 +13,11 @@ from poise.envs.arrays import RobotArrays, robot_arrays
 from poise.envs.block import Block, address_of, call
 from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays, copy
+from poise.envs.kinematics import StateArrays
 from poise.envs.memory import apart
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
+from poise.envs.vectors import copy
 
 from .controller import TargetArrays, Targets
 from .momentum_qp import Memory, MomentumQPConfig, accept, allocate_memory, forget, solve

@@ -9,10 +9,11 @@ from poise.envs.arrays import robot_arrays
 from poise.envs.block import Block, address_of, call
 from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays, copy
+from poise.envs.kinematics import StateArrays
 from poise.envs.memory import apart
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
+from poise.envs.vectors import copy
 
 from .controller import Outputs, Targets
 from .parameters import qp_parameters

@@ -19,8 +19,9 @@ import numpy as np
 from poise.envs.arrays import RobotArrays
 from poise.envs.block import Block
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays, copy, cross
+from poise.envs.kinematics import StateArrays
 from poise.envs.memory import apart
+from poise.envs.vectors import copy, cross
 
 from .controller import TargetArrays
 from .null_space import NullSpace, allocate_null_space, solve_soles

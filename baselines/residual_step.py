@@ -16,9 +16,10 @@ from poise.envs.episode import (
     record_tick,
 )
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays, copy, update_state
+from poise.envs.kinematics import StateArrays, update_state
 from poise.envs.observation import Scales, observe
 from poise.envs.simulation import advance
+from poise.envs.vectors import copy
 
 from .controller import TargetArrays
 from .targets import Motion, update_targets

@@ -11,8 +11,9 @@ from poise.envs.copies import Copyable
 from poise.envs.errors import ConfigError
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
+from poise.envs.vectors import turn
 
-from .capturability import Reach, sides, turn
+from .capturability import Reach, sides
 from .controller import Targets
 from .pd import PDGains, joint_gains, motor_torques
 

@@ -3,13 +3,12 @@
 import numpy as np
 
 from poise.envs.jit import compiled
-from poise.envs.kinematics import copy
+from poise.envs.vectors import copy, rotation_error
 
 from .step_feedback import HEIGHT as FEEDBACK_HEIGHT
 from .step_home import LEANING, PRESSING, press
 from .step_shift import COM, COP, HEIGHT, LEAN
 from .support import find_nearest
-from .swing import rotation_error
 
 
 @compiled

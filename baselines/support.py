@@ -4,14 +4,10 @@ import numpy as np
 
 from poise.envs.jit import compiled
 from poise.envs.state import RobotState
+from poise.envs.vectors import skew
 
 #: Lever [m per m of CoM height] that makes a sole's moment as dear as a force.
 MOMENT_LEVER = 0.05
-
-
-def skew(r: np.ndarray) -> np.ndarray:
-    """(3, 3) matrix of the cross product: skew(r) f = r × f."""
-    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
 
 
 def sole_wrenches(state: RobotState, wrench: np.ndarray) -> np.ndarray:

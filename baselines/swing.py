@@ -8,9 +8,9 @@ from poise.envs.arrays import RobotArrays
 from poise.envs.block import Block
 from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
-from poise.envs.kinematics import copy
 from poise.envs.memory import apart
 from poise.envs.state import RobotState
+from poise.envs.vectors import copy, rotation_error
 
 from .task_rows import Rows
 
@@ -175,18 +175,6 @@ class Swing(Copyable):
         """(3, 3) position, velocity and acceleration [m, s] after `dt` more seconds."""
         advance_swing(self.arrays, dt)
         return self.reference.copy()
-
-
-@compiled
-def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray):
-    """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn from
-    one to the other."""
-    for a in range(3):
-        i, j = (a + 1) % 3, (a + 2) % 3
-        total = 0.0
-        for k in range(3):
-            total += wanted[j, k] * axes[i, k] - wanted[i, k] * axes[j, k]
-        out[a] = 0.5 * total
 
 
 @dataclass(frozen=True, eq=False)

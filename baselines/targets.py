@@ -7,7 +7,8 @@ import numpy as np
 from poise.envs.arrays import RobotArrays
 from poise.envs.block import Block
 from poise.envs.jit import compiled
-from poise.envs.kinematics import StateArrays, copy
+from poise.envs.kinematics import StateArrays
+from poise.envs.vectors import copy
 
 from .controller import TargetArrays
 from .splines import evaluate

@@ -15,6 +15,7 @@ from .block import Block
 from .hull import convex_hull
 from .jit import compiled
 from .memory import GAP, apart
+from .vectors import copy
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,22 +79,6 @@ def allocate_state(nv: int, nc: int) -> StateArrays:
         support=zeros((MAX_VERTICES * nc, 2)),
         support_size=zeros(1, dtype=np.int64),
     )
-
-
-@compiled
-def copy(source, out):
-    """`out[:] = source` of two vectors; NumPy's form compiles checks and their messages too."""
-    for i in range(out.shape[0]):
-        out[i] = source[i]
-
-
-@compiled
-def cross(a, b, out):
-    """out = a × b for arrays of three."""
-    x = a[1] * b[2] - a[2] * b[1]
-    y = a[2] * b[0] - a[0] * b[2]
-    z = a[0] * b[1] - a[1] * b[0]
-    out[0], out[1], out[2] = x, y, z
 
 
 @compiled

@@ -12,9 +12,9 @@ from poise.baselines.capturability import (
     capture_distance,
     clipped,
     drifted,
-    turn,
 )
 from poise.envs.simulation import Simulation
+from poise.envs.vectors import turn
 
 from . import stepping_reference as readable
 from .shared import robot

@@ -8,9 +8,9 @@ from poise.baselines.support import (
     joint_torques,
     nearest_inside,
     shrunk,
-    skew,
     sole_wrenches,
 )
+from poise.envs.vectors import skew
 
 from .shared import generic_state
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from poise.baselines.swing import Swing, SwingTask, quintic, rotation_error, swing_rows
+from poise.baselines.swing import Swing, SwingTask, quintic, swing_rows
 from poise.envs.simulation import Simulation
+from poise.envs.vectors import rotation_error
 
 from . import stepping_reference as readable
 from .shared import generic_state, robot
