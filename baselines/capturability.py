@@ -7,9 +7,9 @@ import numpy as np
 
 from poise.envs.block import Block
 from poise.envs.copies import Copyable
-from poise.envs.hull import convex_hull
 from poise.envs.jit import compiled
 from poise.envs.memory import apart
+from poise.envs.polygons import clipped, convex_hull, stacked
 from poise.envs.robot import Robot
 from poise.envs.vectors import turn
 
@@ -29,24 +29,6 @@ def capture_distance(steps: float, reach: float, length: float, omega: float, ti
     stance foot to come to rest in N steps of length l and time T_s [Koolen12]."""
     a = np.exp(-omega * time)
     return float(reach + length * a * (1.0 - a**steps) / (1.0 - a))
-
-
-def clipped(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
-    """The part of a convex polygon (k, 2) with normal · p ≤ offset; at least its nearest point."""
-    over = polygon @ normal - offset
-    if np.all(over <= 0.0):
-        return polygon
-    if np.all(over > 0.0):
-        return polygon[[int(np.argmin(over))]]
-    kept = []
-    for i in range(len(polygon)):
-        j = (i + 1) % len(polygon)
-        if over[i] <= 0.0:
-            kept.append(polygon[i])
-        if (over[i] <= 0.0) != (over[j] <= 0.0):
-            share = over[i] / (over[i] - over[j])
-            kept.append(polygon[i] + share * (polygon[j] - polygon[i]))
-    return np.array(kept)
 
 
 def standing_feet(robot: Robot) -> np.ndarray:
@@ -160,12 +142,6 @@ def reach_of_two(r, points, cos, sin, cloud, out):
             cloud[n, 0], cloud[n, 1] = x + cos * u - sin * v, y + sin * u + cos * v
             n += 1
     return convex_hull(cloud, n, LINE, out)
-
-
-def stacked(polygons: list[np.ndarray]) -> np.ndarray:
-    """(n, k, 2) polygons of up to k corners, the last one repeated where there are fewer."""
-    most = max(len(polygon) for polygon in polygons)
-    return np.array([np.pad(p, ((0, most - len(p)), (0, 0)), "edge") for p in polygons])
 
 
 class Reach(Copyable):

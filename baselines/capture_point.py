@@ -5,13 +5,13 @@ from typing import Literal
 
 import numpy as np
 
+from poise.envs.polygons import nearest_inside, shrunk
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .controller import Targets
 from .guided import Guided
 from .momentum_qp import MomentumQPConfig
-from .support import nearest_inside, shrunk
 
 
 @dataclass(frozen=True)

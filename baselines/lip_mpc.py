@@ -8,13 +8,13 @@ import osqp
 from scipy import sparse
 
 from poise.envs.errors import PoiseError
+from poise.envs.polygons import half_planes, nearest_inside, shrunk
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
 from .controller import Targets
 from .guided import Guided
 from .momentum_qp import MomentumQPConfig
-from .support import nearest_inside, shrunk
 
 MAX_EDGES = 16  # rows kept per step; a polygon with fewer edges repeats its last
 
@@ -42,16 +42,6 @@ def lip_step(omega: float, step: float) -> tuple[np.ndarray, np.ndarray]:
     """A (2, 2), B (2,) of [c; ċ/ω] after `step` seconds of constant p, exact for c̈ = ω² (c − p)."""
     c, s = np.cosh(omega * step), np.sinh(omega * step)
     return np.array([[c, s], [s, c]]), np.array([1.0 - c, -s])
-
-
-def half_planes(polygon: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """N (k, 2), b (k,) with N p ≤ b inside a counter-clockwise polygon (k, 2)."""
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    length = np.linalg.norm(edges, axis=1)
-    edges, corners = edges[length > 1e-9], polygon[length > 1e-9]
-    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals, np.einsum("ij,ij->i", normals, corners)
 
 
 class LIPMPC(Guided):

@@ -7,12 +7,12 @@ import numpy as np
 from poise.envs.block import Block, call
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
+from poise.envs.polygons import find_nearest
 
 from .capturability import ReachArrays, distance_beyond, reach_of_one
 from .step_feedback import AHEAD, OUTWARD, FeedbackArrays, feed_back, take_gains
 from .step_feedback import TIME as LONGER
 from .step_shift import FOOTHOLD, TIME
-from .support import find_nearest
 from .swing import FROZEN, SwingArrays, time_left
 
 TIMES = 8  # step times that are weighed against each other

@@ -3,12 +3,12 @@
 import numpy as np
 
 from poise.envs.jit import compiled
+from poise.envs.polygons import find_nearest
 from poise.envs.vectors import copy, rotation_error
 
 from .step_feedback import HEIGHT as FEEDBACK_HEIGHT
 from .step_home import LEANING, PRESSING, press
 from .step_shift import COM, COP, HEIGHT, LEAN
-from .support import find_nearest
 
 
 @compiled

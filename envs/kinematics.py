@@ -12,9 +12,9 @@ import numpy as np
 
 from .arrays import MAX_VERTICES, Plant, RobotArrays
 from .block import Block
-from .hull import convex_hull
 from .jit import compiled
 from .memory import GAP, apart
+from .polygons import convex_hull
 from .vectors import copy
 
 

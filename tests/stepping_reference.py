@@ -5,7 +5,7 @@ import numpy as np
 from poise.baselines.capturability import DIRECTIONS, SHARES, drifted
 from poise.baselines.step_home import LEANING, PRESSING
 from poise.baselines.step_plan import Plan
-from poise.baselines.support import nearest_inside
+from poise.envs.polygons import nearest_inside
 from poise.envs.vectors import turn
 
 FROZEN = 0.03

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.envs.hull import convex_hull
+from poise.envs.polygons import convex_hull
 
 
 def test_hull_of_points():

@@ -15,7 +15,7 @@ from poise.baselines.ipm_step import (
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.step_feedback import SignalGains, StepFeedback
 from poise.baselines.step_plan import Foothold, StepLimits
-from poise.baselines.support import nearest_inside
+from poise.envs.polygons import nearest_inside
 
 from .shared import generic_state, robot
 from .test_capture_step import trial

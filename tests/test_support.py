@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from poise.baselines.support import (
-    MOMENT_LEVER,
-    joint_torques,
-    nearest_inside,
-    shrunk,
-    sole_wrenches,
-)
+from poise.baselines.support import MOMENT_LEVER, joint_torques, sole_wrenches
+from poise.envs.polygons import nearest_inside, shrunk
 from poise.envs.vectors import skew
 
 from .shared import generic_state

@@ -23,8 +23,8 @@ import mujoco
 import numpy as np
 from scipy.optimize import linprog
 
-from poise.baselines.lip_mpc import half_planes
 from poise.baselines.parameters import joint_kinds
+from poise.envs.polygons import half_planes
 from poise.envs.robot import load_robot
 from poise.envs.simulation import Simulation
 from poise.training.limits import load_limits
