@@ -19,18 +19,6 @@ SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two s
 LINE = 1e-12  # [m] a corner of the reach that is nearer to the line of its neighbours is none
 
 
-def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float | np.ndarray) -> np.ndarray:
-    """ξ(t) = p + (ξ − p) e^(ωt): where the capture point gets while the CoP stays at p."""
-    return p + (xi - p) * np.exp(omega * t)
-
-
-def capture_distance(steps: float, reach: float, length: float, omega: float, time: float) -> float:
-    """d_N = r + l a (1 − a^N)/(1 − a), a = e^(−ω T_s): how far the capture point may be from the
-    stance foot to come to rest in N steps of length l and time T_s [Koolen12]."""
-    a = np.exp(-omega * time)
-    return float(reach + length * a * (1.0 - a**steps) / (1.0 - a))
-
-
 def standing_feet(robot: Robot) -> np.ndarray:
     """(2, 3) middles of the soles in the standing posture, which faces along x [m]."""
     data = mujoco.MjData(robot.model)

@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from poise.envs.jit import compiled
+from poise.envs.pendulum import pendulum
 from poise.envs.robot import Robot
 
 from .capturability import Reach
@@ -35,13 +36,6 @@ def rest_distance(speed: float, omega: float, height: float, arc: float) -> floa
     `arc` leads from the first (0) to the second (1); g = ω² z.
     """
     return speed / omega * np.sqrt(1.0 + arc * (0.5 * speed / (omega * height)) ** 2)
-
-
-@compiled
-def pendulum(c: float, velocity: float, p: float, omega: float, t: float) -> tuple[float, float]:
-    """Position and velocity along one axis after `t` of c̈ = ω² (c − p), p at rest."""
-    cosh, sinh = np.cosh(omega * t), np.sinh(omega * t)
-    return p + (c - p) * cosh + velocity / omega * sinh, (c - p) * omega * sinh + velocity * cosh
 
 
 @compiled

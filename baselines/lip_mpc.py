@@ -8,6 +8,7 @@ import osqp
 from scipy import sparse
 
 from poise.envs.errors import PoiseError
+from poise.envs.pendulum import lip_step
 from poise.envs.polygons import half_planes, nearest_inside, shrunk
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
@@ -36,12 +37,6 @@ class LIPMPCConfig:
     end: float = field(default=100.0, metadata={"min": 0.0})
     share: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})  # of the polygon
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
-
-
-def lip_step(omega: float, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """A (2, 2), B (2,) of [c; ċ/ω] after `step` seconds of constant p, exact for c̈ = ω² (c − p)."""
-    c, s = np.cosh(omega * step), np.sinh(omega * step)
-    return np.array([[c, s], [s, c]]), np.array([1.0 - c, -s])
 
 
 class LIPMPC(Guided):

@@ -8,7 +8,8 @@ import numpy as np
 
 from .config import build, to_dict
 from .errors import ConfigError, shown
-from .pushes import Kick, Profile, Push, ankle_limit
+from .pendulum import Profile, ankle_limit, pendulum_rate
+from .pushes import Kick, Push
 from .robot import Robot
 
 Margin = Callable[[float], float]  # direction [deg] → support margin δ(θ) [m]
@@ -36,11 +37,6 @@ def body_names(robot: Robot) -> tuple[str, ...]:
     return tuple(
         model.body(i).name for i in range(root, model.nbody) if model.body_rootid[i] == root
     )
-
-
-def pendulum_rate(robot: Robot) -> float:
-    """ω = √(g/z_c) of the standing robot [1/s]."""
-    return float(np.sqrt(np.linalg.norm(robot.model.opt.gravity) / robot.height_com))
 
 
 def to_impulse(

@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 
 from .errors import ConfigError
-from .push_options import Margin, check_body, pendulum_rate, to_impulse
-from .pushes import Kick, Profile, Push, duration_factor
+from .pendulum import Profile, duration_factor, pendulum_rate
+from .push_options import Margin, check_body, to_impulse
+from .pushes import Kick, Push
 from .robot import Robot
 
 Range = tuple[float, float]

@@ -8,15 +8,14 @@ J = ∫F dt [N·s]. Directions are degrees counter-clockwise from forward in the
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
 from .errors import ConfigError
 from .jit import compiled
+from .pendulum import Profile
 from .robot import Robot
 
-Profile = Literal["square", "half-sine"]
 TABLE_COLUMNS = 12
 LARGEST_FORCE = 1e12  # [N] beyond which numbers overflow
 
@@ -73,30 +72,6 @@ class Kick:
     start: float = field(metadata={"min": 0.0})  # [s] after the reset
     delta_v: float = field(metadata={"min": 0.0})  # [m/s]
     direction: float = field(metadata={"min": -360.0, "max": 360.0})  # [deg], heading frame
-
-
-def duration_factor(omega: float, duration: float, profile: Profile = "square") -> float:
-    """How much more impulse a push may have than an instantaneous one, J(T)/J(0) ≥ 1.
-
-    J(T)/J(0) = ∫F ds / ∫F e^(−ωs) ds over [0, T]:
-    square    ωT / (1 − e^(−ωT))
-    half-sine 2 (1 + (ωT/π)²) / (1 + e^(−ωT))
-    """
-    x = omega * duration
-    if profile == "square":
-        return float(x / -np.expm1(-x)) if x > 0.0 else 1.0
-    return float(2.0 * (1.0 + (x / np.pi) ** 2) / (1.0 + np.exp(-x)))
-
-
-def ankle_limit(omega: float, margin: float, duration: float, profile: Profile = "square") -> float:
-    """Largest J/m [N·s/kg] that ankles alone hold: J/m = ω δ · J(T)/J(0).
-
-    Linear inverted pendulum c̈ = ω²(c − p) + F/m with the centre of pressure p at the edge of
-    the support, at distance δ = `margin` [m], from the first instant; the capture point
-    ξ = c + ċ/ω starts at the centre and ends the push exactly on p. For a square push this is
-    ω δ · ωT/(1 − e^(−ωT)). `omega` [1/s], `duration` T [s]. [Stephens07], [Koolen12]
-    """
-    return omega * margin * duration_factor(omega, duration, profile)
 
 
 def pack(pushes: Sequence[Push | Kick], robot: Robot, heading_yaw: float) -> np.ndarray:

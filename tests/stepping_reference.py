@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from poise.baselines.capturability import DIRECTIONS, SHARES, drifted
+from poise.baselines.capturability import DIRECTIONS, SHARES
 from poise.baselines.step_home import LEANING, PRESSING
 from poise.baselines.step_plan import Plan
+from poise.envs.pendulum import drifted
 from poise.envs.polygons import nearest_inside
 from poise.envs.vectors import turn
 

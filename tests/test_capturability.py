@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial import ConvexHull
 
-from poise.baselines.capturability import SHARES, Reach, ankle_limits, capture_distance, drifted
+from poise.baselines.capturability import SHARES, Reach, ankle_limits
+from poise.envs.pendulum import capture_distance, drifted
 from poise.envs.polygons import clipped
 from poise.envs.simulation import Simulation
 from poise.envs.vectors import turn

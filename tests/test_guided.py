@@ -6,9 +6,10 @@ from scipy.integrate import solve_ivp
 
 from poise.baselines.capture_point import CapturePoint, CapturePointConfig
 from poise.baselines.controller import Targets
-from poise.baselines.lip_mpc import LIPMPC, LIPMPCConfig, lip_step
+from poise.baselines.lip_mpc import LIPMPC, LIPMPCConfig
 from poise.baselines.lqr_lip import LQRLIP, lqr_gain
 from poise.baselines.momentum_qp import MomentumQPConfig
+from poise.envs.pendulum import lip_step
 from poise.envs.polygons import half_planes
 from poise.envs.simulation import Simulation
 

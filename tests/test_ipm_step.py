@@ -4,17 +4,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from poise.baselines.capturability import Reach, drifted
-from poise.baselines.ipm_step import (
-    EnergyPlanner,
-    IPMStep,
-    IPMStepConfig,
-    pendulum,
-    rest_distance,
-)
+from poise.baselines.capturability import Reach
+from poise.baselines.ipm_step import EnergyPlanner, IPMStep, IPMStepConfig, rest_distance
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.step_feedback import SignalGains, StepFeedback
 from poise.baselines.step_plan import Foothold, StepLimits
+from poise.envs.pendulum import drifted, pendulum
 from poise.envs.polygons import nearest_inside
 
 from .shared import generic_state, robot

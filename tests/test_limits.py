@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from poise.envs.errors import ConfigError
-from poise.envs.push_options import pendulum_rate
+from poise.envs.pendulum import ankle_limit, pendulum_rate
 from poise.envs.push_schedule import LimitTable, push_bodies
-from poise.envs.pushes import Push, ankle_limit
+from poise.envs.pushes import Push
 from poise.envs.robot import Robot, load_robot
 from poise.training.limits import PushLimits, load_limits, write_limits
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from poise.envs.errors import ConfigError
-from poise.envs.push_options import body_names, parse_pushes, pendulum_rate, to_impulse
-from poise.envs.pushes import Kick, Push, ankle_limit
+from poise.envs.pendulum import ankle_limit, pendulum_rate
+from poise.envs.push_options import body_names, parse_pushes, to_impulse
+from poise.envs.pushes import Kick, Push
 from poise.envs.robot import load_robot
 
 

@@ -8,9 +8,10 @@ import pytest
 
 from poise.envs.config import build, to_dict
 from poise.envs.errors import ConfigError
-from poise.envs.push_options import body_names, pendulum_rate
+from poise.envs.pendulum import duration_factor, pendulum_rate
+from poise.envs.push_options import body_names
 from poise.envs.push_schedule import LimitTable, PushSampler
-from poise.envs.pushes import Kick, duration_factor
+from poise.envs.pushes import Kick
 from poise.envs.robot import load_robot
 
 

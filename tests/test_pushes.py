@@ -7,14 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from poise.envs.pushes import (
-    Kick,
-    Push,
-    ankle_limit,
-    apply_kicks,
-    apply_pushes,
-    pack,
-)
+from poise.envs.pendulum import ankle_limit
+from poise.envs.pushes import Kick, Push, apply_kicks, apply_pushes, pack
 from poise.envs.robot import load_robot
 
 

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from poise.baselines.capturability import drifted
 from poise.baselines.registry import controller_config
 from poise.baselines.step_plan import StepLimits
-from poise.envs.pushes import duration_factor
+from poise.envs.pendulum import drifted, duration_factor
 from poise.training import evaluation, report
 from poise.training.benchmark.case import Result
 from poise.training.benchmark.figures import controller_figures

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from poise.envs.config import build, packaged, read_yaml, resolve, to_yaml, write_atomic
 from poise.envs.errors import ConfigError
-from poise.envs.push_options import pendulum_rate
+from poise.envs.pendulum import ankle_limit, duration_factor, pendulum_rate
 from poise.envs.push_schedule import LIMIT_DURATION, LimitTable
-from poise.envs.pushes import Push, ankle_limit, duration_factor
+from poise.envs.pushes import Push
 from poise.envs.robot import Robot
 from poise.envs.simulation import Simulation
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.capturability import Reach, capture_distance
+from poise.baselines.capturability import Reach
 from poise.baselines.step_plan import StepLimits
-from poise.envs.pushes import duration_factor
+from poise.envs.pendulum import capture_distance, duration_factor
 
 from .limits import PushLimits
 from .players import Player

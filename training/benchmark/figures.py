@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from poise.envs.push_options import pendulum_rate
+from poise.envs.pendulum import pendulum_rate
 
 from ..bootstrap import mean_over_directions
 from ..differences import paired_rates, relative_gain
