@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from poise.envs.block import address_of
+from poise.envs.calls import address_of
 from poise.envs.errors import ConfigError
 from poise.envs.memory import apart
 from poise.envs.robot import Robot

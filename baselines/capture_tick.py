@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.envs.arrays import RobotArrays
-from poise.envs.block import Block, call
+from poise.envs.block import Block
+from poise.envs.calls import call
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays
 from poise.envs.vectors import copy

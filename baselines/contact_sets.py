@@ -10,7 +10,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from poise.envs.arrays import RobotArrays, robot_arrays
-from poise.envs.block import Block, address_of, call
+from poise.envs.block import Block
+from poise.envs.calls import address_of, call
 from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays

@@ -6,7 +6,8 @@ from typing import Literal
 import numpy as np
 
 from poise.envs.arrays import robot_arrays
-from poise.envs.block import Block, address_of, call
+from poise.envs.block import Block
+from poise.envs.calls import address_of, call
 from poise.envs.copies import Copyable
 from poise.envs.jit import compiled
 from poise.envs.kinematics import StateArrays

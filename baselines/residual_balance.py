@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from poise.envs.balance import BalanceEnv, EnvConfig
-from poise.envs.block import Block, Erased, address_of
-from poise.envs.compiled_steps import CompiledStep
+from poise.envs.block import Block
+from poise.envs.calls import CompiledStep, Erased, address_of
 from poise.envs.config import build, to_dict
 from poise.envs.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.errors import ConfigError

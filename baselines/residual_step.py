@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.envs.arrays import Plant, RobotArrays
-from poise.envs.block import Block, Erased, call
+from poise.envs.block import Block
+from poise.envs.calls import Erased, call
 from poise.envs.episode import (
     FAILURES,
     ROOT_FORCE,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from poise.envs.block import Block, Erased, address_of, call
-from poise.envs.compiled_steps import CompiledStep
+from poise.envs.block import Block
+from poise.envs.calls import CompiledStep, Erased, address_of, call
 from poise.envs.env_config import EnvConfig
 from poise.envs.errors import ConfigError
 from poise.envs.jit import compiled

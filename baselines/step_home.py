@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from poise.envs.block import Block, call
+from poise.envs.block import Block
+from poise.envs.calls import call
 from poise.envs.jit import compiled
 from poise.envs.memory import apart
 from poise.envs.robot import Robot

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from poise.envs.block import address_of
+from poise.envs.calls import address_of
 from poise.envs.copies import Copyable
 from poise.envs.memory import apart
 from poise.envs.robot import Robot

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 
 from .arrays import RobotArrays
-from .compiled_steps import CompiledStep
+from .calls import CompiledStep
 from .copies import Copyable
 from .env_config import EnvConfig as EnvConfig
 from .env_config import env_config

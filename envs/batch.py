@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from .balance import BalanceEnv
-from .compiled_steps import NOTHING, CompiledStep, Turns
+from .calls import CompiledStep
+from .compiled_steps import NOTHING, Turns
 from .copies import Copyable
 from .episode import FALLEN, EpisodeArrays
 from .errors import ConfigError, shown

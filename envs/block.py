@@ -5,8 +5,6 @@ compiles all of them. A `Block` is handed over as a pointer: its arrays' address
 its numbers, lie one after the other in memory, and only what a function uses is read.
 """
 
-import importlib
-import sys
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -19,7 +17,6 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
     infer_getattr,
-    intrinsic,
     lower_getattr_generic,
     register_model,
     typeof_impl,
@@ -27,7 +24,6 @@ from numba.extending import (
 )
 
 from .copies import portable
-from .errors import PoiseError
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,85 +163,3 @@ def _array(context: Any, builder: Any, kind: types.Array, word: Any) -> Any:
     array.meminfo = cgutils.get_null_value(array.meminfo.type)
     array.parent = cgutils.get_null_value(array.parent.type)
     return array._getvalue()
-
-
-@dataclass(frozen=True, eq=False)
-class Erased(Block):
-    """Another block, of which a caller by address knows no more than where it lies.
-
-    A kernel that calls others by address is compiled once, whatever they work on.
-    """
-
-    inner: Block
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_address", self.inner.address)
-        object.__setattr__(self, "_type", BlockType("Erased", ()))
-
-
-class Address(int):
-    """Where the function `kernel` lies, compiled for blocks of the type `kind`.
-
-    In another process it lies elsewhere: what is pickled is its name, and the type.
-    """
-
-    kernel: Any
-    kind: BlockType
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Address":
-        return self
-
-    def __copy__(self) -> "Address":
-        return self
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        function = self.kernel.py_func
-        module, name = function.__module__, function.__qualname__
-        if getattr(sys.modules.get(module), name, None) is not self.kernel:
-            raise PoiseError(f"cannot be pickled: {name!r} is no compiled function of {module!r}")
-        return _address, (module, name, self.kind)
-
-
-def _address(module: str, name: str, kind: BlockType) -> Address:
-    """The address of a module's function, in this process."""
-    return _compiled(getattr(importlib.import_module(module), name), kind)
-
-
-def _compiled(kernel: Any, kind: BlockType) -> Address:
-    kernel.compile((kind,))
-    result = kernel.overloads[kind,]
-    address = Address(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
-    address.kernel, address.kind = kernel, kind
-    return address
-
-
-def address_of(kernel: Any, block: Block) -> Address:
-    """The address of the compiled function `kernel(block)`, which returns nothing, for `call`.
-
-    A function called by its address is compiled apart from its caller: neither waits for the
-    other, and it is not optimised once more within all that it is called from.
-    """
-    return _compiled(kernel, block.numba_type)
-
-
-@intrinsic
-def call(typing: Any, address: Any, block: Any) -> Any:
-    """`kernel(block)` by the address of the compiled function; its exceptions go on.
-
-    The block may also be given by its address.
-    """
-    kind = block if isinstance(block, BlockType) else types.voidptr
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        convention = context.call_conv
-        function = convention.get_function_type(types.none, (kind,))
-        kernel = builder.inttoptr(args[0], function.as_pointer())
-        pointer = args[1]
-        if kind is types.voidptr:
-            pointer = builder.inttoptr(pointer, context.get_value_type(kind))
-        status, _ = convention.call_function(builder, kernel, types.none, (kind,), [pointer])
-        with cgutils.if_unlikely(builder, status.is_error):
-            convention.return_status_propagate(builder, status)
-        return context.get_dummy_value()
-
-    return types.void(address, block), generate

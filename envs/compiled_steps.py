@@ -1,14 +1,12 @@
 """Policy steps that compiled code plays by their addresses, many of them in several threads."""
 
 import time
-from typing import Any, NamedTuple
+from typing import Any
 
-import llvmlite.ir
 import numpy as np
-from numba.core import types
-from numba.extending import intrinsic
 
-from .block import Block, call
+from .atomics import look_at, swap, take_turn
+from .calls import call, play_one
 from .errors import PoiseError
 from .helpers import Helpers, tell_of_fork
 from .jit import compiled
@@ -22,64 +20,7 @@ AWAY, WAITING, CALLED = 0, 1, 2  # a helper plays or sleeps, looks for a call, h
 LINE = 8  # integers that a cache line holds
 
 
-class CompiledStep(NamedTuple):
-    """A policy step: `kernel`, by its address, `ticks` times with `block`. It must not raise."""
-
-    kernel: int
-    block: Block
-    ticks: int = 1
-
-    def row(self) -> tuple[int, int, int]:
-        """What `play` reads."""
-        return int(self.kernel), self.block.address, self.ticks
-
-    def play(self) -> None:
-        """Take the step."""
-        play_one(*self.row())
-
-
 NOTHING = np.zeros((0, 3), dtype=np.int64)  #: no steps
-
-
-@compiled
-def play_one(kernel: int, block: int, ticks: int):
-    """Call `kernel` `ticks` times."""
-    for _ in range(ticks):
-        call(kernel, block)
-
-
-@intrinsic
-def take_turn(typing: Any, numbers: Any, k: Any) -> Any:
-    """`numbers[k]` (int), which is one more for whoever asks next in any thread."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        array = context.make_array(numbers)(context, builder, args[0])
-        one = llvmlite.ir.Constant(llvmlite.ir.IntType(64), 1)
-        return builder.atomic_rmw("add", builder.gep(array.data, [args[1]]), one, "acq_rel")
-
-    return types.int64(numbers, types.int64), generate
-
-
-@intrinsic
-def look_at(typing: Any, numbers: Any, k: Any) -> Any:
-    """`numbers[k]` (int), which other threads write."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        array = context.make_array(numbers)(context, builder, args[0])
-        return builder.load_atomic(builder.gep(array.data, [args[1]]), "acquire", 8)
-
-    return types.int64(numbers, types.int64), generate
-
-
-@intrinsic
-def swap(typing: Any, numbers: Any, k: Any, new: Any) -> Any:
-    """`numbers[k]` (int), which is now `new`."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        array = context.make_array(numbers)(context, builder, args[0])
-        return builder.atomic_rmw("xchg", builder.gep(array.data, [args[1]]), args[2], "acq_rel")
-
-    return types.int64(numbers, types.int64, types.int64), generate
 
 
 class Turns:

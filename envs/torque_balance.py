@@ -10,8 +10,8 @@ import numpy as np
 
 from .arrays import Plant, RobotArrays
 from .balance import BalanceEnv, EnvConfig
-from .block import Block, address_of
-from .compiled_steps import CompiledStep
+from .block import Block
+from .calls import CompiledStep, address_of
 from .episode import EpisodeArrays, Judge, judge_step, record_tick
 from .jit import compiled
 from .kinematics import StateArrays, update_state

@@ -8,7 +8,8 @@ import numba
 import numpy as np
 import pytest
 
-from poise.envs.block import Block, Erased, address_of, call
+from poise.envs.block import Block
+from poise.envs.calls import Erased, address_of, call
 
 
 @dataclass(frozen=True, eq=False)

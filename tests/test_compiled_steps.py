@@ -8,8 +8,9 @@ from threading import Barrier, Thread
 import numpy as np
 import pytest
 
-from poise.envs.block import Block, address_of
-from poise.envs.compiled_steps import MANY, CompiledStep, Turns
+from poise.envs.block import Block
+from poise.envs.calls import CompiledStep, address_of
+from poise.envs.compiled_steps import MANY, Turns
 from poise.envs.errors import PoiseError
 from poise.envs.helpers import Helpers
 from poise.envs.jit import compiled

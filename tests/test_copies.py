@@ -19,8 +19,9 @@ import pytest
 from poise.baselines.momentum_qp import MomentumQPConfig
 from poise.baselines.outside import OutsideController
 from poise.baselines.residual_balance import ResidualBalanceEnv
-from poise.envs.block import Block, address_of
-from poise.envs.compiled_steps import CompiledStep, Turns
+from poise.envs.block import Block
+from poise.envs.calls import CompiledStep, address_of
+from poise.envs.compiled_steps import Turns
 from poise.envs.errors import PoiseError
 from poise.envs.jit import compiled
 from poise.envs.simulation import Simulation
