@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from .mirror import Mirror
 from .observation import Scales, observe
 from .robot import Robot
 from .simulation import advance
-from .vector import make_vector_env
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,6 +258,3 @@ class TorqueBalanceEnv(BalanceEnv):
             )  # fmt: skip
             known = self._step = CompiledStep(address_of(torque_step, block), block)
         return known
-
-
-vector_env = partial(make_vector_env, TorqueBalanceEnv)  # for gymnasium.make_vec

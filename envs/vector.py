@@ -3,6 +3,7 @@
 import os
 from collections.abc import Sequence
 from enum import Enum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from .batch import EnvBatch, replicate
 from .copies import Copyable
 from .errors import ConfigError, shown
 from .numbers import option_mapping, seed_number, whole_number
+from .torque_balance import TorqueBalanceEnv
 
 try:
     from gymnasium.vector import AutoresetMode
@@ -240,3 +242,6 @@ def make_vector_env(
         usable = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))
         threads = len(usable(0))
     return BalanceVectorEnv(replicate(env_class(**arguments), num_envs), threads, autoreset_mode)
+
+
+torque_vector_env = partial(make_vector_env, TorqueBalanceEnv)  # for gymnasium.make_vec

@@ -29,7 +29,7 @@ if "numba" not in sys.modules:
 register(
     "poise/TorqueBalance-v0",
     entry_point="poise.envs.torque_balance:TorqueBalanceEnv",
-    vector_entry_point="poise.envs.torque_balance:vector_env",
+    vector_entry_point="poise.envs.vector:torque_vector_env",
 )
 register(
     "poise/ResidualBalance-v0",
