@@ -15,8 +15,8 @@ from poise.envs.config import build, to_dict
 from poise.envs.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, judge_step
 from poise.envs.errors import ConfigError
 from poise.envs.memory import apart
-from poise.envs.mirror import Mirror, mirror_terms
-from poise.envs.observation import Term
+from poise.envs.mirror import Mirror
+from poise.envs.observation import Term, mirror_terms
 from poise.envs.robot import Robot
 from poise.envs.vector import make_vector_env
 

@@ -26,9 +26,9 @@ from .episode import (
     judge,
 )
 from .errors import ConfigError, PoiseError, shown
-from .mirror import Mirror, mirror_robot, mirror_terms
+from .mirror import Mirror, mirror_robot
 from .numbers import finite_array, option_mapping, real_array, seed_number
-from .observation import Term, observation_terms, observe, scales
+from .observation import Term, mirror_terms, observation_terms, observe, scales
 from .push_info import push_info
 from .push_options import parse_pushes
 from .robot import Robot, load_robot

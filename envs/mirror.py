@@ -1,13 +1,11 @@
 """Left and right exchanged: what the mirror image of a robot observes, and does."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from .errors import ConfigError
-from .observation import Term
 from .robot import Robot
 
 SIDES = np.array([1.0, -1.0, 1.0])  # of a vector's x, y, z when left and right are exchanged
@@ -95,27 +93,6 @@ def _mirror_root(robot: Robot, data: mujoco.MjData) -> Mirror:
         name = robot.description.root
         raise _lopsided(robot, f"the axes of the root {name!r} are not each other's mirror images")
     return Mirror(order, np.sign(sign))
-
-
-def mirror_terms(terms: Sequence[Term], parts: Mapping[str, Mirror]) -> Mirror:
-    """How values of these `terms` look in the mirror; `parts` by what their `image` names."""
-    order, sign, first = [], [], 0
-    for term in terms:
-        part = parts[term.image] if term.image in parts else _plain(term)
-        order.append(first + part.order)
-        sign.append(part.sign)
-        first += term.size
-    return Mirror(np.concatenate(order), np.concatenate(sign))
-
-
-def _plain(term: Term) -> Mirror:
-    """Of numbers and vectors, which keep their places, and of feet, which change them."""
-    places = np.arange(term.size)
-    if term.image == "feet":
-        return Mirror(places[::-1].copy(), np.ones(term.size))
-    signs = {"number": np.ones(3), "vector": SIDES, "turn": -SIDES, "between feet": -SIDES}
-    axes = [0 if term.image == "number" else "xyz".index(entry[-1]) for entry in term.entries]
-    return Mirror(places, signs[term.image][axes])
 
 
 def _lopsided(robot: Robot, why: str) -> ConfigError:

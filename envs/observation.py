@@ -1,6 +1,6 @@
 """The observation: what balance is about, in the heading frame, divided by known scales."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,6 +10,7 @@ from .arrays import RobotArrays
 from .block import Block
 from .jit import compiled
 from .kinematics import StateArrays
+from .mirror import SIDES, Mirror
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,3 +154,24 @@ def observe(
         out[k + a] = last_action[a]
     for i in range(out.shape[0]):
         out[i] = min(max(out[i], -10.0), 10.0)
+
+
+def mirror_terms(terms: Sequence[Term], parts: Mapping[str, Mirror]) -> Mirror:
+    """How values of these `terms` look in the mirror; `parts` by what their `image` names."""
+    order, sign, first = [], [], 0
+    for term in terms:
+        part = parts[term.image] if term.image in parts else _plain(term)
+        order.append(first + part.order)
+        sign.append(part.sign)
+        first += term.size
+    return Mirror(np.concatenate(order), np.concatenate(sign))
+
+
+def _plain(term: Term) -> Mirror:
+    """Of numbers and vectors, which keep their places, and of feet, which change them."""
+    places = np.arange(term.size)
+    if term.image == "feet":
+        return Mirror(places[::-1].copy(), np.ones(term.size))
+    signs = {"number": np.ones(3), "vector": SIDES, "turn": -SIDES, "between feet": -SIDES}
+    axes = [0 if term.image == "number" else "xyz".index(entry[-1]) for entry in term.entries]
+    return Mirror(places, signs[term.image][axes])
