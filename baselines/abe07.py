@@ -8,9 +8,8 @@ import numpy as np
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
-from .around_qp import AroundQP
 from .controller import Targets
-from .momentum_qp import MomentumQPConfig
+from .momentum_qp import AroundQP, MomentumQPConfig
 
 
 @dataclass(frozen=True)

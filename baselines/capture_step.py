@@ -11,12 +11,11 @@ from poise.envs.memory import apart
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
-from .around_qp import AroundQP
 from .capturability import Reach, ReachArrays
 from .capture_tick import CaptureTick, StepGains, StepMemory, capture_tick
 from .contact_sets import ContactSets, contact_tick
 from .controller import Outputs, Targets
-from .momentum_qp import COMPILED_SOLVER, MomentumQPConfig, momentum_tick
+from .momentum_qp import COMPILED_SOLVER, AroundQP, MomentumQPConfig, momentum_tick
 from .reduced_qp import QPParameters
 from .step_feedback import FallFeedback, StepFeedback
 from .step_home import StepHome, home_arrays, leave_home

@@ -8,9 +8,8 @@ import numpy as np
 from poise.envs.robot import Robot
 from poise.envs.state import RobotState
 
-from .around_qp import AroundQP
 from .controller import Targets
-from .momentum_qp import MomentumQPConfig
+from .momentum_qp import AroundQP, MomentumQPConfig
 
 UNBOUND = 1e3  # times the motors' limits: rows that never bind
 

@@ -256,3 +256,26 @@ class MomentumQP(Copyable):
             ws.status[0] = 0 if solution.solved else 1
             accept(state.arrays, self.parameters, ws, self.memory)
         return ws.tau[self._motor_joints].copy()
+
+
+class AroundQP(Copyable):
+    """Holds the QP in `qp` and tells what it tells: period, CoM offset, failures, root wrench."""
+
+    def __init__(self, robot: Robot, qp: MomentumQPConfig):
+        self.robot = robot
+        self.qp = MomentumQP(robot, qp)
+        self.period, self.com_offset = self.qp.period, self.qp.com_offset
+
+    @property
+    def failures(self) -> int:
+        """Ticks since the reset at which the QP was not solved."""
+        return self.qp.failures
+
+    @property
+    def root_wrench(self) -> np.ndarray:
+        """(6,) u_root of the QP's last tick, soft root only."""
+        return self.qp.root_wrench
+
+    def reset(self, state: RobotState | None = None) -> None:
+        """Forget the last trial."""
+        self.qp.reset(state)
