@@ -13,6 +13,7 @@ from poise.envs.calls import CompiledStep, Erased, address_of, call
 from poise.envs.env_config import EnvConfig
 from poise.envs.errors import ConfigError
 from poise.envs.jit import compiled
+from poise.envs.kinematics import StateArrays
 from poise.envs.memory import apart
 from poise.envs.observation import Term
 from poise.envs.robot import Robot
@@ -21,19 +22,49 @@ from poise.envs.vector import make_vector_env
 from .capture_tick import StepMemory
 from .residual_balance import ResidualBalanceEnv, ResidualScales
 from .residual_step import ResidualStep
-from .step_shift import (
-    COM,
-    COP,
-    FOOTHOLD,
-    HEIGHT,
-    LEAN,
-    TIME,
-    TRIGGER,
-    StepShift,
-    StepSight,
-    observe_step,
-)
+from .step_shift import COM, COP, FOOTHOLD, HEIGHT, LEAN, TIME, TRIGGER, StepShift
 from .swing import SwingArrays, time_left
+
+
+@dataclass(frozen=True, eq=False)
+class StepSight(Block):
+    """What a policy sees of the steps."""
+
+    state: StateArrays
+    told: np.ndarray  # (7,) `Stepping.told`
+    height: float  # h [m]
+    omega: float  # [1/s]
+    observation: np.ndarray  # (≥ 15,) of which the last are filled
+
+
+@compiled
+def _put_local(sight: StepSight, first: int, x: float, y: float):
+    """(x, y) in the heading frame, in 0.5 h."""
+    cos, sin, half = sight.state.heading[0], sight.state.heading[1], 0.5 * sight.height
+    sight.observation[first] = (cos * x + sin * y) / half
+    sight.observation[first + 1] = (cos * y - sin * x) / half
+
+
+@compiled
+def observe_step(sight: StepSight):
+    """The terms `swing` to `stance_capture_point` of `ResidualStepEnv`, clipped to ±10."""
+    s, told, out = sight.state, sight.told, sight.observation
+    first, foot, feet = out.shape[0] - 15, int(told[1]), s.sole_point
+    for i in range(2):
+        out[first + i] = 1.0 if foot == i else 0.0
+    out[first + 2], out[first + 5] = told[4], told[0]
+    out[first + 3], out[first + 4] = sight.omega * told[5], sight.omega * told[6]
+    _put_local(sight, first + 6, feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1])
+    for i in range(first + 8, first + 15):
+        out[i] = 0.0
+    if foot >= 0:
+        stance, moving, xi = feet[1 - foot], feet[foot], s.capture_point
+        _put_local(sight, first + 8, moving[0] - stance[0], moving[1] - stance[1])
+        out[first + 10] = (moving[2] - stance[2]) / (0.5 * sight.height)
+        _put_local(sight, first + 11, told[2] - stance[0], told[3] - stance[1])
+        _put_local(sight, first + 13, xi[0] - stance[0], xi[1] - stance[1])
+    for i in range(first, first + 15):
+        out[i] = min(max(out[i], -10.0), 10.0)
 
 
 @dataclass(frozen=True)
