@@ -15,9 +15,6 @@ from .momentum_qp import MomentumQP, Tick, accept, momentum_tick, solve
 from .residual_balance import ResidualBalanceEnv
 from .residual_step import residual_tick
 from .residual_step_env import ResidualStepEnv, stepping_tick
-from .warmup import begin
-
-__all__ = ["assembly", "begin", "contacts", "planner", "solver", "steps"]
 
 
 def _standing() -> tuple[MomentumQP, RobotState, Targets]:

@@ -21,11 +21,11 @@ import pytest
 import torch
 
 import poise
-from poise.baselines import warmup
 from poise.baselines.allowance import NOTHING, check_allowed, named
 from poise.baselines.outside import find_outside
 from poise.baselines.registry import controller_config, load_controller, momentum_qp_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
+from poise.envs import warmup
 from poise.envs.errors import ConfigError, PoiseError
 from poise.training import html_report
 from poise.training.backends import Crew
@@ -510,7 +510,7 @@ def test_kernels_are_compiled_apart_from_the_current_folder(
         kill = wait
 
     monkeypatch.setattr(warmup.subprocess, "Popen", Process)
-    assert warmup._compile_apart(["solver"])
+    assert warmup._compile_apart("poise.baselines.compilation", ["solver"])
     assert started[0][:2] == [sys.executable, "-P"]
 
 
