@@ -12,7 +12,9 @@ from scipy import stats
 
 from poise.envs.errors import ConfigError
 from poise.training import seed_groups as module
-from poise.training.seed_groups import expand_seeds, seed_figures, seed_groups, seed_lines
+from poise.training.seed_groups import seed_groups, seed_lines
+from poise.training.seed_statistics import seed_figures
+from poise.training.seeds import expand_seeds
 
 
 def write_seeds(out: Path, **runs: bool) -> Path:

@@ -24,7 +24,8 @@ from .players import Player
 from .progress import progress_bar
 from .provenance import circumstances, usable_cores, versions
 from .report import draw_plots, print_paths, print_summary
-from .seed_groups import expand_seeds, seed_groups
+from .seed_groups import seed_groups
+from .seeds import expand_seeds
 from .stage import Stage
 from .step_limits import stepping_limits
 from .stopping import keeps

@@ -12,7 +12,7 @@ from poise.envs.errors import ConfigError
 from .html_plots import Series, level_curves, level_text
 from .html_table import Cell, Column, Table, cell, name_cell, p_cell
 from .results import Results
-from .seed_groups import FIGURES
+from .seed_statistics import FIGURES
 from .statistics import wilson_interval
 from .values import interval, number
 

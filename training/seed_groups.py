@@ -11,48 +11,10 @@ import numpy as np
 
 from poise.envs.config import to_yaml
 from poise.envs.errors import ConfigError
-from poise.envs.reading import is_file, is_folder, read_json
+from poise.envs.reading import is_file, is_folder
 
-from .statistics import seed_aggregate
-
-SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
-
-
-def seed_folder(out: Path, seed: int) -> Path:
-    """Where the run of a seed lies."""
-    return out / f"seed-{seed}"
-
-
-def read_seeds(out: Path) -> list[dict[str, Any]]:
-    """The runs of seeds.json; raises ConfigError naming the file."""
-    path = out / SEEDS
-    runs = read_json(path).get("runs")
-    if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
-        raise ConfigError("must be a list of mappings", source=path, field="runs")
-    for run in runs:
-        if type(run.get("seed")) is not int or not isinstance(run.get("folder"), str):
-            raise ConfigError("a run without a seed or a folder", source=path, field="runs")
-    return runs
-
-
-def expand_seeds(names: Sequence[str]) -> tuple[str, ...]:
-    """Names of controllers, a folder of `poise train --seeds` replaced by those of its runs.
-
-    Raises ConfigError for a folder with a run that is not finished.
-    """
-    expanded: list[str] = []
-    for name in names:
-        if not is_file(Path(name) / SEEDS):
-            expanded.append(name)
-            continue
-        for run in read_seeds(Path(name)):
-            if not run.get("finished"):
-                raise ConfigError(
-                    f"the run of seed {run['seed']} is not finished: poise train --resume goes on",
-                    source=Path(name) / SEEDS,
-                )
-            expanded.append(str(Path(name) / run["folder"]))
-    return tuple(expanded)
+from .seed_statistics import FIGURES, seed_figures
+from .seeds import SEEDS
 
 
 def seed_groups(names: Sequence[str], entries: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -75,20 +37,6 @@ def seed_groups(names: Sequence[str], entries: Mapping[str, Any]) -> list[dict[s
     ]
 
 
-def seed_figures(scores: np.ndarray, seeds: Sequence[int]) -> dict[str, Any]:
-    """IQM of (seeds, tasks) with its interval, every seed's mean, and the worst of these."""
-    found, values = seed_aggregate(scores), scores.mean(axis=1)
-    worst = int(np.argmin(values))
-    return {
-        "iqm": found.iqm,
-        "iqm_ci95": found.interval,
-        "tasks": found.tasks,
-        "values": values.tolist(),
-        "worst": float(values[worst]),
-        "worst_seed": seeds[worst],
-    }
-
-
 def seed_lines(groups: Sequence[Mapping[str, Any]]) -> list[str]:
     """A line of text per group and figure, for the terminal."""
     lines = []
@@ -103,15 +51,6 @@ def seed_lines(groups: Sequence[Mapping[str, Any]]) -> list[str]:
                 text = f"{title} {value} [{low}, {high}], worst {worst} (seed"
                 lines.append(f"{head} {text} {found['worst_seed']})")
     return lines
-
-
-#: key in a group → what it is called, how it is written
-FIGURES = (
-    ("j50_mean", "mean J50 [N·s]", ".1f"),
-    ("eta", "η", ".2f"),
-    ("recovered", "recovered", ".1%"),
-    ("mix", "recovered of the mix", ".1%"),
-)
 
 
 def _configuration(folder: str) -> tuple[str, int]:

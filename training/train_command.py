@@ -16,7 +16,7 @@ from poise.envs.errors import ConfigError
 from .backends import Backend
 from .config import TrainConfig, train_config
 from .progress import terminal
-from .seed_groups import SEEDS
+from .seeds import SEEDS
 from .train import train
 from .train_seeds import train_seeds
 

@@ -22,8 +22,9 @@ from .config import TrainConfig
 from .folder_lock import FolderLock
 from .policy_files import read_state
 from .provenance import circumstances
-from .seed_groups import SEEDS, read_seeds, seed_figures, seed_folder
 from .seed_progress import SeedProgress, print_seeds
+from .seed_statistics import seed_figures
+from .seeds import SEEDS, read_seeds, seed_folder
 from .stopping import keeps
 from .train import LAST, check_folder, check_pushes, train
 

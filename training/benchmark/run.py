@@ -15,6 +15,8 @@ from poise.baselines.warmup import prepare
 from poise.envs.config import packaged, to_dict
 from poise.envs.errors import ConfigError, shown
 from poise.envs.robot import Robot, load_robot
+from poise.training.seed_groups import seed_groups
+from poise.training.seeds import expand_seeds
 
 from ..backends import Crew, check_backend
 from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS
@@ -22,7 +24,6 @@ from ..players import Player
 from ..progress import progress_bar
 from ..provenance import circumstances, versions
 from ..report import print_paths
-from ..seed_groups import expand_seeds, seed_groups
 from ..stage import Stage
 from ..step_limits import curves, stepping_limits
 from ..stopping import keeps

@@ -8,8 +8,8 @@ from types import NoneType
 from typing import Any
 
 from poise.envs.errors import ConfigError, shown
+from poise.training.seed_statistics import FIGURES
 
-from ..seed_groups import FIGURES
 from ..values import number
 
 NUMBER, INTERVAL, EACH = "number", "interval", "each"  # EACH: of a mapping with any keys
