@@ -11,11 +11,12 @@ import pytest
 from poise.baselines.step_plan import StepLimits
 from poise.envs.pushes import Push
 from poise.envs.robot import load_robot
+from poise.training.files import plain
 from poise.training.limits import PushLimits
 from poise.training.sequence_suite import SequenceSuite
 from poise.training.step_limits import NStepLimit
 from poise.training.suites import EnvelopeSuite, QuietSuite, RandomSuite
-from poise.training.summary import plain, summarise
+from poise.training.summary import summarise
 from poise.training.trials import Outcome, Trial
 
 from .test_evaluation_folder import OUTCOME

@@ -20,7 +20,8 @@ from poise.training.benchmark.case import case_row, failed
 from poise.training.benchmark.cases import Cases
 from poise.training.benchmark.folder import FORMAT, BenchmarkSettings
 from poise.training.benchmark.suite import load_benchmark
-from poise.training.evaluation_folder import Settings, csv_text
+from poise.training.evaluation_folder import Settings
+from poise.training.files import csv_text
 from poise.training.provenance import versions
 from poise.training.stage import Stage
 from poise.training.suites import load_suite

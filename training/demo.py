@@ -6,9 +6,9 @@ from typing import Any
 from rich.console import Console
 
 from .evaluation import evaluate
-from .evaluation_folder import PLOTS
+from .files import PLOTS
 from .players import SHIPPED
-from .report import print_paths
+from .progress import print_paths
 from .stopping import ANEW, keeps
 
 CONTROLLERS = ("momentum-qp", SHIPPED, "capture-step", "residual-step", "feedback-step")

@@ -17,13 +17,14 @@ from poise.envs.push_schedule import LimitTable
 from poise.envs.robot import load_robot
 
 from .backends import Crew
-from .evaluation_folder import PARTIAL, SUMMARY, TRIALS, EvaluationFolder, Settings
+from .evaluation_folder import EvaluationFolder, Settings
 from .evaluation_job import EvaluationJob, play
+from .files import PARTIAL, SUMMARY, TRIALS, plain
 from .limits import PushLimits, load_limits, write_limits
 from .players import Player
-from .progress import progress_bar
+from .progress import print_paths, progress_bar
 from .provenance import circumstances, usable_cores, versions
-from .report import draw_plots, print_paths, print_summary
+from .report import draw_plots, print_summary
 from .seed_groups import seed_groups
 from .seeds import expand_seeds
 from .stage import Stage
@@ -31,7 +32,7 @@ from .step_limits import stepping_limits
 from .stopping import keeps
 from .suite import MOST_TRIALS, Suite
 from .suites import load_suite
-from .summary import plain, summarise
+from .summary import summarise
 from .trials import Trial, row
 
 

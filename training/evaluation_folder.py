@@ -6,8 +6,6 @@
 - summary.json: written last; with it, the evaluation is finished
 """
 
-import csv
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -19,16 +17,10 @@ from poise.envs.errors import ConfigError
 from poise.envs.push_schedule import LimitTable
 from poise.envs.reading import exists, is_folder
 
+from .files import FILES, PARTIAL, REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
 from .folder_lock import FolderLock
 from .trial_log import TrialLog, read_log
 from .trials import COLUMNS, Outcome
-
-SETTINGS, PARTIAL, TRIALS, SUMMARY = (
-    "settings.yaml", "trials.partial.jsonl", "trials.csv", "summary.json",
-)  # fmt: skip
-PLOTS = ("polar_envelope.png", "fall_probability.png")
-REPORT = "report.html"  # by `poise report`; not of the result, but gone with it
-FILES = (SUMMARY, SETTINGS, PARTIAL, TRIALS, *PLOTS)
 
 
 @dataclass(frozen=True)
@@ -108,7 +100,7 @@ class EvaluationFolder:
 
     def finish(self, rows: Sequence[dict[str, Any]], summary: dict[str, Any]) -> None:
         """Write the trials and, last, the summary."""
-        write_atomic(self.path / TRIALS, csv_text(rows))
+        write_atomic(self.path / TRIALS, csv_text(rows, COLUMNS))
         write_atomic(self.path / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
         (self.path / PARTIAL).unlink(missing_ok=True)
         self.close()
@@ -148,12 +140,3 @@ def read_settings(folder: Path) -> Settings:
 
 def _plain(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     return [asdict(outcome) for outcome in outcomes]
-
-
-def csv_text(rows: Sequence[dict[str, Any]], columns: Sequence[str] = COLUMNS) -> str:
-    """Rows as CSV with a header."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()

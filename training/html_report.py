@@ -19,10 +19,10 @@ from poise.envs.errors import PoiseError
 from poise.envs.reading import TABLE_BYTES, read_text
 
 from . import factor_tables, report_plots, report_tables, report_words
-from .evaluation_folder import REPORT, TRIALS
+from .files import REPORT, TRIALS
 from .html_table import Download, download
 from .html_time_plot import signals_csv, time_plot
-from .report import print_paths
+from .progress import print_paths
 from .results import Record, Results, load_results
 from .svg import swatch
 from .worst_trials import AFTER, Case, Film, can_draw, choose_cases, film, frame_times

@@ -1,5 +1,8 @@
 """The terminal, and what it shows while an evaluation runs."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -30,3 +33,9 @@ def progress_bar(console: Console) -> Progress:
         console=console,
         disable=console.quiet,
     )
+
+
+def print_paths(paths: Sequence[Path], console: Console) -> None:
+    """One path a line, whole, as it is to be copied."""
+    for path in paths:
+        console.print(str(path), markup=False, highlight=False, soft_wrap=True)

@@ -14,7 +14,8 @@ from poise.envs.reading import is_file, parse_json, parsing, read_table
 from poise.envs.robot import load_robot
 
 from .benchmark.reading import is_benchmark, load_benchmark_data, player_of, read_case
-from .evaluation_folder import SETTINGS, SUMMARY, TRIALS, Settings, read_settings
+from .evaluation_folder import Settings, read_settings
+from .files import SETTINGS, SUMMARY, TRIALS
 from .players import Player, load_player
 from .signals import Signals
 from .suites import build_suite

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from .bootstrap import EnvelopeFit, mean_over_directions
-from .evaluation_folder import PLOTS
+from .files import PLOTS
 from .fits import fit_logistic
 from .limits import PushLimits
 from .plots import fall_probability, polar_envelope
@@ -186,9 +186,3 @@ def _number(value: float | None, form: str) -> str:
 
 def _milli(value: float | None) -> str:
     return "–" if value is None else f"{1000 * value:.1f}"
-
-
-def print_paths(paths: Sequence[Path], console: Console) -> None:
-    """One path a line, whole, as it is to be copied."""
-    for path in paths:
-        console.print(str(path), markup=False, highlight=False, soft_wrap=True)

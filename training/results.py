@@ -10,7 +10,8 @@ from poise.envs.reading import is_file, is_folder, read_json, read_table, read_y
 
 from .benchmark.flat import flat
 from .benchmark.folder import LOG, BenchmarkSettings, read_benchmark_settings
-from .evaluation_folder import PARTIAL, SETTINGS, SUMMARY, TRIALS, Settings, read_settings
+from .evaluation_folder import Settings, read_settings
+from .files import PARTIAL, SETTINGS, SUMMARY, TRIALS
 from .values import number
 
 NEEDED = ("trial", "controller", "seed", "body", "impulse", "direction", "duration",

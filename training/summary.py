@@ -1,7 +1,5 @@
 """What an evaluation found: summary.json as plain dictionaries."""
 
-import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
@@ -212,18 +210,3 @@ def _pair(
             for angle, g in zip(gain.directions, gain.gains, strict=True)
         ]
     return pair
-
-
-def plain(value: Any) -> Any:
-    """For JSON: plain lists and numbers, None for what is not finite."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return plain(dataclasses.asdict(value))
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

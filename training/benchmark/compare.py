@@ -13,9 +13,9 @@ from rich.table import Table
 
 from poise.envs.errors import ConfigError
 from poise.envs.reading import is_file, read_json, read_table, read_yaml
+from poise.training.files import SETTINGS, SUMMARY, TRIALS
 
 from ..differences import difference, paired_rates
-from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS
 from ..statistics import mcnemar
 from ..values import interval, number
 from .summary_form import check_compared

@@ -17,8 +17,8 @@ from typing import Any
 from poise.envs.config import build, read_yaml, to_yaml, write_atomic
 from poise.envs.errors import ConfigError, shown
 from poise.envs.reading import exists, is_folder
+from poise.training.files import REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
 
-from ..evaluation_folder import REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
 from ..folder_lock import FolderLock
 from ..trial_log import TrialLog, read_log
 from .case import COLUMNS, Result

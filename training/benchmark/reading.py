@@ -14,8 +14,8 @@ from poise.envs.errors import ConfigError, shown
 from poise.envs.pushes import Push
 from poise.envs.reading import is_file, parsing, read_json, read_table
 from poise.envs.robot import load_robot
+from poise.training.files import SETTINGS, SUMMARY, TRIALS
 
-from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS
 from ..players import Player, load_player
 from ..trials import PUSH_COLUMNS
 from .case import COLUMNS, Case, Result

@@ -15,20 +15,19 @@ from poise.baselines.warmup import prepare
 from poise.envs.config import packaged, to_dict
 from poise.envs.errors import ConfigError, shown
 from poise.envs.robot import Robot, load_robot
+from poise.training.files import SETTINGS, SUMMARY, TRIALS, plain
+from poise.training.progress import print_paths
 from poise.training.seed_groups import seed_groups
 from poise.training.seeds import expand_seeds
 
 from ..backends import Crew, check_backend
-from ..evaluation_folder import SETTINGS, SUMMARY, TRIALS
 from ..players import Player
 from ..progress import progress_bar
 from ..provenance import circumstances, versions
-from ..report import print_paths
 from ..stage import Stage
 from ..step_limits import curves, stepping_limits
 from ..stopping import keeps
 from ..suite import MOST_TRIALS
-from ..summary import plain
 from .case import Case, case_row
 from .cases import Cases
 from .figures import controller_figures, pair_figures, robot_figures

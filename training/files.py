@@ -1,0 +1,41 @@
+"""Names of result files, and how figures are written into them."""
+
+import csv
+import dataclasses
+import io
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+SETTINGS, PARTIAL, TRIALS, SUMMARY = (
+    "settings.yaml", "trials.partial.jsonl", "trials.csv", "summary.json",
+)  # fmt: skip
+PLOTS = ("polar_envelope.png", "fall_probability.png")
+REPORT = "report.html"  # by `poise report`; not of the result, but gone with it
+FILES = (SUMMARY, SETTINGS, PARTIAL, TRIALS, *PLOTS)
+
+
+def csv_text(rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> str:
+    """Rows as CSV with a header."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def plain(value: Any) -> Any:
+    """For JSON: plain lists and numbers, None for what is not finite."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return plain(dataclasses.asdict(value))
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
