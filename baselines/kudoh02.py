@@ -10,8 +10,7 @@ from poise.envs.state import RobotState
 
 from .controller import Targets
 from .momentum_qp import AroundQP, MomentumQPConfig
-from .pd import PDGains
-from .stable_pd import StablePD, StablePDConfig
+from .pd import PDGains, StablePD, StablePDConfig
 
 
 @dataclass(frozen=True)

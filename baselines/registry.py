@@ -20,9 +20,8 @@ from .lqr_lip import LQRLIP, LQRLIPConfig
 from .macchietto09 import Macchietto09, Macchietto09Config
 from .momentum_qp import MomentumQP, MomentumQPConfig
 from .outside import OutsideConfig, OutsideController, outside_config
-from .pd import PD, PDConfig
+from .pd import PD, PDConfig, StablePD, StablePDConfig
 from .simbicon import Simbicon, SimbiconConfig
-from .stable_pd import StablePD, StablePDConfig
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration).
 KINDS: dict[str, tuple[type, type]] = {

@@ -27,9 +27,18 @@ from .ipm_step import IPMStep
 from .momentum_qp import MomentumQP, MomentumQPConfig
 from .motions import ReferenceMotion, load_motion
 from .registry import CONTROLLERS, load_controller
-from .residual_step import Residual, ResidualStep, residual_tick, set_offsets, soft_root_force
+from .residual_step import (
+    Aim,
+    Record,
+    Residual,
+    ResidualStep,
+    aim,
+    record,
+    residual_tick,
+    set_offsets,
+    soft_root_force,
+)
 from .targets import Motion
-from .tick_parts import Aim, Record, aim, record
 from .warmup import prepare
 
 COMPILED = (MomentumQP, CaptureStep, IPMStep)  # controllers with a `compiled_tick`

@@ -135,3 +135,42 @@ def residual_tick(step: ResidualStep):
     now = clock[0] * robot.timestep
     judge_step(robot, plant, s, step.scales, step.judge, t.q_ref, plant.ctrl, now, e)
     observe(robot, s, step.scales, t.q_ref, t.v_ref, e.action, e.observation)
+
+
+@dataclass(frozen=True, eq=False)
+class Aim(Block):
+    """What `update_targets` works on."""
+
+    robot: RobotArrays
+    state: StateArrays
+    clock: np.ndarray  # (1,) int
+    motion: Motion
+    com_offset: float  # [m]
+    residual: np.ndarray  # (≥ 9,)
+    targets: TargetArrays
+
+
+@compiled
+def aim(block: Aim):
+    """Targets of this tick."""
+    update_targets(
+        block.robot, block.state, block.motion, block.clock[0] * block.robot.timestep,
+        block.com_offset, block.residual, block.targets,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Record(Block):
+    """What `record_tick` works on."""
+
+    robot: RobotArrays
+    state: StateArrays
+    plant: Plant
+    period: float  # [s]
+    episode: EpisodeArrays
+
+
+@compiled
+def record(block: Record):
+    """Account for the torques in `plant.ctrl`."""
+    record_tick(block.robot, block.state, block.plant.ctrl, block.period, block.episode)

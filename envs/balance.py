@@ -29,8 +29,8 @@ from .errors import ConfigError, PoiseError, shown
 from .mirror import Mirror, mirror_robot
 from .numbers import finite_array, option_mapping, real_array, seed_number
 from .observation import Term, mirror_terms, observation_terms, observe, scales
-from .push_info import push_info
 from .push_options import parse_pushes
+from .pushes import push_info
 from .robot import Robot, load_robot
 from .simulation import Simulation
 

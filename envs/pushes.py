@@ -8,6 +8,7 @@ J = ∫F dt [N·s]. Directions are degrees counter-clockwise from forward in the
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -149,3 +150,25 @@ def apply_kicks(table, t, dt, qvel):
             qvel[0] += table[k, 3]
             qvel[1] += table[k, 4]
             qvel[2] += table[k, 5]
+
+
+def push_info(push: Push | Kick, robot: Robot) -> dict[str, Any]:
+    """start, duration [s], (peak) force [N], body, direction [deg], J [N·s] and J/m [N·s/kg].
+
+    A kick has no force and no duration; its J is the momentum that it gives the whole robot.
+    """
+    if isinstance(push, Kick):
+        force, duration, impulse = 0.0, 0.0, push.delta_v * robot.mass
+        body = robot.model.body(robot.root_body_id).name
+    else:
+        force, duration, impulse = push.peak_force, push.duration, push.impulse
+        body = push.body
+    return {
+        "start": push.start,
+        "force": force,
+        "duration": duration,
+        "body": body,
+        "direction": push.direction,
+        "impulse": impulse,
+        "specific_impulse": impulse / robot.mass,
+    }

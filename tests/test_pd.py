@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from poise.baselines.controller import Targets
-from poise.baselines.pd import PD, PDConfig, PDGains, holding_torques
+from poise.baselines.pd import PD, PDConfig, PDGains, StablePD, StablePDConfig, holding_torques
 from poise.baselines.residual_balance import ResidualBalanceEnv
-from poise.baselines.stable_pd import StablePD, StablePDConfig
 
 from .shared import generic_state, robot
 

@@ -18,8 +18,7 @@ from poise.training.players import load_player
 from poise.training.replay import _trial
 from poise.training.sequence_suite import SequenceSuite
 from poise.training.suites import load_suite
-from poise.training.touchdowns import Touchdowns
-from poise.training.trials import Trial, row, run_trial
+from poise.training.trials import Touchdowns, Trial, row, run_trial
 
 from .evaluations import write_suite
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 import torch
 
-from poise.training.widening import widened
+from poise.training.checkpoints import widened
 
 
 def network(*widths, seed):

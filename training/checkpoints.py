@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
@@ -26,7 +27,6 @@ from poise.envs.reading import is_file, parsing
 
 from .config import TrainConfig
 from .policy_files import MOMENTS, read_parameters, read_state, read_statistics
-from .widening import widened
 
 POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.yaml", "state.json"
 FILES = (POLICY, STATISTICS, CONFIG, STATE)
@@ -159,3 +159,28 @@ def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
 def _beside(folder: Path, suffix: str) -> Path:
     folder = Path(os.path.abspath(folder))  # "." has no name
     return folder.parent / f".{folder.name}.{suffix}"
+
+
+def widened(
+    small: Mapping[str, torch.Tensor], large: Mapping[str, torch.Tensor]
+) -> dict[str, torch.Tensor]:
+    """Weights of the network `large` with which it computes what `small` does.
+
+    Weights W (out, in) and biases (out,) of both, of as many layers. The units that are new keep
+    what comes in as initialised in `large`; nothing goes out of them yet: their columns are zero.
+
+    Raises:
+        ValueError: other layers, or a layer of `small` that is larger.
+    """
+    if small.keys() != large.keys():
+        raise ValueError("has other layers")
+    weights = {}
+    for name, old in small.items():
+        new = large[name].clone()
+        if old.dim() != new.dim() or any(o > n for o, n in zip(old.shape, new.shape, strict=True)):
+            raise ValueError(f"{name} has shape {tuple(old.shape)}, not {tuple(new.shape)} or less")
+        if old.dim() == 2:
+            new[: old.shape[0]] = 0.0
+        new[tuple(slice(length) for length in old.shape)] = old
+        weights[name] = new
+    return weights

@@ -12,7 +12,6 @@ from poise.envs.balance import BalanceEnv
 from poise.envs.pushes import Push
 
 from .players import Player
-from .touchdowns import Touchdowns
 
 STEP_LENGTH = 0.05  # [m] a foot that moves further has stepped, or slid as far
 SETTLED = 1.0  # [s] after which actions and drift count
@@ -190,3 +189,26 @@ def row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Any]:
         "later": json.dumps([asdict(push) for push in trial.later]) if trial.later else None,
         **asdict(outcome),
     }
+
+
+AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
+
+
+class Touchdowns:
+    """Counts touchdowns of feet that were in the air for at least `AIR_TIME`.
+
+    Args:
+        feet: number of feet.
+        period: seconds between two calls of `update`.
+    """
+
+    def __init__(self, feet: int, period: float):
+        self.count = 0
+        self._least = max(round(AIR_TIME / period), 1)
+        self._air = np.zeros(feet, dtype=int)  # updates in a row without contact
+
+    def update(self, contacts: np.ndarray) -> None:
+        """(feet,) 1 where a foot touches the ground, else 0."""
+        down = contacts > 0.5
+        self.count += int(np.sum(down & (self._air >= self._least)))
+        self._air = np.where(down, 0, self._air + 1)
