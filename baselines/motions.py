@@ -11,10 +11,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from poise.envs.config import build, read_yaml, resolve
+from poise.envs.config import build, read_yaml
 from poise.envs.copies import Copyable
 from poise.envs.description import match_names
 from poise.envs.errors import ConfigError, shown
+from poise.envs.files import resolve
 from poise.envs.robot import Robot
 
 from .level_kinematics import LevelKinematics

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from poise.envs.config import build, on_base, packaged, read_yaml, resolve
+from poise.envs.config import build, on_base, read_yaml
 from poise.envs.errors import ConfigError, shown
+from poise.envs.files import packaged, resolve
 from poise.envs.robot import Robot
 
 from .abe07 import Abe07, Abe07Config

@@ -1,21 +1,19 @@
-"""Configuration as dataclasses: read YAML, build strictly, write back atomically."""
+"""Configuration as dataclasses: read YAML, build strictly, write back."""
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
-import os
 import types
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import yaml
 
-from .errors import ConfigError, PoiseError, shown
-from .reading import is_file, read_yaml
+from .errors import ConfigError, shown
+from .files import packaged, resolve
+from .reading import read_yaml
 from .yaml_loader import DEPTH
 
 T = TypeVar("T")
@@ -98,73 +96,6 @@ def to_dict(obj: Any, levels: int = DEPTH) -> Any:
 def to_yaml(obj: Any) -> str:
     """YAML text of :func:`to_dict`, fields in their own order; :func:`read_yaml` reads it back."""
     return yaml.safe_dump(to_dict(obj), sort_keys=False, allow_unicode=True, width=100)
-
-
-def packaged(kind: str) -> list[str]:
-    """Names of the packaged configurations of one kind: ``packaged("robots")``.
-
-    A configuration is a file, ``NAME.yaml``, or a folder, ``NAME/config.yaml`` (policies).
-    """
-    folder = packaged_folder(kind)
-    files = [path.stem for path in folder.glob("*.yaml")]
-    return sorted(files + [path.parent.name for path in folder.glob("*/config.yaml")])
-
-
-def packaged_folder(kind: str) -> Path:
-    """Where the packaged configurations of one kind lie."""
-    return Path(str(files("poise.configs"))) / kind
-
-
-def resolve(kind: str, name: str | Path) -> Path:
-    """The YAML file of a packaged name (``humanoid``) or of a path to a ``.yaml`` file.
-
-    Args:
-        kind: folder of ``poise.configs``, such as ``robots`` or ``controllers``.
-        name: a packaged name, or a path with a folder or a suffix in it.
-
-    Raises:
-        ConfigError: there is no such name or file; its text lists the packaged names.
-    """
-    names = packaged(kind)
-    if not isinstance(name, (str, Path)):
-        raise ConfigError(f"must be a name or a path, not {shown(name)}", field=kind, choices=names)
-    if str(name) in names:
-        return packaged_folder(kind) / f"{name}.yaml"
-    path = Path(name)
-    if path.suffix in (".yaml", ".yml") and is_file(path):
-        return path
-    problem = "no such file" if path.suffix or len(path.parts) > 1 else "no such name"
-    raise ConfigError(
-        f"{problem}: {shown(str(name))}; give a path to a .yaml file or a packaged name",
-        field=kind,
-        choices=names,
-    )
-
-
-def write_atomic(path: str | Path, content: str | bytes) -> None:
-    """Write a file so that a reader, or a kill, sees the old content or the new, never a part.
-
-    Missing folders are made.
-
-    Raises:
-        PoiseError: the file cannot be written; the old content is then untouched.
-    """
-    path = Path(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(part, "wb") as file:
-            file.write(content.encode() if isinstance(content, str) else content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    except OSError as error:
-        raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
-    except ValueError:  # a NUL in its name
-        raise PoiseError(f"{path}: cannot be written (no name of a file)") from None
-    finally:
-        with contextlib.suppress(OSError, ValueError):  # its folder may be a file
-            part.unlink(missing_ok=True)
 
 
 def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:

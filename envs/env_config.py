@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .config import build, read_yaml, resolve, to_dict
+from .config import build, read_yaml, to_dict
 from .episode import FallLimits, RewardWeights
 from .errors import ConfigError, shown
+from .files import resolve
 from .push_schedule import PushSampler
 
 

@@ -10,10 +10,11 @@ import mujoco
 import numpy as np
 
 from .actuators import install_motors
-from .config import build, read_yaml, resolve
+from .config import build, read_yaml
 from .copies import Copyable
 from .description import RobotDescription
 from .errors import ConfigError, shown
+from .files import resolve
 from .ground import (
     CONTACT_SENSOR,
     add_contact_sensors,

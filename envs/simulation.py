@@ -13,7 +13,8 @@ from .jit import compiled
 from .kinematics import StateArrays, allocate_state, update_state
 from .memory import apart
 from .native import mj_step1, mj_step2
-from .pushes import TABLE_COLUMNS, Kick, Push, apply_kicks, apply_pushes, pack
+from .push_table import TABLE_COLUMNS, apply_kicks, apply_pushes, pack
+from .pushes import Kick, Push
 from .robot import Robot
 from .state import RobotState
 

@@ -10,8 +10,8 @@ import sys
 from collections.abc import Sequence
 
 from . import jit
-from .config import write_atomic
 from .errors import PoiseError
+from .files import write_atomic
 from .kernel_cache import stamp
 
 _READY = "kernels.ready"  # beside the kernels: the digest of the sources, then shares

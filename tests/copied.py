@@ -17,7 +17,7 @@ from poise.baselines.residual_step_env import ResidualStepEnv
 from poise.baselines.sensed_env import sensed_env
 from poise.envs.balance import BalanceEnv
 from poise.envs.batch import EnvBatch, replicate
-from poise.envs.config import packaged
+from poise.envs.files import packaged
 from poise.envs.sensed import SensedSimulation
 from poise.envs.simulation import Simulation
 from poise.envs.state import RobotState

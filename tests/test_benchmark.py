@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import poise
-from poise.envs.config import packaged
 from poise.envs.env_config import StartNoise
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged
 from poise.training.benchmark import run
 from poise.training.benchmark.case import Case
 from poise.training.benchmark.play import BenchmarkPlayer, Job, play, play_case

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.envs.config import build, packaged
+from poise.envs.config import build
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged
 from poise.training.benchmark.case import Case, case_row, failed
 from poise.training.benchmark.cases import Cases
 from poise.training.benchmark.suite import BenchmarkSuite, load_benchmark

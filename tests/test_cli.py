@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from poise.envs.config import resolve, to_dict
+from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
+from poise.envs.files import resolve
 from poise.training import cli, evaluation, train_command
 from poise.training.cli import main
 from poise.training.config import TrainConfig, train_config

@@ -12,17 +12,10 @@ import numpy as np
 import pytest
 
 from poise.envs import config
-from poise.envs.config import (
-    build,
-    on_base,
-    packaged,
-    read_yaml,
-    resolve,
-    to_dict,
-    to_yaml,
-    write_atomic,
-)
+from poise.envs import files as file_names
+from poise.envs.config import build, on_base, read_yaml, to_dict, to_yaml
 from poise.envs.errors import ConfigError, PoiseError
+from poise.envs.files import packaged, resolve, write_atomic
 
 
 @dataclass(frozen=True)
@@ -251,7 +244,7 @@ def test_resolve_finds_packaged_names_and_paths(tmp_path: Path, monkeypatch) -> 
     """A name is looked up among the packaged files, a path is taken as it is."""
     (tmp_path / "robots").mkdir()
     packaged_file = write(tmp_path / "robots" / "tall.yaml", "")
-    monkeypatch.setattr(config, "files", lambda package: tmp_path)
+    monkeypatch.setattr(file_names, "files", lambda package: tmp_path)
     own = write(tmp_path / "own.yaml", "")
     assert packaged("robots") == ["tall"]
     assert resolve("robots", "tall") == packaged_file
@@ -263,7 +256,7 @@ def test_resolve_lists_the_choices(tmp_path: Path, monkeypatch, name: str) -> No
     """An unknown name or path is refused with the packaged names."""
     (tmp_path / "robots").mkdir()
     write(tmp_path / "robots" / "tall.yaml", "")
-    monkeypatch.setattr(config, "files", lambda package: tmp_path)
+    monkeypatch.setattr(file_names, "files", lambda package: tmp_path)
     with pytest.raises(ConfigError, match=r"robots: no such .* \(choices: tall\)"):
         resolve("robots", name)
 

@@ -16,8 +16,8 @@ from poise.baselines.registry import (
     momentum_qp_config,
 )
 from poise.baselines.residual_balance import ResidualBalanceEnv
-from poise.envs.config import packaged
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged
 from poise.envs.simulation import Simulation
 
 from .shared import robot

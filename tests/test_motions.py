@@ -8,8 +8,9 @@ import pytest
 
 from poise.baselines.level_kinematics import LevelKinematics
 from poise.baselines.motions import MotionDescription, load_motion, make_motion
-from poise.envs.config import build, packaged
+from poise.envs.config import build
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged
 from poise.envs.robot import load_robot
 
 MOTIONS = ("standing", "squat", "bow", "arm_swing", "weight_shift")

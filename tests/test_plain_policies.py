@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from poise.envs.config import packaged, packaged_folder
+from poise.envs.files import packaged, packaged_folder
 from poise.training.checkpoints import POLICY, STATISTICS
 from poise.training.policy import load_policy
 from poise.training.train import train

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from poise.baselines.residual_balance import ResidualBalanceEnv
-from poise.envs import config
-from poise.envs.config import packaged
+from poise.envs import files as file_names
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged
 from poise.envs.robot import Robot, load_robot
 from poise.envs.torque_balance import TorqueBalanceEnv
 from poise.training import policy
@@ -76,14 +76,14 @@ def test_a_packaged_policy_is_known_by_its_folder(
     robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Any folder of configs/policies, as a player and by load_policy; an error lists them all."""
-    shutil.copytree(config.packaged_folder("policies"), tmp_path / "policies")
+    shutil.copytree(file_names.packaged_folder("policies"), tmp_path / "policies")
     shutil.copytree(finished_run() / "last", tmp_path / "policies/residual-pd")
-    real = config.packaged_folder
+    real = file_names.packaged_folder
 
     def here(kind: str) -> Path:
         return tmp_path / kind if kind == "policies" else real(kind)
 
-    for module in (config, policy):
+    for module in (file_names, policy):
         monkeypatch.setattr(module, "packaged_folder", here)
     player = load_player("residual-pd", robot)
     assert player.fingerprint == load_player(str(finished_run() / "last"), robot).fingerprint
@@ -125,5 +125,5 @@ def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
     else:
         on_baseline = found.controller == "momentum-qp"
         assert name == ("residual" if on_baseline else f"residual-{found.controller}")
-    files = list((config.packaged_folder("policies") / name).iterdir())
+    files = list((file_names.packaged_folder("policies") / name).iterdir())
     assert sum(path.stat().st_size for path in files) < 1_000_000

@@ -8,7 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from poise.envs.pendulum import ankle_limit
-from poise.envs.pushes import Kick, Push, apply_kicks, apply_pushes, pack
+from poise.envs.push_table import apply_kicks, apply_pushes, pack
+from poise.envs.pushes import Kick, Push
 from poise.envs.robot import load_robot
 
 

@@ -20,9 +20,10 @@ import pytest
 from poise.baselines.motions import load_motion
 from poise.baselines.registry import controller_config
 from poise.envs.archives import MEMBERS, UNPACKED_BYTES, Archive, read_arrays
-from poise.envs.config import build, packaged, resolve
+from poise.envs.config import build
 from poise.envs.env_config import EnvConfig, env_config
 from poise.envs.errors import ConfigError, PoiseError, shown
+from poise.envs.files import packaged, resolve
 from poise.envs.reading import (
     MIB,
     YAML_BYTES,

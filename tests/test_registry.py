@@ -4,8 +4,9 @@ import pytest
 
 from poise.baselines.momentum_qp import MomentumQPConfig
 from poise.baselines.registry import controller_config, load_controller
-from poise.envs.config import packaged, to_dict
+from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged
 
 from .shared import robot
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.momentum_qp import MomentumQP
-from poise.envs.config import packaged
+from poise.envs.files import packaged
 from poise.training import evaluation
 from poise.training.benchmark import run
 from poise.training.benchmark.run import benchmark

@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from poise.envs.config import packaged
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged
 from poise.envs.robot import Robot, load_robot
 
 from .small_biped import BOX_FOOT, LEG, write_biped

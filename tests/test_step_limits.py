@@ -15,13 +15,13 @@ from rich.console import Console
 from poise.baselines.registry import controller_config
 from poise.baselines.step_plan import StepLimits
 from poise.envs.pendulum import drifted, duration_factor
-from poise.training import evaluation, report
+from poise.training import evaluation, evaluation_plots
 from poise.training.benchmark.case import Result
 from poise.training.benchmark.figures import controller_figures
 from poise.training.evaluation import evaluate
+from poise.training.evaluation_plots import _step_lines
 from poise.training.limits import PushLimits
 from poise.training.players import Player, load_player
-from poise.training.report import _step_lines
 from poise.training.step_limits import (
     COUNTS,
     ROOM,
@@ -185,7 +185,7 @@ def test_an_evaluation_draws_and_prints_them(
     drawn: dict[str, Any] = {}
     monkeypatch.setattr(evaluation, "Crew", InProcess)
     monkeypatch.setattr(InProcess, "stop_after", None)
-    monkeypatch.setattr(report, "polar_envelope", lambda *_, **given: drawn.update(given))
+    monkeypatch.setattr(evaluation_plots, "polar_envelope", lambda *_, **given: drawn.update(given))
     text, names = io.StringIO(), ["capture-step", "zero"]
     suite, console = write_suite(tmp_path, ENVELOPE), Console(file=text, width=200)
     summary = evaluate(names, suite, out=tmp_path / "out", console=console)

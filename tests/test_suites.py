@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from poise.envs.config import packaged, to_dict
+from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged
 from poise.envs.push_schedule import LimitTable
 from poise.envs.robot import load_robot
 from poise.training.limits import PushLimits

@@ -13,9 +13,10 @@ from poise.envs.pushes import Push
 from poise.envs.robot import load_robot
 from poise.training.files import plain
 from poise.training.limits import PushLimits
+from poise.training.random_suite import QuietSuite, RandomSuite
 from poise.training.sequence_suite import SequenceSuite
 from poise.training.step_limits import NStepLimit
-from poise.training.suites import EnvelopeSuite, QuietSuite, RandomSuite
+from poise.training.suites import EnvelopeSuite
 from poise.training.summary import summarise
 from poise.training.trials import Outcome, Trial
 

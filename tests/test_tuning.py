@@ -8,8 +8,9 @@ import pytest
 
 from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
-from poise.envs.config import build, packaged, read_yaml, to_dict
+from poise.envs.config import build, read_yaml, to_dict
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged
 from poise.envs.push_schedule import push_bodies
 from poise.envs.pushes import Push
 from poise.training import trials

@@ -12,9 +12,10 @@ from typing import Any
 import yaml
 
 from poise.baselines.allowance import check_allowed
-from poise.envs.config import packaged_folder, to_dict, to_yaml
+from poise.envs.config import to_dict, to_yaml
 from poise.envs.env_config import StartNoise
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged_folder
 from poise.training.benchmark.case import COLUMNS as CASE_COLUMNS
 from poise.training.benchmark.case import case_row, failed
 from poise.training.benchmark.cases import Cases

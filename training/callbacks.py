@@ -15,7 +15,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.envs.batch import EnvBatch, replicate
-from poise.envs.config import write_atomic
+from poise.envs.files import write_atomic
 
 from .checkpoints import controller_fingerprint, save_checkpoint
 from .config import TrainConfig

@@ -398,7 +398,7 @@ def qp_set(
 
 def list_names() -> None:
     """List what can be named: robots, controllers, suites, training configurations, motions."""
-    from poise.envs.config import packaged
+    from poise.envs.files import packaged
 
     kinds = (
         "robots",

@@ -8,7 +8,8 @@ from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv, ResidualScales
 from poise.baselines.residual_step_env import ResidualStepEnv, StepScales
 from poise.envs.balance import BalanceEnv, EnvConfig
-from poise.envs.config import build, on_base, read_yaml, resolve
+from poise.envs.config import build, on_base, read_yaml
+from poise.envs.files import resolve
 from poise.envs.push_schedule import PushSampler
 from poise.envs.robot import Robot
 from poise.envs.torque_balance import TorqueBalanceEnv

@@ -19,12 +19,13 @@ from poise.envs.robot import load_robot
 from .backends import Crew
 from .evaluation_folder import EvaluationFolder, Settings
 from .evaluation_job import EvaluationJob, play
+from .evaluation_plots import draw_plots
 from .files import PARTIAL, SUMMARY, TRIALS, plain
 from .limits import PushLimits, load_limits, write_limits
 from .players import Player
 from .progress import print_paths, progress_bar
 from .provenance import circumstances, usable_cores, versions
-from .report import draw_plots, print_summary
+from .report import print_summary
 from .seed_groups import seed_groups
 from .seeds import expand_seeds
 from .stage import Stage

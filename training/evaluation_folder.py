@@ -12,8 +12,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from poise.envs.config import build, read_yaml, to_yaml, write_atomic
+from poise.envs.config import build, read_yaml, to_yaml
 from poise.envs.errors import ConfigError
+from poise.envs.files import write_atomic
 from poise.envs.push_schedule import LimitTable
 from poise.envs.reading import exists, is_folder
 

@@ -14,8 +14,8 @@ import jinja2
 from rich.console import Console
 
 from poise.baselines.allowance import allowing
-from poise.envs.config import write_atomic
 from poise.envs.errors import PoiseError
+from poise.envs.files import write_atomic
 from poise.envs.reading import TABLE_BYTES, read_text
 
 from . import factor_tables, report_plots, report_tables, report_words

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from poise.envs.config import build, packaged, read_yaml, resolve, to_yaml, write_atomic
+from poise.envs.config import build, read_yaml, to_yaml
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged, resolve, write_atomic
 from poise.envs.pendulum import ankle_limit, duration_factor, pendulum_rate
 from poise.envs.push_schedule import LIMIT_DURATION, LimitTable
 from poise.envs.pushes import Push

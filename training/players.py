@@ -14,8 +14,9 @@ from poise.baselines.registry import controller_config
 from poise.baselines.residual_balance import ResidualBalanceEnv
 from poise.baselines.residual_step_env import ResidualStepEnv
 from poise.envs.balance import BalanceEnv
-from poise.envs.config import packaged, to_dict, to_yaml
+from poise.envs.config import to_dict, to_yaml
 from poise.envs.errors import ConfigError, shown
+from poise.envs.files import packaged
 from poise.envs.reading import is_file, is_folder
 from poise.envs.robot import Robot
 from poise.envs.torque_balance import TorqueBalanceEnv

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from poise.envs.config import write_atomic
+from poise.envs.files import write_atomic
 
 # Okabe and Ito's palette: told apart with any colour vision. Line and marker repeat what the colour
 # says, for prints in grey.

@@ -9,9 +9,10 @@ import numpy as np
 
 from poise.baselines.allowance import allowing, carried
 from poise.envs.balance import BalanceEnv
-from poise.envs.config import build, packaged, packaged_folder, read_yaml
+from poise.envs.config import build, read_yaml
 from poise.envs.copies import Copyable
 from poise.envs.errors import ConfigError
+from poise.envs.files import packaged, packaged_folder
 from poise.envs.mirror import Mirror
 from poise.envs.reading import is_file, is_folder, parsing
 from poise.envs.robot import Robot, load_robot

@@ -16,8 +16,9 @@ from poise.baselines.allowance import allows
 from poise.baselines.warmup import prepare
 from poise.envs.balance import BalanceEnv
 from poise.envs.batch import replicate
-from poise.envs.config import build, read_yaml, to_yaml, write_atomic
+from poise.envs.config import build, read_yaml, to_yaml
 from poise.envs.errors import ConfigError
+from poise.envs.files import write_atomic
 
 from .callbacks import Checkpoints, Progress, Throughput
 from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore

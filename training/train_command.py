@@ -10,8 +10,9 @@ from typing import Annotated
 import tyro
 
 from poise.baselines.allowance import named
-from poise.envs.config import build, resolve, to_dict
+from poise.envs.config import build, to_dict
 from poise.envs.errors import ConfigError
+from poise.envs.files import resolve
 
 from .backends import Backend
 from .config import TrainConfig, train_config

@@ -13,8 +13,9 @@ import numpy as np
 from rich.console import Console
 
 from poise.baselines.allowance import allows
-from poise.envs.config import to_yaml, write_atomic
+from poise.envs.config import to_yaml
 from poise.envs.errors import ConfigError, PoiseError
+from poise.envs.files import write_atomic
 
 from .backends import Crew, check_backend
 from .checkpoints import CONFIG, STATE, find_checkpoint

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from poise.envs.config import write_atomic
 from poise.envs.errors import PoiseError
+from poise.envs.files import write_atomic
 from poise.envs.reading import is_file, parse_json, read_lines
 
 

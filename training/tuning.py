@@ -14,8 +14,9 @@ import numpy as np
 from rich.console import Console
 
 from poise.baselines.allowance import allows
-from poise.envs.config import build, on_base, read_yaml, resolve, to_dict, to_yaml, write_atomic
+from poise.envs.config import build, on_base, read_yaml, to_dict, to_yaml
 from poise.envs.errors import ConfigError
+from poise.envs.files import resolve, write_atomic
 from poise.envs.reading import is_file, parse_json, read_lines
 from poise.envs.robot import load_robot
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 
-from poise.envs.config import packaged, packaged_folder
+from poise.envs.files import packaged, packaged_folder
 from poise.training.checkpoints import CONFIG, FILES, STATE, STATISTICS
 from poise.training.policy import load_policy
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from poise.envs.config import build
 from poise.envs.push_options import KICK_KEYS, PUSH_KEYS, parse_pushes
 from poise.envs.push_schedule import PushSampler
-from poise.envs.pushes import pack
+from poise.envs.push_table import pack
 
 from ..shared import robot
 from .resets import KICK, PUSH

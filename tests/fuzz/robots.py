@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 
-from poise.envs.config import packaged_folder
+from poise.envs.files import packaged_folder
 from poise.envs.robot import load_robot
 from poise.envs.torque_balance import TorqueBalanceEnv
 

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from poise.baselines.motions import load_motion
 from poise.baselines.registry import load_controller
-from poise.envs.config import packaged_folder, to_yaml
+from poise.envs.config import to_yaml
 from poise.envs.env_config import EnvConfig, env_config
+from poise.envs.files import packaged_folder
 from poise.envs.robot import load_robot
 from poise.training.benchmark.suite import load_benchmark
 from poise.training.config import train_config

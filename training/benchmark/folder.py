@@ -14,8 +14,9 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from poise.envs.config import build, read_yaml, to_yaml, write_atomic
+from poise.envs.config import build, read_yaml, to_yaml
 from poise.envs.errors import ConfigError, shown
+from poise.envs.files import write_atomic
 from poise.envs.reading import exists, is_folder
 from poise.training.files import REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from poise.envs.config import write_atomic
 from poise.envs.errors import ConfigError
+from poise.envs.files import write_atomic
 from poise.envs.reading import is_folder
 
 from ..seed_groups import seed_lines

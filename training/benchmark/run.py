@@ -12,8 +12,9 @@ from rich.console import Console
 
 from poise.baselines.allowance import allowing, allows
 from poise.baselines.warmup import prepare
-from poise.envs.config import packaged, to_dict
+from poise.envs.config import to_dict
 from poise.envs.errors import ConfigError, shown
+from poise.envs.files import packaged
 from poise.envs.robot import Robot, load_robot
 from poise.training.files import SETTINGS, SUMMARY, TRIALS, plain
 from poise.training.progress import print_paths

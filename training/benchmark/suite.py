@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from poise.envs.config import build, read_yaml, resolve
+from poise.envs.config import build, read_yaml
 from poise.envs.env_config import StartNoise
+from poise.envs.files import resolve
 from poise.envs.push_schedule import Range
 
 
