@@ -8,7 +8,7 @@
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
 #
 # PYTHON311 names another interpreter; PIP_ARGS and PYTEST_ARGS are passed on, as in
-# make test PYTEST_ARGS="-x tests/test_robot.py". LOCKED=1 lets setup take no file whose hash is not in
+# make test PYTEST_ARGS="-x tests/envs/robots/test_robot.py". LOCKED=1 lets setup take no file whose hash is not in
 # requirements.lock.
 
 PYTHON311 ?= $(shell command -v python3.11 || command -v python3)
@@ -88,7 +88,7 @@ build: setup
 	@ls dist
 
 bench: setup
-	$(PYTHON) -m tests.benchmarks
+	$(PYTHON) -m tests.performance
 
 fuzz: setup
 	$(PYTHON) -m tests.fuzz --minutes $(MINUTES) --workers $(WORKERS) \

@@ -24,8 +24,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from poise.envs.config import read_yaml
-from poise.envs.errors import ConfigError
+from poise.configs.errors import ConfigError
+from poise.configs.schema import read_yaml
 
 NAME = re.compile(r"(?P<place>[^:\s]+):(?P<name>[A-Za-z_]\w*)")
 P = ParamSpec("P")

@@ -6,11 +6,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from poise.envs.block import Block
-from poise.envs.copies import Copyable
-from poise.envs.memory import apart
-from poise.envs.robot import Robot
-from poise.envs.state import RobotState
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.memory import apart
+from poise.envs.physics.state import RobotState
+from poise.envs.robots.robot import Robot
 
 
 class Outputs(NamedTuple):

@@ -4,25 +4,25 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from poise.envs.config import build, on_base, read_yaml
-from poise.envs.errors import ConfigError, shown
-from poise.envs.files import packaged, resolve
-from poise.envs.robot import Robot
+from poise.baselines.in_place.abe07 import Abe07, Abe07Config
+from poise.baselines.in_place.capture_point import CapturePoint, CapturePointConfig
+from poise.baselines.in_place.jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
+from poise.baselines.in_place.kudoh02 import Kudoh02, Kudoh02Config
+from poise.baselines.in_place.lip_mpc import LIPMPC, LIPMPCConfig
+from poise.baselines.in_place.lqr_lip import LQRLIP, LQRLIPConfig
+from poise.baselines.in_place.macchietto09 import Macchietto09, Macchietto09Config
+from poise.baselines.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
+from poise.baselines.stepping.capture_step import CaptureStep, CaptureStepConfig
+from poise.baselines.stepping.ipm_step import IPMStep, IPMStepConfig
+from poise.baselines.walking.simbicon import Simbicon, SimbiconConfig
+from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.configs.errors import ConfigError, shown
+from poise.configs.files import packaged, resolve
+from poise.configs.schema import build, on_base, read_yaml
+from poise.envs.robots.robot import Robot
 
-from .abe07 import Abe07, Abe07Config
 from .allowance import is_outside
-from .capture_point import CapturePoint, CapturePointConfig
-from .capture_step import CaptureStep, CaptureStepConfig
-from .ipm_step import IPMStep, IPMStepConfig
-from .jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
-from .kudoh02 import Kudoh02, Kudoh02Config
-from .lip_mpc import LIPMPC, LIPMPCConfig
-from .lqr_lip import LQRLIP, LQRLIPConfig
-from .macchietto09 import Macchietto09, Macchietto09Config
-from .momentum_qp import MomentumQP, MomentumQPConfig
-from .outside import OutsideConfig, OutsideController, outside_config
-from .pd import PD, PDConfig, StablePD, StablePDConfig
-from .simbicon import Simbicon, SimbiconConfig
+from .plugins import OutsideConfig, OutsideController, outside_config
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration).
 KINDS: dict[str, tuple[type, type]] = {

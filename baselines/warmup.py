@@ -1,14 +1,15 @@
 """The compiled code that an environment's step needs, made ready once."""
 
-from poise.envs.warmup import fill_cache
+from poise.envs.compiled.warmup import fill_cache
 
-KERNELS = "poise.baselines.compilation"  # the module that lists the kernels
+KERNELS = "poise.baselines.environments.kernels"  # the module that lists the kernels
 SHARES = ("assembly", "solver", "steps")
 
 
 def prepare(*further: str) -> None:
     """Fill the cache of compiled kernels if it is cold: some twenty seconds on two cores, once.
 
-    `further` shares of `compilation.py` follow, for ten more; they use the kernels of the first.
+    `further` shares of `environments/kernels.py` follow, for ten more; they use the kernels of
+    the first.
     """
     fill_cache(KERNELS, SHARES, further)

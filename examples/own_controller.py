@@ -11,12 +11,12 @@ import numpy as np
 
 import poise  # noqa: F401  (registers the environments)
 from poise.baselines.controller import Targets
-from poise.baselines.momentum_qp import MomentumQP
 from poise.baselines.registry import load_controller
-from poise.envs.push_options import parse_pushes
-from poise.envs.robot import Robot, load_robot
-from poise.envs.simulation import Simulation
-from poise.envs.state import RobotState
+from poise.baselines.whole_body.momentum_qp import MomentumQP
+from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.state import RobotState
+from poise.envs.pushes.options import parse_pushes
+from poise.envs.robots.robot import Robot, load_robot
 
 PUSH = {"impulse": 8.0, "direction": 90.0, "duration": 0.1, "start": 0.5, "body": "torso"}
 

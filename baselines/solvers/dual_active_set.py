@@ -9,10 +9,18 @@ are scaled to unit norm, so that one tolerance serves rows of any unit.
 
 import numpy as np
 
-from poise.envs.jit import compiled
+from poise.envs.compiled.jit import compiled
 
 from .factors import append, factorise, lift, padded, remove, solve_upper, split
-from .rows import INFEASIBLE, INVALID, ITERATION_LIMIT, SOLVED, advance, most_violated, scale_rows
+from .scaled_rows import (
+    INFEASIBLE,
+    INVALID,
+    ITERATION_LIMIT,
+    SOLVED,
+    advance,
+    most_violated,
+    scale_rows,
+)
 
 FEASIBLE = 1e-11  # accepted violation of a scaled row, relative to ‖x‖
 ROUNDING = 1e-13  # the same, relative to the unconstrained ‖x‖, before correction

@@ -10,7 +10,7 @@ with zeros to p, a multiple of 8: every inner loop has unit stride and no remain
 
 import numpy as np
 
-from poise.envs.jit import compiled
+from poise.envs.compiled.jit import compiled
 
 SMALLEST_PIVOT = 1e-14  # of H, relative to its diagonal entry
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from poise.envs.errors import PoiseError
+from poise.configs.errors import PoiseError
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ import dataclasses
 from importlib import import_module
 from typing import Any
 
-from poise.envs.config import build
-from poise.envs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError, shown
+from poise.configs.schema import build
 
 from .problem import Solver
 

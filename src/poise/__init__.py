@@ -14,7 +14,7 @@ from gymnasium.envs.registration import register
 
 if TYPE_CHECKING:
     from poise.baselines.allowance import allowing
-    from poise.training.policy import load_policy
+    from poise.training.learning.policy import load_policy
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "allowing", "load_policy"]
@@ -28,24 +28,24 @@ if "numba" not in sys.modules:
 # No max_episode_steps: the environments end their episodes themselves, from their own config.
 register(
     "poise/TorqueBalance-v0",
-    entry_point="poise.envs.torque_balance:TorqueBalanceEnv",
-    vector_entry_point="poise.envs.vector:torque_vector_env",
+    entry_point="poise.envs.balance.torque:TorqueBalanceEnv",
+    vector_entry_point="poise.envs.vector.vector_env:torque_vector_env",
 )
 register(
     "poise/ResidualBalance-v0",
-    entry_point="poise.baselines.residual_balance:ResidualBalanceEnv",
-    vector_entry_point="poise.baselines.residual_balance:vector_env",
+    entry_point="poise.baselines.environments.residual:ResidualBalanceEnv",
+    vector_entry_point="poise.baselines.environments.residual:vector_env",
 )
 register(
     "poise/ResidualStep-v0",
-    entry_point="poise.baselines.residual_step_env:ResidualStepEnv",
-    vector_entry_point="poise.baselines.residual_step_env:vector_env",
+    entry_point="poise.baselines.environments.stepping:ResidualStepEnv",
+    vector_entry_point="poise.baselines.environments.stepping:vector_env",
 )
 
 
 def __getattr__(name: str) -> Any:
     if name == "load_policy":
-        from poise.training.policy import load_policy
+        from poise.training.learning.policy import load_policy
 
         return load_policy
     if name == "allowing":

@@ -19,12 +19,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from poise.envs.config import to_yaml
-from poise.training.checkpoints import STATE, find_checkpoint, read_state
-
-from ..benchmarks_small import SMALL
-from ..evaluations import RANDOM
-from ..shared import tiny_config
+from poise.configs.schema import to_yaml
+from poise.training.learning.checkpoints import STATE, find_checkpoint, read_state
+from tests.support.benchmarks_small import SMALL
+from tests.support.evaluations import RANDOM
+from tests.support.shared import tiny_config
 
 RUN = ("command", "versions", "machine", "workers", "backend", "commit", "seconds", "tick_us")
 WORKERS = "2"

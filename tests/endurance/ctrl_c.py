@@ -19,7 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..benchmarks.startup import package
+from tests.performance.startup import package
+
 from .commands import commands
 from .processes import Running, kill
 

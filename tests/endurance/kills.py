@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from poise.envs.errors import PoiseError
+from poise.configs.errors import PoiseError
 
 from .commands import Command, commands
 from .processes import Running, kill

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from poise.training import callbacks
-from poise.training.checkpoints import STATE, find_checkpoint, read_state
-from poise.training.config import train_config
-from poise.training.train import train
+from poise.training.learning import callbacks
+from poise.training.learning.checkpoints import STATE, find_checkpoint, read_state
+from poise.training.learning.config import train_config
+from poise.training.learning.train import train
 
 from .commands import checkpoint_content, trained
 

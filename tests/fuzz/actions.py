@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from poise.envs.errors import PoiseError
+from poise.configs.errors import PoiseError
 
 from .texts import Draw
 from .values import Json, decode, values

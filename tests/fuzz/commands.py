@@ -12,8 +12,14 @@ import pytest
 import stable_baselines3
 from hypothesis import strategies as st
 
-from poise.training import cli, evaluation, html_report, qp_set, train_seeds, tuning, video
 from poise.training.benchmark import run
+from poise.training.cli import commands
+from poise.training.evaluation import evaluate
+from poise.training.figures import video
+from poise.training.learning import train_seeds
+from poise.training.qp_set import export
+from poise.training.report import page
+from poise.training.tuning import search
 
 from .samples import copy_sample
 from .texts import Draw
@@ -52,7 +58,7 @@ TOKENS = [
     *("--ppo.net-arch", "--env.pushes", "None", "--env.pushes:None", "True", "quick", "random"),
     *("--start-from", "--controller", "--gate", "--action", "step", "torque", "file", "-h", "--="),
 ]
-COMMANDS = sorted(cli.COMMANDS)
+COMMANDS = sorted(commands.COMMANDS)
 
 
 class Begun(BaseException):
@@ -83,8 +89,8 @@ def cases(draw: Draw) -> Json:
 def _stops() -> tuple[tuple[Any, str], ...]:
     """What long runs begin with."""
     return (
-        (evaluation, "Crew"), (run, "Crew"), (tuning, "Crew"), (train_seeds, "Crew"),
-        (stable_baselines3.PPO, "learn"), (qp_set, "recoveries"), (html_report, "film"),
+        (evaluate, "Crew"), (run, "Crew"), (search, "Crew"), (train_seeds, "Crew"),
+        (stable_baselines3.PPO, "learn"), (export, "recoveries"), (page, "film"),
         (video, "record"),
     )  # fmt: skip
 
@@ -112,7 +118,7 @@ def play(case: Json, folder: Path) -> None:
 
 def _code(words: list[str]) -> int | str | None:
     try:
-        return cli.main(words)
+        return commands.main(words)
     except Begun:
         return "begun"
     except SystemExit as end:  # of the parser: its own words

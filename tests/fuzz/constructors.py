@@ -7,11 +7,11 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from poise.envs.config import to_dict
-from poise.envs.env_config import EnvConfig
-from poise.envs.vector import make_vector_env
+from poise.configs.schema import to_dict
+from poise.envs.balance.config import EnvConfig
+from poise.envs.vector.vector_env import make_vector_env
+from tests.support.shared import robot
 
-from ..shared import robot
 from .texts import Draw, edit_tree
 from .values import Json, decode, values
 from .worlds import CLASSES, play_on

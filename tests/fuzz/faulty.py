@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 
-from poise.envs.errors import PoiseError
+from poise.configs.errors import PoiseError
 
 from .values import Json
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import poise
-from poise.envs.errors import PoiseError
+from poise.configs.errors import PoiseError
 
 from . import memory
 from .kinds import Kind

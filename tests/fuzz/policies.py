@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 
-from poise.envs.files import packaged, packaged_folder
-from poise.training.checkpoints import CONFIG, FILES, STATE, STATISTICS
-from poise.training.policy import load_policy
+from poise.configs.files import packaged, packaged_folder
+from poise.training.learning.checkpoints import CONFIG, FILES, STATE, STATISTICS
+from poise.training.learning.policy import load_policy
+from tests.support.shared import robot
 
-from ..shared import robot
 from .texts import Draw, byte_edits, changed, edit_bytes
 from .values import Json, decode, packed
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 
-from poise.envs.config import build
-from poise.envs.push_options import KICK_KEYS, PUSH_KEYS, parse_pushes
-from poise.envs.push_schedule import PushSampler
-from poise.envs.push_table import pack
+from poise.configs.schema import build
+from poise.envs.pushes.options import KICK_KEYS, PUSH_KEYS, parse_pushes
+from poise.envs.pushes.sampler import PushSampler
+from poise.envs.pushes.table import pack
+from tests.support.shared import robot
 
-from ..shared import robot
 from .resets import KICK, PUSH
 from .texts import Draw, edit_tree
 from .values import Json, decode, values

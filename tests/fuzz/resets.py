@@ -6,10 +6,10 @@ from pathlib import Path
 
 from hypothesis import strategies as st
 
-from poise.envs.balance import RESET_OPTIONS
-from poise.envs.push_options import KICK_KEYS, PUSH_KEYS
+from poise.envs.balance.base import RESET_OPTIONS
+from poise.envs.pushes.options import KICK_KEYS, PUSH_KEYS
+from tests.support.shared import robot
 
-from ..shared import robot
 from .texts import Draw, edit_tree
 from .values import Json, decode, values
 from .worlds import CLASSES, play_on, world, worlds

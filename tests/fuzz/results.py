@@ -11,14 +11,14 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from poise.training.benchmark.compare import compare, print_comparison
-from poise.training.benchmark.leaderboard import write_leaderboard
-from poise.training.benchmark.reading import load_benchmark_data
-from poise.training.evaluation_folder import read_settings
-from poise.training.html_report import write_report
-from poise.training.progress import terminal
-from poise.training.replay import replay
-from poise.training.results import load_results
+from poise.training.evaluation.folder import read_settings
+from poise.training.report.page import write_report
+from poise.training.results.benchmark import load_benchmark_data
+from poise.training.results.compare import compare, print_comparison
+from poise.training.results.leaderboard import write_leaderboard
+from poise.training.results.read import load_results
+from poise.training.results.replay import replay
+from poise.training.running.terminal import terminal
 
 from .samples import copy_sample, samples
 from .texts import Draw, changed

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 
-from poise.envs.files import packaged_folder
-from poise.envs.robot import load_robot
-from poise.envs.torque_balance import TorqueBalanceEnv
+from poise.configs.files import packaged_folder
+from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.robots.robot import load_robot
 
 from .texts import Draw, byte_edits, changed, edit_bytes
 from .values import Json, decode, packed

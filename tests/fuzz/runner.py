@@ -155,7 +155,7 @@ def _size(case: Json) -> tuple[int, str]:
 
 
 def keep(folder: Path, kind: str, case: Json, outcome: Outcome) -> Path:
-    """Write a case so that `tests/test_fuzz.py` plays it again."""
+    """Write a case so that `tests/integration/test_fuzz.py` plays it again."""
     digest = hashlib.sha256(outcome.what.encode()).hexdigest()[:8]
     path = folder / f"{kind}-{outcome.verdict}-{digest}.json"
     entry = {"kind": kind, "what": outcome.what, "case": case}

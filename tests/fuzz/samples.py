@@ -10,12 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from poise.training import evaluation
 from poise.training.benchmark import run
-from poise.training.evaluation import evaluate
-
-from ..benchmarks_small import InProcessCrew, write_small
-from ..evaluations import RANDOM, InProcess, write_suite
+from poise.training.evaluation import evaluate as evaluation
+from poise.training.evaluation.evaluate import evaluate
+from tests.support.benchmarks_small import InProcessCrew, write_small
+from tests.support.evaluations import RANDOM, InProcess, write_suite
 
 CONTROLLERS = ("zero", "pd")
 PLACE = "POISE_FUZZ_SAMPLES"  # environment variable: where a parent process has made them

@@ -6,13 +6,12 @@ from functools import cache
 
 import numpy as np
 
-from poise.baselines.residual_balance import ResidualBalanceEnv
-from poise.baselines.residual_step_env import ResidualStepEnv
-from poise.envs.balance import BalanceEnv
-from poise.envs.torque_balance import TorqueBalanceEnv
-from poise.envs.vector import BalanceVectorEnv
-
-from ..shared import robot
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.vector.vector_env import BalanceVectorEnv
+from tests.support.shared import robot
 
 CLASSES: dict[str, type[BalanceEnv]] = {
     "torque": TorqueBalanceEnv,

@@ -8,20 +8,20 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from poise.baselines.motions import load_motion
+from poise.baselines.motions.motion import load_motion
 from poise.baselines.registry import load_controller
-from poise.envs.config import to_yaml
-from poise.envs.env_config import EnvConfig, env_config
-from poise.envs.files import packaged_folder
-from poise.envs.robot import load_robot
+from poise.configs.files import packaged_folder
+from poise.configs.schema import to_yaml
+from poise.envs.balance.config import EnvConfig, env_config
+from poise.envs.robots.robot import load_robot
 from poise.training.benchmark.suite import load_benchmark
-from poise.training.config import train_config
-from poise.training.limits import load_limits
-from poise.training.suites import load_suite
-from poise.training.tuning import tune_config
-from poise.training.tuning_gains import Gains
+from poise.training.learning.config import train_config
+from poise.training.suites.registry import load_suite
+from poise.training.trials.push_limits import load_limits
+from poise.training.tuning.gains import Gains
+from poise.training.tuning.search import tune_config
+from tests.support.shared import robot
 
-from ..shared import robot
 from .texts import Draw, changed
 from .values import Json, decode, packed
 

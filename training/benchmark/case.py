@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from ..trials import OUTCOMES, PUSH_COLUMNS, Outcome, Trial, row
+from poise.training.trials.trial import OUTCOMES, PUSH_COLUMNS, Outcome, Trial, row
 
 Part = Literal["envelope", "margin", "factors", "mix"]
 
@@ -49,7 +49,7 @@ class Result:
 
     Attributes:
         outcome: as of `poise evaluate`.
-        sway: body sway [rad], see `training/eurobench.py`; None where there is none.
+        sway: body sway [rad], see `training/statistics/eurobench.py`; None where there is none.
         sway_recovery: recovery time by the sway's speed [s].
         error: what the controller raised, on one line; the trial then counts as not recovered.
     """

@@ -9,14 +9,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from poise.envs.altered import floor_friction
-from poise.envs.push_schedule import push_bodies
-from poise.envs.pushes import Push
-from poise.envs.robot import Robot
+from poise.envs.pushes.push import Push
+from poise.envs.pushes.sampler import push_bodies
+from poise.envs.robots.robot import Robot
+from poise.envs.robots.variants import floor_friction
+from poise.training.statistics.fits import fit_logistic
+from poise.training.suites.base import generator, start_seed
+from poise.training.trials.push_limits import PushLimits
 
-from ..fits import fit_logistic
-from ..limits import PushLimits
-from ..suite import generator, start_seed
 from .case import Case
 from .suite import BenchmarkSuite
 

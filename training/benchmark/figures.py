@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from poise.envs.pendulum import pendulum_rate
-
-from ..bootstrap import mean_over_directions
-from ..differences import paired_rates, relative_gain
-from ..eurobench import (
+from poise.envs.maths.pendulum import pendulum_rate
+from poise.training.evaluation.summary import counts, envelope, pushes, won
+from poise.training.statistics.bootstrap import mean_over_directions
+from poise.training.statistics.differences import paired_rates, relative_gain
+from poise.training.statistics.eurobench import (
     HUMAN_COM_HEIGHT,
     Size,
     energy_factor,
@@ -20,10 +20,10 @@ from ..eurobench import (
     mean_or_none,
     stability_margin,
 )
-from ..limits import PushLimits
-from ..statistics import mcnemar, wilson_interval
-from ..step_limits import NStepLimit
-from ..summary import counts, envelope, pushes, won
+from poise.training.statistics.rates import mcnemar, wilson_interval
+from poise.training.trials.push_limits import PushLimits
+from poise.training.trials.step_limits import NStepLimit
+
 from .case import Case, Result
 from .cases import STANDARD, Cases
 

@@ -14,14 +14,14 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from poise.envs.config import build, read_yaml, to_yaml
-from poise.envs.errors import ConfigError, shown
-from poise.envs.files import write_atomic
-from poise.envs.reading import exists, is_folder
-from poise.training.files import REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
+from poise.configs.errors import ConfigError, shown
+from poise.configs.files import write_atomic
+from poise.configs.reading import exists, is_folder
+from poise.configs.schema import build, read_yaml, to_yaml
+from poise.training.running.files import REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
+from poise.training.running.folder_lock import FolderLock
+from poise.training.running.log import TrialLog, read_log
 
-from ..folder_lock import FolderLock
-from ..trial_log import TrialLog, read_log
 from .case import COLUMNS, Result
 
 LOG = "trials.jsonl"

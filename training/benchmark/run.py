@@ -12,31 +12,30 @@ from rich.console import Console
 
 from poise.baselines.allowance import allowing, allows
 from poise.baselines.warmup import prepare
-from poise.envs.config import to_dict
-from poise.envs.errors import ConfigError, shown
-from poise.envs.files import packaged
-from poise.envs.robot import Robot, load_robot
-from poise.training.files import SETTINGS, SUMMARY, TRIALS, plain
-from poise.training.progress import print_paths
-from poise.training.seed_groups import seed_groups
-from poise.training.seeds import expand_seeds
+from poise.configs.errors import ConfigError, shown
+from poise.configs.files import packaged
+from poise.configs.schema import to_dict
+from poise.envs.robots.robot import Robot, load_robot
+from poise.training.evaluation.seed_groups import seed_groups
+from poise.training.learning.seeds import expand_seeds
+from poise.training.running.crew import Crew, check_backend
+from poise.training.running.files import SETTINGS, SUMMARY, TRIALS, plain
+from poise.training.running.provenance import circumstances, versions
+from poise.training.running.stopping import keeps
+from poise.training.running.terminal import print_paths, progress_bar
+from poise.training.suites.base import MOST_TRIALS
+from poise.training.trials.players import Player
+from poise.training.trials.stage import Stage
+from poise.training.trials.step_limits import curves, stepping_limits
 
-from ..backends import Crew, check_backend
-from ..players import Player
-from ..progress import progress_bar
-from ..provenance import circumstances, versions
-from ..stage import Stage
-from ..step_limits import curves, stepping_limits
-from ..stopping import keeps
-from ..suite import MOST_TRIALS
 from .case import Case, case_row
 from .cases import Cases
 from .figures import controller_figures, pair_figures, robot_figures
 from .folder import FORMAT, LOG, BenchmarkFolder, BenchmarkSettings
-from .play import Job, play
 from .suite import load_benchmark
 from .table import print_benchmark
-from .ticks import tick_times
+from .tick_times import tick_times
+from .world import Job, play
 
 REFERENCE = "momentum-qp"
 RESTLESS = ("simbicon",)  # always marks time, and so never counts as recovered

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from poise.envs.config import build, read_yaml
-from poise.envs.env_config import StartNoise
-from poise.envs.files import resolve
-from poise.envs.push_schedule import Range
+from poise.configs.files import resolve
+from poise.configs.schema import build, read_yaml
+from poise.envs.balance.config import StartNoise
+from poise.envs.pushes.sampler import Range
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ..seed_groups import seed_lines
+from poise.training.evaluation.seed_groups import seed_lines
 
 
 def print_benchmark(summary: Mapping[str, Any], console: Console) -> None:

@@ -1,0 +1,1 @@
+"""Environments whose action moves the targets and steps of a controller."""

@@ -1,0 +1,74 @@
+"""The kernels that an environment's step needs, as `compiled/warmup.py` compiles them."""
+
+import numpy as np
+
+from poise.baselines.controller import Targets
+from poise.baselines.stepping.tick import CaptureTick, capture_tick
+from poise.baselines.whole_body.contact_sets import contact_tick
+from poise.baselines.whole_body.momentum_qp import MomentumQP, Tick, accept, momentum_tick, solve
+from poise.envs.physics.kinematics import allocate_state
+from poise.envs.physics.state import RobotState
+from poise.envs.robots.robot import load_robot
+from poise.envs.vector.scheduler import Turns
+from poise.envs.vector.threads import Helpers
+
+from .policy_step import residual_tick
+from .residual import ResidualBalanceEnv
+from .stepping import ResidualStepEnv, stepping_tick
+
+
+def _standing() -> tuple[MomentumQP, RobotState, Targets]:
+    """The baseline, in a state that is all zeros."""
+    robot = load_robot("humanoid")
+    qp = MomentumQP(robot)
+    state = RobotState(qp.arrays, allocate_state(robot.model.nv, len(robot.soles)))
+    return qp, state, Targets.standing(robot, state)
+
+
+def assembly() -> None:
+    """The momentum QP's problem."""
+    qp, state, targets = _standing()
+    qp.problem(state, targets)
+
+
+def solver() -> None:
+    """The active-set method."""
+    qp, _, _ = _standing()
+    solve(qp.workspace)
+
+
+def steps() -> None:
+    """Physics, state and episode, and the policy step from which everything is called."""
+    env = ResidualBalanceEnv(duration=0.1)
+    env.reset(seed=0, options={"push": {"impulse": 1.0, "start": 0.0}})
+    env.simulation.step(np.zeros(env.robot.model.nu))
+    env.simulation.state.support_distance(np.zeros(2))
+    # for its type alone: what is called by these addresses, other processes compile
+    qp = env.controller
+    problem = qp.assembly(env.simulation.state, env.targets)
+    tick = Tick(problem, qp.memory, 0, 0)
+    residual_tick.compile((env.bind(tick, 0).numba_type,))
+    momentum_tick.compile((tick.numba_type,))
+    accept(problem.state, problem.parameters, problem.workspace, qp.memory)
+    helpers = Helpers()
+    Turns(np.zeros((2, 3), dtype=np.int64), 2).play_all(helpers)
+    helpers.close()
+
+
+def _stepping() -> tuple[ResidualStepEnv, CaptureTick]:
+    """A stepping controller's environment, and its tick but for the kernels that it calls."""
+    env = ResidualStepEnv(duration=0.1)
+    env.reset(seed=0)
+    return env, env.controller.blocks(env.simulation.state, env.targets)
+
+
+def contacts() -> None:
+    """The momentum QP with contacts that change. What a reset needs, `planner` compiles as well."""
+    contact_tick.compile((_stepping()[1].both.numba_type,))
+
+
+def planner() -> None:
+    """When, where to and how a foot steps, and what a policy sees of it."""
+    env, tick = _stepping()
+    capture_tick.compile((tick.numba_type,))
+    stepping_tick.compile((env.bind_steps(env.bind(tick, 0), 0).numba_type,))

@@ -1,0 +1,175 @@
+"""One policy step of a controller and the physics, compiled."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.baselines.controller import TargetArrays
+from poise.baselines.motions.targets import Motion, update_targets
+from poise.envs.balance.episode import (
+    FAILURES,
+    ROOT_FORCE,
+    ROOT_MOMENT,
+    EpisodeArrays,
+    Judge,
+    judge_step,
+    record_tick,
+)
+from poise.envs.balance.observation import Scales, observe
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Erased, call
+from poise.envs.compiled.jit import compiled
+from poise.envs.maths.vectors import copy
+from poise.envs.physics.arrays import Plant, RobotArrays
+from poise.envs.physics.kinematics import StateArrays, update_state
+from poise.envs.physics.simulation import advance
+
+
+@compiled
+def soft_root_force(s: StateArrays, wrench: np.ndarray, qfrc_applied: np.ndarray):
+    """Apply a wrench about the CoM (world axes) on the root's six generalised forces."""
+    rx = s.com[0] - s.qpos[0]
+    ry = s.com[1] - s.qpos[1]
+    rz = s.com[2] - s.qpos[2]
+    nx = wrench[3] + ry * wrench[2] - rz * wrench[1]
+    ny = wrench[4] + rz * wrench[0] - rx * wrench[2]
+    nz = wrench[5] + rx * wrench[1] - ry * wrench[0]
+    for a in range(3):
+        qfrc_applied[a] = wrench[a]
+        qfrc_applied[3 + a] = (
+            s.root_axes[0, a] * nx + s.root_axes[1, a] * ny + s.root_axes[2, a] * nz
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Residual(Block):
+    """How an action becomes offsets of the controller's targets."""
+
+    moved: np.ndarray  # (na,) int: the offset that each entry of the action moves
+    scale: np.ndarray  # (na,) the offset that it moves by 1
+    share: float  # of the way that a policy step goes from the last action to the next
+    gate: float  # [m] see `openness`
+    offsets: np.ndarray  # (9,), 13 with steps: see `update_targets`
+
+
+@compiled
+def openness(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> float:
+    """1 − exp(−(d/gate)²), d the capture point's distance from that of the reference [m]."""
+    if r.gate == 0.0:
+        return 1.0
+    nj = motion.samples.shape[1] - 6
+    x = motion.samples[0, nj] + com_offset + motion.samples[1, nj] / s.omega[0]
+    y = motion.samples[0, nj + 1] + motion.samples[1, nj + 1] / s.omega[0]
+    cos, sin = s.heading[0], s.heading[1]
+    dx = s.capture_point[0] - s.origin[0] - (cos * x - sin * y)
+    dy = s.capture_point[1] - s.origin[1] - (sin * x + cos * y)
+    return -np.expm1(-(dx * dx + dy * dy) / (r.gate * r.gate))
+
+
+@compiled
+def set_offsets(r: Residual, s: StateArrays, motion: Motion, com_offset: float, e: EpisodeArrays):
+    """Offsets from the episode's action, which is smoothed first."""
+    opened = openness(r, s, motion, com_offset)
+    for a in range(r.moved.shape[0]):
+        if r.share < 1.0:
+            e.action[a] = e.last_action[a] + r.share * (e.action[a] - e.last_action[a])
+        r.offsets[r.moved[a]] = opened * r.scale[a] * e.action[a]
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualStep(Block):
+    """All that a policy step works on."""
+
+    robot: RobotArrays
+    plant: Plant
+    state: StateArrays
+    clock: np.ndarray  # (1,) int
+    kernel: int  # the address of the controller's tick
+    tick: Erased  # what it works on
+    tau: np.ndarray  # (nj,) what it finds [N·m]
+    root_wrench: np.ndarray  # (6,) of a soft root
+    failures: np.ndarray  # (1,) int: ticks that it could not solve
+    soft_root: bool
+    targets: TargetArrays
+    motion: Motion
+    com_offset: float  # [m]
+    residual: Residual
+    pushes: np.ndarray  # see `apply_pushes`
+    scales: Scales
+    judge: Judge
+    ticks: int
+    substeps: int  # physics steps of each
+    episode: EpisodeArrays
+
+
+@compiled
+def residual_tick(step: ResidualStep):
+    """The controller, held for `substeps` physics steps; `ticks` calls are a policy step."""
+    robot, plant, s, clock, motion = step.robot, step.plant, step.state, step.clock, step.motion
+    t, e, tau, w = step.targets, step.episode, step.tau, step.root_wrench
+    period = step.substeps * robot.timestep
+    if e.ticks[0] == 0:
+        set_offsets(step.residual, s, motion, step.com_offset, e)
+    update_targets(
+        robot, s, motion, clock[0] * robot.timestep, step.com_offset, step.residual.offsets, t
+    )
+    call(step.kernel, step.tick)
+    for i in range(plant.ctrl.shape[0]):
+        plant.ctrl[i] = tau[robot.motor_dofs[i] - 6]
+    if step.soft_root:
+        soft_root_force(s, w, plant.qfrc_applied)
+        m = e.metrics
+        m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
+        m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
+    record_tick(robot, s, plant.ctrl, period, e)
+    for _ in range(step.substeps):
+        advance(robot, plant, step.pushes, clock)
+    update_state(robot, plant, s)
+    e.ticks[0] += 1
+    if e.ticks[0] < step.ticks:
+        return
+    e.ticks[0] = 0
+    copy(w, e.root_wrench)
+    e.metrics[FAILURES] = step.failures[0]
+    now = clock[0] * robot.timestep
+    judge_step(robot, plant, s, step.scales, step.judge, t.q_ref, plant.ctrl, now, e)
+    observe(robot, s, step.scales, t.q_ref, t.v_ref, e.action, e.observation)
+
+
+@dataclass(frozen=True, eq=False)
+class Aim(Block):
+    """What `update_targets` works on."""
+
+    robot: RobotArrays
+    state: StateArrays
+    clock: np.ndarray  # (1,) int
+    motion: Motion
+    com_offset: float  # [m]
+    residual: np.ndarray  # (≥ 9,)
+    targets: TargetArrays
+
+
+@compiled
+def aim(block: Aim):
+    """Targets of this tick."""
+    update_targets(
+        block.robot, block.state, block.motion, block.clock[0] * block.robot.timestep,
+        block.com_offset, block.residual, block.targets,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Record(Block):
+    """What `record_tick` works on."""
+
+    robot: RobotArrays
+    state: StateArrays
+    plant: Plant
+    period: float  # [s]
+    episode: EpisodeArrays
+
+
+@compiled
+def record(block: Record):
+    """Account for the torques in `plant.ctrl`."""
+    record_tick(block.robot, block.state, block.plant.ctrl, block.period, block.episode)

@@ -1,0 +1,1 @@
+"""Controllers that keep their feet where they are."""

@@ -1,0 +1,1 @@
+"""Reference motions, and the targets that they give at a tick."""

@@ -1,0 +1,224 @@
+"""Reference motions in time: joints, centre of mass and root, from keyframes by role.
+
+A motion names no joint of any robot. Its keyframes move *roles* such as `knees`, which each
+robot's description maps to its own joints (`roles:` in configs/robots/*.yaml).
+"""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from poise.configs.errors import ConfigError, shown
+from poise.configs.files import resolve
+from poise.configs.schema import build, read_yaml
+from poise.envs.compiled.copies import Copyable
+from poise.envs.robots.description import match_names
+from poise.envs.robots.robot import Robot
+
+from .postures import LevelKinematics
+from .splines import evaluate, piecewise, rest_spline
+
+SAMPLING = 0.02  # [s] between the postures whose height and root orientation are computed
+BALANCE_TOLERANCE = 1e-6  # [m]
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """A posture at a time; what is left out is as in the standing posture."""
+
+    time: float = field(metadata={"min": 0.0})  # [s]
+    roles: dict[str, float] = field(default_factory=dict)  # role → offset from standing [deg]
+    com: tuple[float, float] = (0.0, 0.0)  # offset forward, left, in `com_unit`
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Roles that keep the CoM over its place: role → share of the angle that is solved for."""
+
+    forward: dict[str, float] = field(default_factory=dict)
+    left: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class MotionDescription:
+    """A motion as data, for any robot that has its roles; configs/motions/*.yaml.
+
+    Every motion starts and ends at rest. With `loop` it repeats for ever, which needs a last
+    keyframe equal to the first; without, the last keyframe is held.
+    `com_unit` fraction: of the half size of the box around the soles, forward and left.
+    """
+
+    keyframes: tuple[Keyframe, ...]
+    loop: bool = False
+    com_unit: Literal["fraction", "m"] = "fraction"
+    balance: Balance = field(default_factory=Balance)
+
+    def __post_init__(self):
+        times = [key.time for key in self.keyframes]
+        if not times or times[0] != 0.0:
+            raise ValueError("keyframes: the first must be at time 0")
+        if any(b - a < 0.05 for a, b in pairwise(times)):
+            raise ValueError(f"keyframes: times must increase by at least 0.05 s, not {times}")
+        first, last = self.keyframes[0], self.keyframes[-1]
+        if self.loop and (first.roles, first.com) != (last.roles, last.com):
+            raise ValueError("keyframes: the last of a loop must be equal to the first")
+
+
+class MotionSample(NamedTuple):
+    """A reference motion at one time; nj = nv − 6 joints in dof order.
+
+    The CoM is relative to the mean of the sole points, in the heading frame, so com_offset[2]
+    is its height. root is the rotation vector φ from the standing root orientation, in the
+    heading frame: R = R_heading exp(φ) R_standing.
+    """
+
+    q_ref: np.ndarray  # (nj,) [rad]
+    v_ref: np.ndarray
+    a_ref: np.ndarray
+    com_offset: np.ndarray  # (3,) [m]
+    com_vel: np.ndarray
+    com_acc: np.ndarray
+    root: np.ndarray  # (3,) [rad]
+    root_vel: np.ndarray
+    root_acc: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceMotion(Copyable):
+    """A motion of one robot, C² in time, as a table of cubic polynomials.
+
+    Columns of `coeffs` (k, 4, nj+6): joint positions, CoM offset (3), root rotation φ (3); see
+    `splines.piecewise` for the layout and `splines.evaluate` for the compiled evaluation.
+    """
+
+    name: str
+    knots: np.ndarray  # (k+1,) [s]
+    coeffs: np.ndarray  # (k, 4, nj+6)
+    loop: bool
+
+    @property
+    def duration(self) -> float:
+        """Time of the last keyframe [s]."""
+        return float(self.knots[-1])
+
+    def sample(self, t: float) -> MotionSample:
+        """The reference at time t [s]."""
+        out = np.zeros((3, self.coeffs.shape[2]))
+        evaluate(self.knots, self.coeffs, self.loop, t, out[0], out[1], out[2])
+        joints, com, root = out[:, :-6], out[:, -6:-3], out[:, -3:]
+        return MotionSample(*joints, *com, *root)
+
+
+def load_motion(name_or_path: str | Path, robot: Robot) -> ReferenceMotion:
+    """A packaged motion (`squat`) or a path to a .yaml file, for one robot.
+
+    Raises ConfigError naming file and field: no such motion, a role that the robot lacks, a
+    posture out of a joint's range, a CoM outside the soles, a balance that cannot be found.
+    """
+    path = resolve("motions", name_or_path)
+    description = build(MotionDescription, read_yaml(path), str(path))
+    return make_motion(description, robot, path.stem, str(path))
+
+
+def make_motion(
+    description: MotionDescription, robot: Robot, name: str, source: str
+) -> ReferenceMotion:
+    """The motion of a description for one robot; errors as in `load_motion`."""
+    kinematics = LevelKinematics(robot)
+    com = np.array([key.com for key in description.keyframes])
+    if description.com_unit == "fraction":
+        com = com * kinematics.support_extent()
+    _check_com(com, kinematics.support_extent(), source)
+    postures = np.array([_posture(key.roles, robot, source) for key in description.keyframes])
+    for i, offset in enumerate(com):
+        postures[i] = _balanced(postures[i], offset, description.balance, robot, kinematics, source)
+
+    times = np.array([key.time for key in description.keyframes])
+    if len(times) == 1:  # a posture that is held
+        times, postures, com = np.array([0.0, 1.0]), postures[[0, 0]], com[[0, 0]]
+    joints, com_xy = rest_spline(times, postures), rest_spline(times, com)
+
+    # height and root orientation follow from the joints
+    dense = np.linspace(times[0], times[-1], 1 + int(np.ceil(times[-1] / SAMPLING)))
+    level = [kinematics.posture(q) for q in joints(dense)]
+    height = rest_spline(dense, np.array([posture.com[2:] for posture in level]))
+    root = rest_spline(dense, np.array([kinematics.root_rotation(p) for p in level]))
+    _check_range(dense, joints(dense), robot, source)
+
+    knots, coeffs = piecewise([joints, com_xy, height, root])
+    return ReferenceMotion(name, knots, coeffs, description.loop)
+
+
+def _posture(roles: dict[str, float], robot: Robot, source: str) -> np.ndarray:
+    """(nj,) standing posture plus the roles' offsets [deg]."""
+    q = robot.standing_qpos[7:].copy()
+    names = list(robot.joint_names)
+    known = robot.description.roles
+    for role, degrees in roles.items():
+        if role not in known:
+            raise ConfigError(
+                f"robot {robot.name!r} has no role {shown(role)}",
+                source=source,
+                field="roles",
+                choices=known,
+            )
+        scales = match_names(known[role], names, robot.name, f"roles.{role}")
+        for joint, scale in scales.items():
+            q[names.index(joint)] += scale * np.radians(degrees)
+    return q
+
+
+def _balanced(
+    q: np.ndarray,
+    com: np.ndarray,
+    balance: Balance,
+    robot: Robot,
+    kinematics: LevelKinematics,
+    source: str,
+) -> np.ndarray:
+    """`q` with the balance roles turned until the CoM is `com` (2,) from where it is standing."""
+    given = [(axis, roles) for axis, roles in enumerate((balance.forward, balance.left)) if roles]
+    active = [axis for axis, _ in given]
+    standing = robot.standing_qpos[7:]
+    turns = np.array([_posture(roles, robot, source) - standing for _, roles in given])
+
+    def error(q: np.ndarray) -> np.ndarray:
+        moved = kinematics.posture(q).com[:2] - kinematics.standing.com[:2]
+        return (moved - com)[active]
+
+    step = 1e-3  # [deg]
+    for _ in range(20):
+        now = error(q)
+        if np.abs(now).max(initial=0.0) < BALANCE_TOLERANCE:
+            return q
+        jacobian = np.column_stack([(error(q + step * turn) - now) / step for turn in turns])
+        q = q - np.linalg.lstsq(jacobian, now, rcond=None)[0] @ turns
+    raise ConfigError(
+        f"these roles cannot bring the centre of mass to {com} m", source=source, field="balance"
+    )
+
+
+def _check_com(com: np.ndarray, extent: np.ndarray, source: str) -> None:
+    for i, offset in enumerate(com):
+        if np.any(np.abs(offset) >= extent):
+            raise ConfigError(
+                f"{offset.round(3)} m is not inside the soles, which reach ±{extent.round(3)} m",
+                source=source,
+                field=f"keyframes[{i}].com",
+            )
+
+
+def _check_range(times: np.ndarray, postures: np.ndarray, robot: Robot, source: str) -> None:
+    low, high = robot.joint_range.T
+    outside = np.maximum(low - postures, postures - high)
+    i, j = np.unravel_index(np.argmax(outside), outside.shape)
+    if outside[i, j] > 1e-9:
+        raise ConfigError(
+            f"joint {robot.joint_names[j]!r} would be at {postures[i, j]:.3f} at {times[i]:.2f} s, "
+            f"outside its range [{low[j]:.3f}, {high[j]:.3f}]",
+            source=source,
+            field="keyframes",
+        )

@@ -1,0 +1,69 @@
+"""Where the centre of mass and the root of a posture are, with the soles on the ground."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from poise.envs.compiled.copies import Copyable
+from poise.envs.robots.robot import Robot
+
+
+class LevelPosture(NamedTuple):
+    """A posture with its soles level and their mean at the origin, in the heading frame."""
+
+    com: np.ndarray  # (3,) [m]
+    root_axes: np.ndarray  # (3, 3) root orientation
+
+
+class LevelKinematics(Copyable):
+    """Forward kinematics of joint positions alone: the feet, not the root, say where it is.
+
+    `data` holds MuJoCo's kinematics of the last posture, with the root where it stands.
+    """
+
+    def __init__(self, robot: Robot):
+        self.robot = robot
+        self.data = mujoco.MjData(robot.model)
+        self.data.qpos[:] = robot.standing_qpos
+        self.standing = self.posture(robot.standing_qpos[7:])
+
+    def posture(self, q: np.ndarray) -> LevelPosture:
+        """CoM and root orientation for joint positions `q` (nj,).
+
+        Up is the mean of the sole normals, forward the mean of the soles' forward axes.
+        """
+        robot, data = self.robot, self.data
+        data.qpos[7:] = q
+        mujoco.mj_kinematics(robot.model, data)
+        mujoco.mj_comPos(robot.model, data)
+        origin, forward, up = np.zeros(3), np.zeros(3), np.zeros(3)
+        for sole in robot.soles:
+            foot_axes = data.xmat[sole.body_id].reshape(3, 3)
+            sole_axes = foot_axes @ sole.rotation
+            origin += (data.xpos[sole.body_id] + foot_axes @ sole.position) / len(robot.soles)
+            forward += sole_axes[:, 0]
+            up += sole_axes[:, 2]
+        up /= np.linalg.norm(up)
+        left = np.cross(up, forward)
+        left /= np.linalg.norm(left)
+        axes = np.stack([np.cross(left, up), left, up])  # rows: the heading frame
+        com = axes @ (data.subtree_com[robot.root_body_id] - origin)
+        return LevelPosture(com, axes @ data.xmat[robot.root_body_id].reshape(3, 3))
+
+    def root_rotation(self, posture: LevelPosture) -> np.ndarray:
+        """Rotation vector φ (3,) [rad], heading frame: root_axes = exp(φ) · standing root_axes."""
+        return Rotation.from_matrix(posture.root_axes @ self.standing.root_axes.T).as_rotvec()
+
+    def support_extent(self) -> np.ndarray:
+        """(2,) half sizes of the box around both soles, forward and left, when standing [m]."""
+        robot, data = self.robot, self.data
+        self.posture(robot.standing_qpos[7:])
+        corners = [
+            data.xpos[sole.body_id]
+            + (np.pad(sole.polygon, ((0, 0), (0, 1))) @ sole.rotation.T + sole.position)
+            @ data.xmat[sole.body_id].reshape(3, 3).T
+            for sole in robot.soles
+        ]
+        return 0.5 * np.ptp(np.concatenate(corners), axis=0)[:2]

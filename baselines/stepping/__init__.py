@@ -1,0 +1,1 @@
+"""Controllers that step: when, where to, and how a foot gets there."""

@@ -1,0 +1,89 @@
+"""Steps to where an inverted pendulum comes to rest upright, by its energy."""
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from poise.envs.compiled.jit import compiled
+from poise.envs.maths.pendulum import pendulum
+from poise.envs.robots.robot import Robot
+
+from .capture_step import CaptureStep, CaptureStepConfig
+from .planner import StepPlanner
+from .reach import Reach
+from .search import Search, allowed, moved, put_foothold, to_local
+
+
+@dataclass(frozen=True)
+class IPMStepConfig(CaptureStepConfig):
+    """As `capture-step`, but of `foothold` only `outward` counts; `time_min` = `time_max` = T.
+
+    `arc`: share of the height that a rigid leg gains on its way up; 0 is the linear pendulum.
+    """
+
+    kind: Literal["ipm-step"] = "ipm-step"  # type: ignore[assignment]
+    arc: float = field(default=1.0, metadata={"min": 0.0, "max": 1.0})
+
+
+@compiled
+def rest_distance(speed: float, omega: float, height: float, arc: float) -> float:
+    """How far ahead of the CoM a foot stops it [m]: the energy left over the foot is 0.
+
+    Linear pendulum, orbital energy E = ½ ẋ² − ½ ω² x² = 0:      x = ẋ/ω
+    rigid leg, ½ ẋ² + g z = g √(z² + x²) [Coros10]:              x = ẋ/ω √(1 + ẋ²/(4 g z))
+
+    `arc` leads from the first (0) to the second (1); g = ω² z.
+    """
+    return speed / omega * np.sqrt(1.0 + arc * (0.5 * speed / (omega * height)) ** 2)
+
+
+@compiled
+def energy_law(q: Search):
+    """The foothold over which the pendulum stands still, see `EnergyPlanner`."""
+    s, foot, omega, t = q.state, q.foot[0], q.state.omega[0], q.time[0]
+    x, vx = pendulum(s.com[0], s.com_vel[0], q.p[0], omega, t)
+    y, vy = pendulum(s.com[1], s.com_vel[1], q.p[1], omega, t)
+    speed = np.sqrt(vx * vx + vy * vy)
+    away = rest_distance(speed, omega, q.height, q.arc) / max(speed, 1e-9)
+    x, y = to_local(q, x + away * vx, y + away * vy)
+    x -= q.reach.middle[foot, 0]
+    y += q.sides[foot] * q.outward - q.reach.middle[foot, 1]
+    x, y = moved(q, x, y)
+    near_x, near_y = allowed(q, x, y)
+    put_foothold(q, near_x, near_y)
+    q.left[0] = np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
+
+
+class EnergyPlanner(StepPlanner):
+    """The foothold over which the pendulum stands still, from where it is at touchdown.
+
+    Until then the CoP is taken to stay at p, where the stance sole brakes most; the cost is how
+    far limits keep the foothold from the one wanted [m].
+    """
+
+    law = staticmethod(energy_law)
+
+    def __init__(self, *arguments: Any, arc: float = 0.0):
+        super().__init__(*arguments)  # those of a `StepPlanner`
+        self.arc = arc
+
+
+class IPMStep(CaptureStep):
+    """`capture-step` with footholds by energy [Notes, lecture 11], the step time given.
+
+    Feet in place, the trigger of a step, the swing, and balance on one foot and after are those
+    of `capture-step`. Raises ConfigError unless there are two soles.
+    """
+
+    def __init__(self, robot: Robot, config: IPMStepConfig | None = None):
+        super().__init__(robot, config or IPMStepConfig())
+
+    def _planner(self, reach: Reach) -> StepPlanner:
+        config = self.config
+        if not isinstance(config, IPMStepConfig):
+            raise TypeError(f"config must be an IPMStepConfig, not {type(config).__name__}")
+        return EnergyPlanner(
+            self.robot, reach, config.limits, config.foothold, config.feedback, config.falls,
+            arc=config.arc,
+        )  # fmt: skip

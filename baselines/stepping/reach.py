@@ -1,0 +1,193 @@
+"""Where a linear inverted pendulum can be stopped: capture regions and CoP reach [Koolen12]."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import apart
+from poise.envs.maths.polygons import clipped, convex_hull, stacked
+from poise.envs.maths.vectors import turn
+from poise.envs.robots.robot import Robot
+
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
+LINE = 1e-12  # [m] a corner of the reach that is nearer to the line of its neighbours is none
+
+
+def standing_feet(robot: Robot) -> np.ndarray:
+    """(2, 3) middles of the soles in the standing posture, which faces along x [m]."""
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_kinematics(robot.model, data)
+    feet = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position
+            for s in robot.soles]  # fmt: skip
+    return np.array(feet)
+
+
+def sides(robot: Robot) -> np.ndarray:
+    """(2,) 1 for the left foot, −1 for the right one, in the standing posture."""
+    feet = standing_feet(robot)
+    sign = 1.0 if feet[0, 1] > feet[1, 1] else -1.0
+    return np.array([sign, -sign])
+
+
+def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """N (k, 2), o (k,), b (k,): |N p − o| ≤ b/λ for a CoP p [m, sole frame] under a load of λ m g.
+
+    One row for each motor joint of the foot itself: the moment of a vertical force about its axis
+    in the standing posture, over its torque limit.
+    """
+    model, foot = robot.model, robot.soles[sole]
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_kinematics(model, data)
+    body = foot.body_id
+    R = data.xmat[body].reshape(3, 3) @ foot.rotation
+    point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot.position
+    weight = robot.mass * -model.opt.gravity[2]
+    normals, offsets, bounds = [], [], []
+    for joint in range(model.njnt):
+        dof = model.jnt_dofadr[joint]
+        motor = np.flatnonzero(np.asarray(robot.motor_dofs) == dof)
+        if model.jnt_bodyid[joint] != body or len(motor) == 0:
+            continue
+        axis, anchor = data.xaxis[joint], data.xanchor[joint]
+        # (axis × (point + R p − anchor))_z, affine in p
+        offsets.append(-np.cross(axis, point - anchor)[2])
+        normals.append([np.cross(axis, R[:, a])[2] for a in range(2)])
+        bounds.append(robot.torque_limit[motor[0]] / weight)
+    return np.reshape(normals, (-1, 2)), np.array(offsets), np.array(bounds)
+
+
+@dataclass(frozen=True, eq=False)
+class ReachArrays(Block):
+    """A `Reach` as compiled code reads it; ns soles, sole frames."""
+
+    alone: np.ndarray  # (ns, k, 2) corners of what each reaches alone [m]
+    corners: np.ndarray  # (ns,) int: how many of them count
+    middle: np.ndarray  # (ns, 2) their mean
+    sums: np.ndarray  # (5, n, 2) corners of what two reach, beside λ p_0 + (1 − λ) p_1
+    support: np.ndarray  # (5, 48) how far these go along each direction
+    directions: np.ndarray  # (48, 2)
+    shares: np.ndarray  # (5,) λ
+
+
+@compiled
+def distance_beyond(r, fx, fy, sx, sy, cos, sin, x, y):
+    """How far (x, y) lies outside what soles at f and s reach together [m]; < 0 inside.
+
+    Measured along 48 DIRECTIONS only, which lets corners reach some millimetres further.
+    """
+    worst = -np.inf
+    for d in range(r.directions.shape[0]):
+        # the direction, turned
+        dx = cos * r.directions[d, 0] - sin * r.directions[d, 1]
+        dy = sin * r.directions[d, 0] + cos * r.directions[d, 1]
+        a, b = fx * dx + fy * dy, sx * dx + sy * dy
+        reach = -np.inf
+        for k in range(r.shares.shape[0]):
+            reach = max(reach, r.support[k, d] + r.shares[k] * a + (1.0 - r.shares[k]) * b)
+        worst = max(worst, x * dx + y * dy - reach)
+    return worst
+
+
+@compiled
+def outside_reach(r, first, second, yaw, xi, out):
+    """`distance_beyond` of rows of `first`, `second`, `xi` into `out`; one row stands for all."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    for i in range(out.shape[0]):
+        f, s, x = first[i % first.shape[0]], second[i % second.shape[0]], xi[i % xi.shape[0]]
+        out[i] = distance_beyond(r, f[0], f[1], s[0], s[1], cos, sin, x[0], x[1])
+
+
+@compiled
+def reach_of_one(r, sole, point, cos, sin, out):
+    """What a sole at `point` reaches alone into rows of `out` (≥ k, 2); how many they are."""
+    for i in range(r.corners[sole]):
+        u, v = r.alone[sole, i, 0], r.alone[sole, i, 1]
+        out[i, 0], out[i, 1] = point[0] + cos * u - sin * v, point[1] + sin * u + cos * v
+    return r.corners[sole]
+
+
+@compiled
+def reach_of_two(r, points, cos, sin, cloud, out):
+    """Hull of what two soles at `points` (2, ≥ 2) reach, for all shares of the load, into rows of
+    `out` (10 n + 1, 2); how many they are.
+
+    `cloud` (5 n, 2) is scratch.
+    """
+    n = 0
+    for k in range(r.shares.shape[0]):
+        a, b = r.shares[k], 1.0 - r.shares[k]
+        x, y = a * points[0, 0] + b * points[1, 0], a * points[0, 1] + b * points[1, 1]
+        for i in range(r.sums.shape[1]):
+            u, v = r.sums[k, i, 0], r.sums[k, i, 1]
+            cloud[n, 0], cloud[n, 1] = x + cos * u - sin * v, y + sin * u + cos * v
+            n += 1
+    return convex_hull(cloud, n, LINE, out)
+
+
+class Reach(Copyable):
+    """Where soles can put the centre of pressure, with the torques that their ankles have.
+
+    Both soles together reach p = λ p_0 + (1 − λ) p_1, p_i what sole i reaches under its share of
+    the load: the less it carries, the further its ankles can move the pressure.
+    """
+
+    def __init__(self, robot: Robot, share: float = 0.95):
+        self.polygons = [share * sole.polygon for sole in robot.soles]
+        self.limits = [ankle_limits(robot, i) for i in range(len(robot.soles))]
+        self._share = share
+        self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
+        self.middle = [polygon.mean(axis=0) for polygon in self.alone]
+        if len(robot.soles) == 2:
+            sums = [self._sum(load) for load in SHARES]
+            self.arrays = ReachArrays(
+                stacked(self.alone),
+                np.array([len(corners) for corners in self.alone]),
+                np.array(self.middle),
+                stacked(sums),
+                np.array([(corners @ DIRECTIONS.T).max(axis=0) for corners in sums]),
+                DIRECTIONS,
+                np.array(SHARES),
+            )
+
+    def _under(self, sole: int, load: float) -> np.ndarray:
+        polygon = self.polygons[sole]
+        for normal, offset, bound in zip(*self.limits[sole], strict=True):
+            room = self._share * bound / max(load, 1e-3)
+            polygon = clipped(polygon, normal, offset + room)
+            polygon = clipped(polygon, -normal, room - offset)
+        return polygon
+
+    def _sum(self, load: float) -> np.ndarray:
+        first, second = load * self._under(0, load), (1.0 - load) * self._under(1, 1.0 - load)
+        return (first[:, None] + second[None]).reshape(-1, 2)
+
+    def under(self, sole: int, point: np.ndarray, yaw: float) -> np.ndarray:
+        """(k, 2) what the sole at `point`, turned by `yaw`, reaches alone [m]."""
+        return point[:2] + self.alone[sole] @ turn(yaw).T
+
+    def both(self, points: np.ndarray, yaw: float) -> np.ndarray:
+        """(k, 2) hull of what two soles at `points` (2, ≥ 2) reach, for all shares of the load."""
+        r = self.arrays
+        cloud = apart((r.sums.shape[0] * r.sums.shape[1], 2))
+        out = apart((2 * len(cloud) + 1, 2))
+        return out[: reach_of_two(r, np.array(points), np.cos(yaw), np.sin(yaw), cloud, out)]
+
+    def beyond(
+        self, first: np.ndarray, second: np.ndarray, yaw: float, xi: np.ndarray
+    ) -> np.ndarray:
+        """(n,) how far points `xi` (n, 2) lie outside what two soles reach together; < 0 inside.
+
+        Soles at `first` and `second`, (n, 2) or (2,); see `distance_beyond`.
+        """
+        rows = [np.array(v, dtype=float, ndmin=2) for v in (first, second, xi)]
+        out = np.empty(max(len(points) for points in rows))
+        outside_reach(self.arrays, rows[0], rows[1], yaw, rows[2], out)
+        return out if max(np.ndim(v) for v in (first, second, xi)) > 1 else out[0]

@@ -1,0 +1,1 @@
+"""Controllers that never stop stepping."""

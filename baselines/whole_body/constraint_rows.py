@@ -1,0 +1,95 @@
+"""Dynamics, contacts and limits of the readable momentum QP: each gives rows l ≤ C x ≤ u.
+
+x = (v̇, w) or (v̇, w, u_root); see `formulation.py`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from poise.envs.physics.state import RobotState
+
+from .reduced_qp import QPParameters
+
+
+class Bounds(NamedTuple):
+    """A constraint: l ≤ C x ≤ u. C may stop short: the columns left out are zero."""
+
+    C: np.ndarray  # (k, ≤ n)
+    l: np.ndarray  # (k,)  # noqa: E741
+    u: np.ndarray  # (k,)
+
+
+def root_dynamics(state: RobotState, p: QPParameters) -> Bounds:
+    """The root's six rows of M v̇ + h = Sᵀτ + Jᵀw + u_root, where no motor helps."""
+    C = np.hstack([state.M[:6], -state.J.T[:6]])
+    if p.soft_root:
+        C = np.hstack([C, -_root_force_matrix(state)])
+    return Bounds(C, -state.h[:6], -state.h[:6])
+
+
+def sole_motion(state: RobotState, p: QPParameters) -> Bounds:
+    """J v̇ + J̇ v = −k_v J v: soles do not accelerate, and what speed they have dies out."""
+    accel = -p.sole_damping * state.J_v - state.Jdot_v
+    return Bounds(state.J, accel, accel)
+
+
+def sole_cones(state: RobotState, p: QPParameters) -> Bounds:
+    """cone · w ≤ 0 in each sole's own axes (see `wrench_cone`)."""
+    cones = [
+        cone @ block_diag(axes.T, axes.T)
+        for cone, axes in zip(p.cone, state.sole_axes, strict=True)
+    ]
+    C = _after(len(state.qvel), block_diag(*cones))
+    return Bounds(C, np.full(len(C), -np.inf), np.zeros(len(C)))
+
+
+def torque_limits(state: RobotState, p: QPParameters) -> Bounds:
+    """|τ| ≤ τ_max; a joint without a motor has τ_max = 0."""
+    h = state.h[6:]
+    return Bounds(torque_matrix(state), -p.torque_limit - h, p.torque_limit - h)
+
+
+def joint_limits(state: RobotState, p: QPParameters) -> Bounds:
+    """Accelerations that let every joint stop before its limit.
+
+    From the distance d to a limit, a joint that is no faster than v stops if it brakes with a
+    after a reaction time r: r v + v²/(2 a) = d. The bound brings its speed there within a horizon
+    T, and demands no more than a floor; r = 4 T makes the approach critically damped. Beyond the
+    limit, v = d/r leads back.
+    """
+    q, v, robot = state.q, state.qvel[6:], state.robot
+    up, down = (_stopping_speed(d, p) for d in (robot.q_max - q, q - robot.q_min))
+    low = np.minimum((-down - v) / p.brake_horizon, p.brake_floor)
+    high = np.maximum((up - v) / p.brake_horizon, -p.brake_floor)
+    C = np.eye(len(q), len(q) + 6, 6)
+    return Bounds(C, low, np.maximum(low, high))
+
+
+def _stopping_speed(distance: np.ndarray, p: QPParameters) -> np.ndarray:
+    reaction = 4.0 * p.brake_horizon
+    ahead, lag = np.maximum(distance, 0.0), reaction * p.brake_accel
+    speed = np.sqrt(lag**2 + 2.0 * p.brake_accel * ahead) - lag
+    return np.where(distance < 0.0, distance / reaction, speed)
+
+
+def torque_matrix(state: RobotState) -> np.ndarray:
+    """(nv−6, nv+6nc) T with τ = T (v̇, w) + h."""
+    return np.hstack([state.M, -state.J.T])[6:]
+
+
+def _root_force_matrix(state: RobotState) -> np.ndarray:
+    """(6, 6) from a wrench about the CoM to the root's generalised forces.
+
+    The force acts as it is; the moment about the root's origin is n + (c − r) × f, in body axes.
+    """
+    r = state.com - state.qpos[:3]
+    arm = np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+    R = state.root_axes
+    return np.block([[np.eye(3), np.zeros((3, 3))], [R.T @ arm, R.T]])
+
+
+def _after(columns: int, matrix: np.ndarray) -> np.ndarray:
+    """`matrix` behind this many columns of zeros."""
+    return np.hstack([np.zeros((len(matrix), columns)), matrix])

@@ -1,0 +1,305 @@
+"""The momentum QP with any subset of the soles in contact.
+
+One reduced problem for each subset (see `reduced_qp.py`), built on arrays that hold the soles in
+contact only; what else is asked of v̇, such as the way of a swing foot, comes as further rows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from poise.baselines.controller import TargetArrays, Targets
+from poise.baselines.solvers import QP
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import address_of, call
+from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import apart
+from poise.envs.maths.vectors import copy
+from poise.envs.physics.arrays import RobotArrays, robot_arrays
+from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.state import RobotState
+from poise.envs.robots.robot import Robot
+
+from .momentum_qp import Memory, MomentumQPConfig, accept, allocate_memory, forget, solve
+from .parameters import qp_parameters
+from .reduced_qp import Assembly, QPParameters, Workspace, allocate_workspace, assemble
+from .task_rows import Rows
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTick(Block):
+    """What a tick of one subset works on; k further rows in v̇, n unknowns."""
+
+    source: StateArrays  # of all soles
+    pick: np.ndarray  # (nc,) int: soles of the subset
+    problem: Assembly  # of these
+    memory: Memory
+    A: np.ndarray  # (k, nv)
+    b: np.ndarray  # (k,)
+    weights: np.ndarray  # (k,)
+    AV: np.ndarray  # (k, n) scratch
+    weighted: np.ndarray  # (k, n) scratch
+    load_limits: np.ndarray  # (nc,) [N]
+    limited: np.ndarray  # (1,) int: whether they count
+    applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
+    jump: np.ndarray  # (nv−6,) the most that they may change [N·m]
+    follows: np.ndarray  # (1,) int: whether there was a last tick
+    chosen: np.ndarray  # (1,) int: the subset of the last tick, −1: none
+    index: int  # of this one
+    assemble: int  # addresses of kernels that are compiled already
+    solve: int
+
+
+@compiled
+def pick_soles(source: StateArrays, pick: np.ndarray, own: StateArrays):
+    """Copy what belongs to soles; the origin is the mean of those picked."""
+    nc = pick.shape[0]
+    own.origin[:] = 0.0
+    for i in range(nc):
+        sole = pick[i]
+        for r in range(6):
+            copy(source.J[6 * sole + r], own.J[6 * i + r])
+            own.J_v[6 * i + r] = source.J_v[6 * sole + r]
+            own.Jdot_v[6 * i + r] = source.Jdot_v[6 * sole + r]
+        for a in range(3):
+            copy(source.sole_axes[sole, a], own.sole_axes[i, a])
+            own.sole_point[i, a] = source.sole_point[sole, a]
+            own.origin[a] += source.sole_point[sole, a]
+        own.contacts[i] = source.contacts[sole]
+    for a in range(3):
+        own.origin[a] /= nc
+
+
+@compiled
+def add_rows(t: ContactTick):
+    """Add ½ Σ weights (A v̇ − b)², v̇ = v̇₀ + V x, to the objective."""
+    ws, A, AV = t.problem.workspace, t.A, t.AV
+    np.dot(A, ws.V, AV)
+    for r in range(A.shape[0]):
+        offset = -t.b[r]
+        for j in range(A.shape[1]):
+            offset += A[r, j] * ws.vdot0[j]
+        for i in range(AV.shape[1]):
+            t.weighted[r, i] = t.weights[r] * AV[r, i]
+            ws.g[i] += offset * t.weighted[r, i]
+    n = AV.shape[1]
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for r in range(A.shape[0]):
+                total += AV[r, i] * t.weighted[r, j]
+            ws.H[i, j] += total
+
+
+@compiled
+def choose_set(t: ContactTick):
+    """Forget what this subset remembers of earlier ticks, if the last one was another's."""
+    if t.chosen[0] != t.index:
+        ws, t.chosen[0] = t.problem.workspace, t.index
+        ws.cop_prev[0] = ws.cop_prev[1] = np.nan
+        for i in range(ws.iscratch.shape[0]):
+            ws.iscratch[i] = 0
+
+
+@compiled
+def assemble_contacts(t: ContactTick):
+    """The reduced QP of a subset."""
+    ws, cone = t.problem.workspace, t.problem.parameters.cone
+    choose_set(t)
+    pick_soles(t.source, t.pick, t.problem.state)
+    call(t.assemble, t.problem)
+    if t.A.shape[0] > 0:
+        add_rows(t)
+    if t.limited[0]:
+        for i in range(cone.shape[0]):
+            row = (i + 1) * cone.shape[1] - 1
+            copy(ws.E[6 * i + 2], ws.C[row])
+            ws.u[row] = t.load_limits[i] - ws.w0[6 * i + 2]
+    if t.follows[0]:
+        bound_torques(t, True)
+
+
+@compiled
+def bound_torques(t: ContactTick, jumps: bool):
+    """Keep τ = τ₀ + T x within its limits, and within `jump` of the last tick's or not."""
+    ws, limit = t.problem.workspace, t.problem.parameters.torque_limit
+    nj = limit.shape[0]
+    first = ws.l.shape[0] - 2 * nj  # rows before the joint limits
+    for a in range(nj):
+        low, high = -limit[a], limit[a]
+        if jumps:
+            low, high = max(low, t.applied[a] - t.jump[a]), min(high, t.applied[a] + t.jump[a])
+        ws.l[first + a], ws.u[first + a] = low - ws.tau0[a], high - ws.tau0[a]
+
+
+@compiled
+def solve_contacts(t: ContactTick):
+    """Torques from the assembled problem, none of which changes by more than `jump`."""
+    ws = t.problem.workspace
+    call(t.solve, ws)
+    if ws.status[0] != 0 and t.follows[0]:
+        bound_torques(t, False)
+        call(t.solve, ws)
+    accept(t.source, t.problem.parameters, ws, t.memory)
+    for a in range(ws.tau.shape[0]):
+        if t.follows[0]:
+            ws.tau[a] = min(max(ws.tau[a], t.applied[a] - t.jump[a]), t.applied[a] + t.jump[a])
+        t.applied[a] = ws.tau[a]
+    t.follows[0] = 1
+
+
+@compiled
+def contact_tick(t: ContactTick):
+    """One tick with a subset: its workspace's `tau` (nv−6,) holds torques."""
+    assemble_contacts(t)
+    solve_contacts(t)
+
+
+class ContactSet(Copyable):
+    """Arrays, parameters and scratch for one subset of the soles (its indices, in order)."""
+
+    def __init__(
+        self, arrays: RobotArrays, parameters: QPParameters, soles: tuple[int, ...], index: int
+    ):
+        pick, self.index = np.array(soles), index
+        self.soles, self.pick = soles, pick
+        self.rows = (6 * pick[:, None] + np.arange(6)).ravel()
+        names = [item.name for item in fields(RobotArrays)]
+        names = [name for name in names if name.startswith(("sole_", "chain"))]
+        self.arrays = replace(arrays, **{name: getattr(arrays, name)[pick] for name in names})
+        cone = parameters.cone[pick]  # with a row more for each sole: the bound on its load
+        self.parameters = replace(parameters, cone=np.pad(cone, ((0, 0), (0, 1), (0, 0))))
+        self.workspace = allocate_workspace(
+            self.arrays, self.parameters.cone.shape[1], parameters.soft_root
+        )
+        nv, nc = len(arrays.q_standing) + 6, len(soles)
+        self._own = {
+            "J": apart((6 * nc, nv)), "J_v": apart(6 * nc), "Jdot_v": apart(6 * nc),
+            "sole_point": apart((nc, 3)), "sole_axes": apart((nc, 3, 3)), "origin": apart(3),
+            "contacts": apart(nc),
+        }  # fmt: skip
+        self._bound_to: tuple[object, ...] = ()
+
+    def state(self, s: StateArrays) -> StateArrays:
+        """`s` with the soles of this set only."""
+        own = replace(s, **self._own)
+        pick_soles(s, self.pick, own)
+        return own
+
+    def bind(
+        self, s: StateArrays, targets: TargetArrays, rows: int, sets: "ContactSets"
+    ) -> ContactTick:
+        """What a tick from `s` with so many further rows works on; `block` from then on."""
+        if (s, targets, rows) != self._bound_to:  # blocks are equal where they are the same
+            ws, nv, n = self.workspace, len(s.qvel), len(self.workspace.g)
+            own = replace(s, **self._own)
+            problem = Assembly(self.arrays, own, self.parameters, targets, sets.period, ws)
+            self.block = ContactTick(
+                s, self.pick, problem, sets.memory, apart((rows, nv)), apart(rows), apart(rows),
+                apart((rows, n)), apart((rows, n)), apart(len(self.soles)),
+                apart(1, dtype=np.int64), sets.applied, sets.jump, sets.follows, sets.chosen,
+                self.index, address_of(assemble, problem), address_of(solve, ws),
+            )  # fmt: skip
+            self._bound_to = (s, targets, rows)
+        return self.block
+
+
+class ContactSets(Copyable):
+    """Solves the momentum QP for whichever soles are in contact; remembers torques between ticks.
+
+    `tick` gives torques; after a call `workspace` holds the solution of the set that was used.
+    No torque changes by more than `jump` of its limit from one tick to the next, whatever the
+    contacts do: the QP knows this bound, and where it has no solution within, the torques are cut.
+    """
+
+    def __init__(self, robot: Robot, config: MomentumQPConfig, jump: float = np.inf):
+        self.robot, self.config, self.period = robot, config, config.period
+        self.arrays = robot_arrays(robot)
+        self.parameters = parameters = qp_parameters(robot, self.arrays, config)
+        count = len(robot.soles)
+        subsets: list[tuple[int, ...]] = [(i,) for i in range(count)]
+        if count > 1:
+            subsets.append(tuple(range(count)))
+        self.sets = {
+            soles: ContactSet(self.arrays, parameters, soles, index)
+            for index, soles in enumerate(subsets)
+        }
+        self.memory = allocate_memory(parameters.torque_limit)
+        limit = parameters.torque_limit
+        self.jump = np.where(limit > 0.0, jump * limit, np.inf)
+        self.applied = apart(len(limit))  # torques of the last tick, if
+        self.follows = apart(1, dtype=np.int64)  # there was one
+        self.chosen = apart(1, dtype=np.int64)  # index of the subset of the last tick, −1: none
+        self.chosen[0] = -1
+        self._motor_joints = self.arrays.motor_dofs - 6
+
+    @property
+    def active(self) -> tuple[int, ...] | None:
+        """The soles of the last tick, if there was one."""
+        return None if self.chosen[0] < 0 else list(self.sets)[self.chosen[0]]
+
+    @property
+    def failures(self) -> int:
+        """Ticks since the reset at which the QP was not solved."""
+        return int(self.memory.failures[0])
+
+    def reset(self) -> None:
+        """Forget the last trial."""
+        forget(self.memory)
+        self.chosen[0], self.follows[0] = -1, 0
+
+    def follow(self, torques: np.ndarray) -> None:
+        """Go on from the joint `torques` (nv−6,) of another controller's last tick."""
+        self.applied[:] = self.memory.torques[:] = torques
+        self.follows[0] = 1
+
+    def problem(
+        self,
+        state: RobotState,
+        targets: Targets,
+        soles: tuple[int, ...],
+        tasks: Sequence[Rows] = (),
+        load_limits: np.ndarray | None = None,
+    ) -> QP:
+        """The reduced QP with `soles` in contact.
+
+        Args:
+            tasks: further rows in v̇: nv columns.
+            load_limits: (len(soles),) largest vertical force of each sole [N]; none if left out.
+        """
+        chosen = self.sets[soles]
+        ws = chosen.workspace
+        rows = sum(len(task.b) for task in tasks)
+        block = chosen.bind(state.arrays, targets.arrays(), rows, self)
+        first = 0
+        for task in tasks:
+            last = first + len(task.b)
+            block.A[first:last], block.b[first:last] = task.A, task.b
+            block.weights[first:last] = task.weights
+            first = last
+        block.limited[0] = load_limits is not None
+        if load_limits is not None:
+            block.load_limits[:] = load_limits
+        assemble_contacts(block)
+        return QP(ws.H, ws.g, ws.C, ws.l, ws.u)
+
+    def tick(
+        self,
+        state: RobotState,
+        targets: Targets,
+        soles: tuple[int, ...],
+        tasks: Sequence[Rows] = (),
+        load_limits: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Joint torques (nu,) [N·m]; arguments as of `problem`."""
+        self.problem(state, targets, soles, tasks, load_limits)
+        chosen = self.sets[soles]
+        solve_contacts(chosen.block)
+        return chosen.workspace.tau[self._motor_joints].copy()
+
+    @property
+    def workspace(self) -> Workspace:
+        """Scratch and solution of the set that was used last."""
+        return self.sets[self.active or tuple(range(len(self.robot.soles)))].workspace

@@ -1,0 +1,127 @@
+"""The momentum QP as the papers write it: nothing eliminated, nothing compiled, pure functions.
+
+    min over x = (v̇, w, u_root)   ½ Σ weight (A x − b)²        rows of the tasks
+    s.t.   M v̇ + h = Sᵀτ + Jᵀw + u_root                        dynamics; the six root rows bind
+           J v̇ + J̇ v = −k_v J v                                soles do not move
+           cone · w ≤ 0,  |τ| ≤ τ_max,  v̇ within what joint limits leave
+
+with τ = M v̇ + h − Jᵀw on the joints' rows; u_root only with a soft root [Moskalev24 §2.1,
+Macchietto09]. `MomentumQP` solves the same problem, compiled and with the equalities eliminated
+(`reduced_qp.py`), and is tested against this one. To try another task or limit, hand its rows to
+`build`:
+
+    qp = build(state, targets, controller.parameters, tasks=[Rows(A, b, weights)])
+    solution = make_solver("active-set").solve(qp)
+    torques = torques_of(state, solution.x)
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from poise.baselines.controller import Targets
+from poise.baselines.solvers import QP
+from poise.envs.physics.state import RobotState
+
+from .constraint_rows import (
+    Bounds,
+    joint_limits,
+    root_dynamics,
+    sole_cones,
+    sole_motion,
+    torque_limits,
+)
+from .reduced_qp import QPParameters
+from .task_rows import (
+    Rows,
+    accel_rows,
+    angular_momentum_rows,
+    linear_momentum_rows,
+    posture_rows,
+    root_rows,
+    torque_rows,
+    wrench_rows,
+)
+
+
+class Unknowns(NamedTuple):
+    """The parts of x: accelerations, sole wrenches, and a soft root's wrench about the CoM."""
+
+    vdot: np.ndarray  # (nv,)
+    w: np.ndarray  # (6 nc,) at the sole points, world axes: force, moment
+    u_root: np.ndarray  # (6,) world axes: force, moment; zero with a hard root
+
+
+def unknowns(state: RobotState, x: np.ndarray) -> Unknowns:
+    """x taken apart."""
+    nv, k = len(state.qvel), len(state.J)
+    root = x[nv + k :] if len(x) > nv + k else np.zeros(6)
+    return Unknowns(x[:nv], x[nv : nv + k], root)
+
+
+def torques_of(state: RobotState, x: np.ndarray) -> np.ndarray:
+    """(nv−6,) joint torques τ = (M v̇ + h − Jᵀw) on the joints' rows [N·m]."""
+    vdot, w, _ = unknowns(state, x)
+    return (state.M @ vdot + state.h - state.J.T @ w)[6:]
+
+
+def build(
+    state: RobotState,
+    targets: Targets,
+    parameters: QPParameters,
+    cop_vel: np.ndarray | None = None,
+    tasks: Sequence[Rows] = (),
+    constraints: Sequence[Bounds] = (),
+) -> QP:
+    """The QP of one tick in x = (v̇, w) or (v̇, w, u_root), with `tasks` and `constraints` added.
+
+    Args:
+        parameters: gains and limits in SI units: `MomentumQP.parameters`, or `qp_parameters`.
+        cop_vel: (2,) ṗ, which a controller measures between its ticks; at rest if left out.
+    """
+    p = parameters
+    cop_vel = np.zeros(2) if cop_vel is None else cop_vel
+    terms = [
+        posture_rows(state, targets, p),
+        linear_momentum_rows(state, targets, p),
+        angular_momentum_rows(state, targets, p, cop_vel),
+        wrench_rows(state, p),
+        torque_rows(state, p),
+        accel_rows(state, p),
+        *tasks,
+    ]
+    bounds = [
+        root_dynamics(state, p),
+        sole_motion(state, p),
+        sole_cones(state, p),
+        torque_limits(state, p),
+        joint_limits(state, p),
+        *constraints,
+    ]
+    if p.soft_root:
+        terms.append(root_rows(state, p))
+    # Zero wherever the soles do not move, so it changes no solution; but H becomes positive
+    # definite even if no task weighs the root's linear acceleration.
+    motion = sole_motion(state, p)
+    terms.append(Rows(motion.C, motion.l, np.full(len(motion.l), p.accel_weight.max())))
+    return assemble(terms, bounds, len(state.qvel) + len(state.J) + (6 if p.soft_root else 0))
+
+
+def assemble(tasks: Sequence[Rows], constraints: Sequence[Bounds], n: int) -> QP:
+    """H = Σ Aᵀ W A, g = −Σ Aᵀ W b, and the constraints one below the other, for n unknowns."""
+    H, g = np.zeros((n, n)), np.zeros(n)
+    for task in tasks:
+        A = _widened(task.A, n)
+        weighted = task.weights[:, None] * A
+        H += A.T @ weighted
+        g -= task.b @ weighted
+    C = np.vstack([_widened(bounds.C, n) for bounds in constraints])
+    l = np.concatenate([bounds.l for bounds in constraints])  # noqa: E741
+    u = np.concatenate([bounds.u for bounds in constraints])
+    return QP(0.5 * (H + H.T), g, C, l, u)
+
+
+def _widened(matrix: np.ndarray, n: int) -> np.ndarray:
+    """`matrix` with columns of zeros up to n."""
+    return np.hstack([matrix, np.zeros((len(matrix), n - matrix.shape[1]))])

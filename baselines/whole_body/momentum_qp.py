@@ -1,0 +1,281 @@
+"""The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from poise.baselines.controller import Outputs, Targets
+from poise.baselines.solvers import QP, Status, make_solver
+from poise.baselines.solvers.dual_active_set import solve_dual
+from poise.baselines.solvers.scaled_rows import INFEASIBLE
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import address_of, call
+from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import apart
+from poise.envs.maths.vectors import copy
+from poise.envs.physics.arrays import robot_arrays
+from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.state import RobotState
+from poise.envs.robots.robot import Robot
+
+from .parameters import qp_parameters
+from .reduced_qp import (
+    Assembly,
+    QPParameters,
+    Workspace,
+    allocate_workspace,
+    assemble,
+    recover,
+)
+from .tasks import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
+
+COMPILED_SOLVER = "active-set"
+MAX_ITERATIONS = 200
+
+
+@dataclass(frozen=True)
+class MomentumQPConfig:
+    """Tasks, contacts, limits and how they are solved [Macchietto09, Moskalev24 §2].
+
+    `root`: "hard" lets nothing but the ground push the root (physics); "soft" adds a penalised
+    wrench u_root on it (a game character that must not fail).
+    """
+
+    kind: Literal["momentum-qp"] = "momentum-qp"
+    period: float = field(default=0.004, metadata={"above": 0.0, "max": 0.05})  # [s]
+    solver: str = COMPILED_SOLVER
+    solver_options: dict[str, bool | float] = field(default_factory=dict)
+    root: Literal["hard", "soft"] = "hard"
+    root_weight: float = field(default=1e3, metadata={"above": 0.0})
+    posture: PostureTask = field(default_factory=PostureTask)
+    com: CoMTask = field(default_factory=CoMTask)
+    cop: CoPTask = field(default_factory=CoPTask)
+    contact: SoleContact = field(default_factory=SoleContact)
+    torque: TorqueLimit = field(default_factory=TorqueLimit)
+    joint: JointLimit = field(default_factory=JointLimit)
+
+
+@dataclass(frozen=True, eq=False)
+class Memory(Block):
+    """What outlives a tick: the torques to fall back on and the count of failures."""
+
+    torques: np.ndarray  # (nj,) of the last solved tick [N·m]
+    damping: np.ndarray  # (nj,) joint-space damping to fall back on [N·m·s/rad]
+    streak: np.ndarray  # (1,) int: failures since then
+    failures: np.ndarray  # (1,) int: failures since the reset
+
+
+def allocate_memory(torque_limit: np.ndarray) -> Memory:
+    """Nothing remembered yet; `torque_limit` (nj,) [N·m]."""
+    return Memory(
+        torques=apart(len(torque_limit)),
+        damping=torque_limit / FALLBACK_SPEED,
+        streak=apart(1, dtype=np.int64),
+        failures=apart(1, dtype=np.int64),
+    )
+
+
+def forget(memory: Memory) -> None:
+    """As before the first tick."""
+    memory.torques[:] = 0.0
+    memory.streak[0] = memory.failures[0] = 0
+
+
+FALLBACK_DECAY = 0.8  # per tick: share that the last good torques keep
+FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the whole torque limit
+
+
+@compiled
+def release_joints(ws: Workspace):
+    """Take away the joint limits, the last rows of the problem."""
+    first = ws.l.shape[0] - ws.tau.shape[0]
+    ws.l[first:] = -np.inf
+    ws.u[first:] = np.inf
+
+
+@compiled
+def solve(ws: Workspace):
+    """Solve the assembled problem, starting from the last tick's active rows."""
+    for _ in range(2):
+        ws.status[0] = solve_dual(
+            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS,
+            True,
+        )  # fmt: skip
+        if ws.status[0] != INFEASIBLE:
+            return
+        release_joints(ws)  # always their fault, and the joints hold their limits by themselves
+
+
+@compiled
+def accept(s: StateArrays, p: QPParameters, ws: Workspace, memory: Memory):
+    """Torques from a solved QP; otherwise the last good ones, blended into damping."""
+    if ws.status[0] == 0:
+        recover(p, ws)
+        if np.all(np.isfinite(ws.tau)):
+            copy(ws.tau, memory.torques)
+            memory.streak[0] = 0
+            return
+    memory.streak[0] += 1
+    memory.failures[0] += 1
+    keep = FALLBACK_DECAY ** memory.streak[0]
+    ws.root_wrench[:] = 0.0
+    for a in range(ws.tau.shape[0]):
+        speed = s.qvel[6 + a] if np.isfinite(s.qvel[6 + a]) else 0.0
+        torque = keep * memory.torques[a] - (1.0 - keep) * memory.damping[a] * speed
+        ws.tau[a] = min(max(torque, -p.torque_limit[a]), p.torque_limit[a])
+
+
+@dataclass(frozen=True, eq=False)
+class Tick(Block):
+    """What a control tick works on; the kernels of its stages, by address, are compiled once."""
+
+    problem: Assembly
+    memory: Memory
+    assemble: int
+    solve: int
+
+
+@compiled
+def momentum_tick(t: Tick):
+    """One control tick with the compiled solver: `tau` (nj,) of the workspace holds torques."""
+    a = t.problem
+    call(t.assemble, a)
+    call(t.solve, a.workspace)
+    accept(a.state, a.parameters, a.workspace, t.memory)
+
+
+class MomentumQP(Copyable):
+    """Tracks a posture, the CoM through linear and the CoP through angular momentum.
+
+    `torques` solves the reduced problem of `reduced_qp.py`, whose readable form is
+    `formulation.py`. After a call, `vdot`, `wrenches`, `root_wrench` and `failures` tell what was
+    found. Raises ConfigError for an unknown solver or solver option.
+    """
+
+    def __init__(self, robot: Robot, config: MomentumQPConfig | None = None):
+        self.robot = robot
+        self.config = config or MomentumQPConfig()
+        self.period = self.config.period
+        self.arrays = robot_arrays(robot)
+        self.parameters = qp_parameters(robot, self.arrays, self.config)
+        self.workspace = allocate_workspace(
+            self.arrays, self.parameters.cone.shape[1], self.config.root == "soft"
+        )
+        self.memory = allocate_memory(self.parameters.torque_limit)
+        self.com_offset = self.config.com.offset * robot.height_com
+        self.solver = None
+        if self.config.solver != COMPILED_SOLVER or self.config.solver_options:
+            self.solver = make_solver(self.config.solver, **self.config.solver_options)
+        self._motor_joints = self.arrays.motor_dofs - 6
+        self._assembly: Assembly | None = None
+        self._tick: Tick | None = None
+
+    @property
+    def failures(self) -> int:
+        """Ticks since the reset at which the QP was not solved."""
+        return int(self.memory.failures[0])
+
+    @property
+    def vdot(self) -> np.ndarray:
+        """(nv,) accelerations of the last solution."""
+        return self.workspace.vdot.copy()
+
+    @property
+    def wrenches(self) -> np.ndarray:
+        """(6 nc,) sole wrenches of the last solution, world axes, at the sole points."""
+        return self.workspace.wrenches.copy()
+
+    @property
+    def root_wrench(self) -> np.ndarray:
+        """(6,) u_root of the last solution: force and moment about the CoM; soft root only."""
+        return self.workspace.root_wrench.copy()
+
+    def reset(self, state: RobotState | None = None) -> None:
+        """Forget the last trial."""
+        forget(self.memory)
+        self.workspace.cop_prev[:] = np.nan
+        self.workspace.iscratch[:] = 0  # no row to start from
+        self.workspace.tau[:] = 0.0
+        self.workspace.root_wrench[:] = 0.0
+        self.workspace.wrenches[:] = 0.0
+        if self.solver is not None:
+            self.solver.reset()
+
+    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Tick]:
+        """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""
+        tick = self.tick(state, targets)
+        return address_of(momentum_tick, tick), tick
+
+    def outputs(self) -> Outputs:
+        """See `Outputs`."""
+        ws, p = self.workspace, self.parameters
+        return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root)
+
+    def assembly(self, state: RobotState, targets: Targets) -> Assembly:
+        """What `assemble` fills the workspace from."""
+        s, t, known = state.arrays, targets.arrays(), self._assembly
+        if (
+            known is None or known.state is not s or known.targets is not t
+            or known.parameters is not self.parameters
+        ):  # fmt: skip
+            known = Assembly(self.arrays, s, self.parameters, t, self.period, self.workspace)
+            self._assembly = known
+        return known
+
+    def tick(self, state: RobotState, targets: Targets) -> Tick:
+        """What `momentum_tick` works on."""
+        problem = self.assembly(state, targets)
+        if self._tick is None or self._tick.problem is not problem:
+            stages = address_of(assemble, problem), address_of(solve, self.workspace)
+            self._tick = Tick(problem, self.memory, *stages)
+        return self._tick
+
+    def problem(self, state: RobotState, targets: Targets) -> QP:
+        """The reduced QP of this state: pure, nothing is solved or remembered."""
+        ws = self.workspace
+        before = ws.cop_prev.copy()
+        assemble(self.assembly(state, targets))
+        ws.cop_prev[:] = before
+        return QP(ws.H.copy(), ws.g.copy(), ws.C.copy(), ws.l.copy(), ws.u.copy())
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] for the next `period`."""
+        ws = self.workspace
+        if self.solver is None:
+            momentum_tick(self.tick(state, targets))
+        else:
+            assemble(self.assembly(state, targets))
+            solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
+            if solution.status is Status.INFEASIBLE:
+                release_joints(ws)
+                solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
+            if solution.solved:
+                ws.x[:] = solution.x
+            ws.status[0] = 0 if solution.solved else 1
+            accept(state.arrays, self.parameters, ws, self.memory)
+        return ws.tau[self._motor_joints].copy()
+
+
+class AroundQP(Copyable):
+    """Holds the QP in `qp` and tells what it tells: period, CoM offset, failures, root wrench."""
+
+    def __init__(self, robot: Robot, qp: MomentumQPConfig):
+        self.robot = robot
+        self.qp = MomentumQP(robot, qp)
+        self.period, self.com_offset = self.qp.period, self.qp.com_offset
+
+    @property
+    def failures(self) -> int:
+        """Ticks since the reset at which the QP was not solved."""
+        return self.qp.failures
+
+    @property
+    def root_wrench(self) -> np.ndarray:
+        """(6,) u_root of the QP's last tick, soft root only."""
+        return self.qp.root_wrench
+
+    def reset(self, state: RobotState | None = None) -> None:
+        """Forget the last trial."""
+        self.qp.reset(state)

@@ -1,0 +1,143 @@
+"""Accelerations that keep the soles where they are: the null space of J, compiled.
+
+Only the joints between the root and a sole (the *held* ones) have columns in J. So the null space
+is one orthonormal vector for each other joint, its own acceleration, and an orthonormal basis of
+the held part, from Householder's QR of Jᵀ with column pivoting.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import apart
+from poise.envs.physics.arrays import RobotArrays
+
+DEPENDENT = 1e-6  # pivot, relative to the first, below which a row of J follows from the others
+
+
+@dataclass(frozen=True, eq=False)
+class NullSpace(Block):
+    """Scratch for `solve_soles`: nh held degrees of freedom, k rows of J, padded to kp."""
+
+    held: np.ndarray  # (nh,) int
+    free: np.ndarray  # (nv − nh,) int
+    rows: np.ndarray  # (nh, kp) Jᵀ on its way to R, its columns not swapped
+    product: np.ndarray  # as wide as `rows` or `basis`: scratch
+    reflectors: np.ndarray  # (min(k, nh), nh)
+    beta: np.ndarray  # (min(k, nh),)
+    pivot: np.ndarray  # (min(k, nh),) int: the row of J that each reflector eliminates
+    open: np.ndarray  # (k,) bool: rows of J still to be eliminated
+    basis: np.ndarray  # (nh, 8 or more) null vectors, then v̇₀, as columns
+
+
+def allocate_null_space(robot: RobotArrays) -> NullSpace:
+    """Zeroed scratch for one robot."""
+    nv = len(robot.q_standing) + 6
+    k = 6 * len(robot.sole_body)
+    held = np.unique(
+        np.concatenate(
+            [chain[:n] for chain, n in zip(robot.chain, robot.chain_length, strict=True)]
+        )
+    )
+    nh, steps = len(held), min(k, len(held))
+    width, basis_width = (-(-columns // 8) * 8 for columns in (k, nh - steps + 1))
+    zeros = apart
+    return NullSpace(
+        held=held,
+        free=np.setdiff1d(np.arange(nv), held),
+        rows=zeros((nh, width)),
+        product=zeros(max(width, basis_width)),
+        reflectors=zeros((steps, nh)),
+        beta=zeros(steps),
+        pivot=zeros(steps, dtype=np.int64),
+        open=zeros(k, dtype=np.bool_),
+        basis=zeros((nh, basis_width)),
+    )
+
+
+@compiled
+def solve_soles(J, rhs, space, vdot0, V):
+    """v̇ = v̇₀ + V z for any z solves J v̇ = rhs; v̇₀ is the least solution.
+
+    In: J (k, nv), rhs (k,). Out: vdot0 (nv,), and in the first columns of V (nv, n) an orthonormal
+    basis of the null space: the held joints' part, then one column for each other joint; the rest
+    is zero. Rows of J that depend on others (a straight leg) are dropped: their part of v̇₀ is 0.
+    """
+    held, free, basis = space.held, space.free, space.basis
+    steps, nh = space.reflectors.shape
+    nullity = nh - steps
+    _reduce(J, space)
+    basis[:, :] = 0.0
+    smallest = DEPENDENT * abs(space.rows[0, space.pivot[0]])
+    for r in range(steps):  # Rᵀ y = rhs
+        column = space.pivot[r]
+        total = rhs[column]
+        for i in range(r):
+            total -= space.rows[i, column] * basis[i, nullity]
+        pivot = space.rows[r, column]
+        basis[r, nullity] = total / pivot if abs(pivot) > smallest else 0.0
+    for i in range(nullity):
+        basis[steps + i, i] = 1.0
+    for r in range(steps - 1, -1, -1):
+        _reflect(space.reflectors[r], space.beta[r], r, basis, space.product)
+    V[:, :] = 0.0
+    vdot0[:] = 0.0
+    for i in range(nh):
+        vdot0[held[i]] = basis[i, nullity]
+        for j in range(nullity):
+            V[held[i], j] = basis[i, j]
+    for j in range(len(free)):
+        V[free[j], nullity + j] = 1.0
+
+
+@compiled
+def _reduce(J, space):
+    """Householder's QR of Jᵀ: `reflectors`, `beta`, `pivot`, and R in `rows`.
+
+    All columns are treated alike: those that are finished are zero where a reflector acts.
+    """
+    rows, norms = space.rows, space.product
+    nh, columns = rows.shape
+    k = J.shape[0]
+    for i in range(nh):
+        for c in range(k):
+            rows[i, c] = J[c, space.held[i]]
+    space.open[:] = True
+    for r in range(space.reflectors.shape[0]):
+        norms[:] = 0.0
+        for i in range(r, nh):
+            for c in range(columns):
+                norms[c] += rows[i, c] * rows[i, c]
+        best, norm2 = -1, -1.0
+        for c in range(k):
+            if space.open[c] and norms[c] > norm2 * (1.0 + 1e-9):
+                best, norm2 = c, norms[c]
+        space.open[best] = False
+        space.pivot[r] = best
+        v = space.reflectors[r]
+        for i in range(v.shape[0]):
+            v[i] = rows[i, best]
+        alpha = -np.sqrt(norm2) if v[r] > 0.0 else np.sqrt(norm2)
+        length2 = 2.0 * (norm2 - alpha * v[r])
+        v[r] -= alpha
+        space.beta[r] = 2.0 / length2 if length2 > 0.0 else 0.0
+        _reflect(v, space.beta[r], r, rows, norms)
+        rows[r, best] = alpha
+        rows[r + 1 :, best] = 0.0
+
+
+@compiled
+def _reflect(v, beta, start, columns, product):
+    """columns ← (I − β v vᵀ) columns, for a v that counts from `start`; `product` is scratch."""
+    width = columns.shape[1]
+    for j in range(width):
+        product[j] = 0.0
+    for i in range(start, len(v)):
+        for j in range(width):
+            product[j] += v[i] * columns[i, j]
+    for i in range(start, len(v)):
+        factor = beta * v[i]
+        for j in range(width):
+            columns[i, j] -= factor * product[j]

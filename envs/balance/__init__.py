@@ -1,0 +1,1 @@
+"""The environments' base: observation, reward, falls, and the environment of joint torques."""

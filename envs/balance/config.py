@@ -1,0 +1,72 @@
+"""What an environment is configured with: pushes, start, fall, reward and time."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from poise.configs.errors import ConfigError, shown
+from poise.configs.files import resolve
+from poise.configs.schema import build, read_yaml, to_dict
+from poise.envs.pushes.sampler import PushSampler
+
+from .episode import FallLimits, RewardWeights
+
+
+class UnknownArgument(ConfigError, TypeError):
+    """An argument that the environment does not have. A TypeError too, as of any function.
+
+    TorchRL gives every environment arguments of its own, and takes back what raises a TypeError.
+    """
+
+
+@dataclass(frozen=True)
+class StartNoise:
+    """How far a reset departs from the standing posture; uniform in ±."""
+
+    joints: float = field(default=0.02, metadata={"min": 0.0, "max": 0.5})  # [rad]
+    joint_speeds: float = field(default=0.05, metadata={"min": 0.0})  # [rad/s]
+    speed: float = field(default=0.02, metadata={"min": 0.0})  # root, horizontal [m/s]
+
+
+@dataclass(frozen=True)
+class EnvConfig:
+    """Everything about an environment that is not its robot or its controller."""
+
+    policy_period: float = field(default=0.02, metadata={"above": 0.0, "max": 1.0})  # [s]
+    duration: float = field(default=6.0, metadata={"above": 0.0, "max": 1e6})  # of an episode [s]
+    pushes: PushSampler | None = field(
+        default_factory=lambda: PushSampler(magnitude=(0.2, 0.5), unit="specific_impulse")
+    )
+    noise: StartNoise = field(default_factory=StartNoise)
+    fall: FallLimits = field(default_factory=FallLimits)
+    reward: RewardWeights = field(default_factory=RewardWeights)
+
+
+def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: Any) -> EnvConfig:
+    """An EnvConfig from a packaged name, a path, a mapping or an object; `overrides` win.
+
+    Raises ConfigError naming the file, the field and the choices, UnknownArgument for an override
+    that is no field.
+    """
+    for name in overrides:
+        if name not in EnvConfig.__dataclass_fields__:
+            raise UnknownArgument(
+                f"unexpected keyword argument {shown(name)}",
+                source="environment",
+                choices=EnvConfig.__dataclass_fields__,
+            )
+    source = "environment"
+    if isinstance(config, (str, Path)):
+        path = resolve("envs", config)
+        config, source = read_yaml(path), str(path)
+    fields = {} if config is None else to_dict(config)
+    if not isinstance(fields, Mapping):
+        raise ConfigError(
+            f"must be an EnvConfig, a file or a mapping, not {shown(config)}",
+            source=source,
+            field="config",
+            choices=EnvConfig.__dataclass_fields__,
+        )
+    overrides = {name: to_dict(value) for name, value in overrides.items()}
+    return build(EnvConfig, {**fields, **overrides}, source)

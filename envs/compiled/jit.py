@@ -1,0 +1,97 @@
+"""The one Numba decorator of this package, and what a user sees when it compiles."""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numba
+from numba.core import event
+
+from poise.configs.errors import ConfigError
+
+from .kernel_cache import drop_stale_kernels, kept_in, kernel_folder
+
+#: Sums may be reordered (SIMD) and products fused into them, but NaN and infinity keep their
+#: meaning: checks rely on them.
+FAST = ("arcp", "contract", "nsz", "reassoc")
+
+
+def fastmath(environment: Mapping[str, str]) -> set[str]:
+    """LLVM's flags for floating-point numbers: none if `POISE_FASTMATH` is 0.
+
+    Then every operation is rounded as the sources write it, as IEEE 754 has it. That is slower, and
+    makes kernels of different processors agree to the bit, up to sines and the like.
+
+    Raises:
+        ConfigError: it is neither 0 nor 1.
+    """
+    switch = environment.get("POISE_FASTMATH", "1")
+    if switch not in ("0", "1"):
+        raise ConfigError(f"not a switch: {switch!r}", source="the environment",
+                          field="POISE_FASTMATH", choices=("0", "1"))  # fmt: skip
+    return set(FAST) if switch == "1" else set()
+
+
+_FLAGS = fastmath(os.environ)
+#: Of the cache of compiled kernels; None where nothing can be written.
+CACHE = kernel_folder(sorted(_FLAGS))
+if CACHE is not None:
+    drop_stale_kernels(CACHE)
+
+
+def compiled(function: Callable) -> Any:
+    """Numba's decorator: cached on disk, without the GIL, NumPy's rules for division by zero."""
+    with kept_in(CACHE):
+        return numba.njit(
+            cache=CACHE is not None,
+            nogil=True,
+            no_cfunc_wrapper=True,  # of which nobody makes use; a twentieth of the compilation
+            error_model="numpy",
+            fastmath=_FLAGS,
+        )(function)
+
+
+PATIENCE = 1.0  # [s] of compilation before the user is told
+MESSAGE = "poise: compiling for the first use; this takes twenty to thirty seconds, once"
+
+
+class Patience(event.Listener):
+    """Says on the standard error, once in a process, that compilation takes a while.
+
+    Kernels read from the cache raise no event, nor do a user's own functions count.
+    """
+
+    def __init__(self) -> None:
+        self.depth, self.begun, self.told = 0, 0.0, False
+
+    def on_start(self, event: event.Event) -> None:
+        if self.depth == 0:
+            self.begun = time.perf_counter()
+        self.depth += 1
+        ours = event.data["dispatcher"].py_func.__module__.startswith("poise.")
+        if ours and time.perf_counter() - self.begun > PATIENCE:
+            self.tell()
+
+    def tell(self) -> None:
+        if not self.told:
+            self.told = True
+            print(MESSAGE, file=sys.stderr, flush=True)
+
+    def on_end(self, event: event.Event) -> None:
+        self.depth -= 1
+
+
+_patience = Patience()
+event.register("numba:compile", _patience)
+
+
+def tell() -> None:
+    """The message, once in a process."""
+    _patience.tell()
+
+
+def quiet() -> None:
+    """No message from this process: the one that started it has told."""
+    _patience.told = True

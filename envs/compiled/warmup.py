@@ -1,0 +1,88 @@
+"""Compile the kernels once, in processes of their own.
+
+A kernel that a process compiled itself may differ in the last bits from the same kernel read from
+the cache (other functions were at hand to be inlined). After `fill_cache` every process reads the
+same compiled code, so results do not depend on which process came first.
+"""
+
+import subprocess
+import sys
+from collections.abc import Sequence
+
+from poise.configs.errors import PoiseError
+from poise.configs.files import write_atomic
+
+from . import jit
+from .kernel_cache import stamp
+
+_READY = "kernels.ready"  # beside the kernels: the digest of the sources, then shares
+_compiling = False  # whether this process is one of those that compile
+_tried: set[str] = set()  # shares that this process has had compiled, or could not have
+
+
+def fill_cache(module: str, *groups: Sequence[str]) -> None:
+    """Compile what is missing: each group is a list of functions of `module`, its shares.
+
+    The shares of a group are compiled at the same time, in a process each, and use the kernels of
+    the groups before it. Where no cache can be written, nothing happens.
+    """
+    if _compiling or jit.CACHE is None:
+        return
+    ready = jit.CACHE / _READY
+    try:
+        sources = stamp(jit.CACHE).read_text()
+        for shares in groups:
+            digest, *done = ready.read_text().split() if ready.is_file() else [""]
+            done = done if digest == sources else []
+            missing = [share for share in shares if share not in done and share not in _tried]
+            if not missing:
+                continue
+            _tried.update(missing)
+            jit.tell()
+            if not _compile_apart(module, missing):
+                return
+            write_atomic(ready, "\n".join([sources, *done, *missing]))
+    except (OSError, PoiseError):
+        return  # a folder that cannot be written has no cache: nothing to share
+
+
+# Ends with the process that holds the other end of its standard input, even if that is killed.
+_WATCH = """
+import os, threading
+def watch():
+    os.read(0, 1)
+    os._exit(1)
+threading.Thread(target=watch, daemon=True).start()
+"""
+
+
+def _compile_apart(module: str, shares: Sequence[str]) -> bool:
+    """Whether the processes have all finished without an error; Ctrl-C reaches this one alone."""
+    jobs: list[subprocess.Popen] = []
+    try:
+        for share in shares:
+            code = (
+                f"{_WATCH}from {__name__} import begin; begin();"
+                f"from {module} import {share}; {share}()"
+            )
+            jobs.append(
+                subprocess.Popen(  # -P: no modules from the current folder
+                    [sys.executable, "-P", "-c", code],
+                    stdin=subprocess.PIPE,
+                    start_new_session=True,
+                )
+            )
+        return all([job.wait() == 0 for job in jobs])
+    finally:
+        for job in jobs:
+            job.kill()
+            job.wait()
+            assert job.stdin is not None  # a pipe
+            job.stdin.close()
+
+
+def begin() -> None:
+    """This process compiles: it has nothing to wait for, and its starter has told the user."""
+    global _compiling
+    _compiling = True
+    jit.quiet()

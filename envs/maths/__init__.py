@@ -1,0 +1,1 @@
+"""Formulas without state: polygons, vectors and frames, the linear inverted pendulum."""

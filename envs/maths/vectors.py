@@ -1,0 +1,44 @@
+"""Vectors and frames: formulas without state."""
+
+import numpy as np
+
+from poise.envs.compiled.jit import compiled
+
+
+@compiled
+def copy(source, out):
+    """`out[:] = source` of two vectors; NumPy's form compiles checks and their messages too."""
+    for i in range(out.shape[0]):
+        out[i] = source[i]
+
+
+@compiled
+def cross(a, b, out):
+    """out = a × b for arrays of three."""
+    x = a[1] * b[2] - a[2] * b[1]
+    y = a[2] * b[0] - a[0] * b[2]
+    z = a[0] * b[1] - a[1] * b[0]
+    out[0], out[1], out[2] = x, y, z
+
+
+@compiled
+def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray):
+    """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn from
+    one to the other."""
+    for a in range(3):
+        i, j = (a + 1) % 3, (a + 2) % 3
+        total = 0.0
+        for k in range(3):
+            total += wanted[j, k] * axes[i, k] - wanted[i, k] * axes[j, k]
+        out[a] = 0.5 * total
+
+
+def skew(r: np.ndarray) -> np.ndarray:
+    """(3, 3) matrix of the cross product: skew(r) f = r × f."""
+    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+
+
+def turn(yaw: float) -> np.ndarray:
+    """(2, 2) rotation by `yaw` in the plane."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s], [s, c]])

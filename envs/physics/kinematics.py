@@ -1,0 +1,293 @@
+"""All kinematic and centroidal quantities of one tick, computed once by compiled code.
+
+Everything follows from what MuJoCo's position and velocity stages leave in `mjData`; no second
+pass is made. Momentum comes from the six root rows of the dynamics: a free joint's rows hold
+the wrench about the root's origin, so moving it to the CoM gives the centroidal momentum
+matrix [Orin08] and its bias without building either.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import GAP, apart
+from poise.envs.maths.polygons import convex_hull
+from poise.envs.maths.vectors import copy
+
+from .arrays import MAX_VERTICES, Plant, RobotArrays
+
+
+@dataclass(frozen=True, eq=False)
+class StateArrays(Block):
+    """Storage of one robot state; see `RobotState` for the meaning of each name."""
+
+    qpos: np.ndarray  # (nv + 1,)
+    qvel: np.ndarray  # (nv,)
+    M: np.ndarray  # (nv, nv)
+    h: np.ndarray  # (nv,)
+    root_axes: np.ndarray  # (3, 3)
+    com: np.ndarray  # (3,)
+    com_vel: np.ndarray  # (3,)
+    momentum: np.ndarray  # (6,)
+    A: np.ndarray  # (6, nv)
+    A_bias: np.ndarray  # (6,)
+    J: np.ndarray  # (6 nc, nv)
+    Jdot_v: np.ndarray  # (6 nc,)
+    J_v: np.ndarray  # (6 nc,)
+    sole_point: np.ndarray  # (nc, 3)
+    sole_axes: np.ndarray  # (nc, 3, 3)
+    origin: np.ndarray  # (3,)
+    heading: np.ndarray  # (2,)
+    contact_wrench: np.ndarray  # (6,)
+    cop: np.ndarray  # (2,)
+    capture_point: np.ndarray  # (2,)
+    omega: np.ndarray  # (1,)
+    contacts: np.ndarray  # (nc,)
+    other_contacts: np.ndarray  # (1,)
+    support: np.ndarray  # (8 nc, 2)
+    support_size: np.ndarray  # (1,) int
+
+
+def allocate_state(nv: int, nc: int) -> StateArrays:
+    """Zeroed storage for a robot of `nv` degrees of freedom and `nc` soles."""
+    zeros = apart
+    return StateArrays(
+        qpos=zeros(nv + 1),
+        qvel=zeros(nv),
+        M=zeros((nv, nv)),
+        h=zeros(nv),
+        root_axes=zeros((3, 3)),
+        com=zeros(3),
+        com_vel=zeros(3),
+        momentum=zeros(6),
+        A=zeros((6, nv)),
+        A_bias=zeros(6),
+        J=zeros((6 * nc, nv)),
+        Jdot_v=zeros(6 * nc),
+        J_v=zeros(6 * nc),
+        sole_point=zeros((nc, 3)),
+        sole_axes=zeros((nc, 3, 3)),
+        origin=zeros(3),
+        heading=zeros(2),
+        contact_wrench=zeros(6),
+        cop=zeros(2),
+        capture_point=zeros(2),
+        omega=zeros(1),
+        contacts=zeros(nc),
+        other_contacts=zeros(1),
+        support=zeros((MAX_VERTICES * nc, 2)),
+        support_size=zeros(1, dtype=np.int64),
+    )
+
+
+@compiled
+def update_state(robot: RobotArrays, plant: Plant, s: StateArrays):
+    """Fill `s` from the plant, whose position and velocity stages are current."""
+    _dynamics(robot, plant, s)
+    _momentum(robot, plant, s)
+    _soles(robot, plant, s)
+    _contact(robot, plant, s)
+
+
+@compiled
+def _dynamics(robot, plant, s):
+    nv = s.M.shape[0]
+    copy(plant.qpos, s.qpos)
+    copy(plant.qvel, s.qvel)
+    for i in range(nv):
+        start = robot.M_rowadr[i]
+        for k in range(robot.M_rownnz[i]):
+            j = robot.M_colind[start + k]
+            s.M[i, j] = plant.M[start + k]
+            s.M[j, i] = plant.M[start + k]
+        s.h[i] = plant.qfrc_bias[i] - plant.qfrc_passive[i]
+    for i in range(3):
+        for j in range(3):
+            s.root_axes[i, j] = plant.xmat[robot.root_body, 3 * i + j]
+
+
+@compiled
+def _momentum(robot, plant, s):
+    """P, L, A and its bias: A v̇ + A_bias is the wrench of the ground about the CoM."""
+    nv = s.M.shape[0]
+    R = s.root_axes
+    for i in range(3):
+        s.com[i] = plant.subtree_com[robot.root_body, i]
+    ox = s.com[0] - plant.qpos[0]
+    oy = s.com[1] - plant.qpos[1]
+    oz = s.com[2] - plant.qpos[2]
+    for j in range(nv):
+        fx, fy, fz = s.M[0, j], s.M[1, j], s.M[2, j]
+        s.A[0, j], s.A[1, j], s.A[2, j] = fx, fy, fz
+        nx = R[0, 0] * s.M[3, j] + R[0, 1] * s.M[4, j] + R[0, 2] * s.M[5, j]
+        ny = R[1, 0] * s.M[3, j] + R[1, 1] * s.M[4, j] + R[1, 2] * s.M[5, j]
+        nz = R[2, 0] * s.M[3, j] + R[2, 1] * s.M[4, j] + R[2, 2] * s.M[5, j]
+        s.A[3, j] = nx - (oy * fz - oz * fy)
+        s.A[4, j] = ny - (oz * fx - ox * fz)
+        s.A[5, j] = nz - (ox * fy - oy * fx)
+    fx, fy, fz = s.h[0], s.h[1], s.h[2]
+    nx = R[0, 0] * s.h[3] + R[0, 1] * s.h[4] + R[0, 2] * s.h[5]
+    ny = R[1, 0] * s.h[3] + R[1, 1] * s.h[4] + R[1, 2] * s.h[5]
+    nz = R[2, 0] * s.h[3] + R[2, 1] * s.h[4] + R[2, 2] * s.h[5]
+    s.A_bias[0], s.A_bias[1], s.A_bias[2] = fx, fy, fz
+    s.A_bias[3] = nx - (oy * fz - oz * fy)
+    s.A_bias[4] = ny - (oz * fx - ox * fz)
+    s.A_bias[5] = nz - (ox * fy - oy * fx)
+    for i in range(6):
+        total = 0.0
+        for j in range(nv):
+            total += s.A[i, j] * plant.qvel[j]
+        s.momentum[i] = total
+    for i in range(3):
+        s.com_vel[i] = s.momentum[i] / robot.mass
+
+
+@compiled
+def _soles(robot, plant, s):
+    """Pose, Jacobian and velocity-product acceleration of every sole; the heading frame."""
+    nc = s.sole_point.shape[0]
+    s.origin[:] = 0.0
+    forward_x, forward_y = 0.0, 0.0
+    for i in range(nc):
+        body = robot.sole_body[i]
+        point, axes = s.sole_point[i], s.sole_axes[i]
+        for a in range(3):
+            offset = 0.0
+            for b in range(3):
+                offset += plant.xmat[body, 3 * a + b] * robot.sole_position[i, b]
+                total = 0.0
+                for c in range(3):
+                    total += plant.xmat[body, 3 * a + c] * robot.sole_rotation[i, c, b]
+                axes[a, b] = total
+            point[a] = plant.xpos[body, a] + offset
+            s.origin[a] += point[a] / nc
+        forward_x += axes[0, 0]
+        forward_y += axes[1, 0]
+        _sole_jacobian(robot, plant, s, i)
+    norm = np.sqrt(forward_x * forward_x + forward_y * forward_y)
+    s.heading[0] = forward_x / norm if norm > 1e-9 else 1.0
+    s.heading[1] = forward_y / norm if norm > 1e-9 else 0.0
+
+
+@compiled
+def _sole_jacobian(robot, plant, s, i):
+    """Rows 6i..6i+6 of J, J v and J̇ v: linear velocity of the reference point, then angular.
+
+    MuJoCo keeps dof axes and spatial velocities at the subtree CoM o; a point at r moves with
+    ṙ = lin + ang × (r − o), and its acceleration has the additional ω × ṙ.
+    """
+    point, row = s.sole_point[i], 6 * i
+    rx = point[0] - plant.subtree_com[robot.tree_body, 0]
+    ry = point[1] - plant.subtree_com[robot.tree_body, 1]
+    rz = point[2] - plant.subtree_com[robot.tree_body, 2]
+    for a in range(6):
+        s.J_v[row + a] = 0.0
+        s.Jdot_v[row + a] = 0.0
+    for k in range(robot.chain_length[i]):
+        d = robot.chain[i, k]
+        speed = plant.qvel[d]
+        wx, wy, wz = plant.cdof[d, 0], plant.cdof[d, 1], plant.cdof[d, 2]
+        s.J[row, d] = plant.cdof[d, 3] + wy * rz - wz * ry
+        s.J[row + 1, d] = plant.cdof[d, 4] + wz * rx - wx * rz
+        s.J[row + 2, d] = plant.cdof[d, 5] + wx * ry - wy * rx
+        s.J[row + 3, d], s.J[row + 4, d], s.J[row + 5, d] = wx, wy, wz
+        for a in range(6):
+            s.J_v[row + a] += s.J[row + a, d] * speed
+        wx, wy, wz = plant.cdof_dot[d, 0], plant.cdof_dot[d, 1], plant.cdof_dot[d, 2]
+        s.Jdot_v[row] += speed * (plant.cdof_dot[d, 3] + wy * rz - wz * ry)
+        s.Jdot_v[row + 1] += speed * (plant.cdof_dot[d, 4] + wz * rx - wx * rz)
+        s.Jdot_v[row + 2] += speed * (plant.cdof_dot[d, 5] + wx * ry - wy * rx)
+        s.Jdot_v[row + 3] += speed * wx
+        s.Jdot_v[row + 4] += speed * wy
+        s.Jdot_v[row + 5] += speed * wz
+    vx, vy, vz = s.J_v[row], s.J_v[row + 1], s.J_v[row + 2]
+    wx, wy, wz = s.J_v[row + 3], s.J_v[row + 4], s.J_v[row + 5]
+    s.Jdot_v[row] += wy * vz - wz * vy
+    s.Jdot_v[row + 1] += wz * vx - wx * vz
+    s.Jdot_v[row + 2] += wx * vy - wy * vx
+
+
+@compiled
+def _contact(robot, plant, s):
+    """Total ground wrench, CoP and capture point; which feet touch the ground.
+
+    The ground is the only thing outside the body, and joint limits and friction do not act on
+    the root: so the root rows of the constraint force are the ground's wrench. They belong to the
+    root's pose before the last step, from which v has led to the present one.
+    """
+    R = s.root_axes
+    dt, f, v = robot.timestep, plant.qfrc_constraint, plant.qvel
+    fx, fy, fz = f[0], f[1], f[2]
+    mx = f[3] - dt * (v[4] * f[5] - v[5] * f[4])
+    my = f[4] - dt * (v[5] * f[3] - v[3] * f[5])
+    mz = f[5] - dt * (v[3] * f[4] - v[4] * f[3])
+    nx = R[0, 0] * mx + R[0, 1] * my + R[0, 2] * mz
+    ny = R[1, 0] * mx + R[1, 1] * my + R[1, 2] * mz
+    nz = R[2, 0] * mx + R[2, 1] * my + R[2, 2] * mz
+    x = plant.qpos[0] - dt * v[0]
+    y = plant.qpos[1] - dt * v[1]
+    z = plant.qpos[2] - dt * v[2]
+    s.contact_wrench[0], s.contact_wrench[1], s.contact_wrench[2] = fx, fy, fz
+    s.contact_wrench[3] = nx + y * fz - z * fy
+    s.contact_wrench[4] = ny + z * fx - x * fz
+    s.contact_wrench[5] = nz + x * fy - y * fx
+    if fz > 1e-3 * robot.mass * robot.gravity:
+        s.cop[0] = -s.contact_wrench[4] / fz
+        s.cop[1] = s.contact_wrench[3] / fz
+    else:  # no support: there is no CoP; the middle of the soles is what can be reached next
+        s.cop[0], s.cop[1] = s.origin[0], s.origin[1]
+    height = max(s.com[2] - s.origin[2], 0.2 * robot.height_com)
+    s.omega[0] = np.sqrt(robot.gravity / height)
+    for a in range(2):
+        s.capture_point[a] = s.com[a] + s.com_vel[a] / s.omega[0]
+    feet = 0.0
+    for i in range(s.contacts.shape[0]):
+        found = plant.sensordata[robot.sole_sensor[i]]
+        s.contacts[i] = 1.0 if found > 0.0 else 0.0
+        feet += found
+    s.other_contacts[0] = plant.sensordata[robot.ground_sensor] - feet
+
+
+AIRBORNE = 0.02  # [h]: a sole without contact that is this far above the lowest one is in the air
+
+
+@compiled
+def update_support(robot: RobotArrays, s: StateArrays):
+    """Convex hull of the vertices of all soles that are not in the air (counter-clockwise,
+    monotone chain). A foot that rocks on its edge still counts; one that steps does not."""
+    n, lowest = 0, np.inf
+    for i in range(s.sole_point.shape[0]):
+        lowest = min(lowest, s.sole_point[i, 2])
+    ceiling = lowest + AIRBORNE * robot.height_com
+    corners = robot.sole_polygon.shape[0] * robot.sole_polygon.shape[1]
+    points = np.empty((corners + 2 * GAP, 2))[GAP:]
+    for i in range(robot.sole_vertices.shape[0]):
+        if s.sole_point[i, 2] > ceiling and s.contacts[i] < 0.5:
+            continue
+        axes = s.sole_axes[i]
+        for k in range(robot.sole_vertices[i]):
+            u, v = robot.sole_polygon[i, k, 0], robot.sole_polygon[i, k, 1]
+            points[n, 0] = s.sole_point[i, 0] + axes[0, 0] * u + axes[0, 1] * v
+            points[n, 1] = s.sole_point[i, 1] + axes[1, 0] * u + axes[1, 1] * v
+            n += 1
+    hull = np.empty((2 * n + 1 + 2 * GAP, 2))[GAP:]
+    size = convex_hull(points, n, 0.0, hull)
+    for i in range(size):
+        s.support[i, 0], s.support[i, 1] = hull[i, 0], hull[i, 1]
+    s.support_size[0] = size
+
+
+@compiled
+def support_distance(s: StateArrays, x, y):
+    """Signed distance [m] from (x, y) to the support polygon's edge, > 0 inside."""
+    distance = np.inf
+    size = s.support_size[0]
+    for i in range(size):
+        ax, ay = s.support[i, 0], s.support[i, 1]
+        ex = s.support[(i + 1) % size, 0] - ax
+        ey = s.support[(i + 1) % size, 1] - ay
+        inside = (ex * (y - ay) - ey * (x - ax)) / np.sqrt(ex * ex + ey * ey)
+        distance = min(distance, inside)
+    return distance

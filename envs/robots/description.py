@@ -1,0 +1,147 @@
+"""The description of a robot: which model it is, where its feet are, how it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from typing import Literal, TypeVar
+
+from poise.configs.errors import ConfigError, shown
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class SourceDescription:
+    """Where the model comes from: one of the two.
+
+    Attributes:
+        builder: a model that Poise builds itself.
+        mjcf: path of an MJCF file, relative to the YAML file.
+    """
+
+    builder: Literal["humanoid"] | None = None
+    mjcf: str | None = None
+
+    def __post_init__(self) -> None:
+        if (self.builder is None) == (self.mjcf is None):
+            raise ValueError("give exactly one of builder and mjcf")
+
+
+@dataclass(frozen=True)
+class FootDescription:
+    """A foot, whose collision geometry makes its sole.
+
+    Attributes:
+        name: a name for the foot, such as ``left``.
+        body: the foot's body in the model.
+        geoms: the geoms of the sole; empty for all collision geoms of the body and of what is
+            welded to it.
+    """
+
+    name: str
+    body: str
+    geoms: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class PostureDescription:
+    """The standing posture. Small errors are levelled out so that both soles lie flat.
+
+    Attributes:
+        keyframe: keyframe of the MJCF to start from; without it, the model's zero posture.
+        unit: unit of the hinge angles in ``joints``; slide joints are in [m].
+        joints: joint name, or pattern such as ``*_knee``, → position.
+    """
+
+    keyframe: str | None = None
+    unit: Literal["degree", "radian"] = "degree"
+    joints: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class OptionDescription:
+    """Simulation options that replace those of the model.
+
+    Attributes:
+        timestep: physics step [s].
+        integrator: MuJoCo's integrator.
+        solver: MuJoCo's constraint solver.
+        friction: sliding friction coefficient of every geom; without it, the model's own.
+    """
+
+    timestep: float = field(default=0.002, metadata={"above": 0.0, "max": 0.01})
+    integrator: Literal["implicitfast", "implicit", "Euler"] = "implicitfast"
+    solver: Literal["Newton", "CG", "PGS"] = "Newton"
+    friction: float | None = field(default=None, metadata={"above": 0.0, "max": 5.0})
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """A floating-base biped as data; ``configs/robots/*.yaml`` are examples.
+
+    Attributes:
+        name: the robot's name.
+        source: where the model comes from.
+        root: the floating body, which has the free joint.
+        feet: the two feet.
+        posture: the standing posture.
+        forward: the robot's forward direction in the root body's frame.
+        roles: what reference motions move: role, such as ``knees`` → joint name or pattern → scale,
+            so that +1 degree of the role turns the joint by ``scale`` degrees. Pitch is positive
+            about the robot's left axis, roll about its forward axis, of the segment that is
+            further from the pelvis: knees bend and the torso leans forward with positive pitch.
+        torque_limits: joint name or pattern → largest torque [N·m]. Needed where the model's
+            actuators do not bound it; wins over the model's own limits, and gives a motor to a
+            joint that has none. An exact name wins over a pattern, an earlier pattern over a later.
+        push_bodies: bodies that a benchmark pushes, the first where one is wanted; empty for the
+            root alone.
+        ground: name of the ground plane; without it, the model's own plane. A model without a
+            plane gets one.
+        options: simulation options.
+    """
+
+    name: str
+    source: SourceDescription
+    root: str
+    feet: tuple[FootDescription, ...]
+    posture: PostureDescription = field(default_factory=PostureDescription)
+    forward: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    roles: dict[str, dict[str, float]] = field(default_factory=dict)
+    torque_limits: dict[str, float] = field(default_factory=dict, metadata={"above": 0.0})
+    push_bodies: tuple[str, ...] = ()
+    ground: str | None = None
+    options: OptionDescription = field(default_factory=OptionDescription)
+
+    def __post_init__(self) -> None:
+        if len(self.feet) != 2:
+            raise ValueError(f"feet: a biped has two feet, {len(self.feet)} given")
+        names = [foot.name for foot in self.feet]
+        if len({*names, "ground", ""}) != 4:
+            raise ValueError(f"feet: names must be different and neither 'ground' nor '': {names}")
+        if self.feet[0].body == self.feet[1].body:
+            raise ValueError(f"feet: both are the body {self.feet[0].body!r}")
+        if not any(self.forward):
+            raise ValueError("forward: must not be the zero vector")
+
+
+def match_names(
+    patterns: dict[str, Value], names: list[str], source: str, field: str
+) -> dict[str, Value]:
+    """The value for each name that is a key of ``patterns`` or matches one (shell wildcards).
+
+    An exact name wins over a pattern, an earlier pattern over a later.
+
+    Raises:
+        ConfigError: a pattern matches no name.
+    """
+    matched: dict[str, Value] = {}
+    for pattern in sorted(patterns, key=lambda key: key not in names):  # exact names first
+        hits = [pattern] if pattern in names else [n for n in names if fnmatchcase(n, pattern)]
+        if not hits:
+            raise ConfigError(
+                f"no joint is called {shown(pattern)}", source=source, field=field, choices=names
+            )
+        for name in hits:
+            matched.setdefault(name, patterns[pattern])
+    return matched

@@ -1,0 +1,144 @@
+"""The ground plane of a robot's world, and the sensors that count contacts with it."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from poise.configs.errors import ConfigError, shown
+
+from .description import OptionDescription, RobotDescription
+
+GROUND = "ground"  # name of a plane that has none
+CONTACT_SENSOR = "contact_"  # prefix of the sensors' names
+ALL_BITS = 0x7FFFFFFF  # of contype and conaffinity: touches everything that collides
+INTEGRATORS = {
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
+}
+SOLVERS = {
+    "Newton": mujoco.mjtSolver.mjSOL_NEWTON,
+    "CG": mujoco.mjtSolver.mjSOL_CG,
+    "PGS": mujoco.mjtSolver.mjSOL_PGS,
+}
+
+
+def install_ground(spec: mujoco.MjSpec, name: str | None, source: str) -> str:
+    """The name of the ground plane, which is added where the model has no plane.
+
+    Args:
+        spec: changed in place.
+        name: a plane of the model, or how to call a new one; None takes the model's first plane
+            that collides with anything.
+        source: the description file, for errors.
+
+    Raises:
+        ConfigError: the model has planes but none with this name.
+    """
+    paired = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
+    planes = [
+        geom
+        for geom in spec.worldbody.geoms
+        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE
+        and (geom.contype or geom.conaffinity or geom.name in paired)
+    ]
+    if not planes:
+        _add_ground(spec, name or GROUND)
+        return name or GROUND
+    names = [geom.name for geom in planes]
+    if name is not None and name not in names:
+        raise ConfigError(
+            f"the model has no plane {shown(name)}", source=source, field="ground", choices=names
+        )
+    ground = planes[0 if name is None else names.index(name)]
+    ground.name = ground.name or GROUND
+    return ground.name
+
+
+def check_ground(model: mujoco.MjModel, ground: int, source: str) -> None:
+    """Raise ConfigError unless the ground is the plane z = 0."""
+    normal = np.zeros(3)
+    mujoco.mju_rotVecQuat(normal, np.array([0.0, 0.0, 1.0]), model.geom_quat[ground])
+    if model.geom_pos[ground, 2] != 0 or normal[2] < 1.0 - 1e-9:
+        raise ConfigError(
+            f"the plane {model.geom(ground).name!r} must be z = 0", source=source, field="ground"
+        )
+
+
+def can_touch(model: mujoco.MjModel, geom: int, other: int) -> bool:
+    """Whether two geoms may collide: by their contype and conaffinity, or as an explicit pair."""
+    return bool(
+        model.geom_contype[geom] & model.geom_conaffinity[other]
+        or model.geom_contype[other] & model.geom_conaffinity[geom]
+        or {geom, other} in [set(p) for p in zip(model.pair_geom1, model.pair_geom2, strict=True)]
+    )
+
+
+def add_contact_sensors(spec: mujoco.MjSpec, description: RobotDescription, ground: str) -> None:
+    """Sensors of the number of contacts with the ground: of all bodies, and of each foot."""
+    found = [1, 0, 1]  # data: "found"; no reduction; one slot
+    spec.add_sensor(
+        name=f"{CONTACT_SENSOR}ground",
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_GEOM,
+        objname=ground,
+        intprm=found,
+    )
+    for foot in description.feet:
+        spec.add_sensor(
+            name=CONTACT_SENSOR + foot.name,
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_XBODY,  # the foot's whole subtree
+            objname=foot.body,
+            reftype=mujoco.mjtObj.mjOBJ_GEOM,
+            refname=ground,
+            intprm=found,
+        )
+
+
+def set_options(spec: mujoco.MjSpec, options: OptionDescription) -> None:
+    """Set time step, integrator, solver and friction; make room for rendered frames."""
+    spec.option.timestep = options.timestep
+    spec.option.integrator = INTEGRATORS[options.integrator]
+    spec.option.solver = SOLVERS[options.solver]
+    if options.friction is not None:
+        for geom in spec.geoms:
+            geom.friction[0] = options.friction
+        for pair in spec.pairs:
+            pair.friction[:2] = options.friction
+    picture = spec.visual.global_
+    picture.offwidth, picture.offheight = max(picture.offwidth, 1280), max(picture.offheight, 960)
+
+
+def _add_ground(spec: mujoco.MjSpec, name: str) -> None:
+    if not any(t.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for t in spec.textures):
+        spec.add_texture(
+            name="poise_sky",
+            type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+            builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+            rgb1=[0.8, 0.87, 0.95],
+            rgb2=[1.0, 1.0, 1.0],
+            width=64,
+            height=384,
+        )
+    spec.add_texture(
+        name="poise_ground",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=[0.86, 0.86, 0.86],
+        rgb2=[0.76, 0.76, 0.76],
+        width=256,
+        height=256,
+    )
+    material = spec.add_material(name="poise_ground", texrepeat=[1, 1], texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "poise_ground"
+    spec.worldbody.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0, 0, 0.05],
+        contype=ALL_BITS,
+        conaffinity=ALL_BITS,
+        condim=3,
+        material="poise_ground",
+    )

@@ -1,0 +1,170 @@
+"""Bounds of an MJCF model, checked before MuJoCo builds it: nothing stops MuJoCo once it began."""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import mujoco
+
+from poise.configs.errors import ConfigError
+from poise.configs.reading import MIB, is_file, read_text
+
+MJCF_BYTES = 4 * MIB  # of all files of a model together
+ELEMENTS = 20_000  # of the XML, copies counted
+NESTED = 8  # files that include each other
+#: copies that an element may make; MuJoCo's time for the last two grows faster than the square
+COPIES = {"replicate": ELEMENTS, "composite": 200, "flexcomp": 1000}
+BUILTIN = 200.0  # resolution of a mesh that MuJoCo makes
+ASSET_BYTES = 16 * MIB  # of a file of a mesh, a texture or a height field
+PIXELS = 10_000_000  # of all textures and height fields together, and of a camera
+LISTS = {"bodies": 1000, "joints": 1000, "geoms": 5000, "keys": 1000, "sensors": 5000}
+MEMORY = 256 * MIB  # of a simulation's stack
+LONGEST = 10_000  # of what elements may reserve: user data, keyframes, dimensions of a sensor
+_RESERVED = ("nkey", "nuserdata", "nuser_actuator", "nuser_body", "nuser_cam", "nuser_geom",
+             "nuser_jnt", "nuser_sensor", "nuser_site", "nuser_tendon")  # fmt: skip
+
+_OPEN = re.compile(r"<!--|<!\[CDATA\[|<\?|<(?=/?[A-Za-z_])")
+_CLOSE = {"<!--": "-->", "<![CDATA[": "]]>", "<?": "?>"}
+_TAG = re.compile(r"<(/?)([\w:.-]+)((?:\"[^\"]*\"|'[^']*'|[^\"'<>])*)>")
+_ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
+
+
+class MjcfText:
+    """Counts the elements of MJCF files, with what replicate, include and attach make of them.
+
+    Args:
+        path: the main file.
+        source: the description file, for errors.
+    """
+
+    def __init__(self, path: Path, source: str):
+        self._folder, self._source = path.parent, source
+        self._elements = self._attached = self._models = self._size = 0
+        self._walk(path, 1, 0)
+        if self._elements + self._attached * self._models > ELEMENTS:
+            raise self._wrong(f"the model has more than {ELEMENTS} elements, with their copies")
+
+    def _walk(self, path: Path, factor: int, depth: int) -> None:
+        """Count a file whose elements are copied `factor` times."""
+        if depth > NESTED:
+            raise self._wrong(f"more than {NESTED} files include each other")
+        text = read_text(path, MJCF_BYTES)  # MuJoCo itself takes names that are no text
+        self._size += len(text)
+        if self._size > MJCF_BYTES:
+            raise self._wrong(f"its files are together larger than {MJCF_BYTES / MIB:g} MiB")
+        factors = [factor]
+        for closing, name, attributes, empty in _tags(text):
+            if not closing:
+                self._count(name, attributes, factors, depth)
+                if name == "replicate" and not empty:
+                    factors.append(factors[-1] * _whole(attributes.get("count", "1")))
+            elif name == "replicate":
+                factors = factors[:-1] or [factor]
+
+    def _count(self, name: str, attributes: dict[str, str], factors: list[int], depth: int) -> None:
+        factor, count = factors[-1], _whole(attributes.get("count", "1"))
+        if count > COPIES.get(name, ELEMENTS):
+            raise self._wrong(f"{name} would make more than {COPIES.get(name, ELEMENTS)} copies")
+        self._elements += factor * (count if name in ("composite", "flexcomp") else 1)
+        if self._elements > ELEMENTS:
+            raise self._wrong(f"the model has more than {ELEMENTS} elements, with their copies")
+        if name == "mesh" and any(abs(x) > BUILTIN for x in _numbers(attributes.get("params", ""))):
+            raise self._wrong(f"params of a mesh must be at most {BUILTIN:g}")
+        if name == "hfield" and _sides(attributes) > PIXELS:  # MuJoCo reserves it as it reads
+            raise self._wrong(f"a height field may have at most {PIXELS} points")
+        if name == "attach":
+            self._attached += factor
+        if "file" in attributes and name in ("include", "model"):
+            before = self._elements
+            for folder in {self._folder, self._folder.resolve()}:
+                if is_file(file := folder / attributes["file"]):
+                    self._walk(file, factor, depth + 1)
+                    break
+            self._models += self._elements - before if name == "model" else 0
+
+    def _wrong(self, problem: str) -> ConfigError:
+        return _wrong(problem, self._source)
+
+
+def check_spec(spec: mujoco.MjSpec, folder: Path, source: str) -> None:
+    """Raise ConfigError for a model that is larger than a robot is, before it is compiled."""
+    for name, most in LISTS.items():
+        if len(getattr(spec, name)) > most:
+            raise _wrong(f"the model has more than {most} {name}", source)
+    for name in _RESERVED:
+        if getattr(spec, name) > LONGEST:
+            raise _wrong(f"size: {name} must be at most {LONGEST}", source)
+    if max(spec.memory, spec.nstack * 8, spec.njmax * 1000, spec.nconmax * 1000) > MEMORY:
+        raise _wrong(f"size: memory must be at most {MEMORY / MIB:g} MiB", source)
+    reserved = [x for s in spec.sensors for x in (s.dim, s.nsample)]
+    reserved += [x for a in spec.actuators for x in (a.actdim, a.nsample)]
+    if max(reserved, default=0) > LONGEST:
+        raise _wrong(f"sensors and actuators may have at most {LONGEST} numbers each", source)
+    if any(math.prod(map(int, camera.resolution)) > PIXELS for camera in spec.cameras):
+        raise _wrong(f"a camera may have at most {PIXELS} pixels", source)
+    if spec.visual.global_.offwidth * spec.visual.global_.offheight > PIXELS:
+        raise _wrong(f"visual: a picture may have at most {PIXELS} pixels", source)
+    _check_assets(spec, folder, source)
+
+
+def _check_assets(spec: mujoco.MjSpec, folder: Path, source: str) -> None:
+    """Sizes of textures, height fields and the files of these and of meshes."""
+    sides = [t.width * (t.height or t.width) * (1 if t.height else 6) for t in spec.textures]
+    sides += [h.nrow * h.ncol for h in spec.hfields]
+    textures = [name for t in spec.textures for name in (t.file, *t.cubefiles)]
+    files = [folder / spec.texturedir / name for name in textures if name]
+    files += [folder / spec.meshdir / x.file for x in (*spec.meshes, *spec.hfields) if x.file]
+    for file in filter(is_file, files):
+        if file.stat().st_size > ASSET_BYTES:
+            raise _wrong(f"{file} is larger than {ASSET_BYTES / MIB:g} MiB", source)
+        sides.append(_pixels(file))
+    if sum(sides) > PIXELS:
+        raise _wrong(f"textures and height fields may have at most {PIXELS} pixels", source)
+
+
+def _pixels(file: Path) -> int:
+    """The pixels that a PNG file says to have: a few bytes may unpack to many; else 0."""
+    with file.open("rb") as opened:
+        head = opened.read(24)
+    if head[:8] != b"\x89PNG\r\n\x1a\n":
+        return 0
+    return int.from_bytes(head[16:20]) * int.from_bytes(head[20:24])
+
+
+def _tags(text: str) -> Iterator[tuple[bool, str, dict[str, str], bool]]:
+    """Whether it closes, name, attributes, and whether it is empty, of all tags."""
+    at = 0
+    while match := _OPEN.search(text, at):
+        close = _CLOSE.get(match[0])
+        if close:
+            at = text.find(close, match.end())
+            if at < 0:
+                return
+        elif tag := _TAG.match(text, match.start()):
+            at = tag.end()
+            pairs = _ATTRIBUTE.findall(tag[3])
+            attributes = {key: html.unescape(value[1:-1]) for key, value in pairs}
+            yield bool(tag[1]), tag[2], attributes, tag[3].endswith("/")
+        else:
+            at = match.end()
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(x) for x in re.findall(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", text[:1000])]
+
+
+def _sides(attributes: dict[str, str]) -> int:
+    return _whole(attributes.get("nrow", "1")) * _whole(attributes.get("ncol", "1"))
+
+
+def _whole(text: str) -> int:
+    """The product of the numbers in an attribute, none of them less than 1."""
+    return int(min(math.prod(max(1.0, x) for x in _numbers(text)), 1e12))
+
+
+def _wrong(problem: str, source: str) -> ConfigError:
+    return ConfigError(problem, source=source, field="source.mjcf")

@@ -1,0 +1,241 @@
+"""A robot: a floating-base biped, compiled from its description for everything built on it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from poise.configs.errors import ConfigError, shown
+from poise.configs.files import resolve
+from poise.configs.schema import build, read_yaml
+from poise.envs.compiled.copies import Copyable
+
+from .actuators import install_motors
+from .description import RobotDescription
+from .ground import (
+    CONTACT_SENSOR,
+    add_contact_sensors,
+    check_ground,
+    install_ground,
+    set_options,
+)
+from .humanoid import humanoid_spec
+from .mjcf import read_mjcf
+from .model_check import check_numbers, check_standing
+from .soles import Sole, build_sole, find_sole_plane, sole_geoms
+from .standing import described_qpos, level_soles, turn_forward
+
+BUILDERS = {"humanoid": humanoid_spec}
+TOUCH = 1e-9  # [m] by which the soles stand below z = 0, so that rounding loses no contact
+DYNAMICS = (  # arrays of the model that its motion depends on
+    *("body_parentid", "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos"),
+    *("body_iquat", "jnt_type", "jnt_bodyid", "jnt_pos", "jnt_axis", "jnt_limited", "jnt_range"),
+    *("jnt_stiffness", "qpos_spring", "dof_damping", "dof_armature", "dof_frictionloss"),
+    *("geom_type", "geom_bodyid", "geom_contype", "geom_conaffinity", "geom_condim", "geom_pos"),
+    *("geom_quat", "geom_size", "geom_friction", "geom_margin", "geom_solref", "geom_solimp"),
+    *("geom_priority", "body_gravcomp", "actuator_trnid", "actuator_ctrlrange"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Robot(Copyable):
+    """A biped and what does not change while it moves.
+
+    Every actuator of ``model`` is a torque motor on one joint: ``data.ctrl`` is the joint torque in
+    N·m. The free joint has the first seven entries of qpos and the first six of qvel.
+
+    Attributes:
+        name: the robot's name.
+        description: what it was built from.
+        model: the compiled MuJoCo model.
+        mass: total mass [kg].
+        height_com: height of the centre of mass above the ground in the standing posture [m].
+        root_body_id: the floating body.
+        ground_geom_id: the ground plane, z = 0.
+        soles: one per foot, in the description's order.
+        standing_qpos: (nq,) standing posture: soles flat on the ground, the mean of their
+            reference points at (0, 0), facing +x.
+        joint_names: (nv - 6) names of the hinge and slide joints in the order of the dofs.
+        joint_range: (nv - 6, 2) limits [rad] or [m], infinite where there are none.
+        motor_dofs: (nu,) dof that each motor drives, ascending.
+        torque_limit: (nu,) largest torque of each motor [N·m].
+        sensor_adr: address in ``data.sensordata`` of the number of contacts with the ground, by
+            foot name; ``"ground"`` counts all contacts with it. What the feet leave of it is
+            contact of other bodies.
+        fingerprint: hash of all that the dynamics depend on.
+    """
+
+    name: str
+    description: RobotDescription
+    model: mujoco.MjModel
+    mass: float
+    height_com: float
+    root_body_id: int
+    ground_geom_id: int
+    soles: tuple[Sole, ...]
+    standing_qpos: np.ndarray
+    joint_names: tuple[str, ...]
+    joint_range: np.ndarray
+    motor_dofs: np.ndarray
+    torque_limit: np.ndarray
+    sensor_adr: dict[str, int]
+    fingerprint: str
+
+
+def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
+    """Build a robot from a packaged description (``humanoid``) or a path to a ``.yaml`` file.
+
+    Raises:
+        ConfigError: no such robot; the description or its MJCF is not valid, or does not fit the
+            other. The text names the file, the field and the valid choices.
+    """
+    path = resolve("robots", name_or_path)
+    source = str(path)
+    description = build(RobotDescription, read_yaml(path), source)
+    spec, keyframes, ground_name = _prepare(description, path)
+    model = _compile(spec, source)
+    data = mujoco.MjData(model)
+    root = model.body(description.root).id
+    bodies = [model.body(foot.body).id for foot in description.feet]
+
+    data.qpos[:] = described_qpos(model, description, keyframes, source)
+    mujoco.mj_kinematics(model, data)
+    ground = model.geom(ground_name).id
+    check_ground(model, ground, source)
+    geoms, planes = [], []
+    for i, foot in enumerate(description.feet):
+        ids = sole_geoms(model, bodies[i], foot.geoms, ground, source, f"feet[{i}]")
+        planes.append(find_sole_plane(model, data, bodies[i], ids, source, f"feet[{i}]"))
+        geoms.append(ids)
+    level_soles(model, data, bodies, planes, source)
+    turn_forward(model, data, root, description.forward, source)
+    soles = tuple(
+        build_sole(foot.name, foot.body, bodies[i], geoms[i], planes[i], data.xmat[bodies[i]])
+        for i, foot in enumerate(description.feet)
+    )
+    points = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position for s in soles]
+    data.qpos[:3] -= np.mean(points, axis=0)
+    data.qpos[2] -= TOUCH
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+
+    check_standing(data, root, source)
+    limited = model.jnt_limited[1:, None].astype(bool)
+    standing_qpos = data.qpos.copy()
+    robot = Robot(
+        name=description.name,
+        description=description,
+        model=model,
+        mass=float(model.body_subtreemass[root]),
+        height_com=float(data.subtree_com[root, 2]),
+        root_body_id=root,
+        ground_geom_id=ground,
+        soles=soles,
+        standing_qpos=standing_qpos,
+        joint_names=tuple(model.joint(i).name for i in range(1, model.njnt)),
+        joint_range=np.where(limited, model.jnt_range[1:], [-np.inf, np.inf]),
+        motor_dofs=model.jnt_dofadr[model.actuator_trnid[:, 0]].copy(),
+        torque_limit=model.actuator_ctrlrange[:, 1].copy(),
+        sensor_adr={
+            name: int(model.sensor(CONTACT_SENSOR + name).adr[0])
+            for name in ("ground", *(foot.name for foot in description.feet))
+        },
+        fingerprint=fingerprint(model, standing_qpos),
+    )
+    for array in (standing_qpos, robot.joint_range, robot.motor_dofs, robot.torque_limit):
+        array.setflags(write=False)
+    return robot
+
+
+def fingerprint(model: mujoco.MjModel, standing_qpos: np.ndarray) -> str:
+    """SHA-256 (hexadecimal) of the dynamics and the standing posture, rounded to six digits.
+
+    Looks, names and the versions of libraries do not enter.
+    """
+    digest = hashlib.sha256()
+    for array in [*(getattr(model, name) for name in DYNAMICS), standing_qpos]:
+        rounded = np.round(np.asarray(array, dtype=float), 6) + 0.0  # + 0.0: no negative zeros
+        digest.update(repr(rounded.tolist()).encode())
+    for name in ("timestep", "integrator", "solver", "cone", "gravity", "disableflags"):
+        digest.update(repr(np.asarray(getattr(model.opt, name), dtype=float).tolist()).encode())
+    return digest.hexdigest()
+
+
+def _prepare(
+    description: RobotDescription, path: Path
+) -> tuple[mujoco.MjSpec, dict[str, np.ndarray], str]:
+    """The model with motors, ground, sensors and options; its keyframes; the ground's name."""
+    source = str(path)
+    if description.source.builder is not None:
+        spec = BUILDERS[description.source.builder]()
+    else:
+        feet = tuple(foot.body for foot in description.feet)
+        spec = read_mjcf(path.parent / str(description.source.mjcf), feet, source)
+    for i, joint in enumerate(spec.joints):
+        joint.name = joint.name or f"joint{i}"
+    ground = install_ground(spec, description.ground, source)
+    model = _compile(spec, source)
+    check_numbers(model, DYNAMICS, source)
+    _check_bodies(model, description, source)
+    keyframes = {model.key(i).name: model.key_qpos[i].copy() for i in range(model.nkey)}
+    for element in [*spec.keys, *spec.sensors]:  # they need not fit the new actuators
+        spec.delete(element)
+    install_motors(spec, model, description.torque_limits, source)
+    add_contact_sensors(spec, description, ground)
+    set_options(spec, description.options)
+    return spec, keyframes, ground
+
+
+def _check_bodies(model: mujoco.MjModel, description: RobotDescription, source: str) -> None:
+    """The root floats, all other joints are simple, and the feet hang on the root."""
+    bodies = {model.body(i).name: i for i in range(1, model.nbody)}
+    named = {"root": description.root}
+    named |= {f"feet[{i}].body": foot.body for i, foot in enumerate(description.feet)}
+    for field, name in named.items():
+        if name not in bodies:
+            raise ConfigError(
+                f"the model has no body {shown(name)}", source=source, field=field, choices=bodies
+            )
+    free = [i for i in range(model.njnt) if model.jnt_type[i] == int(mujoco.mjtJoint.mjJNT_FREE)]
+    floating = [model.body(model.jnt_bodyid[i]).name for i in free]
+    if floating != [description.root] or free != [0]:
+        raise ConfigError(
+            f"the root {description.root!r} must have the model's only free joint, "
+            "before all other joints",
+            source=source,
+            field="root",
+            choices=floating,
+        )
+    if int(mujoco.mjtJoint.mjJNT_BALL) in model.jnt_type:
+        raise ConfigError("ball joints are not supported", source=source, field="source")
+    loops = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
+    if any(kind in loops for kind in model.eq_type[model.eq_active0.astype(bool)]):
+        raise ConfigError(
+            "closed kinematic loops (connect, weld) are not supported",
+            source=source,
+            field="source",
+        )
+    for field, name in list(named.items())[1:]:
+        body, joints = bodies[name], 0
+        while body != bodies[description.root] and body != 0:
+            joints += model.body_jntnum[body]
+            body = model.body_parentid[body]
+        if body == 0 or not joints:
+            raise ConfigError(
+                f"the body {shown(name)} is no limb of the root {description.root!r}",
+                source=source,
+                field=field,
+            )
+
+
+def _compile(spec: mujoco.MjSpec, source: str) -> mujoco.MjModel:
+    try:
+        return spec.compile()
+    except Exception as error:  # whatever MuJoCo has
+        raise ConfigError(
+            f"the model does not compile: {error}", source=source, field="source"
+        ) from None

@@ -1,0 +1,1 @@
+"""What a controller may know of the state, and when."""

@@ -1,0 +1,114 @@
+"""Threads that wait for work, without the futures and locks of an executor."""
+
+import os
+import threading
+import weakref
+from collections.abc import Callable
+from queue import SimpleQueue
+from typing import Any
+
+from poise.configs.errors import PoiseError
+
+_watchers: weakref.WeakSet[Any] = weakref.WeakSet()
+
+
+def tell_of_fork(watcher: Any) -> None:
+    """Have `watcher.forget_threads()` called in a forked process: it has none but its own."""
+    _watchers.add(watcher)
+
+
+def _forget() -> None:
+    for watcher in list(_watchers):
+        watcher.forget_threads()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(after_in_child=_forget)
+
+
+class Helpers:
+    """Threads that share some work with the one that asks for it; they start when first asked.
+
+    A copy, and what a forked process has of it, starts threads of its own.
+    """
+
+    def __init__(self) -> None:
+        self._calls: list[SimpleQueue[Any]] = []
+        self._threads: list[threading.Thread] = []
+        self._end = weakref.finalize(self, _end, self._calls)
+        tell_of_fork(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Helpers, ()
+
+    def forget_threads(self) -> None:
+        """As if none had been asked: they are threads of another process."""
+        self._calls.clear()
+        self._threads.clear()
+
+    def share(self, work: Callable[[int], None], helpers: int) -> None:
+        """`work(0)` in this thread, `work(1)`, `work(2)`… in some helpers; returns when all have.
+
+        Raises what one of them raised, PoiseError if they have been closed or have died.
+        """
+        done: SimpleQueue[BaseException | None] = SimpleQueue()
+        asked = range(1, helpers + 1)
+        for k in asked:
+            self.ask(work, k, done)
+        try:
+            work(0)
+        finally:
+            errors = [done.get() for _ in asked]
+        for error in errors:
+            if error is not None:
+                raise error
+
+    def ask(
+        self,
+        work: Callable[[int], None],
+        helper: int,
+        done: "SimpleQueue[BaseException | None] | None" = None,
+    ) -> None:
+        """`work(helper)` in helper 1, 2…, once it is free; what it raised, or None, goes to `done`.
+
+        Raises PoiseError if they have been closed or have died.
+        """
+        if not self._end.alive:
+            raise PoiseError("the threads have ended: close() comes last")
+        self.expect_alive()
+        while len(self._calls) < helper:
+            self._calls.append(SimpleQueue())
+            arguments = (self._calls[-1],)
+            thread = threading.Thread(target=_serve, args=arguments, name="poise", daemon=True)
+            self._threads.append(thread)
+            thread.start()
+        self._calls[helper - 1].put((work, helper, done))
+
+    def expect_alive(self) -> None:
+        """Raises PoiseError if a helper has died."""
+        if not all(thread.is_alive() for thread in self._threads):
+            raise PoiseError("a thread has ended that was to help")
+
+    def close(self) -> None:
+        """End the threads."""
+        self._end()
+
+
+def _serve(calls: "SimpleQueue[Any]") -> None:
+    while (call := calls.get()) is not None:
+        work, number, done = call
+        try:
+            work(number)
+            error = None
+        except BaseException as caught:  # the thread that asked raises it
+            error = caught
+        if done is not None:
+            done.put(error)
+        elif error is not None:
+            raise error
+        del call, work, done, error  # nothing is kept until the next call
+
+
+def _end(calls: "list[SimpleQueue[Any]]") -> None:
+    for each in calls:
+        each.put(None)

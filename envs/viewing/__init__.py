@@ -1,0 +1,1 @@
+"""Pictures and the window; they only read."""

@@ -1,0 +1,117 @@
+"""What is drawn over a simulation: pushes, centre of mass, and what the balance depends on.
+
+| mark | shape and colour |
+|---|---|
+| push, kick | amber arrow; its tip is the force's point of application, its length the peak force |
+| centre of mass | black sphere, and a small black disc below it on the ground |
+| centre of pressure | vermilion disc, while the ground carries anything |
+| capture point | blue disc, the largest |
+| support polygon | bluish green line around the soles |
+
+The colours are from Okabe and Ito's palette, told apart with any colour vision, and no two marks
+have both the same shape and the same size. Marks on the ground that coincide lie on each other,
+the largest lowest.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from poise.envs.physics.simulation import Simulation
+
+AMBER = (0.902, 0.624, 0.0)
+BLACK = (0.05, 0.05, 0.05)
+VERMILION = (0.835, 0.369, 0.0)
+BLUE = (0.0, 0.447, 0.698)
+GREEN = (0.0, 0.62, 0.451)
+
+FADE = 0.3  # [s] for which a push stays visible after its end
+KICK_TIME = 0.1  # [s]: a kick is drawn as the force that gives its impulse in this time
+ARROW_GAIN = 1.5  # arrow length over CoM height, for a force equal to the weight
+ARROW_LENGTHS = (0.4, 1.0)  # shortest and longest, over CoM height
+SPHERE, DISC = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CYLINDER
+BAR, ARROW = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ARROW
+
+
+class Mark(NamedTuple):
+    """One thing to draw, world frame."""
+
+    name: str
+    shape: mujoco.mjtGeom
+    start: np.ndarray  # (3,) centre, or where a bar or an arrow begins [m]
+    end: np.ndarray  # (3,) where it ends [m]
+    radius: float  # [m]
+    colour: tuple[float, float, float]
+    opacity: float = 1.0
+
+
+def marks(simulation: Simulation) -> list[Mark]:
+    """All marks for the simulation's current state, which is only read."""
+    state = simulation.state.copy()  # the support polygon is computed into the state's own arrays
+    size = simulation.robot.height_com
+    ground = [*state.com[:2], 0.0]
+    found = _polygon(state.support_polygon, 0.009 * size)
+    found.append(_disc("capture point", state.capture_point, 0.055 * size, 0.004 * size, BLUE))
+    if state.contact_wrench[2] > 1e-3 * state.mass * simulation.arrays.gravity:
+        found.append(_disc("cop", state.cop, 0.038 * size, 0.007 * size, VERMILION))
+    found.append(_disc("com on ground", np.array(ground), 0.018 * size, 0.010 * size, BLACK))
+    found.append(Mark("com", SPHERE, state.com, state.com, 0.04 * size, BLACK))
+    return found + push_arrows(simulation)
+
+
+def push_arrows(simulation: Simulation) -> list[Mark]:
+    """An arrow for every push that acts, or has ended less than `FADE` seconds ago."""
+    weight = simulation.robot.mass * simulation.arrays.gravity
+    size = simulation.robot.height_com
+    plant, found = simulation.plant, []
+    for row in simulation.push_table:
+        body, start, duration, vector, is_kick = int(row[0]), row[1], row[2], row[3:6], row[10]
+        age = simulation.time - start
+        opacity = 1.0 - max(age - duration, 0.0) / FADE
+        force = float(np.linalg.norm(vector))
+        if age < -1e-9 or opacity <= 0.0 or force == 0.0:
+            continue
+        tip = plant.xipos[body] + plant.xmat[body].reshape(3, 3) @ row[6:9]
+        share = (simulation.robot.mass / KICK_TIME if is_kick else 1.0) * force / weight
+        length = size * float(np.clip(ARROW_GAIN * share, *ARROW_LENGTHS))
+        tail = tip - length * vector / force
+        found.append(Mark("push", ARROW, tail, tip, 0.035 * size, AMBER, float(opacity)))
+    return found
+
+
+def draw(scene: mujoco.MjvScene, found: list[Mark]) -> None:
+    """Append marks to a scene, as far as it has room."""
+    for mark in found:
+        if scene.ngeom >= scene.maxgeom:
+            return
+        geom = scene.geoms[scene.ngeom]
+        rgba = np.array([*mark.colour, mark.opacity], dtype=np.float32)
+        size = np.array([mark.radius, 0.0, 0.0])
+        if mark.shape == DISC:
+            size[1] = mark.radius
+        mujoco.mjv_initGeom(geom, mark.shape, size, mark.start, np.eye(3).ravel(), rgba)
+        if mark.shape != SPHERE:
+            # MuJoCo draws an arrow half as long as it is told
+            end = 2.0 * mark.end - mark.start if mark.shape == ARROW else mark.end
+            mujoco.mjv_connector(geom, mark.shape, mark.radius, mark.start, end)
+        geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+        geom.specular, geom.shininess, geom.emission = 0.1, 0.2, 0.3
+        scene.ngeom += 1
+
+
+def _disc(name: str, point: np.ndarray, radius: float, height: float, colour: tuple) -> Mark:
+    """A disc on the ground at `point` (2,) or (3,), which sticks out of it by `height`."""
+    start = np.array([point[0], point[1], 0.0])
+    return Mark(name, DISC, start, start + [0.0, 0.0, height], radius, colour)
+
+
+def _polygon(vertices: np.ndarray, radius: float) -> list[Mark]:
+    corners = np.column_stack([vertices, np.zeros(len(vertices))])
+    ends = np.roll(corners, -1, axis=0)
+    return [
+        Mark("support", BAR, start, end, radius, GREEN)
+        for start, end in zip(corners, ends, strict=True)
+    ]

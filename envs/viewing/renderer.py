@@ -1,0 +1,141 @@
+"""Pictures of a simulation, off-screen or in MuJoCo's viewer. The simulation is only read."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from poise.envs.physics.simulation import Simulation
+
+from .appearance import looks
+from .offscreen import OffScreen
+from .overlays import draw, marks
+from .window import Viewer
+
+MAX_GEOMS = 10_000
+XRAY = 0.55  # how strongly an overlay shines through what hides it
+LOOK_AT = 0.92  # height that the camera looks at, over the CoM height
+FOLLOW = 0.4  # [s] time constant with which the camera follows
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the camera stands, seen from the robot in its standing posture."""
+
+    azimuth: float = field(default=50.0)  # [deg] counter-clockwise: 0 = in front, 90 = left
+    elevation: float = field(default=22.0, metadata={"min": 0.0, "max": 90.0})  # [deg] above it
+    distance: float = field(default=4.7, metadata={"above": 0.0})  # over the CoM height
+
+
+class SceneRenderer:
+    """Draws a simulation with its overlays, as `overlays.py` lists them.
+
+    Physics are never touched: positions are copied into a private model and data, so neither
+    `render` nor dragging in the viewer changes a bit of the simulation. The camera follows the
+    robot with a short delay, so that a push is seen as motion of the robot.
+
+    Args:
+        simulation: what to draw.
+        human: open MuJoCo's passive viewer, at most in real time, instead of returning frames.
+        width: of a frame [pixels].
+        height: of a frame [pixels].
+        camera: where it stands.
+
+    Raises:
+        PoiseError: there is no OpenGL to draw with, or no display for the viewer.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        human: bool,
+        width: int = 640,
+        height: int = 480,
+        camera: Camera | None = None,
+    ):
+        self.simulation = simulation
+        self.camera = camera or Camera()
+        self.model = looks(simulation.robot, width, height, self.camera.azimuth)
+        self.data = mujoco.MjData(self.model)
+        self.shown = np.inf  # simulation time of the last picture [s]
+        self.due = 0.0  # wall clock at which the next one is shown [s]
+        self.scene = mujoco.MjvScene(self.model, MAX_GEOMS)
+        self.screen = None if human else OffScreen(self.model, width, height)
+        self.viewer = Viewer(self.model, self.data) if human else None
+        self.view = self.viewer.handle.cam if self.viewer else mujoco.MjvCamera()
+        self.view.azimuth = self.camera.azimuth + 180.0
+        self.view.elevation = -self.camera.elevation
+        self.view.distance = self.camera.distance * simulation.robot.height_com
+
+    @property
+    def is_open(self) -> bool:
+        """False after `close`, and when the user has closed the viewer's window."""
+        watched = self.viewer is not None and self.viewer.handle.is_running()
+        return self.screen is not None or watched
+
+    def render(self) -> np.ndarray | None:
+        """A frame (height, width, 3) uint8; None where a viewer shows it, or when not open."""
+        if self.screen is not None:
+            self._update()
+            return self._frame(self.screen)
+        if self.viewer is not None and self.viewer.handle.is_running():
+            self._wait()
+            handle = self.viewer.handle
+            with handle.lock():
+                self._update()
+                handle.user_scn.ngeom = 0
+                draw(handle.user_scn, marks(self.simulation))
+            handle.sync()
+        return None
+
+    def close(self) -> None:
+        """Close the viewer or free the off-screen buffer; safe to call twice."""
+        for held in (self.screen, self.viewer):
+            if held is not None:
+                held.close()
+        self.screen = self.viewer = None
+
+    def _update(self) -> None:
+        """Bring positions, lamp and camera up to date."""
+        self.data.qpos[:] = self.simulation.data.qpos
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_camlight(self.model, self.data)
+        state, size = self.simulation.state, self.simulation.robot.height_com
+        target = np.array([*state.com[:2], LOOK_AT * size])
+        elapsed = self.simulation.time - self.shown
+        self.shown = self.simulation.time
+        if elapsed < 0.0 or self.shown == 0.0:  # another episode
+            self.view.lookat = target
+        else:
+            share = 1.0 - np.exp(-elapsed / FOLLOW)
+            self.view.lookat = self.view.lookat + share * (target - self.view.lookat)
+
+    def _frame(self, screen: OffScreen) -> np.ndarray:
+        """The scene, with the marks that it hides shining through."""
+        found, scene = marks(self.simulation), self.scene
+        mujoco.mjv_updateScene(
+            self.model, self.data, mujoco.MjvOption(), None, self.view,
+            mujoco.mjtCatBit.mjCAT_ALL, scene,
+        )  # fmt: skip
+        draw(scene, found)
+        frame = screen.draw(scene)
+        scene.ngeom = 0
+        draw(scene, [mark for mark in found if mark.opacity == 1.0])
+        scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = 0
+        alone = screen.draw(scene)
+        scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = 1
+        covered = alone.max(axis=2) > 0
+        frame[covered] = (1.0 - XRAY) * frame[covered] + XRAY * alone[covered]
+        return frame
+
+    def _wait(self) -> None:
+        """Sleep until the wall clock has caught up with the simulation."""
+        now = time.monotonic()
+        self.due += self.simulation.time - self.shown
+        if self.simulation.time <= self.shown or self.due < now:  # new episode, or late
+            self.due = now
+        time.sleep(self.due - now)

@@ -1,0 +1,133 @@
+"""QP for large deviations, PD for small ones; and Abe's weights that vary with the state."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from poise.baselines.controller import Targets
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.in_place.abe07 import Abe07, Abe07Config
+from poise.baselines.in_place.kudoh02 import Kudoh02, Kudoh02Config
+from poise.baselines.registry import (
+    KINDS,
+    controller_config,
+    load_controller,
+    momentum_qp_config,
+)
+from poise.baselines.whole_body.momentum_qp import MomentumQP
+from poise.configs.errors import ConfigError
+from poise.configs.files import packaged
+from poise.envs.physics.simulation import Simulation
+from tests.support.shared import robot
+
+
+@pytest.fixture
+def standing():
+    simulation = Simulation(robot())
+    return simulation, Targets.standing(robot(), simulation.state)
+
+
+def test_the_rule_and_its_hysteresis(standing):
+    """PD near the goal, the QP beyond `far` until below `near`, then a blend back to PD."""
+    simulation, targets = standing
+    state, h = simulation.state, robot().height_com
+    controller = Kudoh02(robot(), Kudoh02Config(near=0.02, far=0.05, blend=0.02))
+    xi = simulation.state_arrays.capture_point
+
+    def at(distance):
+        xi[:] = targets.com[:2] + [distance * h, 0.0]
+        return controller.torques(state, targets)
+
+    pd = controller.pd.torques(state, targets)
+    np.testing.assert_array_equal(at(0.04), pd)
+    at(0.06)
+    assert controller.large
+    qp = MomentumQP(robot(), controller.config.qp)
+    np.testing.assert_allclose(at(0.06), qp.torques(state, targets), atol=1e-6)
+    at(0.03)
+    assert controller.large  # not yet below `near`
+    shares = []
+    for _ in range(6):
+        at(0.01)
+        shares.append(controller._share)
+    np.testing.assert_allclose(shares, [0.8, 0.6, 0.4, 0.2, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_array_equal(at(0.01), pd)
+    controller.reset()
+    assert not controller.large
+
+
+def test_thresholds_in_the_wrong_order_are_refused():
+    """near > far."""
+    with pytest.raises(ConfigError, match="near"):
+        load_controller({"kind": "kudoh02", "near": 0.1, "far": 0.05}, robot())
+
+
+def test_tracking_gives_way_as_the_com_leaves(standing):
+    """β falls from 1 to its floor; at 1 the QP is the momentum QP without CoP control."""
+    simulation, targets = standing
+    state, config = simulation.state, Abe07Config(distance=0.05, floor=0.2)
+    controller = Abe07(robot(), config)
+    com = simulation.state_arrays.com
+    com[:2] = targets.com[:2]
+    assert controller.tracking(state, targets) == 1.0
+    cop = replace(config.qp.cop, weight=0.0, yaw_weight=0.0)
+    plain = MomentumQP(robot(), replace(config.qp, cop=cop))
+    np.testing.assert_array_equal(controller.torques(state, targets), plain.torques(state, targets))
+    betas = []
+    for distance in (0.0, 0.02, 0.05, 0.5):
+        com[0] = targets.com[0] + distance * robot().height_com
+        betas.append(controller.tracking(state, targets))
+    assert np.all(np.diff(betas) < 0.0)
+    assert betas[2] == pytest.approx(0.2 + 0.8 / np.e) and betas[3] == pytest.approx(0.2)
+    controller.torques(state, targets)
+    np.testing.assert_allclose(
+        controller.qp.parameters.accel_weight, 0.2 * plain.parameters.accel_weight
+    )
+
+
+@pytest.mark.parametrize("name", packaged("controllers"))
+def test_every_packaged_controller_takes_a_light_push(name):
+    """4 N·s from the side on the standing humanoid: still up after 1.2 s, nothing failed."""
+    env = ResidualBalanceEnv(robot(), controller=name, pushes=None, duration=1.2)
+    push = {"impulse": 4.0, "direction": 90.0, "duration": 0.1, "start": 0.3, "body": "torso"}
+    env.reset(seed=0, options={"push": push})
+    for _ in range(env.max_steps):
+        _, terminated, _ = env.step_in_place(np.zeros(4))
+        assert not terminated
+    assert getattr(env.controller, "failures", 0) == 0
+
+
+@pytest.mark.parametrize("name", packaged("controllers"))
+def test_every_packaged_controller_suits_another_robot(name):
+    """Gains are scaled by mass and height: `tall` stands for half a second."""
+    env = ResidualBalanceEnv(robot("tall"), controller=name, pushes=None, duration=0.5)
+    env.reset(seed=0)
+    for _ in range(env.max_steps):
+        _, terminated, _ = env.step_in_place(np.zeros(4))
+        assert not terminated
+
+
+def test_kinds_are_named_in_the_error():
+    """An unknown kind, and a `qp` that is not one."""
+    with pytest.raises(ConfigError, match="kind.*lip-mpc"):
+        load_controller({"kind": "magic"}, robot())
+    with pytest.raises(ConfigError, match="controllers.*momentum-qp"):
+        load_controller({"kind": "lqr-lip", "qp": "nothing"}, robot())
+    with pytest.raises(ConfigError, match="gian"):
+        load_controller({"kind": "capture-point", "gian": 1.0}, robot())
+
+
+def test_some_commands_need_a_momentum_qp():
+    """Others are refused by name, with those that will do."""
+    assert momentum_qp_config("moskalev24").root == "soft"
+    choices = "choices: momentum-qp, momentum-qp-osqp, moskalev24, root-assist"
+    with pytest.raises(ConfigError, match=f"lip-mpc.*{choices}"):
+        momentum_qp_config("lip-mpc")
+
+
+def test_every_kind_is_packaged():
+    """Each kind but that from outside has a file; `qp: momentum-qp` stands for its gains."""
+    kinds = {controller_config(name).kind for name in packaged("controllers")}
+    assert kinds | {"outside"} == set(KINDS)
+    assert controller_config("lqr-lip").qp == controller_config("momentum-qp")

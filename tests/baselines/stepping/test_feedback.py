@@ -1,0 +1,136 @@
+"""The law that feeds the body's lean and turn back to a step."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from poise.baselines.registry import load_controller
+from poise.baselines.stepping.feedback import (
+    SIGNALS,
+    FallFeedback,
+    SignalGains,
+    StepFeedback,
+    feed_back,
+    take_gains,
+)
+from poise.baselines.stepping.feedback import feedback_arrays as arrays_of
+from poise.configs.errors import ConfigError
+from poise.envs.physics.simulation import Simulation
+from tests.support.shared import generic_state, robot
+
+YAW = 0.7
+
+
+def signals(simulation, side=1.0, yaw=YAW):
+    """What is read beside the second sole."""
+    f, state = arrays_of(simulation.robot, StepFeedback(), {}), simulation.state
+    feed_back(f, state.arrays, state.sole_points[1], np.cos(yaw), np.sin(yaw), side)
+    return dict(zip(SIGNALS, f.signals.copy(), strict=True))
+
+
+def turned(ahead=0.0, left=0.0):
+    """The humanoid faces `YAW` and leans as a whole: first to the left, then ahead [rad]."""
+    simulation = Simulation(robot())
+    qpos = robot().standing_qpos.copy()
+    q = np.array([1.0, 0.0, 0.0, 0.0])
+    for axis, angle in (((0, 0, 1), YAW), ((0, 1, 0), ahead), ((1, 0, 0), -left)):
+        turn = np.zeros(4)
+        mujoco.mju_axisAngle2Quat(turn, np.array(axis, dtype=float), angle)
+        mujoco.mju_mulQuat(q, q.copy(), turn)
+    mujoco.mju_mulQuat(qpos[3:7], q, robot().standing_qpos[3:7])
+    simulation.reset(qpos, np.zeros(robot().model.nv))
+    return simulation
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_lean(side):
+    """The sine of the angle, ahead and to the foot's side; at rest next to nothing."""
+    told = signals(turned(ahead=0.2), side)
+    assert told["lean_ahead"] == pytest.approx(np.sin(0.2), abs=1e-3)
+    assert told["lean_outward"] == pytest.approx(0.0, abs=1e-3)
+    told = signals(turned(left=0.3), side)
+    assert told["lean_outward"] == pytest.approx(side * np.sin(0.3), abs=1e-3)
+    told = signals(turned(), side)
+    assert abs(told["lean_ahead"]) + abs(told["lean_outward"]) < 1e-3
+
+
+def test_spin_is_mujocos_angular_momentum():
+    """ω L/(m g h), about the axes that turn the body ahead and to the side."""
+    simulation = generic_state(seed=4)
+    model, data, r = simulation.robot.model, simulation.data, simulation.robot
+    mujoco.mj_subtreeVel(model, data)
+    x, y, _ = data.subtree_angmom[0]
+    g, h = -model.opt.gravity[2], r.height_com
+    unit = np.sqrt(g / h) / (r.mass * g * h)
+    told = signals(simulation, side=-1.0)
+    ahead = unit * (np.cos(YAW) * y - np.sin(YAW) * x)  # about the axis to the left
+    right = unit * (np.cos(YAW) * x + np.sin(YAW) * y)  # about the axis ahead
+    assert told["spin_ahead"] == pytest.approx(ahead, rel=1e-6)
+    assert told["spin_outward"] == pytest.approx(right, rel=1e-6)
+    assert min(abs(ahead), abs(right)) > 1e-4
+
+
+def test_the_other_foot_sees_the_mirror_image():
+    """Only what is outward changes its sign."""
+    simulation = generic_state(seed=2)
+    one, two = signals(simulation, 1.0), signals(simulation, -1.0)
+    for name in SIGNALS:
+        assert two[name] == (-one[name] if "outward" in name else one[name])
+    assert one["capture_outward"] != 0.0
+
+
+@pytest.mark.parametrize("name", ["humanoid", "toddler"])
+def test_what_is_added_fits_the_robot(name):
+    """Lengths in h, times in 1/ω; a row adds up its gains times the signals."""
+    r, row = robot(name), SignalGains(constant=0.1, again=0.2, phase=0.3, lean_ahead=1.0)
+    f = arrays_of(r, StepFeedback(row, row, row, row), {})
+    f.stage[:] = 1.0, 0.5
+    state = generic_state(name, seed=1).state
+    feed_back(f, state.arrays, state.sole_points[0], np.cos(YAW), np.sin(YAW), 1.0)
+    expected = 0.1 + 0.2 + 0.15 + f.signals[SIGNALS.index("lean_ahead")]
+    h = r.height_com
+    units = np.array([h, h, np.sqrt(h / -r.model.opt.gravity[2]), h])
+    np.testing.assert_allclose(f.added, expected * units, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("angle", "expected"),
+    [(0.0, 1.5), (30.0, 1.5), (60.0, 1.25), (75.0, 1.125), (90.0, 1.0), (120.0, 2.5), (170.0, 4.0)],
+)
+def test_gains_are_linear_between_the_angles_of_falls(angle, expected):
+    """What is always fed back and what is added there; further out as at the last angle."""
+    r = robot()
+    falls = {
+        "back": FallFeedback(angle=150.0, ahead=SignalGains(lean_ahead=3.0)),
+        "ahead": FallFeedback(angle=30.0, ahead=SignalGains(lean_ahead=0.5)),
+        "side": FallFeedback(angle=90.0),
+    }
+    f = arrays_of(r, StepFeedback(SignalGains(lean_ahead=1.0, phase=0.3)), falls)
+    for side in (1.0, -1.0):
+        speed = 0.7 * np.array([np.cos(np.radians(angle)), side * np.sin(np.radians(angle))])
+        f.stage[0] = 1.0
+        take_gains(f, *speed)
+        np.testing.assert_array_equal(f.gains, f.always)  # further steps
+        f.stage[0] = 0.0
+        take_gains(f, *speed)
+        gains = dict(zip(SIGNALS, f.gains[0] / r.height_com, strict=True))
+        assert gains.pop("lean_ahead") == pytest.approx(expected, rel=1e-12)
+        assert gains.pop("phase") == pytest.approx(0.3, rel=1e-12)
+        assert not any(gains.values()) and not f.gains[1:].any()
+
+
+@pytest.mark.parametrize(
+    ("falls", "words"),
+    [
+        ({"a": {"angle": 40.0}, "b": {"angle": 40.0}}, ["falls", "differ"]),
+        ({"a": {"angle": 190.0}}, ["falls.a.angle", "180"]),
+        ({"a": {"time": {"phase": 0.1}}}, ["falls.a.angle", "missing"]),
+        ({"a": {"angle": 40.0, "sideways": {}}}, ["falls.a.sideways", "outward"]),
+    ],
+)
+def test_falls_that_are_wrong(falls, words):
+    """One error names the field."""
+    with pytest.raises(ConfigError) as error:
+        load_controller({"kind": "capture-step", "falls": falls}, robot())
+    for word in words:
+        assert word in str(error.value)

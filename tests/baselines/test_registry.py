@@ -1,0 +1,44 @@
+"""Controllers by name: what a file may leave to another one."""
+
+import pytest
+
+from poise.baselines.registry import controller_config, load_controller
+from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+from poise.configs.errors import ConfigError
+from poise.configs.files import packaged
+from poise.configs.schema import to_dict
+from tests.support.shared import robot
+
+
+@pytest.mark.parametrize("name", packaged("controllers"))
+def test_every_packaged_controller_can_be_made(name):
+    """With a period and the two methods."""
+    controller = load_controller(name, robot())
+    assert controller.period > 0.0 and callable(controller.reset) and callable(controller.torques)
+
+
+def test_a_base_holds_where_a_file_says_nothing(tmp_path):
+    """Single gains are replaced, their neighbours stay."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("base: momentum-qp\nperiod: 0.01\ncom: {offset: 0.05}\n")
+    mine, base = to_dict(controller_config(path)), to_dict(controller_config("momentum-qp"))
+    assert mine.pop("period") == 0.01 != base.pop("period")
+    assert mine["com"].pop("offset") == 0.05 != base["com"].pop("offset")
+    assert mine == base
+
+
+def test_the_packaged_variant_differs_in_its_solver_alone():
+    """`momentum-qp-osqp` has the baseline's gains, whatever they are tuned to."""
+    variant, base = (controller_config(name) for name in ("momentum-qp-osqp", "momentum-qp"))
+    assert isinstance(variant, MomentumQPConfig) and variant.solver == "osqp"
+    different = {k for k, v in to_dict(variant).items() if v != to_dict(base)[k]}
+    assert different == {"solver", "solver_options"}
+
+
+@pytest.mark.parametrize("base", ["nonsense", "3", "{}"])
+def test_a_base_that_is_none_is_refused(tmp_path, base):
+    """Naming the choices."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(f"base: {base}\n")
+    with pytest.raises(ConfigError, match="momentum-qp"):
+        controller_config(path)

@@ -1,0 +1,124 @@
+"""The momentum QP with some of the soles: the readable problem, physics, limits of load."""
+
+import numpy as np
+import pytest
+
+from poise.baselines.controller import Targets
+from poise.baselines.solvers import make_solver, residuals
+from poise.baselines.stepping.swing import SwingTask, swing_rows
+from poise.baselines.whole_body.contact_sets import ContactSets
+from poise.baselines.whole_body.formulation import build, unknowns
+from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.state import RobotState
+from tests.support.shared import generic_state, robot
+
+SETS = [(0,), (1,), (0, 1)]
+
+
+@pytest.fixture(scope="module")
+def sets():
+    return ContactSets(robot(), MomentumQPConfig())
+
+
+def situation(seed=0):
+    """A pushed robot, its standing targets, and rows for a step of its left foot."""
+    state = generic_state(seed=seed).state
+    targets = Targets.standing(robot(), state)
+    reference = np.array([state.sole_points[0], [0.5, 0.0, 0.2], [2.0, 0.0, 1.0]])
+    return state, targets, swing_rows(state, 0, reference, state.sole_axes[0], SwingTask())
+
+
+def test_both_soles_are_the_momentum_qp(sets):
+    """With all soles and no further rows it is the baseline's problem, number by number."""
+    state, targets, _ = situation()
+    qp, same = MomentumQP(robot()).problem(state, targets), sets.problem(state, targets, (0, 1))
+    np.testing.assert_array_equal(same.H, qp.H)
+    np.testing.assert_array_equal(same.g, qp.g)
+    finite = np.isfinite(same.u)
+    assert finite.sum() == np.isfinite(qp.u).sum() + 2 * 1  # the rows kept for limits of load
+
+
+@pytest.mark.parametrize("soles", SETS)
+def test_solution_is_that_of_the_readable_problem(sets, soles):
+    """Eliminated or not, with the swing rows or not: the same accelerations and wrenches."""
+    state, targets, rows = situation()
+    chosen = sets.sets[soles]
+    tasks = [rows] if 0 not in soles else []
+    sets.tick(state, targets, soles, tasks)
+    assert sets.failures == 0
+    restricted = RobotState(chosen.arrays, chosen.state(state.arrays))
+    p = chosen.parameters
+    qp = build(restricted, targets, p, chosen.workspace.cop_vel, tasks=tasks)
+    solution = make_solver("active-set").solve(qp)
+    assert solution.solved
+    vdot, wrenches, _ = unknowns(restricted, solution.x)
+    scale = np.abs(vdot).max()
+    np.testing.assert_allclose(chosen.workspace.vdot, vdot, atol=1e-4 * scale)
+    np.testing.assert_allclose(chosen.workspace.wrenches, wrenches, atol=1e-3 * state.mass)
+
+
+@pytest.mark.parametrize("soles", SETS)
+def test_optimality_conditions(sets, soles):
+    """No row is violated, the gradient vanishes, the duality gap is closed."""
+    state, targets, rows = situation(seed=1)
+    qp = sets.problem(state, targets, soles, [rows] if 0 not in soles else [])
+    solution = make_solver("active-set").solve(qp)
+    assert solution.solved
+    left, scale = residuals(qp, solution), np.abs(qp.g).max()
+    assert left.primal < 1e-8
+    assert left.dual < 1e-8 * scale
+    assert left.gap < 1e-7 * scale
+
+
+@pytest.mark.parametrize("soles", SETS)
+def test_motion_obeys_physics_and_leaves_the_stance(sets, soles):
+    """Root rows of M v̇ + h = Jᵀw with the wrenches of the soles in contact only; they rest."""
+    state, targets, rows = situation()
+    sets.tick(state, targets, soles, [rows] if 0 not in soles else [])
+    ws, chosen = sets.workspace, sets.sets[soles]
+    J = state.J[chosen.rows]
+    force = state.M @ ws.vdot + state.h - J.T @ ws.wrenches
+    np.testing.assert_allclose(force[:6], 0.0, atol=1e-6)
+    needed = -chosen.parameters.sole_damping * state.J_v[chosen.rows] - state.Jdot_v[chosen.rows]
+    np.testing.assert_allclose(J @ ws.vdot, needed, atol=1e-6)
+
+
+def test_swing_rows_move_the_free_foot(sets):
+    """A heavy swing task is met: the free sole accelerates as asked."""
+    state, targets, rows = situation()
+    sets.tick(state, targets, (1,), [rows._replace(weights=1e6 * rows.weights)])
+    np.testing.assert_allclose(rows.A @ sets.workspace.vdot, rows.b, atol=1.0)
+
+
+def test_load_limits_bind(sets):
+    """A sole whose load is limited carries no more; without limits it would."""
+    simulation = Simulation(robot())
+    state = simulation.state
+    targets = Targets.standing(robot(), state)
+    sets.tick(state, targets, (0, 1))
+    free = sets.workspace.wrenches[2]
+    sets.tick(state, targets, (0, 1), (), np.array([0.2 * free, np.inf]))
+    wrenches = sets.workspace.wrenches
+    assert sets.failures == 0
+    assert wrenches[2] == pytest.approx(0.2 * free, rel=1e-6)
+    assert wrenches[8] > free
+
+
+def test_torques_follow_those_of_before():
+    """With a bound on jumps the torques stay near those followed, and the plan knows of it."""
+    limit = robot().torque_limit
+    bounded = ContactSets(robot(), MomentumQPConfig(), jump=0.3)
+    state, targets, rows = situation()
+    joints = bounded.arrays.motor_dofs - 6
+    before = np.zeros(len(bounded.parameters.torque_limit))
+    free = bounded.tick(state, targets, (1,), [rows])
+    assert np.abs(free / limit).max() > 0.3
+    bounded.reset()
+    bounded.follow(before)
+    torques = bounded.tick(state, targets, (1,), [rows])
+    assert np.abs(torques / limit).max() <= 0.3 + 1e-9
+    ws = bounded.workspace
+    planned = state.M @ ws.vdot + state.h - state.J[6:].T @ ws.wrenches
+    assert bounded.failures == 0
+    np.testing.assert_allclose(planned[6:][joints], torques, atol=1e-5)

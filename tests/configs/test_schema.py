@@ -1,0 +1,339 @@
+"""configs/schema.py, configs/yaml_loader.py and configs/errors.py."""
+
+from __future__ import annotations
+
+import os
+import pickle
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+
+from poise.configs import files as file_names
+from poise.configs import schema
+from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.files import packaged, resolve, write_atomic
+from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
+
+
+@dataclass(frozen=True)
+class Weights:
+    com: float = field(default=1.0, metadata={"min": 0.0})
+    posture: float = field(default=1.0, metadata={"above": 0.0, "max": 10.0})
+
+
+@dataclass(frozen=True)
+class Settings:
+    name: str
+    weights: Weights = Weights()
+    steps: int = field(default=1, metadata={"min": 1})
+    fast: bool = False
+    root: Literal["hard", "soft"] = "hard"
+    level: Literal[1, 2] = 1
+    limit: float | None = None
+    scale: tuple[float, float] = (0.2, 0.2)
+    hidden: tuple[int, ...] = (128, 128)
+    bodies: list[str] = field(default_factory=list)
+    torque: dict[str, float] = field(default_factory=dict)
+    many: tuple[Weights, ...] = ()
+    mode: Literal["auto"] | float = "auto"
+    gain: float | dict[str, float] = 1.0
+    file: Path = Path("model.xml")
+    extra: Any = None
+    derived: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        if self.name == "nobody":
+            raise ValueError("nobody is not a name")
+
+
+def make(**data: Any) -> Settings:
+    return build(Settings, {"name": "a", **data}, "file.yaml")
+
+
+FULL = {
+    "name": "b",
+    "weights": {"com": 2.0, "posture": 10.0},
+    "steps": 4,
+    "fast": True,
+    "root": "soft",
+    "level": 2,
+    "limit": 1.5,
+    "scale": [0.1, 0.3],
+    "hidden": [64],
+    "bodies": ["torso"],
+    "torque": {"knee": 80.0},
+    "many": [{"com": 0.0, "posture": 1.0}],
+    "mode": 2.0,
+    "gain": {"knee": 1.0},
+    "file": "other.xml",
+    "extra": [1, "two"],
+}
+
+
+def test_build_makes_every_kind_of_field() -> None:
+    """All supported types are built, with nested dataclasses and tuples where they are declared."""
+    settings = build(Settings, FULL, "file.yaml")
+    assert settings == Settings(
+        name="b",
+        weights=Weights(2.0, 10.0),
+        steps=4,
+        fast=True,
+        root="soft",
+        level=2,
+        limit=1.5,
+        scale=(0.1, 0.3),
+        hidden=(64,),
+        bodies=["torso"],
+        torque={"knee": 80.0},
+        many=(Weights(0.0, 1.0),),
+        mode=2.0,
+        gain={"knee": 1.0},
+        file=Path("other.xml"),
+        extra=[1, "two"],
+    )
+    assert isinstance(settings.scale, tuple) and isinstance(settings.many[0], Weights)
+
+
+def test_to_dict_is_the_inverse_of_build(tmp_path: Path) -> None:
+    """Dataclass to dict, to YAML, to file and back gives the same dataclass."""
+    settings = build(Settings, FULL, "file.yaml")
+    assert to_dict(settings) == FULL
+    write_atomic(tmp_path / "settings.yaml", to_yaml(settings))
+    assert build(Settings, read_yaml(tmp_path / "settings.yaml"), "again") == settings
+
+
+def test_to_dict_turns_numpy_into_plain_values() -> None:
+    """Arrays and NumPy scalars become lists and Python numbers, which YAML can hold."""
+    plain = to_dict({"a": np.array([1.0, 2.0]), "b": np.float64(3.0)})
+    assert plain == {"a": [1.0, 2.0], "b": 3.0}
+    assert type(plain["b"]) is float
+
+
+def test_an_int_is_taken_for_a_float_and_stays_exact() -> None:
+    """`limit: 3` gives the float 3.0."""
+    limit = make(limit=3).limit
+    assert limit == 3.0 and type(limit) is float
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        ({"wieghts": {}}, "file.yaml: wieghts: unknown field (choices: name, weights, steps"),
+        ({"weights": {"cm": 1}}, "file.yaml: weights.cm: unknown field (choices: com, posture)"),
+        ({"weights": 3}, "weights: must be a mapping of fields, not 3 (choices: com, posture)"),
+        ({"weights": {"com": -1}}, "weights.com: must be at least 0.0, not -1"),
+        ({"weights": {"posture": 0}}, "weights.posture: must be above 0.0, not 0"),
+        ({"weights": {"posture": 11}}, "weights.posture: must be at most 10.0, not 11"),
+        ({"many": [{}, {"com": -1}]}, "many[1].com: must be at least 0.0"),
+        ({"steps": True}, "steps: must be a whole number, not True"),
+        ({"steps": 1.0}, "steps: must be a whole number, not 1.0"),
+        ({"limit": True}, "limit: must be a number, not True"),
+        ({"limit": "3"}, "limit: must be a number, not '3'"),
+        ({"limit": float("nan")}, "limit: must be a finite number, not nan"),
+        ({"limit": float("-inf")}, "limit: must be a finite number, not -inf"),
+        ({"limit": 10**400}, "limit: must be a finite number"),
+        ({"fast": 1}, "fast: must be true or false, not 1"),
+        ({"name": 1}, "name: must be text, not 1"),
+        ({"name": None}, "name: must be text, not None"),
+        ({"root": "hrad"}, "root: unknown value 'hrad' (choices: hard, soft)"),
+        ({"level": True}, "level: unknown value True (choices: 1, 2)"),
+        ({"derived": 1}, "derived: unknown field"),
+        ({"scale": [1, 2, 3]}, "scale: must be a list of 2"),
+        ({"scale": 1}, "scale: must be a list, not 1"),
+        ({"scale": [1, "x"]}, "scale[1]: must be a number, not 'x'"),
+        ({"bodies": "torso"}, "bodies: must be a list, not 'torso'"),
+        ({"torque": {1: 2.0}}, "torque: must be a mapping with names as keys"),
+        ({"torque": {"knee": "x"}}, "torque.knee: must be a number, not 'x'"),
+        ({"gain": "x"}, "gain: must be a number, not 'x', or must be a mapping"),
+        ({"gain": {"knee": "x"}}, "gain.knee: must be a number, not 'x'"),
+        ({"mode": "x"}, "mode: unknown value 'x', or must be a number, not 'x' (choices: auto)"),
+        ({"file": 3}, "file: must be a path, not 3"),
+        ({"name": "nobody"}, "file.yaml: nobody is not a name"),
+    ],
+)
+def test_bad_values_name_file_field_and_choices(data: dict, text: str) -> None:
+    """Each bad value gives one line with the source, the dotted field and what is valid."""
+    with pytest.raises(ConfigError) as caught:
+        make(**data)
+    message = str(caught.value)
+    assert text in message
+    assert message.startswith("file.yaml: ") and "\n" not in message
+
+
+def test_a_required_field_must_be_there() -> None:
+    """A field without a default must be given."""
+    with pytest.raises(ConfigError, match=r"file\.yaml: name: this field is missing"):
+        build(Settings, {}, "file.yaml")
+
+
+def test_an_unsupported_field_type_is_the_programmers_error() -> None:
+    """A dataclass with a field of another type is a TypeError, not a ConfigError."""
+
+    @dataclass
+    class Odd:
+        value: complex
+
+    with pytest.raises(TypeError, match="complex"):
+        schema._build(complex, 1, "file.yaml", "value", {})
+
+
+def write(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def test_numbers_with_an_exponent_are_numbers(tmp_path: Path) -> None:
+    """YAML 1.1 reads 1e-3 as text; Poise reads it as a number, and leaves other words alone."""
+    text = "a: 1e-3\nb: 3E5\nc: 1.5e6\nd: -2.e-1\ne: .5e1\nf: e3\ng: 1e\nh: 1.5e-3\ni: 0x10\n"
+    assert read_yaml(write(tmp_path / "a.yaml", text)) == {
+        "a": 1e-3,
+        "b": 3e5,
+        "c": 1.5e6,
+        "d": -0.2,
+        "e": 5.0,
+        "f": "e3",
+        "g": "1e",
+        "h": 1.5e-3,
+        "i": 16,
+    }
+
+
+def test_merge_keys_work_and_are_not_taken_for_repeated_keys(tmp_path: Path) -> None:
+    """A merged mapping may be overridden, also when it is merged again elsewhere."""
+    text = "a: &a {x: 1, y: 1}\nb: {deep: &b {<<: *a, x: 2}}\nc: {<<: *b, y: 3}\n"
+    data = read_yaml(write(tmp_path / "a.yaml", text))
+    assert data["b"]["deep"] == {"x": 2, "y": 1}
+    assert data["c"] == {"x": 2, "y": 3}
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("a: 1\nb: 2\na: 3\n", "line 3, column 1: key 'a' occurs twice"),
+        ("a: [1, 2\n", "line 2, column 1"),
+        ("a: !!python/object:os.system {}\n", "not valid YAML"),
+        ("[1]: 2\n? [1]\n: 3\n", "not valid YAML"),
+        ("a: 2020-13-45\n", "not valid YAML"),
+        ("a: \x01\n", "not valid YAML"),
+        ("[" * 3000, "not valid YAML"),
+        ("- a\n", "must hold a mapping of fields, found list"),
+        ("", "must hold a mapping of fields, found nothing"),
+    ],
+)
+def test_unreadable_yaml_is_one_clear_line(tmp_path: Path, text: str, problem: str) -> None:
+    """Whatever is wrong with the text, the error is one line that begins with the file."""
+    path = write(tmp_path / "bad.yaml", text)
+    with pytest.raises(ConfigError) as caught:
+        read_yaml(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ") and problem in message and "\n" not in message
+
+
+def test_missing_file_and_folder_are_config_errors(tmp_path: Path) -> None:
+    """A path that cannot be read says why."""
+    with pytest.raises(ConfigError, match=r"none\.yaml: cannot be read \(No such file"):
+        read_yaml(tmp_path / "none.yaml")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_yaml(tmp_path)
+
+
+def test_resolve_finds_packaged_names_and_paths(tmp_path: Path, monkeypatch) -> None:
+    """A name is looked up among the packaged files, a path is taken as it is."""
+    (tmp_path / "robots").mkdir()
+    packaged_file = write(tmp_path / "robots" / "tall.yaml", "")
+    monkeypatch.setattr(file_names, "files", lambda package: tmp_path)
+    own = write(tmp_path / "own.yaml", "")
+    assert packaged("robots") == ["tall"]
+    assert resolve("robots", "tall") == packaged_file
+    assert resolve("robots", str(own)) == own
+
+
+@pytest.mark.parametrize("name", ["tiny", "no/such.yaml", "../robots/tall", "."])
+def test_resolve_lists_the_choices(tmp_path: Path, monkeypatch, name: str) -> None:
+    """An unknown name or path is refused with the packaged names."""
+    (tmp_path / "robots").mkdir()
+    write(tmp_path / "robots" / "tall.yaml", "")
+    monkeypatch.setattr(file_names, "files", lambda package: tmp_path)
+    with pytest.raises(ConfigError, match=r"robots: no such .* \(choices: tall\)"):
+        resolve("robots", name)
+
+
+def test_write_atomic_makes_folders_and_replaces(tmp_path: Path) -> None:
+    """Text and bytes are written; nothing but the file is left."""
+    path = tmp_path / "new" / "file.txt"
+    write_atomic(path, "ωδ")
+    write_atomic(path, b"bytes")
+    assert path.read_bytes() == b"bytes"
+    assert os.listdir(path.parent) == ["file.txt"]
+
+
+def test_write_atomic_does_not_write_into_the_old_file(tmp_path: Path) -> None:
+    """The old file is replaced as a whole: another name for it keeps the old content."""
+    path, other = tmp_path / "file.txt", tmp_path / "other.txt"
+    write_atomic(path, "old")
+    os.link(path, other)
+    write_atomic(path, "new")
+    assert (path.read_text(), other.read_text()) == ("new", "old")
+
+
+def test_write_atomic_into_a_file_is_told(tmp_path: Path) -> None:
+    """A folder that is a file: one error, and the file stays."""
+    (tmp_path / "file").write_text("old")
+    with pytest.raises(PoiseError, match="cannot be written"):
+        write_atomic(tmp_path / "file" / "new", "text")
+    assert (tmp_path / "file").read_text() == "old"
+
+
+def test_write_atomic_keeps_the_old_content_when_it_fails(tmp_path: Path, monkeypatch) -> None:
+    """A failure half way leaves the old file and no part of the new one."""
+    path = tmp_path / "file.txt"
+    write_atomic(path, "old")
+
+    def fail(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(PoiseError, match="cannot be written"):
+        write_atomic(path, "new")
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["file.txt"]
+
+
+def test_write_atomic_refuses_a_folder(tmp_path: Path) -> None:
+    """Writing over a folder is an error of Poise, not of the operating system."""
+    with pytest.raises(PoiseError, match="cannot be written"):
+        write_atomic(tmp_path, "text")
+
+
+def test_errors_survive_a_process_boundary() -> None:
+    """A worker's ConfigError arrives with the same text and fields."""
+    error = ConfigError("is wrong", source="a.yaml", field="b", choices=["c", "d"])
+    copy = pickle.loads(pickle.dumps(error))
+    assert str(copy) == str(error) == "a.yaml: b: is wrong (choices: c, d)"
+    assert (copy.field, copy.choices) == ("b", ("c", "d"))
+
+
+def test_a_base_may_have_a_base(tmp_path: Path) -> None:
+    """What is nearest counts; mappings are merged, lists are not."""
+    (tmp_path / "a.yaml").write_text("x: 1\nlist: [1, 2]\npart: {y: 1, z: {u: 1, v: 1}}\n")
+    (tmp_path / "b.yaml").write_text(f"base: {tmp_path}/a.yaml\npart: {{z: {{u: 2}}}}\n")
+    data = {"base": str(tmp_path / "b.yaml"), "list": [3], "part": {"y": 3}}
+    found = on_base(data, "training", "c.yaml")
+    assert found == {"x": 1, "list": [3], "part": {"y": 3, "z": {"u": 2, "v": 1}}}
+    assert data["part"] == {"y": 3}
+
+
+def test_a_base_that_is_none(tmp_path: Path) -> None:
+    """Not a name, no such file, and two that are each other's: one error that names the file."""
+    with pytest.raises(ConfigError, match=r"^c.yaml: base: must be a name .*residual-step"):
+        on_base({"base": 3}, "training", "c.yaml")
+    with pytest.raises(ConfigError, match="nowhere"):
+        on_base({"base": "nowhere"}, "training", "c.yaml")
+    one, other = tmp_path / "one.yaml", tmp_path / "other.yaml"
+    one.write_text(f"base: {other}\n")
+    other.write_text(f"base: {one}\n")
+    with pytest.raises(ConfigError, match=r"other.yaml: base: .*one.yaml' leads back to itself"):
+        on_base({"base": str(one)}, "training", "c.yaml")

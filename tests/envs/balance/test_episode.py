@@ -1,0 +1,214 @@
+"""Falls, quiet time, effort and the reward of one policy step."""
+
+import numpy as np
+import pytest
+
+from poise.envs.balance import episode
+from poise.envs.balance.episode import (
+    METRICS,
+    REWARD_TERMS,
+    FallLimits,
+    RewardWeights,
+    allocate_episode,
+    begin_episode,
+    has_fallen,
+    judge,
+    judge_step,
+    record_tick,
+)
+from poise.envs.balance.observation import scales
+from poise.envs.physics.simulation import Simulation
+from tests.support.shared import generic_state, robot
+
+
+def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, actions=3, e=None):
+    """One judged step; returns reward and episode."""
+    r = simulation.robot
+    if e is None:
+        e = allocate_episode(actions, 1, len(r.soles))
+        begin_episode(simulation.state_arrays, e)
+        e.action[:], e.last_action[:] = [0.5, -0.25, 0.0], [0.1, 0.1, -0.1]
+    judge_step(
+        simulation.arrays, simulation.plant, simulation.state_arrays,
+        scales(simulation.arrays, Simulation(r).state.support_polygon),
+        judge(limits or FallLimits(), weights or RewardWeights(), r.height_com, 100),
+        r.standing_qpos[7:].copy() if q_ref is None else q_ref,
+        np.zeros(r.model.nu) if tau is None else tau, time, e,
+    )  # fmt: skip
+    return float(e.reward[0]), e
+
+
+def test_each_reward_term_is_its_formula():
+    """At a generic state every term equals its definition times its weight."""
+    simulation = generic_state()
+    state, r = simulation.state, robot()
+    assert not fallen(simulation)
+    tau = np.random.default_rng(0).uniform(-1.0, 1.0, r.model.nu) * r.torque_limit
+    reward, e = play(simulation, tau=tau)
+    terms = dict(zip(REWARD_TERMS, e.reward_terms, strict=True))
+
+    cos, sin = state.heading
+    polygon = Simulation(r).state.support_polygon
+    half = np.ptp(polygon, axis=0) / 2
+
+    def squared(point):
+        x, y = point[:2] - state.origin[:2]
+        return np.sum((np.array([cos * x + sin * y, cos * y - sin * x]) / half) ** 2)
+
+    tilt = state.root_axes[2] @ simulation.arrays.root_standing[2]
+    speed = np.linalg.norm(state.com_vel)
+    expected = {
+        "alive": 1.0,
+        "com": np.exp(-4 * squared(state.com)),
+        "capture": np.exp(-2 * squared(state.capture_point)),
+        "upright": tilt**4,
+        "quiet": np.exp(-((speed / 0.1) ** 2) / 4),
+        "posture": np.exp(-np.sum((state.q - r.standing_qpos[7:]) ** 2)),
+        "effort": -np.mean((tau / r.torque_limit) ** 2),
+        "action": -(0.5**2 + 0.25**2) / 3,
+        "action_rate": -(0.4**2 + 0.35**2 + 0.1**2) / 3 / 4,
+        "fall": 0.0,
+    }
+    for name, value in expected.items():
+        weight = getattr(RewardWeights(), name)
+        assert terms[name] == pytest.approx(weight * value, rel=1e-9, abs=1e-15), name
+    assert reward == pytest.approx(sum(terms.values()), rel=1e-12)
+
+
+def test_a_fall_costs_its_weight_and_earns_nothing():
+    """In the step of the fall the positive terms are zero."""
+    simulation = generic_state()
+    simulation.state_arrays.other_contacts[0] = 1.0
+    reward, e = play(simulation)
+    terms = dict(zip(REWARD_TERMS, e.reward_terms, strict=True))
+    assert e.metrics[episode.FALLEN] == 1.0 and terms["fall"] == -RewardWeights().fall
+    assert all(terms[name] == 0.0 for name in ("alive", "com", "capture", "quiet", "posture"))
+    assert terms["action"] < 0.0
+    assert reward == pytest.approx(sum(terms.values()))
+
+
+def test_weights_scale_the_terms():
+    """A weight of zero removes a term; another weight multiplies it."""
+    simulation = generic_state()
+    _, e = play(simulation, weights=RewardWeights(alive=0.0, action=7.0))
+    assert e.reward_terms[REWARD_TERMS.index("alive")] == 0.0
+    assert e.reward_terms[REWARD_TERMS.index("action")] == pytest.approx(-7.0 * 0.3125 / 3)
+
+
+def fallen(simulation, **limits):
+    return has_fallen(
+        simulation.arrays, simulation.state_arrays,
+        judge(FallLimits(**limits), RewardWeights(), simulation.robot.height_com, 100),
+    )  # fmt: skip
+
+
+def test_what_a_fall_is():
+    """Too low, too tilted, a hand on the ground, or numbers that are none."""
+    simulation = Simulation(robot())
+    s = simulation.state_arrays
+    assert not fallen(simulation) and not fallen(simulation, height=0.99)
+    s.com[2] = 0.59 * robot().height_com
+    assert fallen(simulation)
+    simulation.reset()
+    s.other_contacts[0] = 1.0
+    assert fallen(simulation) and not fallen(simulation, ground_contact=False)
+    simulation.reset()
+    s.com_vel[2] = np.nan
+    assert fallen(simulation)
+
+
+def tilted(degrees, axis):
+    """A simulation whose root is turned about a horizontal axis, nothing but feet touching."""
+    simulation = Simulation(robot())
+    qpos = robot().standing_qpos.copy()
+    half = np.radians(degrees) / 2
+    q, c, s = qpos[3:7].copy(), np.cos(half), np.sin(half)
+    other = [-q[1], q[0], -q[3], q[2]] if axis == 0 else [-q[2], q[3], q[0], -q[1]]
+    qpos[3:7] = c * q + s * np.array(other)
+    simulation.reset(qpos)
+    simulation.state_arrays.other_contacts[0] = 0.0
+    return simulation
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_tilt_limit_is_an_angle(axis):
+    """50° about a horizontal axis falls with a limit of 49°, not with one of 51°."""
+    simulation = tilted(50.0, axis)
+    assert fallen(simulation, tilt=49.0, height=0.01)
+    assert not fallen(simulation, tilt=51.0, height=0.01)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_only_who_stands_upright_is_quiet(axis):
+    """Tilted by 20° and at rest over the soles counts as quiet below a limit of 21°, not of 19°."""
+    simulation = tilted(20.0, axis)
+    s = simulation.state_arrays
+    s.com[:2] = s.origin[:2]
+    s.contacts[:] = 1.0  # tilted, one foot is in the air
+    for limit, steps in ((21.0, 1.0), (19.0, 0.0)):
+        _, e = play(simulation, time=0.02, limits=FallLimits(quiet_tilt=limit))
+        assert e.metrics[episode.FALLEN] == 0.0
+        assert e.metrics[episode.QUIET_STEPS] == steps
+
+
+def test_quiet_steps_count_and_start_again():
+    """Quiet time grows while the CoM is slow and over the soles, and starts again if not."""
+    simulation = Simulation(robot())
+    s = simulation.state_arrays
+    _, e = play(simulation, time=0.02)
+    play(simulation, time=0.04, e=e)
+    assert e.metrics[episode.QUIET_STEPS] == 2.0 and e.metrics[episode.LAST_MOVING] == 0.0
+    s.com_vel[0] = 0.11
+    play(simulation, time=0.06, e=e)
+    assert e.metrics[episode.QUIET_STEPS] == 0.0 and e.metrics[episode.LAST_MOVING] == 0.06
+    simulation.reset()
+    s.com[0] += 0.5  # at rest, but not over the soles
+    play(simulation, time=0.08, e=e)
+    assert e.metrics[episode.QUIET_STEPS] == 0.0 and e.metrics[episode.LAST_MOVING] == 0.08
+
+
+def test_largest_excursions_are_kept():
+    """Maxima of CoM, capture point and slide, and the smallest CoP margin, do not come back."""
+    simulation = Simulation(robot())
+    s, m = simulation.state_arrays, episode
+    _, e = play(simulation)
+    margin = simulation.state.support_distance(simulation.state.cop)
+    assert e.metrics[m.MIN_COP_MARGIN] == pytest.approx(margin)
+    s.com[:2] = s.origin[:2] + [0.03, 0.04]
+    s.capture_point[:] = s.origin[:2] + [-0.06, 0.08]
+    s.cop[:] = s.origin[:2] + [5.0, 0.0]
+    s.sole_point[1, 0] += 0.02
+    play(simulation, e=e)
+    simulation.reset()
+    play(simulation, e=e)
+    assert e.metrics[m.MAX_COM] == pytest.approx(0.05)
+    assert e.metrics[m.MAX_CAPTURE] == pytest.approx(0.1)
+    assert e.metrics[m.MAX_SLIDE] == pytest.approx(0.02)
+    assert e.metrics[m.MIN_COP_MARGIN] < -4.0
+
+
+def test_ticks_account_for_power_and_saturation():
+    """Energy is Σ|τ q̇| dt, saturation the share of motors at their limit."""
+    simulation = generic_state()
+    r = robot()
+    e = allocate_episode(1, 1, 2)
+    tau = 0.5 * r.torque_limit
+    tau[:3] = -r.torque_limit[:3]
+    record_tick(simulation.arrays, simulation.state_arrays, tau, 0.004, e)
+    power = np.abs(tau * simulation.state.qvel[r.motor_dofs]).sum()
+    assert e.metrics[episode.ENERGY] == pytest.approx(0.004 * power)
+    assert e.metrics[episode.SATURATED] == pytest.approx(3 / r.model.nu)
+    assert e.metrics[episode.PEAK_TORQUE] == pytest.approx(1.0)
+    assert e.metrics[episode.TICKS] == 1.0
+
+
+def test_a_new_episode_forgets_the_last():
+    """Everything recorded is cleared, and the feet are where they should stay."""
+    simulation = generic_state()
+    e = allocate_episode(2, 1, 2)
+    e.action[:], e.last_action[:], e.reward_terms[:], e.metrics[:] = 1.0, 1.0, 1.0, 1.0
+    begin_episode(simulation.state_arrays, e)
+    assert not e.action.any() and not e.last_action.any() and not e.reward_terms.any()
+    assert e.metrics[episode.MIN_COP_MARGIN] == np.inf
+    assert np.count_nonzero(e.metrics) == 1 and len(e.metrics) == METRICS
+    np.testing.assert_array_equal(e.sole_start, simulation.state.sole_points[:, :2])

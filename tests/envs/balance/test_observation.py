@@ -1,0 +1,115 @@
+"""The observation against the quantities of RobotState, index by index."""
+
+import numpy as np
+import pytest
+
+from poise.envs.balance.observation import observation_table, observation_terms, observe, scales
+from tests.support.shared import generic_state, robot
+
+
+def observed(simulation, q_ref, v_ref, action):
+    """The observation as a mapping from term to its numbers."""
+    r = simulation.robot
+    terms = observation_terms(r.joint_names, [s.name for s in r.soles], range(len(action)))
+    out = np.full(sum(term.size for term in terms), np.nan)
+    standing = type(simulation)(r).state.support_polygon
+    observe(
+        simulation.arrays, simulation.state_arrays, scales(simulation.arrays, standing),
+        q_ref, v_ref, action, out,
+    )  # fmt: skip
+    ends = np.cumsum([term.size for term in terms])
+    return dict(zip([term.name for term in terms], np.split(out, ends[:-1]), strict=True))
+
+
+@pytest.mark.parametrize("name", ["humanoid", "tall", "compact"])
+def test_every_term_is_what_its_name_says(name):
+    """At a pushed state that faces another way, each term equals its definition."""
+    simulation = generic_state(name)
+    state, r = simulation.state, robot(name)
+    rng = np.random.default_rng(1)
+    q_ref, v_ref = state.q + rng.normal(0, 0.1, len(state.q)), rng.normal(0, 0.5, len(state.q))
+    action = rng.uniform(-1.0, 1.0, 4)
+    terms = observed(simulation, q_ref, v_ref, action)
+
+    yaw = state.heading_yaw
+    assert abs(yaw) > 0.3  # else the frames would not be told apart
+    to_heading = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    polygon = type(simulation)(r).state.support_polygon
+    half = (polygon.max(axis=0) - polygon.min(axis=0)) / 2
+    h, g, m = r.height_com, 9.81, r.mass
+    omega = np.sqrt(g / h)
+
+    def ground(point):
+        return to_heading @ (point[:2] - state.origin[:2]) / half
+
+    def space(vector):
+        return np.append(to_heading @ vector[:2], vector[2])
+
+    expected = {
+        "com": ground(state.com),
+        "com_height": [(state.com[2] - state.origin[2] - h) / (0.1 * h)],
+        "capture_point": ground(state.capture_point),
+        "cop": ground(state.cop),
+        "com_vel": space(state.com_vel) / (0.2 * omega * h),
+        "angular_momentum": space(state.angular_momentum) / (0.1 * m * h**2 * omega),
+        "gravity": state.root_axes.T @ [0.0, 0.0, -1.0],
+        "root_rate": state.qvel[3:6] / omega,
+        "load": [state.contact_wrench[2] / (m * g) - 1.0],
+        "joint_pos": state.q - q_ref,
+        "joint_vel": (state.qvel[6:] - v_ref) / (3.0 * omega),
+        "contacts": state.contacts,
+        "last_action": action,
+    }
+    assert list(terms) == list(expected)
+    for term, value in expected.items():
+        np.testing.assert_allclose(terms[term], np.clip(value, -10, 10), atol=1e-9, err_msg=term)
+        if term != "contacts":
+            assert np.abs(terms[term]).max() > 1e-4, f"{term} is not tested at zero"
+
+
+def test_the_observation_does_not_depend_on_place_and_heading():
+    """A robot that stands elsewhere and faces another way sees the same."""
+    r = robot()
+    still = np.zeros(len(r.joint_names))
+    here = type(generic_state())(r)
+    there = type(here)(r)
+    qpos = r.standing_qpos.copy()
+    q = qpos[3:7].copy()
+    qpos[3:7] = np.cos(1.0) * q + np.sin(1.0) * np.array([-q[3], -q[2], q[1], q[0]])
+    cos, sin = np.cos(2.0), np.sin(2.0)
+    x, y = qpos[:2]
+    qpos[:2] = [3.0 + cos * x - sin * y, -2.0 + sin * x + cos * y]
+    there.reset(qpos)
+    assert abs(there.state.heading_yaw - 2.0) < 1e-9
+    a = observed(here, r.standing_qpos[7:], still, np.zeros(4))
+    b = observed(there, r.standing_qpos[7:], still, np.zeros(4))
+    for term in a:
+        np.testing.assert_allclose(a[term], b[term], atol=1e-4, err_msg=term)
+
+
+def test_the_observation_is_clipped():
+    """No entry leaves the observation space, however fast the robot."""
+    simulation = generic_state()
+    q = simulation.state.q
+    terms = observed(simulation, q - 50.0, np.full(len(q), 1e6), np.zeros(4))
+    assert np.all(terms["joint_pos"] == 10.0) and np.all(terms["joint_vel"] == -10.0)
+
+
+def test_scales_of_the_standing_robot():
+    """Half extents, height and rate are those of the robot."""
+    simulation = type(generic_state())(robot())
+    scale = scales(simulation.arrays, simulation.state.support_polygon)
+    polygon = simulation.state.support_polygon
+    assert 2 * scale.support_x == pytest.approx(np.ptp(polygon[:, 0]))
+    assert 2 * scale.support_y == pytest.approx(np.ptp(polygon[:, 1]))
+    assert scale.omega == pytest.approx(simulation.state.omega)
+    assert scale.weight == pytest.approx(robot().mass * 9.81)
+
+
+def test_the_table_has_one_row_per_index():
+    """Rows count from 0 and name the entries of each term."""
+    terms = observation_terms(["hip", "knee"], ["left", "right"], ["push"])
+    rows = observation_table(terms).splitlines()[2:]
+    assert [int(row.split("|")[1]) for row in rows] == list(range(sum(t.size for t in terms)))
+    assert rows[20].startswith("| 20 | joint_pos | hip | rad |")
+    assert rows[-1].startswith("| 26 | last_action | push |")

@@ -1,0 +1,107 @@
+"""Compiled kernels are kept apart for everything that their bits depend on."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from poise.configs.errors import ConfigError
+from poise.envs.compiled import jit, kernel_cache
+
+#: Prints the folder of the kernels, whether one was read from it, and the bits of a sum that
+#: `fastmath` reorders and fuses.
+PROBE = """
+import numpy as np
+from poise.envs.compiled import jit
+from tests.envs.compiled.test_kernel_cache import total
+
+x = 1.0 / np.arange(3.0, 103.0)
+value = total(x, x[::-1].copy())
+print(jit.CACHE, sum(total.stats.cache_hits.values()), value.hex())
+"""
+
+
+@jit.compiled
+def total(x, y):
+    """A scalar product, one product after the other."""
+    value = 0.0
+    for i in range(x.shape[0]):
+        value += x[i] * y[i]
+    return value
+
+
+def probe(room: Path, **settings: str) -> tuple[Path, int, str]:
+    """What PROBE prints in a process with these settings, its kernels somewhere below `room`."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(room)} | settings
+    command = [sys.executable, "-c", PROBE]
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=True,
+        cwd=Path(__file__).parents[3],
+    )  # fmt: skip
+    folder, hits, value = done.stdout.split()
+    return Path(folder), int(hits), value
+
+
+def test_kernels_with_and_without_fastmath_do_not_mix(tmp_path: Path) -> None:
+    """Each process reads the kernels of its own kind, and without fastmath nothing is reordered."""
+    x = 1.0 / np.arange(3.0, 103.0)
+    in_order = 0.0
+    for a, b in zip(x.tolist(), x[::-1].tolist(), strict=True):
+        in_order += a * b
+    fast, strict = (probe(tmp_path, POISE_FASTMATH=switch) for switch in "10")
+    assert fast[0] != strict[0] and fast[1] == strict[1] == 0
+    assert strict[2] == in_order.hex()
+    assert probe(tmp_path, POISE_FASTMATH="1") == (fast[0], 1, fast[2])
+    assert probe(tmp_path, POISE_FASTMATH="0") == (strict[0], 1, strict[2])
+
+
+def test_processors_have_caches_of_their_own(tmp_path: Path) -> None:
+    """The name and the features that Numba compiles for are part of the folder's name."""
+    host, generic = probe(tmp_path), probe(tmp_path, NUMBA_CPU_NAME="generic")
+    plain = probe(tmp_path, NUMBA_CPU_FEATURES="")
+    assert len({host[0], generic[0], plain[0]}) == 3
+    assert host[1] == generic[1] == plain[1] == 0
+
+
+@pytest.mark.parametrize("switch", ["", "2", "yes", " 1"])
+def test_the_switch_is_0_or_1(switch: str) -> None:
+    """Anything else is refused with the choices."""
+    with pytest.raises(ConfigError, match=r"POISE_FASTMATH: .*\(choices: 0, 1\)"):
+        jit.fastmath({"POISE_FASTMATH": switch})
+
+
+def test_the_flags_keep_nan_and_infinity() -> None:
+    """Checks rely on them; by default the other flags are set, with 0 none."""
+    assert jit.fastmath({}) == jit.fastmath({"POISE_FASTMATH": "1"}) == set(jit.FAST)
+    assert not set(jit.FAST) & {"fast", "nnan", "ninf", "afn"}
+    assert jit.fastmath({"POISE_FASTMATH": "0"}) == set()
+
+
+def test_kernels_of_other_sources_are_dropped(tmp_path: Path) -> None:
+    """A changed file of the package, wherever it is, outdates what was compiled from it."""
+    package, folder = tmp_path / "package", tmp_path / "kernels"
+    (package / "part").mkdir(parents=True)
+    (folder / "below").mkdir(parents=True)
+    source, kernel = package / "part" / "a.py", folder / "below" / "a.1.nbc"
+    for text, stale in (("x = 1", True), ("x = 1", False), ("x = 2", True)):
+        source.write_text(text)
+        kernel.write_bytes(b"code")
+        assert kernel_cache.drop_stale_kernels(folder, (package,)) == stale
+        assert kernel.exists() != stale
+
+
+def test_a_folder_is_found_where_the_package_cannot_be_written(tmp_path, monkeypatch) -> None:
+    """First NUMBA_CACHE_DIR, then beside the sources, then the user's caches, then none."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(kernel_cache, "_ROOM", tmp_path / "file")
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    assert kernel_cache.kernel_folder([]).parent == tmp_path / "caches" / "poise"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert kernel_cache.kernel_folder([]) is None
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "numba"))
+    assert kernel_cache.kernel_folder([]).parent == tmp_path / "numba" / "poise"

@@ -1,0 +1,93 @@
+"""Reading MJCF whose mesh and texture files may be absent."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import pytest
+
+from poise.configs.errors import ConfigError
+from poise.envs.robots.robot import load_robot
+from tests.support.small_biped import BOX_FOOT, write_biped
+
+MESH = '<mesh name="hull" file="hull.stl"/>'
+INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
+
+
+def test_missing_visual_meshes_are_dropped(tmp_path: Path) -> None:
+    """A robot loads without the files of its visual meshes, with the same dynamics."""
+    visual = '<geom type="mesh" mesh="hull" contype="0" conaffinity="0" mass="0"/>'
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        robot = load_robot(write_biped(tmp_path, asset=MESH, trunk=visual, foot=visual + BOX_FOOT))
+    assert robot.model.nmesh == 0
+    assert robot.fingerprint == load_robot(write_biped(tmp_path)).fingerprint
+
+
+def test_masks_of_default_classes_count(tmp_path: Path) -> None:
+    """A mesh is visual also where a default class says so."""
+    defaults = '<default><default class="v"><geom contype="0" conaffinity="0" mass="0"/></default>'
+    visual = '<geom class="v" type="mesh" mesh="hull"/>'
+    path = write_biped(tmp_path, asset=MESH, foot=visual + BOX_FOOT)
+    text = (tmp_path / "biped.xml").read_text()
+    (tmp_path / "biped.xml").write_text(text.replace("<asset>", f"{defaults}</default><asset>"))
+    assert load_robot(path).model.nmesh == 0
+
+
+def test_missing_collision_mesh_elsewhere_warns(tmp_path: Path) -> None:
+    """A collision mesh of another body is dropped with a warning that names the body."""
+    arm = f'<body name="arm">{INERTIAL}<joint/><geom type="mesh" mesh="hull"/></body>'
+    with pytest.warns(UserWarning, match=r"collision geometry: arm$"):
+        load_robot(write_biped(tmp_path, asset=MESH, trunk=arm))
+
+
+def test_missing_textures_are_dropped(tmp_path: Path) -> None:
+    """A texture without its file goes; what it was painted on stays."""
+    asset = '<texture name="t" type="2d" file="t.png"/><material name="m" texture="t"/>'
+    robot = load_robot(write_biped(tmp_path, asset=asset, trunk='<geom size="0.1" material="m"/>'))
+    assert robot.model.material("m").id >= 0
+
+
+def test_includes_are_read(tmp_path: Path) -> None:
+    """A scene that includes the robot's file works as the source."""
+    path = write_biped(tmp_path, source={"mjcf": "scene.xml"})
+    (tmp_path / "scene.xml").write_text('<mujoco><include file="biped.xml"/></mujoco>')
+    assert load_robot(path).model.nu == 8
+
+
+FOOT_MESH = '<geom type="mesh" mesh="hull"/>'
+WRONG = {
+    "foot": ({"asset": MESH, "foot": INERTIAL + FOOT_MESH}, ["'hull'", "left_foot", "collides"]),
+    "mass": ({"asset": MESH, "trunk": FOOT_MESH}, ["'hull'", "trunk", "mass"]),
+}
+
+
+@pytest.mark.parametrize(("change", "words"), WRONG.values(), ids=WRONG)
+def test_meshes_that_matter_are_missed(tmp_path: Path, change: dict, words: list[str]) -> None:
+    """A missing mesh that touches the ground or gives mass is an error that says so."""
+    path = write_biped(tmp_path, **change)
+    with pytest.raises(ConfigError) as caught:
+        load_robot(path)
+    for word in [str(path), "source.mjcf", *words]:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "<mujoco><worldbody>", "<mujoco><wing/></mujoco>", "\x00\x01"]
+)
+def test_broken_mjcf(tmp_path: Path, text: str) -> None:
+    """What is not MJCF gives one line that names both files."""
+    path = write_biped(tmp_path)
+    (tmp_path / "biped.xml").write_text(text)
+    with pytest.raises(ConfigError, match=r"biped\.yaml.*biped\.xml") as caught:
+        load_robot(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_include(tmp_path: Path) -> None:
+    """An include without its file is an error that names it."""
+    path = write_biped(tmp_path)
+    (tmp_path / "biped.xml").write_text('<mujoco><include file="legs.xml"/></mujoco>')
+    with pytest.raises(ConfigError, match=r"biped\.xml.*legs\.xml"):
+        load_robot(path)

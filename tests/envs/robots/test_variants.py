@@ -1,0 +1,55 @@
+"""envs/robots/variants.py."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.variants import altered_robot, floor_friction
+from tests.support.shared import robot
+
+
+def test_masses_and_what_follows_from_them_are_scaled() -> None:
+    """Mass, inertia matrix and bias forces of the same state all grow by a tenth."""
+    heavy = altered_robot(robot(), mass_error=0.1)
+    assert heavy.mass == pytest.approx(1.1 * robot().mass)
+    one, other = Simulation(robot()).state, Simulation(heavy).state
+    armature = np.diag(robot().model.dof_armature)
+    assert other.M - armature == pytest.approx(1.1 * (one.M - armature), abs=1e-9)
+    assert other.com == pytest.approx(one.com)
+    assert heavy.model.body_subtreemass[0] == pytest.approx(1.1 * robot().mass)
+
+
+def test_the_given_robot_stays_as_it_was() -> None:
+    """The altered robot has its own model, and another fingerprint."""
+    before = robot().model.geom_friction.copy(), robot().model.body_mass.copy()
+    other = altered_robot(robot(), friction=0.4, mass_error=-0.1)
+    assert np.array_equal(robot().model.geom_friction, before[0])
+    assert np.array_equal(robot().model.body_mass, before[1])
+    assert other.fingerprint != robot().fingerprint
+    assert altered_robot(robot()).fingerprint == robot().fingerprint
+
+
+def test_friction_is_what_the_soles_meet() -> None:
+    """A robot pushed sideways at its root slides where the floor does not hold it."""
+    assert floor_friction(robot()) == pytest.approx(0.8)
+    smooth = altered_robot(robot(), friction=0.05)
+    assert floor_friction(smooth) == pytest.approx(0.05)
+    moved = []
+    for one in (robot(), smooth):
+        simulation = Simulation(one)
+        qvel = np.zeros(one.model.nv)
+        qvel[1] = 0.4
+        simulation.reset(qvel=qvel)
+        start = simulation.state.origin.copy()
+        simulation.step(np.zeros(one.model.nu), 50)
+        moved.append(float(np.linalg.norm(simulation.state.origin[:2] - start[:2])))
+    assert moved[1] > 3 * moved[0]
+
+
+@pytest.mark.parametrize("change", [{"friction": 0.0}, {"mass_error": -1.0}])
+def test_what_cannot_be_is_refused(change: dict[str, float]) -> None:
+    """No friction at all, or no mass."""
+    with pytest.raises(ValueError, match=next(iter(change))):
+        altered_robot(robot(), **change)

@@ -1,0 +1,79 @@
+"""The choice of an off-screen renderer, and what our modules leave alone."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from poise.envs.viewing import gl
+
+
+@pytest.fixture
+def bare(monkeypatch):
+    """Linux without a display, where nothing has been chosen and MuJoCo is not loaded."""
+    for name in ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delitem(sys.modules, "mujoco", raising=False)
+
+    def installed(*libraries):
+        monkeypatch.setattr(gl.ctypes.util, "find_library", lambda n: n if n in libraries else None)
+
+    installed("OSMesa", "EGL")
+    monkeypatch.setenv("MUJOCO_GL", "")  # so that what a test sets is undone
+    monkeypatch.setenv("MESA_SHADER_CACHE_DISABLE", "")
+    return installed
+
+
+@pytest.mark.parametrize(
+    "libraries, backend", [(("OSMesa", "EGL"), "osmesa"), (("EGL",), "egl"), ((), None)]
+)
+def test_software_comes_first(bare, libraries, backend):
+    """OSMesa where it is installed, else EGL, else nothing is set."""
+    bare(*libraries)
+    assert gl.choose_gl_backend() == backend
+    assert os.environ["MUJOCO_GL"] == (backend or "")
+
+
+def test_choice_of_the_user_stays(bare, monkeypatch):
+    """A value of MUJOCO_GL is returned, not replaced."""
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    assert gl.choose_gl_backend() == "egl"
+
+
+def test_no_thread_of_least_priority_is_started(bare, monkeypatch):
+    """It would hold up the end of the process; a value of the user stays."""
+    monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)
+    gl.choose_gl_backend()
+    assert os.environ["MESA_SHADER_CACHE_DISABLE"] == "true"
+    monkeypatch.setenv("MESA_SHADER_CACHE_DISABLE", "false")
+    gl.choose_gl_backend()
+    assert os.environ["MESA_SHADER_CACHE_DISABLE"] == "false"
+
+
+@pytest.mark.parametrize("situation", ["display", "macOS", "too late"])
+def test_nothing_is_set_where_it_would_not_help(bare, monkeypatch, situation):
+    """With a display, on another system, or after MuJoCo has read the variable."""
+    if situation == "display":
+        monkeypatch.setenv("DISPLAY", ":0")
+    elif situation == "macOS":
+        monkeypatch.setattr(sys, "platform", "darwin")
+    else:
+        monkeypatch.setitem(sys.modules, "mujoco", os)
+    assert not gl.choose_gl_backend()
+    assert os.environ["MUJOCO_GL"] == ""
+
+
+def test_imports_set_no_variable_and_choosing_loads_no_mujoco():
+    """The module `gl` comes without MuJoCo; the modules that draw leave the environment alone."""
+    code = (
+        "import os, sys; import poise.envs.viewing.gl; assert 'mujoco' not in sys.modules;"
+        "before = dict(os.environ); import poise.envs.viewing.renderer;"
+        "import poise.training.figures.video;"
+        "assert 'mujoco' in sys.modules; new = set(os.environ.items()) - set(before.items());"
+        "assert not new, new"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()

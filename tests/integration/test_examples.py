@@ -1,0 +1,86 @@
+"""Every example runs as a user would start it."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+ARGUMENTS = {
+    "own_controller.py": [],
+    "ppo_single_file.py": ["--steps", "128", "--envs", "2", "--rollout", "32"],
+    "push_strip.py": ["strip.png"],
+    "sb3_train.py": ["100"],
+}
+
+
+def run(name, folder):
+    """Its output; fails with what it wrote to stderr."""
+    command = [sys.executable, "-W", "error::DeprecationWarning:poise", str(EXAMPLES / name)]
+    result = subprocess.run(
+        [*command, *ARGUMENTS[name]], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_every_example_is_tried():
+    """A new example needs its arguments here."""
+    assert sorted(path.name for path in EXAMPLES.glob("*.py")) == sorted(ARGUMENTS)
+
+
+def test_a_controller_from_outside_stands(tmp_path):
+    """It stands in all three places where it can act."""
+    assert run("own_controller.py", tmp_path).count("stands") == 3
+
+
+def test_ppo_in_a_single_file(tmp_path):
+    """The loop collects and updates, and reports as it goes."""
+    lines = run("ppo_single_file.py", tmp_path).splitlines()
+    assert [int(re.sub(r"\D", "", line.split("steps")[0])) for line in lines] == [64, 128]
+
+
+def test_stable_baselines3_in_ten_lines(tmp_path):
+    """It learns and saves."""
+    assert "fps" in run("sb3_train.py", tmp_path)
+    assert (tmp_path / "sb3_residual.zip").is_file()
+
+
+def test_the_picture_of_the_readme(tmp_path, can_render):
+    """Frames of a push are drawn into one picture."""
+    run("push_strip.py", tmp_path)
+    assert (tmp_path / "strip.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("mode", ["vector_entry_point", "sync", "async"])
+def test_the_single_file_masks_the_steps_that_only_reset(mode, monkeypatch):
+    """Advantages stop at an episode's end; the step after it is no experience."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import gymnasium
+    import numpy as np
+    import ppo_single_file as example
+    import torch
+
+    import poise  # noqa: F401
+
+    env = gymnasium.make_vec(
+        "poise/ResidualBalance-v0", num_envs=2, vectorization_mode=mode,
+        duration=0.06, pushes=None,
+    )  # fmt: skip
+    observation, _ = env.reset(seed=0)
+    rollout = example.Rollout(9, env)
+    agent = example.Agent(observation.shape[1], rollout.actions.shape[-1], -2.0)
+    fresh = np.zeros(2, dtype=bool)
+    example.collect(env, agent, rollout, observation, fresh)
+    env.close()
+    assert rollout.valid[:, 0].tolist() == 2 * [True, True, True, False] + [True]
+    assert rollout.done[:, 0].tolist() == 2 * [0.0, 0.0, 1.0, 0.0] + [0.0]
+    assert not rollout.terminated.any() and not rollout.rewards[3].any()
+    values = torch.rand(10, 2)
+    gains = rollout.advantages(values, gamma=0.9, lam=0.8)
+    last = rollout.rewards[2] + 0.9 * values[3] - values[2]  # bootstrapped: time ran out
+    torch.testing.assert_close(gains[2], last)
+    before = rollout.rewards[1] + 0.9 * values[2] - values[1]
+    torch.testing.assert_close(gains[1], before + 0.72 * last)

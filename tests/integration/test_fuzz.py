@@ -1,0 +1,83 @@
+"""tests/fuzz: a few cases of every kind, those that were ever found, and the fuzzer itself."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+
+from tests.fuzz import faulty, runner
+from tests.fuzz.child import SETTINGS
+from tests.fuzz.kinds import NAMES, kind
+from tests.fuzz.playing import play
+from tests.fuzz.runner import FOUND, Runner, table
+from tests.fuzz.values import NUMBERS, OBJECTS, TEXTS, Json, decode
+
+CASES = 40  # of each kind: seconds
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux alone")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_works_or_says_in_one_line_what_is_wrong(name: str) -> None:
+    """The same cases in every run; `make fuzz` draws others."""
+    played = kind(name)
+
+    @settings(SETTINGS, max_examples=CASES, derandomize=True)
+    @given(played.cases)
+    def test(case: Json) -> None:
+        outcome = play(played, case)
+        assert outcome.good, f"{outcome.what}\n{outcome.details}"
+
+    test()
+
+
+@pytest.mark.parametrize("path", sorted(FOUND.glob("*.json")), ids=lambda path: path.stem)
+def test_what_was_found_stays_mended(path: Path) -> None:
+    """Cases that once ended in a traceback, a hang or a crash."""
+    entry = json.loads(path.read_text())
+    outcome = play(kind(entry["kind"]), entry["case"])
+    assert outcome.good, f"{outcome.what}\n{outcome.details}"
+
+
+@pytest.mark.parametrize(
+    ("way", "verdict"),
+    [
+        ("traceback", "traceback"),
+        ("crash", "crash"),
+        ("hang", "hang"),
+        ("half-written", "traceback"),
+        pytest.param("memory", "memory", marks=LINUX),
+    ],
+)
+def test_the_fuzzer_sees_what_goes_wrong(
+    way: str, verdict: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is counted, the smallest case is kept, and the next turn goes on."""
+    monkeypatch.setenv(faulty.WAY, way)
+    monkeypatch.setattr(runner, "SECONDS", 0.3)
+    fuzzer = Runner(1, tmp_path)
+    try:
+        fuzzer.turn("faulty", 0.5)
+        fuzzer.turn("faulty", 0.1)
+    finally:
+        fuzzer.close()
+    count = fuzzer.counts["faulty"]
+    assert count.verdicts[verdict] >= 1 and count.cases > count.verdicts[verdict]
+    (path,) = tmp_path.glob(f"faulty-{verdict}-*.json")
+    entry = json.loads(path.read_text())
+    assert entry["kind"] == "faulty" and entry["case"] >= 10
+    if verdict in ("traceback", "memory"):
+        assert entry["case"] == 10
+    assert f"{count.verdicts[verdict]}" in table(fuzzer.counts)
+
+
+def test_every_value_can_be_made_and_kept() -> None:
+    """Cases are JSON: what a file gives back is what was drawn."""
+    for value in [*NUMBERS, *TEXTS, *({"$object": name} for name in OBJECTS)]:
+        decode(value)
+        assert json.loads(json.dumps(value)) == value
+    assert decode({"$pairs": [[1, {"$tuple": [1]}]]}) == {1: (1,)}
+    assert decode({"a": [{"$bytes": "/w=="}]}) == {"a": [b"\xff"]}

@@ -1,0 +1,69 @@
+"""Other bipeds, described by data alone, stand and recover with the default controller's gains."""
+
+import numpy as np
+import pytest
+
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from tests.support.physics import robot_named
+
+
+def trial(name, push, duration):
+    """The environment after a trial with the default controller, and whether the robot fell."""
+    robot = robot_named(name)
+    env = ResidualBalanceEnv(robot, pushes=None, duration=duration)
+    if push:
+        body = robot.model.body(robot.root_body_id).name
+        specific, direction = push
+        push = {"impulse": specific * robot.mass, "direction": direction, "duration": 0.1,
+                "start": 0.3, "body": body}  # fmt: skip
+    env.reset(seed=0, options={"push": push})
+    for _ in range(env.max_steps):
+        env.step_in_place(np.zeros(4))
+        if env.fallen:
+            break
+    return env
+
+
+@pytest.mark.parametrize("name", ["humanoid", "tall", "compact"])
+def test_standing(name):
+    """From a slightly disturbed start it stands for 5 s, all but at rest, and fails at no tick."""
+    env = trial(name, [], 5.0)
+    state = env.simulation.state
+    assert not env.fallen and env.recovered
+    assert np.linalg.norm(state.com_vel) < 0.05  # `tall` may rock its feet
+    assert env.controller.failures == 0
+    assert state.support_distance(state.com[:2]) > 0.03
+
+
+@pytest.mark.parametrize("direction", [0.0, 90.0, 180.0, 270.0])
+@pytest.mark.parametrize("name", ["humanoid", "tall", "compact"])
+def test_light_pushes(name, direction):
+    """0.15 N·s/kg from any side: it recovers, and comes back to where it stood to 1 cm."""
+    env = trial(name, (0.15, direction), 3.5)
+    assert not env.fallen and env.recovered
+    state = env.simulation.state
+    np.testing.assert_allclose(state.com[:2], env.targets.com[:2], atol=0.01)
+
+
+def test_single_axis_ankles():
+    """A robot whose feet cannot tilt sideways, and whose soles constrain each other, stands too."""
+    env = trial("toddler", [], 5.0)
+    assert not env.fallen
+    assert np.linalg.norm(env.simulation.state.com_vel) < 0.1
+
+
+def test_gains_scale_with_mass_and_height():
+    """One configuration becomes other numbers: forces by m g, moments by m g h, rates by √(g/h)."""
+    humanoid, tall = (ResidualBalanceEnv(robot_named(n), pushes=None) for n in ("humanoid", "tall"))
+    a, b = humanoid.controller.parameters, tall.controller.parameters
+    m = tall.robot.mass / humanoid.robot.mass
+    h = tall.robot.height_com / humanoid.robot.height_com
+    np.testing.assert_allclose(b.com_weight, a.com_weight / m**2)
+    np.testing.assert_allclose(b.angular_weight, a.angular_weight / (m * h) ** 2)
+    np.testing.assert_allclose(b.com_stiffness, a.com_stiffness / h)
+    np.testing.assert_allclose(b.com_damping, a.com_damping / np.sqrt(h))
+    np.testing.assert_allclose(b.stiffness[3:6], a.stiffness[3:6] / h)
+    np.testing.assert_allclose(b.accel_weight[3:6], a.accel_weight[3:6] * h**2)
+    assert b.force_weight == pytest.approx(a.force_weight / m**2)
+    assert b.moment_weight == pytest.approx(a.moment_weight / (m * h) ** 2)
+    assert b.sole_damping == pytest.approx(a.sole_damping / np.sqrt(h))

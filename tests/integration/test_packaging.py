@@ -1,0 +1,146 @@
+"""The package: what is in the wheel, what imports what, and what a light import loads."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.metadata
+import importlib.util
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import gymnasium
+import pytest
+
+import poise
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = {
+    "src/poise": "poise",
+    "envs": "poise.envs",
+    "baselines": "poise.baselines",
+    "training": "poise.training",
+    "configs": "poise.configs",
+}
+
+
+def tracked_files() -> list[Path]:
+    """Files of the mapped folders that git tracks, relative to the root."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout")
+    command = ["git", "ls-files", "-z", "--", *FOLDERS]
+    listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return [Path(name) for name in listing.split("\0") if name and (ROOT / name).exists()]
+
+
+def installed_name(path: Path) -> str:
+    """Where a file of a mapped folder goes in the wheel."""
+    for folder, package in FOLDERS.items():
+        if path.is_relative_to(folder):
+            return f"{package.replace('.', '/')}/{path.relative_to(folder).as_posix()}"
+    raise AssertionError(f"{path} is in no mapped folder")
+
+
+def test_the_wheel_holds_exactly_the_tracked_files(tmp_path: Path) -> None:
+    """A package or data file that setup.py or pyproject.toml forgets is found here."""
+    tracked = tracked_files()
+    others = [Path(name) for name in ("setup.py", "pyproject.toml", "LICENSE", "README.md")]
+    source = tmp_path / "source"
+    for path in tracked + [path for path in others if (ROOT / path).exists()]:
+        (source / path).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / path, source / path)
+    options = ["--no-deps", "--no-build-isolation", "--quiet", "--wheel-dir", str(tmp_path)]
+    command = [sys.executable, "-m", "pip", "wheel", *options, str(source)]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    content = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    assert content == {installed_name(path) for path in tracked}
+
+
+def python_files(folder: str) -> Iterator[Path]:
+    return (path for path in (ROOT / folder).rglob("*.py"))
+
+
+def imported_modules(path: Path, package: str) -> set[str]:
+    """Absolute names of everything that a file imports, also inside functions."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            relative = "." * node.level + (node.module or "")
+            base = importlib.util.resolve_name(relative, package) if node.level else node.module
+            names |= {f"{base}.{alias.name}" for alias in node.names}
+    return names
+
+
+@pytest.mark.parametrize(
+    ("folder", "forbidden"),
+    [
+        ("envs", ("poise.baselines", "poise.training")),
+        ("baselines", ("poise.training",)),
+    ],
+)
+def test_imports_run_one_way(folder: str, forbidden: tuple[str, ...]) -> None:
+    """training imports baselines imports envs, never the other way."""
+    wrong = []
+    for path in python_files(folder):
+        parts = path.relative_to(ROOT / folder).parent.parts
+        for name in imported_modules(path, ".".join((FOLDERS[folder], *parts))):
+            if f"{name}.".startswith(tuple(f"{package}." for package in forbidden)):
+                wrong.append(f"{path.relative_to(ROOT)} imports {name}")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("folder", list(FOLDERS)[1:])
+def test_every_mapped_folder_is_imported_as_poise(folder: str) -> None:
+    """Importing `envs` bare, as one may from the root, says to import poise.envs."""
+    command = [sys.executable, "-c", f"import {folder}"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 1
+    assert f"write `import poise.{folder}`" in result.stderr
+
+
+def test_import_poise_is_light() -> None:
+    """`import poise` loads neither torch nor numba nor MuJoCo, and registers the environments."""
+    code = (
+        "import sys, poise, gymnasium\n"
+        "assert {'poise/TorqueBalance-v0', 'poise/ResidualBalance-v0'} <= set(gymnasium.registry)\n"
+        "print([m for m in ('torch', 'numba', 'mujoco', 'scipy', 'yaml') if m in sys.modules])"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert result.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    "name", ["poise/TorqueBalance-v0", "poise/ResidualBalance-v0", "poise/ResidualStep-v0"]
+)
+def test_registered_environments_exist(name: str) -> None:
+    """The string entry point names a class, and Gymnasium adds no time limit of its own."""
+    spec = gymnasium.spec(name)
+    module, _, attribute = str(spec.entry_point).partition(":")
+    assert issubclass(getattr(importlib.import_module(module), attribute), gymnasium.Env)
+    assert spec.max_episode_steps is None
+
+
+def test_load_policy_is_reached_lazily() -> None:
+    """`poise.load_policy` is that of poise.training.learning.policy; other names do not exist."""
+    assert (
+        poise.load_policy is importlib.import_module("poise.training.learning.policy").load_policy
+    )
+    with pytest.raises(AttributeError, match="no attribute 'load_polciy'"):
+        _ = poise.load_polciy
+
+
+def test_the_command_and_the_version() -> None:
+    """The console script `poise` can be loaded, and the metadata carries the package's version."""
+    (script,) = importlib.metadata.entry_points(group="console_scripts", name="poise")
+    assert callable(script.load())
+    assert importlib.metadata.version("poise") == poise.__version__

@@ -1,0 +1,184 @@
+"""The rooms of the package: what may import what, and what belongs in one room alone."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("configs", "envs", "baselines", "training")
+MOST = 14  # files in a room
+
+# A room imports rooms of lower floors only; those of one floor do not know each other. A file that
+# is not in a room is one by itself.
+FLOORS = """
+ 1 configs, training/statistics
+ 2 envs/compiled, baselines/allowance
+ 3 envs/robots, baselines/solvers, baselines/warmup, training/running
+ 4 envs/maths
+ 5 envs/pushes
+ 6 envs/physics
+ 7 envs/sensors, envs/viewing, baselines/controller
+ 8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
+ 9 envs/vector, baselines/in_place, baselines/stepping
+10 baselines/walking
+11 baselines/registry
+12 baselines/environments
+13 training/learning
+14 training/trials
+15 training/figures, training/suites, training/tuning
+16 training/evaluation, training/qp_set
+17 training/benchmark
+18 training/results
+19 training/report
+20 training/cli
+21 envs, baselines, training
+"""
+FLOOR = {
+    room: int(line.split()[0])
+    for line in FLOORS.split("\n")
+    for room in line.replace(",", "").split()[1:]
+}
+
+#: libraries that one room alone may import; LATE ones elsewhere inside of functions
+ALONE = {
+    "llvmlite": "envs/compiled",
+    "numba.core": "envs/compiled",
+    "numba.extending": "envs/compiled",
+    "torch": "training/learning",
+    "stable_baselines3": "training/learning",
+}
+LATE = ("torch", "stable_baselines3")
+
+
+def room_of(path: str) -> str:
+    """The room of a file; `configs` is one, and of other top folders every file is."""
+    folder, _, name = path.rpartition("/")
+    return path[:-3] if folder in FOLDERS[1:] and name != "__init__.py" else folder
+
+
+@cache
+def sources() -> dict[str, ast.Module]:
+    """Every source file, relative to the root, as its syntax tree."""
+    paths = [path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))]
+    return {str(path.relative_to(ROOT)): ast.parse(path.read_text()) for path in paths}
+
+
+@cache
+def modules() -> dict[str, str]:
+    """Name of every module → its file."""
+    names = {path[:-3].replace("/", ".").removesuffix(".__init__"): path for path in sources()}
+    return {f"poise.{name}": path for name, path in names.items()}
+
+
+def imports(path: str, *, late: bool = True) -> Iterator[tuple[str, str]]:
+    """(module, name) of everything that a file imports; with `late` also inside of functions."""
+    package = ".".join(["poise", *path.split("/")[:-1]])
+    tree = sources()[path]
+    inside = {
+        id(node)
+        for function in ast.walk(tree)
+        if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
+        for node in ast.walk(function)
+    }
+    for node in ast.walk(tree):
+        if not late and id(node) in inside:
+            continue
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, "") for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            relative = "." * node.level + (node.module or "")
+            base = importlib.util.resolve_name(relative, package) if node.level else relative
+            yield from ((base, alias.name) for alias in node.names)
+
+
+def imported_files(path: str) -> Iterator[tuple[str, str]]:
+    """(file, name) of everything of Poise that a file imports; the name is empty for a module."""
+    for module, name in imports(path):
+        if (whole := modules().get(f"{module}.{name}")) is not None:
+            yield whole, ""
+        elif (file := modules().get(module)) is not None:
+            yield file, name
+
+
+def test_every_file_is_in_a_room_that_has_a_floor() -> None:
+    found = {room_of(path) for path in sources()}
+    assert found == set(FLOOR), found ^ set(FLOOR)
+
+
+def test_rooms_import_lower_floors_only() -> None:
+    wrong = {
+        f"{path} ({FLOOR[room_of(path)]}) imports {other} ({FLOOR[room_of(other)]})"
+        for path in sources()
+        for other, _ in imported_files(path)
+        if room_of(other) != room_of(path) and FLOOR[room_of(other)] >= FLOOR[room_of(path)]
+    }
+    assert wrong == set()
+
+
+@pytest.mark.parametrize("library", list(ALONE))
+def test_some_libraries_are_one_room_s_alone(library: str) -> None:
+    """Numba's and LLVM's internals, torch and SB3: where they are used, and nowhere else."""
+    wrong, used = set(), False
+    for path in sources():
+        late = library not in LATE
+        for module, name in imports(path, late=late):
+            if not f"{module}.{name}.".startswith(f"{library}."):
+                continue
+            used |= room_of(path) == ALONE[library]
+            wrong |= {path} - ({path} if room_of(path) == ALONE[library] else set())
+    assert used and wrong == set()
+
+
+def test_private_names_stay_in_their_file() -> None:
+    wrong = {
+        f"{path} imports {other}: {name}"
+        for path in sources()
+        for other, name in imported_files(path)
+        if re.match(r"_[^_]", name)
+    }
+    assert wrong == set()
+
+
+def test_rooms_are_small_and_say_what_is_in_them() -> None:
+    """At most 14 files each; the first line of a room's `__init__` is one sentence."""
+    files = Counter(path.rpartition("/")[0] for path in sources() if "__init__" not in path)
+    assert {room: n for room, n in files.items() if n > MOST} == {}
+    said = {room: ast.get_docstring(sources()[f"{room}/__init__.py"]) for room in files}
+    assert [
+        room for room, text in said.items() if not (text or "").split("\n\n")[0].endswith(".")
+    ] == []
+
+
+def test_tests_stand_in_the_rooms_of_what_they_test() -> None:
+    """tests/ has the folders of the package, and three of its own."""
+    tests = ROOT / "tests"
+    if not tests.is_dir():
+        pytest.skip("not a checkout")
+    own = {"integration", "support", "performance", "fuzz", "endurance"}
+    folders = {str(path.parent.relative_to(tests)) for path in tests.rglob("test_*.py")} - {"."}
+    strange = {f for f in folders if f.split("/")[0] not in own and not (ROOT / f).is_dir()}
+    assert strange == set()
+    assert [path.name for path in tests.glob("test_*.py")] == []
+
+
+def test_a_room_is_imported_without_those_above_it() -> None:
+    """The world loads no controller, and a controller no learning."""
+    code = "import sys, poise.{};print(*(name for name in sys.modules if name.startswith({})))"
+    for room, above in (
+        ("envs.vector.vector_env", ("poise.baselines", "poise.training", "torch")),
+        ("baselines.environments.stepping", ("poise.training", "torch")),
+        ("training.statistics.rates", ("poise.envs", "poise.baselines", "torch", "mujoco")),
+    ):
+        command = [sys.executable, "-c", code.format(room, above)]
+        result = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert result.stdout.split() == [], room

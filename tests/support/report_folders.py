@@ -1,0 +1,53 @@
+"""Small finished results for the tests of the report: made once, copied to be broken."""
+
+from __future__ import annotations
+
+import functools
+import shutil
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from poise.training.benchmark import run
+from poise.training.evaluation import evaluate as evaluation
+from poise.training.evaluation.evaluate import evaluate
+from tests.support.benchmarks_small import InProcessCrew, write_small
+from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, write_suite
+
+SOFT = 'a "soft" <b>&.yaml'  # a name that must be escaped wherever it is written
+_folders: list[tempfile.TemporaryDirectory] = []  # removed at the end of the process
+
+
+@functools.cache
+def finished(kind: str) -> Path:
+    """A finished result of a controller's file and of no control; do not write into it.
+
+    Args:
+        kind: "random" or "envelope" of `poise evaluate`, or "benchmark"; "envelope-steps" and
+            "benchmark-steps" with a controller that steps instead of no control.
+    """
+    _folders.append(tempfile.TemporaryDirectory(prefix="poise-report-"))
+    path = Path(_folders[-1].name)
+    (path / SOFT).write_text("kind: momentum-qp\ncom: {stiffness: 5.0}\n")
+    kind, _, steps = kind.partition("-")
+    names = [str(path / SOFT), "capture-step" if steps else "zero"]
+    if kind == "benchmark":
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(run, "Crew", InProcessCrew)
+            patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+            InProcessCrew.stop_after = None
+            run.benchmark(names, write_small(path), out=path / "out", seed=2)
+        return path / "out"
+    fields = {"random": {**RANDOM, "trials": 8}, "envelope": ENVELOPE}[kind]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(evaluation, "Crew", InProcess)
+        InProcess.stop_after = None
+        suite = write_suite(path, fields)
+        evaluate(names, suite, out=path / "out", seed=4)
+    return path / "out"
+
+
+def copied(kind: str, to: Path) -> Path:
+    """A copy of the evaluation, to be changed."""
+    return Path(shutil.copytree(finished(kind), to / "copy"))

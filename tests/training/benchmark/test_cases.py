@@ -1,0 +1,164 @@
+"""training/benchmark/suite.py, cases.py and case.py."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from poise.configs.errors import ConfigError
+from poise.configs.files import packaged
+from poise.configs.schema import build
+from poise.training.benchmark.case import Case, case_row, failed
+from poise.training.benchmark.cases import Cases
+from poise.training.benchmark.suite import BenchmarkSuite, load_benchmark
+from poise.training.trials.push_limits import PushLimits
+from tests.support.benchmarks_small import SMALL, TRIALS
+from tests.support.shared import robot
+
+
+def small(seed: int = 0, **changes: object) -> Cases:
+    suite = build(BenchmarkSuite, {**SMALL, **changes}, "small")
+    return Cases(suite, robot(), seed)
+
+
+@pytest.mark.parametrize("name", packaged("benchmarks"))
+def test_the_packaged_suites_load(name: str) -> None:
+    """Every case has a number of its own; the standard suite asks all that the issue asks."""
+    cases = Cases(load_benchmark(name), robot(), 0)
+    every = [*cases.first, *cases.second({case.number: True for case in cases.first})]
+    numbers = [case.number for case in [*every, *cases.others]]
+    assert numbers == list(range(cases.count(1)))
+    if name == "standard":
+        part = cases.suite.envelope
+        assert part.directions == 16 and part.first_trials + part.trials >= 20
+        assert {case.factor for case in cases.others if case.part == "factors"} == {
+            "standard", "duration", "body", "height", "friction", "delay", "mass_error", "pushes",
+        }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("envelop: {}", "envelop: unknown field"),
+        ("envelope: {directions: 0}", "envelope.directions: must be at least 1"),
+        ("factors: {levels: {delay: [1.0]}}", r"factors.levels.delay\[0\]: must be at most 0.1"),
+        ("mix: {fractions: [1.0, 0.5]}", "mix: fractions: the range .* must not decrease"),
+        ("mix: {delay: []}", "mix: delay: must not be empty"),
+    ],
+)
+def test_a_suite_that_is_not_valid_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    """The text names the file and the field."""
+    path = tmp_path / "suite.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=f"suite.yaml: {message}"):
+        load_benchmark(path)
+
+
+def test_cases_depend_on_suite_and_seed_alone() -> None:
+    """Equal for an equal seed, all different for another."""
+    one, again, other = small(), small(), small(1)
+    assert one.first == again.first and one.others == again.others
+    pushes = [{case.push for case in c.first} for c in (one, other)]
+    assert not pushes[0] & pushes[1]
+    assert one.count(2) == 2 * TRIALS
+
+
+def test_the_second_stage_lies_around_the_rough_j50() -> None:
+    """Within ±30 % of the impulse at which the first stage was lost; numbers follow the first."""
+    cases = small(envelope={"directions": 2, "fractions": [0.2, 2.0], "first_trials": 8,
+                            "trials": 4})  # fmt: skip
+    edge = 20.0
+    second = cases.second({case.number: case.push.impulse < edge for case in cases.first})
+    impulses = np.array([case.push.impulse for case in second])
+    assert len(second) == 8 and [case.number for case in second] == list(range(16, 24))
+    assert impulses.min() > 0.7 * 15 and impulses.max() < 1.3 * 27
+    assert np.ptp(impulses[:4]) > 5.0 and all(case.stage == 2 for case in second)
+    lost = cases.second(dict.fromkeys((case.number for case in cases.first), False))
+    assert max(case.push.impulse for case in lost) < impulses.max()
+
+
+def test_levels_meet_the_same_starts_directions_and_fractions() -> None:
+    """Within a factor only the factor differs; the standard case is first."""
+    cases = small(factors={
+        "trials": 3,
+        "levels": {"duration": [0.3], "body": True, "height": [1.0], "friction": [0.4, 0.8],
+                   "delay": [0.02], "mass_error": [0.1], "pushes": [3]},
+    })  # fmt: skip
+    rows = [case for case in cases.others if case.part == "factors"]
+    standard, rest = rows[:3], rows[3:]
+    assert {case.factor for case in standard} == {"standard"}
+    assert "0.8" not in {case.level for case in rest}  # the robot's own friction is the standard
+    cells = [rest[k : k + 3] for k in range(0, len(rest), 3)]
+    for cell in cells:
+        assert len({(case.factor, case.level) for case in cell}) == 1
+        for case, base in zip(cell, standard, strict=True):
+            assert case.seed == base.seed and case.push.direction == base.push.direction
+            assert case.limit_fraction == pytest.approx(base.limit_fraction)
+    changed = {cell[0].factor: cell[0] for cell in cells}
+    assert changed["duration"].push.duration == 0.3
+    assert changed["duration"].push.impulse > standard[0].push.impulse
+    assert changed["friction"].friction == 0.4 and changed["delay"].delay == 0.02
+    assert changed["mass_error"].mass_error == 0.1 and changed["pushes"].pushes == 3
+    bodies = {cell[0].push.body for cell in cells if cell[0].factor == "body"}
+    assert bodies == set(robot().description.push_bodies[1:])
+
+
+def test_a_height_is_a_point_of_the_first_push_body() -> None:
+    """At 1.0 the point lies at the height of the robot's CoM."""
+    cases = small(factors={"trials": 1, "levels": {"height": [1.0]}})
+    push = next(case.push for case in cases.others if case.factor == "height")
+    centre = float(cases.standard["height"]) * robot().height_com
+    assert push.body == robot().description.push_bodies[0]
+    assert push.point[2] == pytest.approx(robot().height_com - centre, abs=0.01)
+    assert push.point[:2] == pytest.approx((0.0, 0.0), abs=0.02)
+
+
+def test_the_mix_stays_in_its_ranges_and_uses_all_of_them() -> None:
+    """Every factor varies; fractions and directions are spread evenly."""
+    mix = {"trials": 60, "delay": [0.0, 0.02], "friction": [0.5, 0.6], "repeated": 0.5}
+    cases = [case for case in small(mix=mix).others if case.part == "mix"]
+    assert all(0.5 <= case.friction <= 0.6 and -0.1 <= case.mass_error <= 0.1 for case in cases)
+    assert {case.delay for case in cases} == {0.0, 0.02} and {c.pushes for c in cases} == {1, 2}
+    assert all(0.05 <= case.push.duration <= 0.5 for case in cases)
+    assert {case.push.body for case in cases} == set(robot().description.push_bodies)
+    sectors = np.histogram([case.push.direction for case in cases], bins=6, range=(0, 360))[0]
+    assert set(sectors) == {10}
+    shares = np.histogram([case.limit_fraction for case in cases], bins=4, range=(0.3, 1.1))[0]
+    assert set(shares) == {15}
+
+
+def test_margins_repeat_one_push_from_different_starts() -> None:
+    """Levels are fractions of the ankle limit in the direction."""
+    suite = {"directions": [0, 90], "levels": [0.5, 1.0], "runs": 3}
+    cases = [case for case in small(margin=suite).others if case.part == "margin"]
+    assert len({case.seed for case in cases}) == len(cases) == 12
+    limit = PushLimits(robot()).ankle(90, 0.1)
+    assert [case.push.impulse for case in cases[6:9]] == pytest.approx([0.5 * limit] * 3)
+
+
+def test_a_repeated_push_comes_again_after_the_interval() -> None:
+    """The options of the reset hold all pushes, alike but for their start."""
+    case = next(case for case in small().others if case.factor == "pushes")
+    pushes = case.options["push"]
+    assert [push.start for push in pushes] == pytest.approx([0.1, 0.4])
+    assert pushes[0] == case.push and replace(pushes[1], start=0.1) == case.push
+    assert Case(0, 1).options == {"push": []}
+
+
+def test_resized_suites_have_small_cells() -> None:
+    """No cell has more; the envelope's first stage keeps two, for a fit."""
+    suite = load_benchmark("full").resized(1)
+    assert (suite.envelope.first_trials, suite.envelope.trials) == (2, 1)
+    assert suite.margin.runs == suite.factors.trials == suite.mix.trials == 1
+    assert load_benchmark("quick").resized(10**6) == load_benchmark("quick")
+
+
+def test_an_error_is_a_row_like_others() -> None:
+    """Not recovered, no figures, and what was raised on one line."""
+    case = small().first[0]
+    row = case_row(case, "mine", failed(RuntimeError("a\nb")))
+    assert row["error"] == "RuntimeError: a b" and row["recovered"] is False
+    assert row["energy"] is None and row["impulse"] == case.push.impulse

@@ -1,0 +1,261 @@
+"""training/cli/commands.py and training/cli/train.py."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from poise.configs.errors import ConfigError
+from poise.configs.files import resolve
+from poise.configs.schema import to_dict
+from poise.training.cli import commands
+from poise.training.cli import train as train_command
+from poise.training.cli.commands import main
+from poise.training.cli.train import parse
+from poise.training.evaluation import evaluate
+from poise.training.learning.config import TrainConfig, train_config
+from tests.support.evaluations import RANDOM, InProcess, write_suite
+
+RICH = (
+    "from poise.training.cli import commands\n"
+    "from poise.training.running.terminal import terminal\n"
+    "commands._run = lambda _: terminal().print('x')"
+)
+BAD_SUITE = "kind: random\ntrials: many\n"
+BAD_ROBOT = "name: a\nsource: {mjcf: nowhere.xml}\nroot: b\nfeet: []\n"
+
+
+def test_help_is_light() -> None:
+    """Neither the command nor its help loads MuJoCo, Numba, torch or SciPy."""
+    code = (
+        "import sys\nfrom poise.training.cli import main\n"
+        "try:\n    main(['--help'])\nexcept SystemExit as end:\n    assert end.code == 0\n"
+        "heavy = {'mujoco', 'numba', 'torch', 'scipy', 'matplotlib'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    names = (
+        *("train", "evaluate", "benchmark", "compare", "leaderboard", "replay", "demo", "tune"),
+        *("qp-set", "report", "list"),
+    )
+    for name in names:
+        assert name in done.stdout
+
+
+@pytest.mark.parametrize(("args", "before"), [(["list"], ""), (["--help"], ""), (["list"], RICH)])
+def test_a_closed_pipe_is_no_error(args: list[str], before: str) -> None:
+    """`poise list | head -1` ends without a traceback, with a shell's code for a broken pipe; so
+    does what Rich prints."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    code = f"import sys\nfrom poise.training import cli\n{before}\nsys.exit(cli.main({args}))"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_an_error_with_its_output_closed() -> None:
+    """The code is that of bad input without a standard output, 141 if its text finds no reader."""
+    command = [sys.executable, "-m", "poise.training.cli", "replay", "nowhere", "--trial", "0"]
+    shell = f"{shlex.join(command)} >&-; echo $?"
+    shut = subprocess.run(["sh", "-c", shell], capture_output=True, text=True, check=False)
+    assert shut.stdout == "2\n" and "Traceback" not in shut.stderr
+    reader, writer = os.pipe()
+    os.close(reader)
+    assert subprocess.run(command, stderr=writer, check=False).returncode == 141
+    os.close(writer)
+
+
+def test_a_broken_pipe_of_another_kind_is_raised(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One to a process, say: the output is read, so this is an error like any other."""
+
+    def fail(_: object) -> int:
+        raise BrokenPipeError
+
+    monkeypatch.setattr(commands, "_run", fail)
+    with pytest.raises(BrokenPipeError):
+        main(["list"])
+    print("still here")
+    assert "still here" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["evaluate", "pid"], "no such controller: 'pid'"),
+        (["evaluate"], "controller: give at least one"),
+        (["evaluate", "zero", "--suite", "rndom"], "no such name: 'rndom'"),
+        (["evaluate", "zero", "--robot", "robby"], "no such name: 'robby'"),
+        (["evaluate", "zero", "--workers", "0"], "workers: must be at least 1"),
+        (["evaluate", "zero", "--suite", "bad.yaml"], "bad.yaml: trials: must be a whole number"),
+        (["evaluate", "zero", "--suite", "text.yaml"], "text.yaml: not valid YAML"),
+        (["evaluate", "zero", "--robot", "robot.yaml"], "robot.yaml: feet: a biped has two feet"),
+        (["evaluate", "run"], "a policy folder holds"),
+        (["replay", "run", "--trial", "0"], "settings.yaml: cannot be read"),
+        (["benchmark", "--out", "out", "--controllers", "pid"], "no such controller: 'pid'"),
+        (["benchmark", "--out", "out", "--suite", "bad.yaml"], "bad.yaml: kind: unknown field"),
+        (["compare", "run", "run"], "summary.json: cannot be read"),
+        (["leaderboard", "run"], "summary.json: cannot be read"),
+        (["report", "run"], "holds no finished evaluation or benchmark"),
+        (["report", "nowhere"], "nowhere: no such folder"),
+        (["train", "--out", "run", "--config", "nothing"], "no such name: 'nothing'"),
+        (["train", "--out", "run", "--seed", "1", "--ppo.gamma", "2"], "ppo.gamma"),
+        (["train", "--out", "run", "--config", "bad.yaml"], "bad.yaml: kind: unknown field"),
+        (["tune", "--out", "run", "--controller", "pid"], "controllers: no such name: 'pid'"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    args: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The line names the file, the field and what is wrong; nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.yaml").write_text(BAD_SUITE)
+    (tmp_path / "text.yaml").write_text("kind: [random\n")
+    (tmp_path / "robot.yaml").write_text(BAD_ROBOT)
+    (tmp_path / "run").mkdir()
+    assert main(args) == 2
+    output = capsys.readouterr()
+    assert message in output.err
+    assert output.err.startswith("poise: ") and output.err.count("\n") == 1
+    assert not list((tmp_path / "run").iterdir()) and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["evaluate", "zero", "--sede", "1"],
+        ["evaluate", "zero", "--seed", "one"],
+        ["train"],
+        ["train", "--out", "run", "--ppo.gama", "0.9"],
+        ["train", "--out", "run", "--resume", "--config"],
+        ["push"],
+        [],
+    ],
+)
+def test_a_wrong_flag_ends_with_code_2(
+    args: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unknown flags and sub-commands, and values that do not parse."""
+    monkeypatch.chdir(tmp_path)
+    try:
+        code: object = main(args)
+    except SystemExit as end:
+        code = end.code
+    assert code == 2 and not list(tmp_path.iterdir())
+
+
+def test_a_traceback_is_left_to_real_faults(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only Poise's own errors become a line."""
+    monkeypatch.setitem(commands.COMMANDS, "list", lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        main(["list"])
+
+
+def test_evaluate_and_replay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One command plays, the other plays one of its trials again and says that it is the same."""
+    monkeypatch.setattr(evaluate, "Crew", InProcess)
+    InProcess.played, InProcess.stop_after = 0, None
+    suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
+    args = ["evaluate", "zero", "--suite", suite, "--out", out, "--trials", "2", "--seed", "3"]
+    assert main(args) == 0
+    assert InProcess.played == 2 and f"{out}/summary.json" in capsys.readouterr().out
+    assert main(args) == 2
+    assert "already holds an evaluation" in capsys.readouterr().err
+    assert main([*args, "--overwrite"]) == 0
+    capsys.readouterr()
+    assert main(["replay", out, "--trial", "1"]) == 0
+    shown = capsys.readouterr().out
+    assert "trial 1, zero: fell" in shown and "exactly as recorded" in shown
+
+
+def test_ctrl_c_says_how_to_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 130, no traceback; the same command finishes the evaluation."""
+    monkeypatch.setattr(evaluate, "Crew", InProcess)
+    InProcess.played, InProcess.stop_after = 0, 1
+    suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
+    args = ["evaluate", "zero", "--suite", suite, "--out", out]
+    assert main(args) == 130
+    assert f"kept in {out}; the same command goes on" in capsys.readouterr().err
+    InProcess.stop_after = None
+    assert main(args) == 0 and InProcess.played == 4
+
+
+def test_list_names_what_is_packaged(capsys: pytest.CaptureFixture[str]) -> None:
+    """Robots, controllers and suites."""
+    assert main(["list"]) == 0
+    shown = capsys.readouterr().out
+    assert "humanoid" in shown and "momentum-qp" in shown and "envelope" in shown
+
+
+def test_flags_of_train_replace_fields_of_the_file(tmp_path: Path) -> None:
+    """Nested fields by dotted flags; the rest is the file's; ranges are checked."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("steps: 1000\nseed: 5\nppo: {n_envs: 4}\nenv: {duration: 3.0}\n")
+    args = ["--config", str(path), "--out", "run", "--seed", "7", "--ppo.net-arch", "8", "16"]
+    command = parse([*args, "--env.pushes.magnitude", "0.1", "0.3", "--resume"])
+    settings = command.settings
+    assert (settings.steps, settings.seed, settings.ppo.n_envs) == (1000, 7, 4)
+    assert settings.ppo.net_arch == (8, 16) and settings.env.duration == 3.0
+    assert settings.env.pushes is not None and settings.env.pushes.magnitude == (0.1, 0.3)
+    assert command.resume and command.out == Path("run")
+    with pytest.raises(ConfigError, match="command line: env.duration"):
+        parse([*args, "--env.duration", "-1"])
+
+
+def test_train_without_flags_is_the_packaged_configuration() -> None:
+    """No flag changes a field by itself."""
+    command = parse(["--out", "run"])
+    assert to_dict(command.settings) == to_dict(train_config(train_command.DEFAULT))
+    assert not command.resume
+
+
+def test_another_robot_is_trained_by_a_configuration_that_fits_it() -> None:
+    """The packaged default names bodies of the humanoid."""
+    settings = parse(["--out", "run", "--robot", "tall"]).settings
+    assert settings == replace(train_config(train_command.ANY_ROBOT), robot="tall")
+    humanoid = str(resolve("robots", "humanoid"))
+    same = parse(["--out", "run", "--robot", humanoid]).settings
+    assert same == replace(train_config(train_command.DEFAULT), robot=humanoid)
+    named = parse(["--out", "run", "--robot", "tall", "--config", "residual"]).settings
+    assert named == replace(train_config("residual"), robot="tall")
+
+
+def test_resume_takes_the_runs_own_configuration(tmp_path: Path) -> None:
+    """Without --config, a run goes on as it was started."""
+    (tmp_path / "config.yaml").write_text("steps: 77\n")
+    command = parse(["--out", str(tmp_path), "--resume"])
+    assert command.settings == TrainConfig(steps=77)
+    assert parse(["--out", str(tmp_path)]).settings.steps != 77
+
+
+def test_train_trains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sub-command hands configuration, folder and resume on."""
+    seen = []
+
+    def train(*args: object, allow: object) -> Path:
+        seen.append(args)
+        return tmp_path
+
+    monkeypatch.setattr(train_command, "train", train)
+    assert main(["train", "--out", str(tmp_path), "--steps", "9"]) == 0
+    ((config, out, resume),) = seen
+    assert config.steps == 9 and out == tmp_path and resume is False

@@ -1,0 +1,150 @@
+"""training/evaluation/summary.py."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from poise.baselines.stepping.planner import StepLimits
+from poise.envs.pushes.push import Push
+from poise.envs.robots.robot import load_robot
+from poise.training.evaluation.summary import summarise
+from poise.training.running.files import plain
+from poise.training.suites.random import QuietSuite, RandomSuite
+from poise.training.suites.registry import EnvelopeSuite
+from poise.training.suites.sequences import SequenceSuite
+from poise.training.trials.push_limits import PushLimits
+from poise.training.trials.step_limits import NStepLimit
+from poise.training.trials.trial import Outcome, Trial
+from tests.training.evaluation.test_folder import OUTCOME
+
+
+@pytest.fixture(scope="module")
+def limits() -> PushLimits:
+    return PushLimits(load_robot())
+
+
+def outcomes(won: list[bool]) -> list[Outcome]:
+    fallen = replace(OUTCOME, recovered=False, fallen=True, solver_failures=1, stepped=True)
+    return [replace(OUTCOME, solver_failures=0) if w else fallen for w in won]
+
+
+def trials(limits: PushLimits, impulses: list[float], angles: list[float]) -> list[Trial]:
+    pushes = [Push("torso", 0.5, 0.1, j, a) for j, a in zip(impulses, angles, strict=True)]
+    return [Trial(i, i, p, limits.fraction(p)) for i, p in enumerate(pushes)]
+
+
+def test_counts_and_pairs(limits: PushLimits) -> None:
+    """Recovered, lost and won trials are counted, each pair once, b against a."""
+    some = trials(limits, [5.0, 10.0, 15.0, 20.0], [0.0, 100.0, 200.0, 300.0])
+    found = summarise(
+        RandomSuite(), some,
+        {"a": outcomes([True, False, False, True]), "b": outcomes([True, True, True, False])},
+        limits,
+    )  # fmt: skip
+    a = found["controllers"]["a"]
+    assert (a["trials"], a["recovered"], a["recovered_rate"]) == (4, 2, 0.5)
+    assert a["fallen"] == 2 and a["solver_failures"] == 2 and a["recovered_with_step"] == 0
+    assert 0.1 < a["recovered_ci95"][0] < 0.5 < a["recovered_ci95"][1]
+    (pair,) = found["pairs"]
+    assert (pair["both"], pair["only_a"], pair["only_b"], pair["neither"]) == (1, 1, 2, 0)
+    assert pair["p_mcnemar"] == 1.0 and pair["rate_gain"] == 0.25 and not pair["identical"]
+    assert a["fraction_of"] == "ankle limit"
+    assert [s["direction"] for s in a["sectors"]] == [0.0, 90.0, 180.0, 315.0]
+
+
+def test_the_envelope_finds_the_impulse_that_was_put_in(limits: PushLimits) -> None:
+    """J50 of each direction, its mean, η and the paired gain are those of a known threshold."""
+    impulses = np.tile(np.linspace(8.0, 30.0, 45), 2)
+    angles = np.repeat([0.0, 180.0], 45)
+    threshold = np.where(angles == 0.0, 20.0, 16.0)
+    results = {
+        "base": outcomes((impulses < threshold).tolist()),
+        "better": outcomes((impulses < 1.25 * threshold).tolist()),
+    }
+    found = summarise(
+        EnvelopeSuite(), trials(limits, impulses.tolist(), angles.tolist()), results, limits
+    )
+    base = found["controllers"]["base"]
+    assert base["j50_mean"] == pytest.approx(18.0, abs=0.4)
+    assert base["j50_min"] == pytest.approx(16.0, abs=0.4)
+    assert base["j50_mean_ci95"][0] < 18.0 < base["j50_mean_ci95"][1]
+    forward = base["directions"][0]
+    assert forward["direction"] == 0.0 and forward["trials"] == 45
+    assert forward["eta"] == pytest.approx(forward["j50"] / limits.ankle(0.0, 0.1))
+    assert base["eta_min"] == min(d["eta"] for d in base["directions"])
+    (pair,) = found["pairs"]
+    assert pair["j50_gain"] == pytest.approx(0.25, abs=0.03)
+    assert pair["j50_gain_ci95"][0] < 0.25 < pair["j50_gain_ci95"][1]
+    assert [d["direction"] for d in pair["directions"]] == [0.0, 180.0]
+
+
+def test_shares_of_the_step_limits_are_added_and_nothing_else_changes(limits: PushLimits) -> None:
+    """Only for controllers that step; all other figures keep their bits."""
+    impulses, angles = np.tile(np.linspace(8.0, 30.0, 12), 2), np.repeat([0.0, 112.5], 12)
+    some = trials(limits, impulses.tolist(), angles.tolist())
+    results = {name: outcomes((impulses < at).tolist()) for name, at in (("a", 15.0), ("b", 21.0))}
+    own = NStepLimit(limits, StepLimits(speed=0.55))
+    before = summarise(EnvelopeSuite(), some, results, limits)
+    found = summarise(EnvelopeSuite(), some, results, limits, {"b": own})
+    entry = found["controllers"]["b"]
+    for d in entry["directions"]:
+        assert d["step_limit_2"] == own(d["direction"], 0.1, 2)
+        assert d["step_share_2"] == d["j50"] / d["step_limit_2"]
+    assert entry["step_share_1_mean"] > entry["step_share_inf_mean"] > 0.0
+    (curve,) = found.pop("step_limits")
+    assert curve["controllers"] == ["b"] and curve["steps"]["speed"] == 0.55
+
+    def less(value):
+        if isinstance(value, dict):
+            return {k: less(v) for k, v in value.items() if not k.startswith("step_")}
+        return [less(v) for v in value] if isinstance(value, list) else value
+
+    assert less(found) == before and found["controllers"]["a"] == before["controllers"]["a"]
+    random = summarise(RandomSuite(), some, results, limits, {"b": own})
+    assert random == summarise(RandomSuite(), some, results, limits)
+
+
+def test_without_pushes_there_is_no_j50(limits: PushLimits) -> None:
+    """A quiet suite counts falls and drift alone."""
+    quiet = [replace(OUTCOME, com_drift=d, mean_abs_action=0.01) for d in (0.001, 0.004)]
+    found = summarise(QuietSuite(), [Trial(0, 0), Trial(1, 1)], {"a": quiet}, limits)
+    entry = found["controllers"]["a"]
+    assert entry["com_drift_max"] == 0.004 and entry["mean_abs_action"] == 0.01
+    assert "j50_mean" not in entry and "fraction50" not in entry and found["pairs"] == []
+
+
+def test_steps_are_counted_and_feet_in_place_apart(limits: PushLimits) -> None:
+    """A recovery with feet in place has neither a touchdown nor a foot that slid."""
+    four = [
+        OUTCOME,
+        replace(OUTCOME, stepped=True, steps=2),
+        replace(OUTCOME, stepped=True),  # slid
+        replace(OUTCOME, recovered=False, fallen=True, stepped=True, steps=5),
+    ]
+    found = summarise(QuietSuite(), [Trial(i, i) for i in range(4)], {"a": four}, limits)
+    entry = found["controllers"]["a"]
+    assert entry["recovered"] == 3 and entry["recovered_in_place"] == 1
+    assert entry["recovered_with_step"] == 2
+    assert entry["steps_mean"] == 7 / 4 and entry["steps_max"] == 5
+    assert entry["never_fell_rate"] == 0.75 and entry["fallen"] == 1
+    assert entry["never_fell_ci95"][0] < 0.75 < entry["never_fell_ci95"][1]
+
+
+def test_pushes_one_after_the_other_have_no_direction(limits: PushLimits) -> None:
+    """Falls are counted; no J50 is fitted to the first push of many."""
+    push = Push("torso", 0.5, 0.1, 10.0, 0.0)
+    many = [Trial(i, i, push, 0.5, later=(replace(push, start=2.0),)) for i in range(2)]
+    results = {"a": [OUTCOME, replace(OUTCOME, recovered=False, fallen=True)]}
+    entry = summarise(SequenceSuite(), many, results, limits)["controllers"]["a"]
+    assert entry["never_fell_rate"] == 0.5 and "fraction50" not in entry
+
+
+def test_plain_is_json_of_any_reader(limits: PushLimits) -> None:
+    """No NaN, no NumPy, no tuples."""
+    value = {"a": np.float64(1.5), "b": (np.int64(2), float("nan")), "c": [float("inf"), None]}
+    assert plain(value) == {"a": 1.5, "b": [2, None], "c": [None, None]}
+    json.dumps(plain(value), allow_nan=False)

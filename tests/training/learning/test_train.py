@@ -1,0 +1,368 @@
+"""Training: what a run writes, that it repeats, and that it survives a kill."""
+
+import csv
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stable_baselines3 import PPO
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.stepping.capture_step import CaptureStep
+from poise.configs.errors import ConfigError
+from poise.configs.schema import build, read_yaml
+from poise.envs.pushes.sampler import PushSampler
+from poise.envs.vector.batch import EnvBatch
+from poise.training.learning import callbacks, schedules
+from poise.training.learning.checkpoints import FILES, POLICY, STATE
+from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, train_config
+from poise.training.learning.policy import load_policy
+from poise.training.learning.train import _env_seed, train
+from poise.training.learning.train_seeds import train_seeds
+from poise.training.trials.players import load_player
+from tests.support.shared import finished_run, robot, tiny_config
+
+ROOT = Path(__file__).parents[3]
+ROLLOUT = 64  # steps of the tiny configuration
+
+
+def weights(run, which="last"):
+    return [array for layer in load_policy(run / which).layers for array in layer]
+
+
+def evaluations(run):
+    with open(run / "evaluations.csv") as file:
+        return list(csv.DictReader(file))
+
+
+def state(run, which="last"):
+    return json.loads((run / which / STATE).read_text())
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A copy of the finished run, to write into."""
+    return Path(shutil.copytree(finished_run(), tmp_path / "run"))
+
+
+def test_a_run_writes_everything():
+    """best/ and last/ whole, the configuration, the evaluations and TensorBoard's scalars."""
+    run = finished_run()
+    assert sorted(path.name for path in run.iterdir()) == [
+        *("best", "config.yaml", "evaluations.csv", "last", "tensorboard"),
+    ]
+    for which in ("best", "last"):
+        assert sorted(path.name for path in (run / which).iterdir()) == sorted(FILES)
+    for path in (run / "config.yaml", run / "last" / "config.yaml"):
+        assert build(TrainConfig, read_yaml(path), str(path)) == tiny_config()
+    assert state(run)["timesteps"] == 192
+    rows = evaluations(run)
+    assert [int(row["timesteps"]) for row in rows] == [0, 128, 192]
+    assert float(rows[0]["mean_abs_action"]) == 0.0  # the controller alone
+    assert float(rows[-1]["mean_abs_action"]) > 0.0
+    assert all(0.0 <= float(row["recovered"]) <= 1.0 for row in rows)
+    events = EventAccumulator(str(run / "tensorboard"))
+    events.Reload()
+    tags = events.Tags()["scalars"]
+    for tag in ("evaluation/recovered", "train/loss", "rollout/ep_rew_mean", "curriculum/largest"):
+        assert tag in tags
+    assert [s.step for s in events.Scalars("evaluation/recovered")] == [0, 128, 192]
+
+
+def test_best_is_the_best_evaluation():
+    """best/ holds the first of the highest scores that training has reached."""
+    run = finished_run()
+    rows = evaluations(run)
+    scores = [float(row["score"]) for row in rows]
+    best = int(rows[1 + int(np.argmax(scores[1:]))]["timesteps"])
+    assert state(run, "best")["timesteps"] == best
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_the_same_seed_gives_the_same_weights(tmp_path, threads):
+    """A second run, in any number of threads, ends with the same bits."""
+    train(tiny_config(threads=threads), tmp_path, progress=False)
+    for a, b in zip(weights(tmp_path), weights(finished_run()), strict=True):
+        assert np.array_equal(a, b)
+    assert evaluations(tmp_path) == evaluations(finished_run())
+
+
+def test_another_seed_gives_other_weights(tmp_path):
+    """The seed of the configuration decides."""
+    train(tiny_config(seed=1, steps=64), tmp_path, progress=False)
+    assert not np.array_equal(weights(tmp_path)[0], weights(finished_run())[0])
+    assert evaluations(tmp_path)[0] == evaluations(finished_run())[0]  # held-out pushes are fixed
+
+
+def test_every_evaluation_meets_the_same_pushes(tmp_path, monkeypatch):
+    """The held-out seeds do not change as the run goes on, and are not those of training."""
+    seeds, reset = [], EnvBatch.reset
+
+    def spy(self, given, *rest):
+        seeds.append(list(given))
+        return reset(self, given, *rest)
+
+    monkeypatch.setattr(EnvBatch, "reset", spy)
+    train(tiny_config(steps=128), tmp_path, progress=False)
+    held_out = [given for given in seeds if len(given) == 5]
+    trained = [seed for given in seeds if len(given) == 4 for seed in given]
+    assert len(held_out) == 2 and held_out[0] == held_out[1] and len(set(held_out[0])) == 5
+    assert len(set(trained)) == 4 and not set(trained) & set(held_out[0])
+
+
+def test_an_evaluated_policy_sees_every_step(tmp_path, monkeypatch):
+    """What it acts on is what the step before has left."""
+    seen, predict = [], PPO.predict
+
+    def spy(self, observation, *rest, **named):
+        seen.append(observation.copy())
+        return predict(self, observation, *rest, **named)
+
+    monkeypatch.setattr(PPO, "predict", spy)
+    train(tiny_config(steps=64), tmp_path, progress=False)
+    assert len(seen) > 20
+    for before, after in pairwise(seen):
+        assert (before != after).any(axis=1).all()
+
+
+def test_neighbouring_seeds_share_no_environment():
+    """Environment i of a run gets seed + i: the first seeds of two runs lie far apart."""
+    first = sorted(_env_seed(seed) for seed in range(50))
+    assert np.diff(first).min() > 256
+
+
+def test_last_is_written_after_every_rollout(tmp_path, monkeypatch):
+    """A kill at any time loses at most the rollout that is running."""
+    saved = []
+
+    def spy(folder, model, normalize, config, state):
+        saved.append((folder.name, state["timesteps"], len(state["evaluations"])))
+
+    monkeypatch.setattr(callbacks, "save_checkpoint", spy)
+    train(tiny_config(), tmp_path, progress=False)
+    last = [(steps, rows) for name, steps, rows in saved if name == "last"]
+    assert last == [(0, 1), (64, 1), (128, 1), (128, 2), (192, 3)]
+    assert saved[0] == ("best", 0, 1)  # the controller alone
+
+
+def test_a_killed_run_resumes(tmp_path):
+    """After SIGKILL the run goes on from the last rollout and reaches its steps."""
+    out = tmp_path / "run"
+    code = (
+        "from tests.support.shared import tiny_config\n"
+        "from poise.training.learning.train import train\n"
+        f"train(tiny_config(steps=10**6), {str(out)!r}, progress=False)"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, stderr=subprocess.PIPE)
+    deadline, seen = time.monotonic() + 300.0, -1
+    while seen < 2 * ROLLOUT:
+        assert process.poll() is None, process.stderr.read().decode()
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+        try:
+            seen = state(out)["timesteps"]
+        except (OSError, ValueError):  # not there yet, or just being replaced
+            continue
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    process.stderr.close()
+
+    last = out / "last" if (out / "last").exists() else out / ".last.old"
+    reached = json.loads((last / STATE).read_text())["timesteps"]
+    assert reached >= seen
+    config = tiny_config(steps=reached + 100, threads=2)
+    train(config, out, resume=True, progress=False)
+    assert state(out)["timesteps"] == reached + 2 * ROLLOUT
+    steps = [int(row["timesteps"]) for row in evaluations(out)]
+    assert steps[0] == 0 and steps == sorted(set(steps)) and steps[-1] == reached + 2 * ROLLOUT
+    assert read_yaml(out / "config.yaml")["steps"] == config.steps
+    load_policy(out)
+
+
+def test_resuming_goes_on_from_the_weights(run):
+    """With no steps left nothing changes; with more, training goes on from what there was."""
+    before = weights(run)
+    train(tiny_config(), run, resume=True, progress=False)
+    assert all(np.array_equal(a, b) for a, b in zip(weights(run), before, strict=True))
+    train(tiny_config(steps=256), run, resume=True, progress=False)
+    after = weights(run)
+    moved = np.abs(after[0] - before[0]).max()
+    assert 0.0 < moved < 0.05  # a few small steps, no new start
+    assert state(run)["timesteps"] == 256
+    assert [int(row["timesteps"]) for row in evaluations(run)] == [0, 128, 192, 256]
+
+
+def test_a_run_starts_from_a_policy(tmp_path):
+    """Its first evaluation is that policy's; weights go on from there, steps from 0."""
+    first = tiny_config(start_from=str(finished_run() / "last"), seed=5)
+    train(first, tmp_path / "run", progress=False)
+    before, after = weights(finished_run()), weights(tmp_path / "run")
+    change = max(abs(a - b).max() for a, b in zip(before, after, strict=True))
+    assert 0.0 < change < 0.05  # another seed's own first weights are further away
+    assert state(tmp_path / "run")["timesteps"] == first.steps
+    assert evaluations(tmp_path / "run")[0]["mean_abs_action"] != "0.0"
+
+
+def test_a_larger_network_starts_as_the_policy(tmp_path):
+    """Its first evaluation is that of the smaller network; then its new units learn."""
+    start = str(finished_run() / "last")
+    wide = replace(tiny_config().ppo, net_arch=(32, 24))
+    for name, ppo in (("narrow", tiny_config().ppo), ("wide", wide)):
+        train(tiny_config(start_from=start, ppo=ppo), tmp_path / name, progress=False)
+    narrow, grown = (evaluations(tmp_path / name)[0] for name in ("narrow", "wide"))
+    assert float(grown["mean_abs_action"]) == pytest.approx(float(narrow["mean_abs_action"]))
+    outgoing = next(w for w in weights(tmp_path / "wide") if w.shape == (32, 24))
+    assert np.abs(outgoing[16:, :16]).max() > 0.0
+
+
+def test_a_start_that_is_no_policy_is_refused(tmp_path):
+    """Before anything is written: no such policy, or more layers or units than asked for."""
+    with pytest.raises(ConfigError, match="nowhere: no such folder.*residual-step"):
+        train(tiny_config(start_from="nowhere"), tmp_path / "run", progress=False)
+    start = str(finished_run() / "last")
+    for widths, said in (((8,), "other layers"), ((8, 16), "has shape")):
+        ppo = replace(tiny_config().ppo, net_arch=widths)
+        with pytest.raises(ConfigError, match=rf"policy\.zip: cannot be read.*{said}"):
+            train(tiny_config(start_from=start, ppo=ppo), tmp_path / "run", progress=False)
+    assert not (tmp_path / "run").exists()
+
+
+def snapshot(folder):
+    return {p: p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@pytest.mark.parametrize(
+    ("config", "resume", "named"),
+    [
+        (tiny_config(), False, ("already holds", "--resume")),
+        (tiny_config(seed=3), True, ("another configuration", "seed")),
+        (tiny_config(ppo=PPOConfig(n_envs=2)), True, ("another configuration", "ppo")),
+    ],
+)
+def test_a_run_is_not_written_over(run, config, resume, named):
+    """One error names the folder and the way out; no file changes."""
+    before = snapshot(run)
+    with pytest.raises(ConfigError) as error:
+        train(config, run, resume=resume, progress=False)
+    for word in (str(run), *named):
+        assert word in str(error.value)
+    assert snapshot(run) == before
+
+
+def test_nothing_to_resume(tmp_path):
+    """Resuming an empty folder is refused, and leaves it empty."""
+    with pytest.raises(ConfigError, match="no run to resume"):
+        train(tiny_config(), tmp_path, resume=True, progress=False)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("spoil", ["truncate", "fingerprint", "controller_fingerprint"])
+def test_a_damaged_run_is_not_resumed(run, spoil):
+    """One error names the file; nothing is written over."""
+    path = run / "last" / (POLICY if spoil == "truncate" else STATE)
+    if spoil == "truncate":
+        path.write_bytes(path.read_bytes()[:5000])
+    else:
+        path.write_text(json.dumps({**state(run), spoil: "0" * 64}))
+    before = snapshot(run)
+    with pytest.raises(ConfigError, match=path.name):
+        train(tiny_config(steps=256), run, resume=True, progress=False)
+    assert snapshot(run) == before
+
+
+def test_the_curriculum_grows_the_pushes(tmp_path, monkeypatch):
+    """The largest push starts small and reaches its size after its share of the run."""
+    largest = []
+    start = schedules.CurriculumCallback._on_rollout_start
+
+    def spy(self):
+        start(self)
+        largest.append(self.training_env.get_attr("push_sampler")[0].magnitude)
+
+    monkeypatch.setattr(schedules.CurriculumCallback, "_on_rollout_start", spy)
+    config = tiny_config(steps=256, curriculum=Curriculum(start=0.1, share=0.5))
+    config = replace(config, evaluation=replace(config.evaluation, trials=1))
+    train(config, tmp_path, progress=False)
+    expected = [(0.06, 0.06), (0.1, 0.33), (0.1, 0.6), (0.1, 0.6)]
+    np.testing.assert_allclose(largest[:4], expected)
+
+
+def test_the_progress_bar_shows_steps_and_success(tmp_path, capsys):
+    """With a bar, the recovery rate of the exploring policy is printed."""
+    train(tiny_config(steps=128), tmp_path, progress=True)
+    out = capsys.readouterr().out
+    assert "128/128 steps" in out and "recovered" in out
+
+
+@pytest.mark.parametrize(
+    ("section", "named"),
+    [
+        ({"ppo": {"n_envs": 1, "n_steps": 1}}, "ppo: n_envs"),
+        ({"ppo": {"net_arch": [64, 0]}}, "ppo: net_arch"),
+        ({"ppo": {"gamma": 1.5}}, "ppo.gamma"),
+        ({"ppo": {"lr": 1e-3}}, "ppo.lr.*learning_rate"),
+        ({"steps": 0}, "steps"),
+        ({"seed": 1.5}, "seed"),
+        ({"evaluation": {"trials": 0}}, "evaluation.trials"),
+    ],
+)
+def test_bad_configurations_are_refused(section, named):
+    """One error names the field, the value and the choices."""
+    with pytest.raises(ConfigError, match=named):
+        build(TrainConfig, section, "test")
+
+
+@pytest.mark.parametrize("which", ["env", "evaluation"])
+def test_pushes_that_do_not_fit_the_robot_are_refused_before_anything_is_written(tmp_path, which):
+    """A body that the robot lacks: one error with field and choices, no folder; seeds likewise."""
+    config = tiny_config()
+    pushes = PushSampler(magnitude=(0.1, 0.2), unit="specific_impulse", bodies=("tail",))
+    config = replace(config, **{which: replace(getattr(config, which), pushes=pushes)})
+    named = f"^{which}.pushes.bodies: no body 'tail' .*choices: .*torso"
+    with pytest.raises(ConfigError, match=named):
+        train(config, tmp_path / "run")
+    with pytest.raises(ConfigError, match=named):
+        train_seeds(config, [0, 1], tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_exploration_narrows_on_a_schedule(tmp_path, monkeypatch):
+    """With log_std_final, the noise of each rollout lies on a line in time."""
+    seen = []
+    start = schedules.ExplorationCallback._on_rollout_start
+
+    def spy(self):
+        start(self)
+        seen.append(self.model.policy.log_std.detach().numpy().copy())
+
+    monkeypatch.setattr(schedules.ExplorationCallback, "_on_rollout_start", spy)
+    ppo = replace(tiny_config().ppo, log_std_init=-1.0, log_std_final=-3.0)
+    config = tiny_config(steps=128, ppo=ppo)
+    train(replace(config, evaluation=replace(config.evaluation, trials=1)), tmp_path, False, False)
+    np.testing.assert_allclose([values.mean() for values in seen], [-1.0, -2.0], atol=1e-6)
+    assert all(np.ptp(values) == 0.0 for values in seen)
+
+
+def test_steps_are_trained_by_a_word_in_the_configuration(tmp_path):
+    """`action: step` trains in `ResidualStepEnv` around `capture-step`, with its own scales."""
+    config = train_config("residual-step")
+    env = config.make_env()
+    assert type(env) is ResidualStepEnv and type(env.controller) is CaptureStep
+    assert env.residual == config.step_residual and env.residual.foothold > 0.0
+    small = tiny_config(
+        action="step", controller="capture-step", step_residual=config.step_residual, steps=128
+    )
+    train(small, tmp_path / "run", progress=False)
+    player = load_player(str(tmp_path / "run"), robot(), duration=0.5)
+    assert type(player.env) is ResidualStepEnv
+    action = player.act(player.env.reset(seed=0)[0])
+    assert action.shape == (len(player.env.action_names),)

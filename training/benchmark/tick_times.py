@@ -1,0 +1,91 @@
+"""How long a control tick takes, all controllers measured in turn in one process."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.training.trials.players import Player
+
+ROUNDS = 3  # in which every controller has its turn
+SECONDS = 0.6  # of simulated time in a round, with a push at its start
+
+
+class Clocked:
+    """A controller whose calls of `torques` are timed."""
+
+    def __init__(self, controller: Any):
+        self.inner, self.period = controller, controller.period
+        self.seconds: list[float] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+    def torques(self, *arguments: Any) -> np.ndarray:
+        begun = time.perf_counter()
+        try:
+            return self.inner.torques(*arguments)
+        finally:
+            self.seconds.append(time.perf_counter() - begun)
+
+
+def tick_times(players: dict[str, Player]) -> dict[str, float | None]:
+    """Median time of a control tick [µs] from Python; None for a controller that raises.
+
+    For a policy the time of one of its actions is shared among the ticks that it is held for.
+    """
+    clocks = {name: _Clock(player) for name, player in players.items()}
+    for turn in range(ROUNDS):
+        for clock in clocks.values():
+            clock.play(seed=turn)
+    return {name: clock.median() for name, clock in clocks.items()}
+
+
+class _Clock:
+    def __init__(self, player: Player):
+        self.player, self.broken = player, False
+        self.acts: list[float] = []
+        self.ticks: list[float] = []
+
+    def play(self, seed: int) -> None:
+        env, act = self.player.env, self._timed(self.player.act)
+        inner = getattr(env, "controller", None)
+        try:
+            clocked = None
+            if isinstance(env, ResidualBalanceEnv):
+                clocked = env.controller = Clocked(inner)
+            push = {"specific_impulse": 0.2, "start": 0.05}
+            observation, _ = env.reset(seed=seed, options={"push": push})
+            for _ in range(round(SECONDS / env.config.policy_period)):
+                env.step_in_place(act(observation))
+                observation = env.episode.observation.astype(np.float32)
+                if env.fallen:
+                    break
+            if clocked is not None:
+                self.ticks += clocked.seconds
+        except Exception:  # its trials say what it raised
+            self.broken = True
+        finally:
+            if isinstance(env, ResidualBalanceEnv):
+                env.controller = inner
+
+    def _timed(self, act: Callable[[np.ndarray], np.ndarray]) -> Callable:
+        def timed(observation: np.ndarray) -> np.ndarray:
+            begun = time.perf_counter()
+            action = act(observation)
+            self.acts.append(time.perf_counter() - begun)
+            return action
+
+        return timed
+
+    def median(self) -> float | None:
+        if self.broken or not self.acts:
+            return None
+        env = self.player.env
+        ticks = env.ticks if isinstance(env, ResidualBalanceEnv) else 1
+        tick = float(np.median(self.ticks)) if self.ticks else 0.0
+        return 1e6 * (tick + float(np.median(self.acts)) / ticks)

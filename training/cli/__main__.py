@@ -1,0 +1,5 @@
+"""`python -m poise.training.cli`, where no script is installed."""
+
+from . import main
+
+main()

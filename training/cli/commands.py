@@ -1,0 +1,432 @@
+"""The command `poise`. What is heavy (MuJoCo, Numba, torch) is imported by the sub-commands."""
+
+import errno
+import os
+import select
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, TextIO
+
+import tyro
+
+from poise.configs.errors import ConfigError, PoiseError
+from poise.training.running.stopping import exit_at_once, stop_code, stop_message, stoppable
+from poise.training.running.terminal import terminal
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
+
+Names = Annotated[
+    tuple[str, ...],
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="CONTROLLER …", help_behavior_hint=""),
+]
+Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
+Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
+Allow = Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="MODULE:CLASS")]
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run a sub-command; returns 0, 1 (see `benchmark`), 2 after bad input or on a full disk, 130
+    after Ctrl-C, 143 after SIGTERM, 141 if nobody reads the output any more."""
+    args = list(sys.argv[1:] if args is None else args)
+    # Small matrices lose time to threads, and sums may change their order. Read at import.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    try:
+        try:
+            return _stoppable(args)
+        except PoiseError as error:
+            print(f"poise: {error}", file=sys.stderr)
+            return 2
+        finally:
+            if sys.stdout is not None:  # poise list >&-
+                sys.stdout.flush()
+    except BrokenPipeError:
+        unread = [stream for stream in (sys.stdout, sys.stderr) if _unread(stream)]
+        if not unread:
+            raise
+        with open(os.devnull, "w") as nowhere:  # the exit flushes once more
+            for stream in unread:
+                os.dup2(nowhere.fileno(), stream.fileno())
+        return 141
+
+
+def _stoppable(args: list[str]) -> int:
+    try:
+        with stoppable():
+            return _run(args)
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) or stop_code() is not None:
+            # a library may have made another error of the interrupt
+            print(stop_message(), file=sys.stderr)
+            return stop_code() or 130
+        if isinstance(error, OSError) and error.errno in FULL:
+            place = "" if error.filename is None else f"{error.filename}: "
+            raise PoiseError(f"{place}cannot be written ({error.strerror})") from None
+        raise
+
+
+def command() -> None:
+    """`main` as a process: after a stop, or at one that comes when all is done, the interpreter
+    takes no time for an end of its own."""
+    code = main()
+    if stop_code() is not None:
+        sys.stderr.flush()
+        os._exit(code)
+    exit_at_once(code)
+    sys.exit(code)
+
+
+def _unread(stream: TextIO | None) -> bool:
+    """Whether this is a pipe that nobody reads any more."""
+    try:
+        poll = select.poll()
+        poll.register(stream.fileno(), 0)  # type: ignore[union-attr]
+    except (AttributeError, OSError, ValueError):  # no stream, no descriptor, no poll
+        return False
+    return bool(poll.poll(0))
+
+
+def _run(args: list[str]) -> int:
+    if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass
+        from .train import run
+
+        run(args[1:])
+        return 0
+    code = tyro.extras.subcommand_cli_from_dict(
+        COMMANDS,
+        prog="poise",
+        description="Keep a simulated humanoid on its feet while it is pushed.",
+        args=args,
+    )
+    return code if isinstance(code, int) else 0
+
+
+def demo(out: Path = Path("out/demo"), workers: int | None = None, seed: int = 0) -> None:
+    """Push three controllers and the shipped policies, and compare, in a few minutes.
+
+    momentum-qp, whose feet stay in place, and residual on it; capture-step and residual-step on it;
+    feedback-step.
+
+    Args:
+        out: folder to write to; an earlier demo there is replaced.
+        workers: number of processes; all cores if not given.
+        seed: of the pushes.
+    """
+    from .demo import demo
+
+    demo(out, workers=workers, seed=seed, console=terminal())
+
+
+def train() -> None:
+    """Train a residual policy with PPO; `poise train --help` lists every field of its config."""
+    raise AssertionError("main() answers this sub-command")
+
+
+def evaluate(
+    controllers: Names,
+    /,
+    suite: str = "random",
+    *,
+    out: Path | None = None,
+    robot: str = "humanoid",
+    seed: int = 0,
+    workers: int | None = None,
+    trials: int | None = None,
+    limits: str | None = None,
+    write_limits: Path | None = None,
+    overwrite: Switch = False,
+    allow: Allow = (),
+) -> None:
+    """Play a suite of pushes with several controllers, all on the same trials.
+
+    Writes settings.yaml, trials.csv, summary.json and plots. A run that was stopped goes on when
+    it is started again alike. The result is the same for any number of workers.
+
+    Args:
+        controllers: a name of `poise list`, such as residual (a shipped policy), zero (no torque),
+            a .yaml file of a controller, a folder written by poise train, with --seeds too, or
+            module:Class.
+        suite: random, envelope, grid, quiet, repeated, in-step, or a .yaml file.
+        out: folder to write to; out/SUITE if not given.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        seed: of the trials.
+        workers: number of processes; all cores if not given.
+        trials: number of pushes (random), of starts (quiet), of trials per direction and controller
+            in the second stage (envelope), of repeats (grid), of sequences (repeated, in-step).
+        limits: a .yaml file that pushes are measured by; if not given, the packaged file of the
+            robot, else its ankle limit.
+        write_limits: write the first controller's J50s to this file, for --limits.
+        overwrite: replace an evaluation that the folder holds.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
+    """
+    from poise.training.evaluation.evaluate import evaluate, measured_limits
+
+    folder = Path("out") / Path(suite).stem if out is None else out
+    summary = evaluate(
+        controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, trials=trials,
+        limits=limits, overwrite=overwrite, console=terminal(), allow=allow,
+    )  # fmt: skip
+    if write_limits is not None:
+        measured_limits(summary, write_limits, robot)
+        print(write_limits)
+
+
+def benchmark(
+    *,
+    out: Path,
+    controllers: tuple[str, ...] = (),
+    suite: str = "standard",
+    robot: str = "humanoid",
+    seed: int = 0,
+    workers: int | None = None,
+    backend: Literal["local", "joblib", "ray"] = "local",
+    trials: int | None = None,
+    overwrite: Switch = False,
+    report: bool = True,
+    allow: Allow = (),
+) -> int:
+    """Rank controllers: J50 per direction, factors one at a time, a random mix; see docs.
+
+    Writes settings.yaml, trials.jsonl, trials.csv, summary.json and report.html. The same command
+    goes on where it was stopped; with other controllers it adds them. Exit code 1 if a controller
+    raised.
+
+    Args:
+        out: folder to write to.
+        controllers: names as poise evaluate takes them; all packaged ones that can rest if not
+            given.
+        suite: quick (minutes), standard (an hour), full (many hours), or a .yaml file.
+        robot: a packaged robot or a .yaml description.
+        seed: of the cases.
+        workers: number of processes; all cores if not given.
+        backend: local (processes of this machine), joblib (the same by joblib), ray (a cluster).
+        trials: at most as many in every cell of the suite, to try things out.
+        overwrite: replace what the folder holds.
+        report: write report.html at the end, as poise report does.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
+    """
+    from poise.envs.viewing.gl import choose_gl_backend
+
+    choose_gl_backend()
+    from poise.baselines.allowance import named
+    from poise.training.benchmark.run import benchmark, errors
+
+    summary = benchmark(
+        controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
+        trials=trials, overwrite=overwrite, console=terminal(), allow=allow,
+    )  # fmt: skip
+    if failed := errors(summary):
+        print(f"poise: a controller raised an error in {failed} trials; see the column error of "
+              f"{out / 'trials.csv'}", file=sys.stderr)  # fmt: skip
+    if report:
+        from poise.training.report.page import write_report
+
+        write_report(out, console=terminal(), allow=[*named(*controllers), *allow])
+    return 1 if failed else 0
+
+
+def compare(
+    a: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_A")],
+    b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_B")],
+    /,
+) -> None:
+    """Say what changed from one result to another, with intervals.
+
+    Args:
+        a: written by poise benchmark or poise evaluate.
+        b: another of the same kind.
+    """
+    from poise.training.results.compare import compare, print_comparison
+
+    print_comparison(compare(a, b), a, b, terminal())
+
+
+def leaderboard(
+    results: Annotated[
+        tuple[Path, ...],
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="RESULT …", help_behavior_hint=""),
+    ],
+    /,
+    *,
+    page: Path = Path("docs/leaderboard.md"),
+) -> None:
+    """Write the leaderboard page from benchmarks' results.
+
+    Args:
+        results: summary.json of poise benchmark, or the folder that holds it. Controllers of
+            later results are added, or take the place of earlier ones of their name.
+        page: the Markdown file to write.
+    """
+    from poise.training.results.leaderboard import write_leaderboard
+
+    if not results:
+        raise ConfigError("needs one or more results", field="results")
+    write_leaderboard(results, page)
+    print(page)
+
+
+def replay(
+    folder: Folder,
+    /,
+    *,
+    trial: int,
+    controller: str | None = None,
+    video: Path | None = None,
+    plot: Path | None = None,
+    allow: Allow = (),
+) -> None:
+    """Play one trial of a result again, exactly, and say whether it ends as it was recorded.
+
+    Args:
+        folder: written by poise evaluate or poise benchmark.
+        trial: its number in trials.csv.
+        controller: which of the evaluated ones; the last if not given.
+        video: an MP4 file to write.
+        plot: a PNG file to write: CoM, CoP, capture point and torque over time.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
+    """
+    if video is not None:
+        from poise.envs.viewing.gl import choose_gl_backend
+
+        choose_gl_backend()
+    from poise.training.results.replay import replay
+
+    done = replay(folder, trial, controller, video=video, plot=plot, allow=allow)
+    end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
+    print(f"trial {trial}, {done.controller}: {end}")
+    print(done.trial.push or "no push")
+    for name, (recorded, now) in done.differences.items():
+        print(f"{name}: recorded {recorded or 'nothing'}, now {now or 'nothing'}")
+    print("differs from the record" if done.differences else "exactly as recorded")
+    for path in (video, plot):
+        if path is not None:
+            print(path)
+
+
+def report(
+    folder: Folder, /, *, out: Path | None = None, films: bool = True, allow: Allow = ()
+) -> None:
+    """Write one HTML file that shows a result: ranking, envelopes, falls, worst trials, numbers.
+
+    The file opens from disk and needs nothing else.
+
+    Args:
+        folder: written by poise evaluate or poise benchmark.
+        out: file to write; report.html in the folder if not given.
+        films: play the worst trials again, for pictures and plots over time (seconds for each).
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
+    """
+    from poise.envs.viewing.gl import choose_gl_backend
+
+    choose_gl_backend()
+    from poise.training.report.page import write_report
+
+    write_report(folder, out, films=films, console=terminal(), allow=allow)
+
+
+def tune(
+    *,
+    out: Path,
+    config: str = "momentum-qp",
+    controller: str | None = None,
+    robot: str | None = None,
+    policy: str | None = None,
+    generations: int | None = None,
+    seed: int | None = None,
+    workers: int = 2,
+    resume: Switch = False,
+    allow: Allow = (),
+) -> None:
+    """Search a controller's gains by CMA-ES on seeded pushes.
+
+    Args:
+        out: folder to write gains.yaml (a controller) and history.jsonl to.
+        config: a packaged tuning configuration or a .yaml file: which gains, how far.
+        controller: where the search starts: a packaged controller or a .yaml file.
+        robot: a packaged robot or a .yaml description.
+        policy: a policy on top of the controller, which counts too.
+        generations: of the search.
+        seed: of the search and its pushes.
+        workers: number of processes.
+        resume: go on with the search that the folder holds.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
+    """
+    from poise.baselines.allowance import named
+    from poise.training.tuning.search import tune, tune_config
+
+    given = {"controller": controller, "robot": robot, "policy": policy,
+             "generations": generations, "seed": seed}  # fmt: skip
+    chosen = {name: value for name, value in given.items() if value is not None}
+    permitted = [*named(controller), *allow]
+    tune(tune_config(config, **chosen), out, workers, resume, terminal(), permitted)
+
+
+def qp_set(
+    *,
+    out: Path,
+    count: int = 1000,
+    seed: int = 0,
+    form: Literal["reduced", "full"] = "reduced",
+    robot: str = "humanoid",
+    controller: str = "momentum-qp",
+) -> None:
+    """Export whole-body QPs of real push recoveries, for qpsolvers and qpbenchmark.
+
+    Args:
+        out: folder to write to: new, or empty.
+        count: number of problems; 25 of each trial.
+        seed: of the pushes and starts.
+        form: reduced (dense, inequalities only) or full (accelerations and wrenches, equalities).
+        robot: a packaged robot or a .yaml description.
+        controller: a packaged controller or a .yaml file.
+    """
+    from poise.training.qp_set.export import write_qp_set
+
+    manifest = write_qp_set(
+        out, count=count, seed=seed, form=form, robot=robot, controller=controller
+    )
+    ends = [trial["end"] for trial in manifest["trials"]]
+    counts = ", ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
+    print(f"{out}: {count} problems of {len(ends)} trials ({counts})")
+
+
+def list_names() -> None:
+    """List what can be named: robots, controllers, suites, training configurations, motions."""
+    from poise.configs.files import packaged
+
+    kinds = (
+        "robots",
+        "controllers",
+        "policies",
+        "suites",
+        "benchmarks",
+        "training",
+        "motions",
+        "tuning",
+        "limits",
+    )
+    for kind in kinds:
+        print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
+    print("also as controllers: policies, zero, a folder written by poise train, module:Class")
+
+
+COMMANDS: dict[str, Callable[..., Any]] = {
+    "demo": demo,
+    "train": train,
+    "evaluate": evaluate,
+    "benchmark": benchmark,
+    "compare": compare,
+    "leaderboard": leaderboard,
+    "replay": replay,
+    "report": report,
+    "tune": tune,
+    "qp-set": qp_set,
+    "list": list_names,
+}
+
+
+if __name__ == "__main__":
+    command()

@@ -1,0 +1,113 @@
+"""`poise train`: a training configuration, changed by flags; one run, or one per seed."""
+
+import argparse
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from poise.baselines.allowance import named
+from poise.configs.errors import ConfigError
+from poise.configs.files import resolve
+from poise.configs.schema import build, to_dict
+from poise.training.learning.config import TrainConfig, train_config
+from poise.training.learning.seeds import SEEDS
+from poise.training.learning.train import train
+from poise.training.learning.train_seeds import train_seeds
+from poise.training.running.crew import Backend
+from poise.training.running.terminal import terminal
+
+DEFAULT, ANY_ROBOT = "residual", "any-robot"
+HUMANOID = TrainConfig.robot  # whose bodies and limits DEFAULT names
+
+
+@dataclass(frozen=True)
+class Command:
+    """Train a residual policy with PPO.
+
+    Attributes:
+        settings: fields of the configuration.
+        out: folder to write to.
+        config: a packaged training configuration or a path to a .yaml file; the flags below
+            replace its fields. If not given: residual, with another --robot any-robot, with
+            --resume the run's own.
+        resume: go on with the run, or the runs, that the folder holds.
+        seeds: train a run for each of these seeds, in folders seed-SEED of the folder.
+        backend: of runs with several seeds: local (processes of this machine), joblib (the same
+            by joblib), ray (a cluster).
+        workers: with several seeds, runs at a time; all cores if not given.
+        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
+    """
+
+    settings: Annotated[TrainConfig, tyro.conf.arg(name="")]  # no prefix
+    out: Path
+    config: str | None = None
+    resume: tyro.conf.FlagCreatePairsOff[bool] = False
+    seeds: tuple[int, ...] = ()
+    backend: Backend = "local"
+    workers: int | None = None
+    allow: Annotated[
+        tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="MODULE:CLASS")
+    ] = ()
+
+
+def run(args: Sequence[str]) -> None:
+    """Parse and train; raises ConfigError, and SystemExit as command lines do."""
+    command = parse(args)
+    out, allow = command.out, [*named(_peek(args).controller), *command.allow]
+    if not command.seeds and not (out / SEEDS).exists():
+        print(train(command.settings, out, command.resume, allow=allow))
+        return
+    train_seeds(
+        command.settings, command.seeds, out, resume=command.resume, allow=allow,
+        workers=command.workers, backend=command.backend, console=terminal(),
+    )  # fmt: skip
+    print(out / SEEDS)
+
+
+def parse(args: Sequence[str]) -> Command:
+    """The command of these arguments, its configuration checked like one from a file."""
+    base = train_config(_base(args))
+    command = tyro.cli(
+        Command,
+        prog="poise train",
+        args=list(args),
+        default=Command(base, out=tyro.MISSING, config=None),
+        config=(tyro.conf.AvoidSubcommands,),
+    )
+    settings = build(TrainConfig, to_dict(command.settings), "command line")
+    return replace(command, settings=settings)
+
+
+def _base(args: Sequence[str]) -> str | Path:
+    """Where the defaults of the flags come from: looked up before the flags are read."""
+    known = _peek(args)
+    if known.config is not None:
+        return known.config
+    own = Path(known.out or ".") / "config.yaml"
+    if known.resume and own.is_file():
+        return own
+    return DEFAULT if _is_humanoid(known.robot) else ANY_ROBOT
+
+
+def _peek(args: Sequence[str]) -> argparse.Namespace:
+    """The flags that matter by being there, which a parsed command does not tell."""
+    peek = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    for name in ("--config", "--out", "--controller"):
+        peek.add_argument(name)
+    peek.add_argument("--robot", default=HUMANOID)
+    peek.add_argument("--resume", action="store_true")
+    try:
+        return peek.parse_known_args(list(args))[0]
+    except argparse.ArgumentError as error:
+        raise ConfigError(str(error), source="command line") from None
+
+
+def _is_humanoid(robot: str) -> bool:
+    """By its name or its file; what there is not is refused later."""
+    with contextlib.suppress(ConfigError):
+        return resolve("robots", robot).samefile(resolve("robots", HUMANOID))
+    return False

@@ -1,0 +1,1 @@
+"""`poise evaluate`: its course, its folder, its figures."""

@@ -1,0 +1,1 @@
+"""PPO: what is trained, how, and what comes of it."""

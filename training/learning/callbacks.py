@@ -1,0 +1,216 @@
+"""What happens beside the learning: evaluation, checkpoints, progress."""
+
+import csv
+import io
+import time
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecNormalize
+
+from poise.configs.files import write_atomic
+from poise.envs.vector.batch import EnvBatch, replicate
+
+from .checkpoints import controller_fingerprint, save_checkpoint
+from .config import TrainConfig
+
+
+class Throughput(BaseCallback):
+    """Logs steps per second and the update's share of the time."""
+
+    model: PPO
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._rollout_start = self._rollout_end = time.perf_counter()
+
+    def _on_rollout_start(self) -> None:
+        now = time.perf_counter()
+        rollout, update = self._rollout_end - self._rollout_start, now - self._rollout_end
+        if rollout > 0.0:
+            steps = self.model.n_steps * self.training_env.num_envs
+            self.logger.record("time/steps_per_second", steps / (rollout + update))
+            self.logger.record("time/update_share", update / (rollout + update))
+        self._rollout_start = now
+
+    def _on_rollout_end(self) -> None:
+        self._rollout_end = time.perf_counter()
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class Checkpoints(BaseCallback):
+    """Writes last/ after every rollout, and best/ after the best evaluation of what was trained."""
+
+    model: PPO
+
+    def __init__(
+        self, config: TrainConfig, last: Path, best: Path, table: Path, state: dict[str, Any]
+    ):
+        super().__init__()
+        self.config, self.last, self.best, self.table = config, last, best, table
+        self.rows: list[dict[str, float]] = list(state.get("evaluations", []))
+        self._next = state.get("next_evaluation", 0)
+        scores = [row["score"] for row in self.rows if row["timesteps"] > 0]
+        self._record = max(scores, default=-np.inf)
+        self._batch: EnvBatch | None = None
+
+    def _on_training_start(self) -> None:
+        evaluation = self.config.evaluation
+        pushes = evaluation.pushes or self.config.env.pushes
+        robot = self.training_env.get_attr("robot")[0]
+        count = min(evaluation.trials, 32)
+        first = self.config.make_env(robot, pushes=pushes)
+        self._batch = EnvBatch(replicate(first, count), self.config.threads)
+        if self.num_timesteps == 0:
+            self._evaluate()  # the controller alone: what the policy must beat
+
+    def _on_rollout_start(self) -> None:
+        # the update of the rollout before is done: its weights are new
+        self._save(self.last)  # first, so that a kill in the evaluation loses nothing
+        if self.num_timesteps >= self._next:
+            self._evaluate()
+            self._save(self.last)
+
+    def _on_training_end(self) -> None:
+        self._evaluate()
+        self._save(self.last)
+        self.close()
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _evaluate(self) -> None:
+        if self.rows and self.rows[-1]["timesteps"] == self.num_timesteps:
+            return
+        row = {"timesteps": self.num_timesteps, **self._play()}
+        self.rows.append(row)
+        self._next = self.num_timesteps + self.config.evaluation.every
+        for name, value in row.items():
+            self.logger.record(f"evaluation/{name}", value)
+        self.logger.dump(self.num_timesteps)
+        text = io.StringIO()
+        writer = csv.DictWriter(text, list(row), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(self.rows)
+        write_atomic(self.table, text.getvalue())
+        if row["score"] > self._record:
+            if self.num_timesteps > 0:  # anything trained replaces the controller alone
+                self._record = row["score"]
+            self._save(self.best)
+
+    def _play(self) -> dict[str, float]:
+        """The deterministic policy on the held-out pushes, the same at every evaluation."""
+        evaluation, batch = self.config.evaluation, self._batch
+        assert batch is not None  # made at the start of the training
+        normalize = self._normalize()
+        recovered: list[bool] = []
+        fallen: list[bool] = []
+        actions: list[float] = []
+        seeds = np.random.SeedSequence(evaluation.seed).generate_state(evaluation.trials)
+        size = len(batch.envs)
+        for start in range(0, evaluation.trials, size):
+            chunk = [int(s) for s in seeds[start : start + size]]
+            chunk += [int(seeds[0])] * (size - len(chunk))  # filled up, not counted
+            counted = min(size, evaluation.trials - start)
+            batch.reset(chunk)
+            result: dict[int, tuple[bool, bool]] = {}
+
+            def at_end(i, env, result=result):
+                result.setdefault(i, (env.recovered and not env.fallen, env.fallen))
+
+            while len(result) < size:
+                action, _ = self.model.predict(
+                    normalize.normalize_obs(batch.observations), deterministic=True
+                )
+                running = [i for i in range(counted) if i not in result]
+                actions.extend(np.abs(action[running]).mean(axis=1))
+                batch.step(action, at_end)
+            recovered.extend(result[i][0] for i in range(counted))
+            fallen.extend(result[i][1] for i in range(counted))
+        rate = float(np.mean(recovered))
+        return {
+            "recovered": rate,
+            "fallen": float(np.mean(fallen)),
+            "mean_abs_action": float(np.mean(actions)),
+            "score": rate,
+        }
+
+    def _normalize(self) -> VecNormalize:
+        env = self.model.get_env()
+        assert isinstance(env, VecNormalize)
+        return env
+
+    def _save(self, folder: Path) -> None:
+        robot = self.training_env.get_attr("robot")[0]
+        inputs, outputs = self.model.observation_space.shape, self.model.action_space.shape
+        assert inputs and outputs  # both spaces are boxes
+        state = {
+            "timesteps": self.num_timesteps,
+            "fingerprint": robot.fingerprint,
+            "robot": robot.name,
+            "controller_fingerprint": controller_fingerprint(self.config),
+            "observations": int(inputs[0]),
+            "actions": int(outputs[0]),
+            "next_evaluation": self._next,
+            "evaluations": self.rows,
+        }
+        save_checkpoint(folder, self.model, self._normalize(), self.config, state)
+
+    def close(self) -> None:
+        """Close the environments of the evaluation."""
+        if self._batch is not None:
+            self._batch.close()
+            self._batch = None
+
+
+class Progress(BaseCallback):
+    """A progress bar with the recovery rate of the latest episodes and steps per second."""
+
+    def __init__(self, total: int):
+        super().__init__()
+        self.total = total
+        self._episodes: deque[bool] = deque(maxlen=500)
+        self._bar: Bar | None = None
+
+    def _on_training_start(self) -> None:
+        self._bar = Bar(
+            TextColumn("training"),
+            BarColumn(),
+            TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps"),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(),
+        )
+        self._bar.start()
+        self._task = self._bar.add_task("", total=self.total, completed=self.num_timesteps, rate="")
+        self._start, self._start_steps = time.perf_counter(), self.num_timesteps
+
+    def _on_step(self) -> bool:
+        for info in self.locals["infos"]:
+            if "is_success" in info:
+                self._episodes.append(info["is_success"])
+        return True
+
+    def _on_rollout_end(self) -> None:
+        seconds = time.perf_counter() - self._start
+        speed = (self.num_timesteps - self._start_steps) / max(seconds, 1e-9)
+        rate = f"recovered {np.mean(self._episodes):.0%}" if self._episodes else ""
+        assert self._bar is not None  # made at the start of the training
+        self._bar.update(
+            self._task, completed=self.num_timesteps, rate=f"{rate}  {speed:,.0f} steps/s"
+        )
+
+    def _on_training_end(self) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the terminal back, after an error too."""
+        if self._bar is not None:
+            self._bar.stop()

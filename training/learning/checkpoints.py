@@ -1,0 +1,186 @@
+"""A policy folder: policy.zip (SB3), vecnormalize.npz, config.yaml, state.json.
+
+The folder is replaced as a whole: a reader, or a kill, finds the old one or the new one.
+Nothing in it is unpickled on loading, see `policy_files.py`.
+"""
+
+import copy
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.vec_env import VecNormalize
+from torch import Tensor
+
+from poise.baselines.registry import controller_config
+from poise.configs.errors import ConfigError, PoiseError, shown
+from poise.configs.reading import is_file, parsing
+from poise.configs.schema import to_yaml
+
+from .config import TrainConfig
+from .policy_files import MOMENTS, read_parameters, read_state, read_statistics
+
+POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.yaml", "state.json"
+FILES = (POLICY, STATISTICS, CONFIG, STATE)
+#: made anew by `PPO.load`, or of the running process alone
+LEFT_OUT = ("ep_info_buffer", "ep_success_buffer", "lr_schedule")
+
+
+def save_checkpoint(
+    folder: Path, model: PPO, normalize: VecNormalize, config: TrainConfig, state: dict[str, Any]
+) -> None:
+    """Write the folder whole; raises PoiseError when the disk refuses."""
+    new, old = _beside(folder, "new"), _beside(folder, "old")
+    try:
+        shutil.rmtree(new, ignore_errors=True)
+        new.mkdir(parents=True)
+        plain(model).save(new / POLICY, exclude=LEFT_OUT)
+        arrays: dict[str, Any] = statistics(normalize)
+        np.savez(new / STATISTICS, **arrays)
+        (new / CONFIG).write_text(to_yaml(config))
+        (new / STATE).write_text(json.dumps(state, indent=1) + "\n")
+        if folder.exists():
+            shutil.rmtree(old, ignore_errors=True)
+            os.replace(folder, old)
+        os.replace(new, folder)
+        shutil.rmtree(old, ignore_errors=True)
+    except (OSError, RuntimeError) as error:  # torch has errors of its own for a full disk
+        shutil.rmtree(new, ignore_errors=True)
+        reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
+        raise PoiseError(f"{folder}: cannot be written ({reason})") from None
+
+
+def plain(model: PPO) -> PPO:
+    """The model with nothing in it that is defined by Poise, so that SB3 alone can load it.
+
+    It shares the weights. Its learning rate is the one at the start. Of a symmetric policy it is
+    the ordinary one, f, whose weights these are: see `symmetry.py` for what is made of it.
+    """
+    stock = copy.copy(model)
+    stock.learning_rate = float(model.lr_schedule(1.0))
+    stock.policy_class = ActorCriticPolicy
+    stock.policy_kwargs = {k: v for k, v in model.policy_kwargs.items() if k != "mirrors"}
+    return stock
+
+
+def find_checkpoint(folder: Path) -> Path | None:
+    """The folder, or what a kill in the middle of a replacement left of it."""
+    for candidate in (folder, _beside(folder, "old")):
+        if all(is_file(candidate / name) for name in FILES):
+            return candidate
+    return None
+
+
+def restore(
+    folder: Path, model: PPO, normalize: VecNormalize, fingerprint: str, wider: bool = False
+) -> dict[str, Any]:
+    """Load weights, optimizer and statistics into `model` and `normalize`; returns the state.
+
+    With `wider` the network of `model` may be larger than the stored one; its optimizer then
+    begins anew. Raises ConfigError naming the file that cannot be read or is for another robot
+    than the one with this `fingerprint`.
+    """
+    state = read_state(folder / STATE)
+    check_robot(state, fingerprint, folder / STATE)
+    parameters = read_parameters(folder / POLICY)
+    with parsing(folder / POLICY):
+        if not (wider and _load_into_wider(parameters["policy"], model)):
+            model.set_parameters(parameters, exact_match=True, device="cpu")
+    _restore_statistics(folder / STATISTICS, normalize)
+    return state
+
+
+def _restore_statistics(path: Path, normalize: VecNormalize) -> None:
+    of = {"obs": normalize.obs_rms, "ret": normalize.ret_rms}
+    found = read_statistics(path, [f"{prefix}_{name}" for prefix in of for name in MOMENTS])
+    for key, value in found.items():
+        prefix, name = key.split("_")
+        if value.shape != np.shape(getattr(of[prefix], name)):
+            raise ConfigError(f"{key} has shape {value.shape}", source=path)
+        setattr(of[prefix], name, value[()])
+
+
+def _load_into_wider(stored: Mapping[str, Tensor], model: PPO) -> bool:
+    """Load the weights if the network of `model` is another one than the stored; else False."""
+    own = model.policy.state_dict()
+    if {n: w.shape for n, w in stored.items()} == {n: w.shape for n, w in own.items()}:
+        return False
+    model.policy.load_state_dict(widened(stored, own))
+    return True
+
+
+def check_robot(state: dict[str, Any], fingerprint: str, path: Path) -> None:
+    """Raise ConfigError unless the policy was trained for the robot with this fingerprint."""
+    if state.get("fingerprint") != fingerprint:
+        raise ConfigError(
+            f"trained for another robot, {shown(state.get('robot'))}, or another version of it",
+            source=path,
+            field="fingerprint",
+        )
+
+
+def check_controller(state: dict[str, Any], config: TrainConfig, path: Path) -> None:
+    """Raise ConfigError unless the controller still has the gains that the policy learned on."""
+    if state.get("controller_fingerprint") != controller_fingerprint(config):
+        raise ConfigError(
+            f"trained on another version of the controller {shown(config.controller)}",
+            source=path,
+            field="controller_fingerprint",
+        )
+
+
+def controller_fingerprint(config: TrainConfig) -> str:
+    """Hash of the configuration of the controller below the policy; empty if there is none."""
+    if config.action == "torque":
+        return ""
+    return hashlib.sha256(to_yaml(controller_config(config.controller)).encode()).hexdigest()
+
+
+def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
+    """What normalises observations and returns, as arrays."""
+    arrays = {
+        f"{prefix}_{name}": np.asarray(getattr(moments, name), dtype=float)
+        for prefix, moments in (("obs", normalize.obs_rms), ("ret", normalize.ret_rms))
+        for name in MOMENTS
+    }
+    arrays["clip_obs"] = np.asarray(normalize.clip_obs)
+    arrays["epsilon"] = np.asarray(normalize.epsilon)
+    return arrays
+
+
+def _beside(folder: Path, suffix: str) -> Path:
+    folder = Path(os.path.abspath(folder))  # "." has no name
+    return folder.parent / f".{folder.name}.{suffix}"
+
+
+def widened(
+    small: Mapping[str, torch.Tensor], large: Mapping[str, torch.Tensor]
+) -> dict[str, torch.Tensor]:
+    """Weights of the network `large` with which it computes what `small` does.
+
+    Weights W (out, in) and biases (out,) of both, of as many layers. The units that are new keep
+    what comes in as initialised in `large`; nothing goes out of them yet: their columns are zero.
+
+    Raises:
+        ValueError: other layers, or a layer of `small` that is larger.
+    """
+    if small.keys() != large.keys():
+        raise ValueError("has other layers")
+    weights = {}
+    for name, old in small.items():
+        new = large[name].clone()
+        if old.dim() != new.dim() or any(o > n for o, n in zip(old.shape, new.shape, strict=True)):
+            raise ValueError(f"{name} has shape {tuple(old.shape)}, not {tuple(new.shape)} or less")
+        if old.dim() == 2:
+            new[: old.shape[0]] = 0.0
+        new[tuple(slice(length) for length in old.shape)] = old
+        weights[name] = new
+    return weights

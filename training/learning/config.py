@@ -1,0 +1,129 @@
+"""Everything that decides a training run; written beside its results."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
+from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
+from poise.baselines.registry import controller_config
+from poise.configs.files import resolve
+from poise.configs.schema import build, on_base, read_yaml
+from poise.envs.balance.base import BalanceEnv, EnvConfig
+from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.pushes.sampler import PushSampler
+from poise.envs.robots.robot import Robot
+
+MOST_STEPS = 4_000_000  # of a rollout, which is kept in memory
+MOST_SEED = 2**31 - 1  # that torch and NumPy take, also with a run's steps added
+
+
+@dataclass(frozen=True)
+class PPOConfig:
+    """Stable-Baselines3's PPO, its names."""
+
+    n_envs: int = field(default=32, metadata={"min": 1, "max": 4096})
+    n_steps: int = field(default=128, metadata={"min": 1})  # per environment and rollout
+    batch_size: int = field(default=1024, metadata={"min": 2})
+    n_epochs: int = field(default=8, metadata={"min": 1})
+    learning_rate: float = field(default=3e-4, metadata={"above": 0.0})
+    final_learning_rate: float = field(default=5e-5, metadata={"min": 0.0})  # linear in time
+    gamma: float = field(default=0.99, metadata={"above": 0.0, "max": 1.0})
+    gae_lambda: float = field(default=0.95, metadata={"min": 0.0, "max": 1.0})
+    clip_range: float = field(default=0.2, metadata={"above": 0.0})
+    ent_coef: float = field(default=0.0, metadata={"min": 0.0})
+    vf_coef: float = field(default=0.5, metadata={"min": 0.0})
+    max_grad_norm: float = field(default=0.5, metadata={"above": 0.0})
+    net_arch: tuple[int, ...] = (128, 128)  # tanh
+    log_std_init: float = -1.5
+    log_std_final: float | None = None  # linear in time from log_std_init; None: learned
+    use_sde: bool = False  # exploration that is smooth in the state
+    sde_sample_freq: int = field(default=16, metadata={"min": -1})  # [steps]
+    symmetric: bool = False  # the policy is its own mirror image, see `symmetry.py`
+
+    def __post_init__(self):
+        if self.symmetric and self.use_sde:
+            raise ValueError("symmetric: not with use_sde")
+        if self.n_envs * self.n_steps < 2:
+            raise ValueError("n_envs × n_steps must be at least 2")
+        if self.n_envs * self.n_steps > MOST_STEPS:
+            raise ValueError(f"n_envs × n_steps must be at most {MOST_STEPS}")
+        if len(self.net_arch) > 16 or not all(1 <= width <= 4096 for width in self.net_arch):
+            raise ValueError("net_arch: at most 16 widths from 1 to 4096")
+
+
+@dataclass(frozen=True)
+class Curriculum:
+    """The largest push grows from `start` times its final size over a share of the run."""
+
+    start: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})
+    share: float = field(default=0.3, metadata={"min": 0.0, "max": 1.0})
+
+
+@dataclass(frozen=True)
+class EvaluationConfig:
+    """Held-out pushes that the deterministic policy meets during training."""
+
+    every: int = field(default=200_000, metadata={"min": 1})  # [environment steps]
+    trials: int = field(default=128, metadata={"min": 1, "max": 100_000})
+    # never used for training
+    seed: int = field(default=1_000_003, metadata={"min": 0, "max": MOST_SEED})
+    pushes: PushSampler | None = None  # None: those of training
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """A policy that moves a controller's targets, its steps too, or gives the torques itself.
+
+    With `action` "step" the environment is `poise/ResidualStep-v0`, and `step_residual` is what an
+    action adds instead of `residual`. With "torque" it is `poise/TorqueBalance-v0`, and controller,
+    motion, both residuals, smoothing and gate are not used.
+    """
+
+    robot: str = "humanoid"
+    action: Literal["residual", "step", "torque"] = "residual"
+    controller: str = "momentum-qp"
+    motion: str = "standing"
+    seed: int = field(default=0, metadata={"min": 0, "max": MOST_SEED})
+    steps: int = field(default=3_000_000, metadata={"min": 1})  # [environment steps]
+    threads: int = field(default=2, metadata={"min": 1})
+    start_from: str | None = None  # a policy whose weights and statistics are the first ones
+    env: EnvConfig = field(default_factory=EnvConfig)
+    residual: ResidualScales = field(default_factory=ResidualScales)
+    step_residual: StepScales = field(default_factory=StepScales)
+    smoothing: float = field(default=0.0, metadata={"min": 0.0})  # of the action [s]
+    gate: float = field(default=0.0, metadata={"min": 0.0})  # of the residual [m]
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    curriculum: Curriculum = field(default_factory=Curriculum)
+    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+
+    def make_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
+        """The environment of this run; `overrides` replace its arguments or fields of `env`.
+
+        A loaded `robot` spares loading it again. Raises ConfigError for a controller from outside
+        that the user has not allowed, see `allowing`.
+        """
+        if self.action == "torque":
+            return TorqueBalanceEnv(robot or self.robot, self.env, **overrides)
+        steps = self.action == "step"
+        if "controller" not in overrides:  # an environment takes a name for what the user says
+            overrides["controller"] = controller_config(self.controller)
+        arguments = {
+            "motion": self.motion,
+            "residual": self.step_residual if steps else self.residual,
+            "smoothing": self.smoothing,
+            "gate": self.gate,
+            **overrides,
+        }
+        kind = ResidualStepEnv if steps else ResidualBalanceEnv
+        return kind(robot or self.robot, self.env, **arguments)
+
+
+def train_config(name_or_path: str | Path) -> TrainConfig:
+    """A packaged training configuration (`configs/training`) or a path to one.
+
+    `base` in it names another one, whose fields hold where it has none of its own. Raises
+    ConfigError naming the file, the field and the choices.
+    """
+    path = resolve("training", name_or_path)
+    return build(TrainConfig, on_base(read_yaml(path), "training", path), str(path))

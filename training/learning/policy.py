@@ -1,0 +1,184 @@
+"""A trained policy, ready to use: observation in, action out, plain NumPy."""
+
+from collections.abc import Iterable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from poise.baselines.allowance import allowing, carried
+from poise.configs.errors import ConfigError
+from poise.configs.files import packaged, packaged_folder
+from poise.configs.reading import is_file, is_folder, parsing
+from poise.configs.schema import build, read_yaml
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.compiled.copies import Copyable
+from poise.envs.robots.mirror import Mirror
+from poise.envs.robots.robot import Robot, load_robot
+
+from .checkpoints import (
+    CONFIG,
+    FILES,
+    POLICY,
+    STATE,
+    STATISTICS,
+    check_controller,
+    check_robot,
+    find_checkpoint,
+)
+from .config import TrainConfig
+from .policy_files import read_state, read_statistics, read_weights
+
+SHIPPED = "residual"
+ACTOR = "mlp_extractor.policy_net."  # SB3's name of the actor's hidden layers
+
+
+class Policy(Copyable):
+    """The mean of a Gaussian actor: a = clip(W₃ tanh(W₂ tanh(W₁ ô + b₁) + b₂) + b₃, −1, 1).
+
+    ô = clip((o − mean)/√(var + ε), ±clip) is the normalised observation. `config` is the run's
+    configuration, `state` what its state.json says (steps, robot, evaluations). With `mirrors` a
+    is the mean of it and of its mirror image, see `symmetry.py`.
+    """
+
+    def __init__(
+        self,
+        config: TrainConfig,
+        layers: list[tuple[np.ndarray, np.ndarray]],
+        mean: np.ndarray,
+        var: np.ndarray,
+        clip: float,
+        epsilon: float,
+        state: dict[str, Any],
+        mirrors: tuple[Mirror, Mirror] | None = None,
+    ):
+        self.config, self.state = config, state
+        self._mirrors = mirrors
+        self.layers = layers
+        self._mean, self._scale = mean, 1.0 / np.sqrt(var + epsilon)
+        self._clip = clip
+        self._make_env = carried(config.make_env)
+
+    def act(self, observation: np.ndarray) -> np.ndarray:
+        """Deterministic action (..., na) for raw observations (..., no).
+
+        An observation gives the same bits alone as in a batch: each is a product of its own.
+        """
+        mean = self._mean_action(observation)
+        if self._mirrors is not None:
+            seen, done = self._mirrors
+            mean = 0.5 * (mean + done(self._mean_action(seen(observation))))
+        return np.clip(mean, -1.0, 1.0)
+
+    def _mean_action(self, observation: np.ndarray) -> np.ndarray:
+        x = np.clip((observation - self._mean) * self._scale, -self._clip, self._clip)
+        x = x[..., None, :]
+        for weight, bias in self.layers[:-1]:
+            x = np.tanh(x @ weight + bias)
+        weight, bias = self.layers[-1]
+        return (x @ weight + bias)[..., 0, :]
+
+    def content(self) -> list[bytes]:
+        """All that decides its actions."""
+        layers = [array for layer in self.layers for array in layer]
+        sides = [] if self._mirrors is None else [m.sign * (1 + m.order) for m in self._mirrors]
+        numbers = [*layers, self._mean, self._scale, np.array(self._clip), *sides]
+        return [array.tobytes() for array in numbers]
+
+    def make_env(self, **overrides: Any) -> BalanceEnv:
+        """The environment that the policy was trained in; `overrides` as in `EnvConfig`."""
+        return self._make_env(**overrides)
+
+
+def load_policy(
+    folder: str | Path | None = None,
+    robot: Robot | None = None,
+    *,
+    allow: str | Iterable[str] = (),
+) -> Policy:
+    """A packaged policy, a policy folder, or the best checkpoint of a run folder.
+
+    None is the packaged policy ``residual``. No code from the files is executed, nor any that they
+    name: a policy on a controller from outside needs `allow`, the names (``module:Class``) that may
+    run.
+
+    Raises ConfigError naming the file when it is missing, truncated, made for another robot
+    (of `robot`, or of the configuration's own), has another number of observations or actions, or
+    names a controller from outside that is not allowed.
+    """
+    path = locate_policy(folder)
+    with allowing(allow, source=path / CONFIG):
+        return _read_policy(path, robot)
+
+
+def _read_policy(path: Path, robot: Robot | None) -> Policy:
+    config = build(TrainConfig, read_yaml(path / CONFIG), str(path / CONFIG))
+    state = read_state(path / STATE)
+    mean, var, clip, epsilon = _read_statistics(path / STATISTICS)
+    layers = _read_weights(path / POLICY)
+    robot = robot or load_robot(config.robot)
+    check_robot(state, robot.fingerprint, path / STATE)
+    check_controller(state, config, path / STATE)
+    env = config.make_env(robot)
+    inputs, outputs = env.observation_space.shape[0], env.action_space.shape[0]
+    for name, what, size, expected in (
+        (STATISTICS, "observations", len(mean), inputs),
+        (POLICY, "observations", layers[0][0].shape[0], inputs),
+        (POLICY, "actions", layers[-1][0].shape[1], outputs),
+    ):
+        if size != expected:
+            raise ConfigError(
+                f"is for {size} {what}, the environment has {expected}", source=path / name
+            )
+    mirrors = env.mirrors() if config.ppo.symmetric else None
+    return Policy(config, layers, mean, var, clip, epsilon, state, mirrors)
+
+
+def locate_policy(folder: str | Path | None) -> Path:
+    """The folder that `load_policy` reads; raises ConfigError where there is none."""
+    name = SHIPPED if folder is None else str(folder)
+    if name in packaged("policies"):
+        path = packaged_folder("policies") / name
+    else:
+        path = Path(name)
+        path = find_checkpoint(path / "best") or find_checkpoint(path) or path
+        if not is_folder(path):
+            raise ConfigError(
+                "no such folder, and no packaged policy", source=path, choices=packaged("policies")
+            )
+    for name in FILES:
+        if not is_file(path / name):
+            raise ConfigError(
+                f"no {name}: a policy folder holds {', '.join(FILES)}", source=path, field=name
+            )
+    return path
+
+
+def _read_statistics(path: Path) -> tuple[np.ndarray, np.ndarray, float, float]:
+    found = read_statistics(path, ("obs_mean", "obs_var", "clip_obs", "epsilon"))
+    mean, var, clip, epsilon = found.values()
+    if mean.ndim != 1 or mean.shape != var.shape or clip.shape or epsilon.shape:
+        raise ConfigError("holds numbers that are not statistics: they have other shapes",
+                          source=path)  # fmt: skip
+    return mean, var, float(clip), float(epsilon)
+
+
+def _read_weights(path: Path) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(weight (in, out), bias) of the actor's layers."""
+    weights = read_weights(path)
+    with parsing(path):
+        actor = [key.rsplit(".", 1)[0] for key in weights if key.startswith(ACTOR)]
+        names = sorted(set(actor), key=lambda name: int(name.rsplit(".", 1)[1]))
+        layers = [
+            (weights[f"{name}.weight"].double().numpy().T.copy(),
+             weights[f"{name}.bias"].double().numpy().copy())
+            for name in [*names, "action_net"]
+        ]  # fmt: skip
+        if any(weight.ndim != 2 for weight, _ in layers):
+            raise ValueError("a layer is no matrix")
+        if any(a[0].shape[1] != b[0].shape[0] for a, b in pairwise(layers)):
+            raise ValueError("layers do not fit each other")
+        if any(bias.shape != (weight.shape[1],) for weight, bias in layers):
+            raise ValueError("a bias does not fit its layer")
+    return layers

@@ -1,0 +1,125 @@
+"""What the files of a policy folder hold: statistics, weights, the optimizer; read and checked.
+
+Nothing is unpickled: weights come by torch's weights-only reader, statistics as plain arrays.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from poise.configs.archives import Archive, read_archive, read_arrays
+from poise.configs.errors import ConfigError
+from poise.configs.reading import parsing, read_json
+
+MOMENTS = ("mean", "var", "count")
+#: The smallest and the largest of each number; what training gives lies far inside.
+RANGES = {
+    "mean": (-1e6, 1e6),
+    "var": (0.0, 1e12),
+    "count": (1e-9, 1e15),
+    "clip_obs": (1e-3, 1e3),
+    "epsilon": (1e-12, 1.0),
+}
+WEIGHT = 1e6  # the largest
+STEPS = 10**15  # of training
+_PARTS = ("policy", "policy.optimizer")  # members of policy.zip, without .pth
+_VALUES = 100_000  # in a member
+_FLOATS = (torch.float32, torch.float64)
+
+
+def read_state(path: Path) -> dict[str, Any]:
+    """The mapping in a state.json; raises ConfigError naming the file."""
+    state = read_json(path)
+    steps = state.get("timesteps")
+    if type(steps) is not int or not 0 <= steps <= STEPS:
+        raise ConfigError(f"must be a whole number from 0 to {STEPS:.0e}", source=path,
+                          field="timesteps")  # fmt: skip
+    return state
+
+
+def read_statistics(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Arrays of vecnormalize.npz by name, such as ``obs_mean`` (no,) and ``clip_obs`` ().
+
+    Raises ConfigError for one that is missing, of another type than floats, not finite, or beyond
+    what statistics may be (`RANGES`).
+    """
+    arrays = read_arrays(path, names)
+    for name, values in arrays.items():
+        low, high = RANGES[name if name in RANGES else name.rpartition("_")[2]]
+        wrong = values[~((values >= low) & (values <= high))]  # NaN too
+        if wrong.size:
+            raise ConfigError(
+                f"holds numbers that are not statistics: {name} must be from {low:g} to {high:g}, "
+                f"not {wrong[0]:g}", source=path,
+            )  # fmt: skip
+    return arrays
+
+
+def read_weights(path: Path) -> dict[str, torch.Tensor]:
+    """The state_dict of the network in policy.zip.
+
+    Raises ConfigError for anything but finite floats of at most `WEIGHT`.
+    """
+    return _weights(read_archive(path), path)
+
+
+def read_parameters(path: Path) -> dict[str, Any]:
+    """The state_dicts of the network and its optimizer in policy.zip, as SB3 names them.
+
+    Raises ConfigError as `read_weights`.
+    """
+    archive = read_archive(path)
+    _, optimizer = _PARTS
+    return {"policy": _weights(archive, path), optimizer: _member(archive, path, optimizer)}
+
+
+def _weights(archive: Archive, path: Path) -> dict[str, torch.Tensor]:
+    weights = _member(archive, path, "policy")
+    if not isinstance(weights, dict):
+        raise ConfigError("policy.pth holds no weights", source=path)
+    for name, value in weights.items():
+        if not isinstance(name, str) or not isinstance(value, torch.Tensor):
+            raise ConfigError(f"policy.pth holds no weights: {name!s:.80} is a "
+                              f"{type(value).__name__}", source=path)  # fmt: skip
+        if value.numel() and value.abs().max() > WEIGHT:
+            raise ConfigError(f"{name}: weights must be at most {WEIGHT:g}", source=path)
+    return weights
+
+
+def _member(archive: Archive, path: Path, part: str) -> Any:
+    """What torch saved in a member of policy.zip; its tensors are finite floats."""
+    data = archive.read(f"{part}.pth")
+    Archive(data, f"{path}: {part}.pth")  # torch's own format is a zip file too
+    with parsing(path):
+        value = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
+    for tensor in _tensors(value, path):
+        if tensor.dtype not in _FLOATS or tensor.layout is not torch.strided:
+            raise ConfigError(f"holds weights of {tensor.dtype}: they must be 32- or 64-bit floats",
+                              source=path)  # fmt: skip
+        if tensor.numel() * tensor.element_size() > len(data):  # a few bytes that are repeated
+            raise ConfigError("holds weights that are larger than their file", source=path)
+        if not torch.isfinite(tensor).all():
+            raise ConfigError("holds weights that are not finite", source=path)
+    return value
+
+
+def _tensors(value: Any, path: Path) -> Iterator[torch.Tensor]:
+    """All tensors in mappings, lists and tuples of these."""
+    waiting, seen = [value], 0
+    while waiting:
+        seen += 1
+        if seen > _VALUES:
+            raise ConfigError(f"holds more than {_VALUES} values", source=path)
+        each = waiting.pop()
+        if isinstance(each, torch.Tensor):
+            yield each
+        elif isinstance(each, dict):
+            waiting += each.values()
+        elif isinstance(each, (list, tuple)):
+            waiting += each

@@ -1,0 +1,49 @@
+"""A folder of `poise train --seeds`, and the runs that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from poise.configs.errors import ConfigError
+from poise.configs.reading import is_file, read_json
+
+SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
+
+
+def seed_folder(out: Path, seed: int) -> Path:
+    """Where the run of a seed lies."""
+    return out / f"seed-{seed}"
+
+
+def read_seeds(out: Path) -> list[dict[str, Any]]:
+    """The runs of seeds.json; raises ConfigError naming the file."""
+    path = out / SEEDS
+    runs = read_json(path).get("runs")
+    if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
+        raise ConfigError("must be a list of mappings", source=path, field="runs")
+    for run in runs:
+        if type(run.get("seed")) is not int or not isinstance(run.get("folder"), str):
+            raise ConfigError("a run without a seed or a folder", source=path, field="runs")
+    return runs
+
+
+def expand_seeds(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of controllers, a folder of `poise train --seeds` replaced by those of its runs.
+
+    Raises ConfigError for a folder with a run that is not finished.
+    """
+    expanded: list[str] = []
+    for name in names:
+        if not is_file(Path(name) / SEEDS):
+            expanded.append(name)
+            continue
+        for run in read_seeds(Path(name)):
+            if not run.get("finished"):
+                raise ConfigError(
+                    f"the run of seed {run['seed']} is not finished: poise train --resume goes on",
+                    source=Path(name) / SEEDS,
+                )
+            expanded.append(str(Path(name) / run["folder"]))
+    return tuple(expanded)

@@ -1,0 +1,202 @@
+"""Training a residual policy with Stable-Baselines3's PPO on the CPU."""
+
+from collections.abc import Iterable
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.logger import configure
+from stable_baselines3.common.vec_env import VecNormalize
+
+from poise.baselines.allowance import allows
+from poise.baselines.warmup import prepare
+from poise.configs.errors import ConfigError
+from poise.configs.files import write_atomic
+from poise.configs.schema import build, read_yaml, to_yaml
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.vector.batch import replicate
+from poise.training.running.folder_lock import FolderLock
+from poise.training.running.stopping import keeps
+
+from .callbacks import Checkpoints, Progress, Throughput
+from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
+from .config import TrainConfig
+from .policy import locate_policy
+from .schedules import CurriculumCallback, ExplorationCallback
+from .symmetry import MirroredMeanStd, MirroredPolicy
+from .vec_env import ThreadedVecEnv
+
+LAST, BEST = "last", "best"
+
+
+@allows()
+def train(
+    config: TrainConfig,
+    out: str | Path,
+    resume: bool = False,
+    progress: bool = True,
+    *,
+    allow: str | Iterable[str] = (),
+) -> Path:
+    """Train into the folder `out`; returns the folder of the best checkpoint.
+
+    `out` gets config.yaml, evaluations.csv, tensorboard/, and the policy folders best/ and last/.
+    `resume` goes on from last/, which is written after every rollout; the configuration must be
+    the same but for `steps` and `threads`. A new run begins with the policy `config.start_from`,
+    if there is one, of the same robot; its network may be smaller (`widened`). The same
+    configuration gives the same weights, whatever the number of threads; a resumed run starts new
+    episodes, and so differs. A controller from outside (``module:Class``) that the configuration
+    names must be among `allow`.
+
+    Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
+    round; when the configurations or robots differ; when a file of last/ cannot be read; for
+    pushes that do not fit the robot; for a controller from outside that is not allowed. Raises
+    PoiseError when another process writes to `out`, or a file cannot be written.
+    """
+    out = Path(out)
+    checkpoint = check_folder(config, out, resume)
+    keeps(out / LAST, f"what is trained is kept in {out}; go on with --resume")
+    start = None if checkpoint or config.start_from is None else locate_policy(config.start_from)
+    torch.set_num_threads(1)
+    prepare()
+    with ExitStack() as stack:
+        normalize = _training_envs(config)
+        stack.callback(normalize.close)
+        model = make_model(config, normalize)
+        normalize.seed(_env_seed(config.seed))
+        state: dict[str, Any] = {}
+        fingerprint = normalize.get_attr("robot")[0].fingerprint
+        stack.enter_context(FolderLock(out))
+        checkpoint = check_folder(config, out, resume)  # another run may have ended since
+        if start is not None:
+            restore(start, model, normalize, fingerprint, wider=True)
+        if checkpoint is not None:
+            state = restore(checkpoint, model, normalize, fingerprint)
+            check_controller(state, config, checkpoint / STATE)
+            model.num_timesteps = state["timesteps"]
+            _reseed(model, normalize, config.seed + model.num_timesteps)
+        write_atomic(out / CONFIG, to_yaml(config))
+        model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
+        checkpoints = Checkpoints(config, out / LAST, out / BEST, out / "evaluations.csv", state)
+        stack.callback(checkpoints.close)
+        schedules = [CurriculumCallback(config), ExplorationCallback(config)]
+        callbacks = [Throughput(), *schedules, checkpoints]
+        bar = Progress(config.steps)
+        stack.callback(bar.close)
+        if progress:
+            callbacks.append(bar)
+        remaining = config.steps - model.num_timesteps
+        if remaining > 0:
+            model.learn(remaining, callback=callbacks, reset_num_timesteps=checkpoint is None)
+    return out / BEST
+
+
+def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
+    """PPO whose first policy is the controller alone: the mean's last layer is zero."""
+    ppo = config.ppo
+
+    def learning_rate(remaining: float) -> float:
+        return ppo.final_learning_rate + remaining * (ppo.learning_rate - ppo.final_learning_rate)
+
+    policy: dict[str, Any] = {
+        "net_arch": list(ppo.net_arch),
+        "activation_fn": torch.nn.Tanh,
+        "log_std_init": ppo.log_std_init,
+    }
+    if ppo.symmetric:
+        policy["mirrors"] = env.env_method("mirrors", indices=0)[0]
+    model = PPO(
+        MirroredPolicy if ppo.symmetric else "MlpPolicy",
+        env,
+        n_steps=ppo.n_steps,
+        batch_size=ppo.batch_size,
+        n_epochs=ppo.n_epochs,
+        learning_rate=learning_rate,
+        gamma=ppo.gamma,
+        gae_lambda=ppo.gae_lambda,
+        clip_range=ppo.clip_range,
+        ent_coef=ppo.ent_coef,
+        vf_coef=ppo.vf_coef,
+        max_grad_norm=ppo.max_grad_norm,
+        use_sde=ppo.use_sde,
+        sde_sample_freq=ppo.sde_sample_freq,
+        policy_kwargs=policy,
+        seed=config.seed,
+        device="cpu",
+        stats_window_size=500,
+    )
+    head = model.policy.action_net
+    assert isinstance(head, torch.nn.Linear)
+    with torch.no_grad():
+        head.weight.zero_()
+        head.bias.zero_()
+    return model
+
+
+def _training_envs(config: TrainConfig) -> VecNormalize:
+    env = config.make_env()
+    check_pushes(config, env)
+    moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
+    vec = ThreadedVecEnv(replicate(env, config.ppo.n_envs), config.threads)
+    normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
+    if moments is not None:
+        normalize.obs_rms = moments
+    return normalize
+
+
+def check_pushes(config: TrainConfig, env: BalanceEnv) -> None:
+    """Raises ConfigError, naming the field, for pushes that do not fit the environment's robot."""
+    margin = env.simulation.state.support_margin
+    for section in ("env", "evaluation"):
+        sampler = getattr(config, section).pushes
+        if sampler is None:
+            continue
+        try:
+            sampler.sample(np.random.default_rng(0), env.robot, margin)
+        except ConfigError as error:
+            name = error.source or error.field
+            raise ConfigError(
+                error.message, field=f"{section}.pushes.{name}", choices=error.choices
+            ) from None
+
+
+def _reseed(model: PPO, env: VecNormalize, seed: int) -> None:
+    model.set_random_seed(seed)
+    env.seed(_env_seed(seed))
+
+
+def _env_seed(seed: int) -> int:
+    """Seed of the first environment; the others follow, and runs with neighbouring seeds differ."""
+    return int(np.random.SeedSequence(seed).generate_state(1)[0])
+
+
+def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
+    """The checkpoint to go on from, or None for a new run; raises ConfigError as `train`."""
+    checkpoint = find_checkpoint(out / LAST)
+    if not resume:
+        if checkpoint is not None:
+            raise ConfigError(
+                "already holds a training run; go on with --resume or choose another folder",
+                source=str(out),
+                field="out",
+            )
+        return None
+    if checkpoint is None:
+        raise ConfigError("holds no run to resume", source=str(out), field="resume")
+    before = build(TrainConfig, read_yaml(checkpoint / CONFIG), str(checkpoint / CONFIG))
+    same = replace(before, steps=config.steps, threads=config.threads)
+    if same != config:
+        different = [
+            name for name in TrainConfig.__dataclass_fields__
+            if getattr(same, name) != getattr(config, name)
+        ]  # fmt: skip
+        raise ConfigError(
+            f"the run was started with another configuration ({', '.join(different)})",
+            source=str(checkpoint / CONFIG),
+            field=different[0],
+        )
+    return checkpoint

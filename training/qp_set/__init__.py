@@ -1,0 +1,1 @@
+"""QPs of real recoveries as files."""

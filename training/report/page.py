@@ -1,0 +1,259 @@
+"""A result folder as one HTML file that opens from disk, with nothing outside it."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import shlex
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from rich.console import Console
+
+from poise.baselines.allowance import allowing
+from poise.configs.errors import PoiseError
+from poise.configs.files import write_atomic
+from poise.configs.reading import TABLE_BYTES, read_text
+from poise.training.results.read import Record, Results, load_results
+from poise.training.running.files import REPORT, TRIALS
+from poise.training.running.terminal import print_paths
+
+from . import factors, plots, words
+from . import tables as report_tables
+from .cells import Download, download
+from .svg import swatch
+from .time_chart import signals_csv, time_plot
+from .worst_trials import AFTER, Case, Film, can_draw, choose_cases, film, frame_times
+
+CROWD = 4  # of controllers; with more, bands and bars are shown for the one that is pointed at
+EMBEDDED = 600_000  # [bytes] trials.csv is embedded up to this size, beyond it packed
+PACKED = 2_500_000  # [bytes] up to this size
+
+
+def write_report(
+    folder: str | Path,
+    out: str | Path | None = None,
+    *,
+    films: bool = True,
+    console: Console | None = None,
+    allow: str | Iterable[str] = (),
+) -> Path:
+    """Write the report of a finished evaluation or benchmark; returns its path.
+
+    The file holds everything it shows: style, script, plots, pictures, and the numbers as CSV. The
+    same folder gives the same file. Trials that cannot be played again are left out, and the report
+    says why.
+
+    Args:
+        folder: written by `evaluate`.
+        out: the file; `folder`/report.html if not given.
+        films: play the worst trials again, for pictures and plots over time (seconds for each).
+        console: where progress and the path are printed; None: nowhere.
+        allow: controllers from outside (``module:Class``) that may run; others are not played.
+
+    Raises:
+        ConfigError: the folder holds no finished evaluation, or its files are not whole.
+        PoiseError: the file cannot be written.
+    """
+    console = console or Console(quiet=True)
+    path = Path(folder) / REPORT if out is None else Path(out)
+    results = load_results(folder)
+    with allowing(allow):
+        write_atomic(path, render(results, films=films, console=console))
+    print_paths([path], console)
+    return path
+
+
+def render(results: Results, *, films: bool = True, console: Console | None = None) -> str:
+    """The page; raises ConfigError where the summary does not hold what it should."""
+    console = console or Console(quiet=True)
+    baseline = results.reference
+    order = report_tables.ranked(results)
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("poise.training.report", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    tables = {
+        "ranking": report_tables.ranking(results, baseline),
+        "directions": report_tables.directions(results),
+        "pairs": report_tables.pairs(results),
+        "factors": factors.factor_table(results),
+        "sensitivity": factors.sensitivity(results, order),
+        "indicators": factors.indicators(results, order),
+        "seeds": factors.seed_table(results),
+        "errors": factors.error_table(results),
+        "smallest": report_tables.smallest(results, order),
+    }
+    cases, notes = _cases(results, baseline, order, films, console)
+    envelope, own_envelopes = plots.envelopes(results)
+    falls, curves = plots.falls(results)
+    return environment.get_template("report.html.j2").render(
+        summary=results.summary,
+        trial_count=len({record.trial for record in results.records}),
+        controllers=[
+            {"name": name, "index": results.controllers.index(name),
+             "swatch": swatch(results.controllers.index(name))}
+            for name in order
+        ],
+        baseline=baseline,
+        assisted=[name for name in order if report_tables.assisted(results, name)],
+        lead=words.lead(results),
+        tables=tables,
+        forests=plots.forests(results),
+        envelope=envelope,
+        own_envelopes=own_envelopes,
+        step_lines=list(plots.step_lines(results)) if envelope else [],
+        falls=falls,
+        curves=curves,
+        factors=factors.factor_plots(results, order),
+        cases=cases,
+        notes=notes,
+        facts=_facts(results),
+        trials=_trials(results),
+        summary_file=_summary_file(results),
+        crowded=len(order) > CROWD,
+    )  # fmt: skip
+
+
+def _cases(
+    results: Results, baseline: str, order: Sequence[str], films: bool, console: Console
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """The trials shown, and what to say of those that are not."""
+    cases = choose_cases(results, baseline, order)
+    notes: list[str] = []
+    if not films:
+        notes.append("The trials were not played again: the report was asked to go without.")
+    problem = can_draw() if films and cases else None
+    if problem:
+        notes.append(f"There are no pictures: {problem}.")
+    done: dict[tuple[int, str], Film | None] = {}
+    shown = []
+    for k, case in enumerate(cases, 1):
+        played = []
+        for record in [case.record, *([case.baseline] if case.baseline else [])]:
+            key = (record.trial, record.controller)
+            if films and key not in done:
+                console.print(f"playing trial {k} of {len(cases)} again: {record.controller}",
+                              markup=False, highlight=False)  # fmt: skip
+                times = frame_times(case.record)
+                done[key] = _film(results, record, times, not problem, notes, console)
+            found = done.get(key)
+            if found is not None:
+                played.append(found)
+        shown.append(_shown(case, played, results))
+    return shown, notes
+
+
+def _film(
+    results: Results,
+    record: Record,
+    times: Sequence[float],
+    draw: bool,
+    notes: list[str],
+    console: Console,
+) -> Film | None:
+    try:
+        return film(results, record, times, draw)
+    except PoiseError as error:
+        reason = str(error)
+    except Exception as error:  # a controller from outside may raise anything
+        reason = f"{type(error).__name__}: {error}"
+    note = f"{record.controller} was not played again: {reason}."
+    if note not in notes:
+        notes.append(note)
+        console.print(note, markup=False, highlight=False, soft_wrap=True)
+    return None
+
+
+def _shown(case: Case, films: Sequence[Film], results: Results) -> dict[str, Any]:
+    """A case for the template."""
+    record = case.record
+    start = _float(record.line.get("start"))
+    pushes = words.push_times(record)
+    end = _end(record, start or 0.0)
+    parts = []
+    for played in films:
+        who, t = played.record, played.signals.t
+        columns = played.signals.columns
+        label = (f"Trial {who.trial}, {who.controller}: centre of mass, centre of pressure, "
+                 f"capture point, angular momentum and torque over {end:.1f} s.")  # fmt: skip
+        name = re.sub(r"[^\w.-]+", "-", f"trial-{who.trial}-{Path(who.controller).name}")
+        parts.append({
+            "name": who.controller,
+            "swatch": swatch(results.controllers.index(who.controller)),
+            "end": _ending(who),
+            "same": played.same,
+            "frames": [
+                (time, "data:image/webp;base64," + base64.b64encode(picture).decode())
+                for time, picture in played.frames
+            ],
+            "plot": time_plot(t, columns, end, pushes, label),
+            "download": signals_csv(name, t, columns),
+        })  # fmt: skip
+    return {
+        "case": case,
+        "facts": words.push_text(record),
+        "end": _ending(record),
+        "films": parts,
+        "command": f"poise replay {shlex.quote(str(results.folder))} --trial {record.trial} "
+        f"--controller {shlex.quote(record.controller)} --video trial.mp4",
+    }
+
+
+def _end(record: Record, start: float) -> float:
+    """Last time worth showing of a trial that was lost [s]."""
+    return (record.fall_time if record.fallen else start + 3.0) + AFTER
+
+
+def _ending(record: Record) -> str:
+    if record.recovered:
+        return "recovered"
+    return f"fell after {record.fall_time:.2f} s" if record.fallen else "stood, but not quiet"
+
+
+def _facts(results: Results) -> list[tuple[str, str]]:
+    """Where the result comes from, as far as the summary says."""
+    summary, settings = results.summary, results.settings
+    machine = summary.get("machine")
+    machine = machine if isinstance(machine, dict) else {}
+    versions = summary.get("versions")
+    versions = versions if isinstance(versions, dict) else settings.versions
+    rows = [
+        ("Command", summary.get("command")),
+        ("Commit", summary.get("commit")),
+        ("Suite", settings.suite_name),
+        ("Seed", settings.seed),
+        ("Robot", f"{settings.robot} ({settings.robot_fingerprint[:12]})"),
+        ("Processor", machine.get("processor")),
+        ("Cores", machine.get("cores")),
+        ("Workers", summary.get("workers")),
+        ("System", machine.get("system")),
+        ("Duration", f"{summary['seconds']} s" if summary.get("seconds") is not None else None),
+        ("Versions", ", ".join(f"{name} {version}" for name, version in versions.items())),
+        ("Fingerprints", ", ".join(f"{n} {mark[:12]}" for n, mark in settings.controllers.items())),
+    ]
+    return [(name, str(value)) for name, value in rows if value is not None]
+
+
+def _trials(results: Results) -> Download | None:
+    """trials.csv, packed where it is long; None where it is too long for a page."""
+    text = read_text(results.folder / TRIALS, TABLE_BYTES)
+    if len(text) <= EMBEDDED:
+        return download(TRIALS, text)
+    packed = download(TRIALS, text, pack=True)
+    return packed if packed.size <= PACKED else None
+
+
+def _summary_file(results: Results) -> Download:
+    text = json.dumps(results.source, indent=1)
+    return download("summary.json", text, pack=len(text) > EMBEDDED)
+
+
+def _float(text: Any) -> float | None:
+    return float(text) if text not in (None, "") else None

@@ -1,0 +1,1 @@
+"""Finished folders of either kind, read back, compared and played again."""

@@ -1,0 +1,102 @@
+"""One process at a time writes to a folder: two would lose each other's trials."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import re
+import shlex
+import socket
+import sys
+from pathlib import Path
+from types import TracebackType
+
+from poise.configs.errors import PoiseError
+
+HOLDER = ".poise.lock"  # who holds the lock: of a process that was killed it says nothing
+
+
+class FolderLock:
+    """Holds a folder until `release`, or the end of the process; also as a context.
+
+    The folder is made if missing, and an empty one that it has made goes again. The system keeps
+    the lock, so that one of a dead process blocks nobody. Files that a killed process has left
+    half-written go.
+
+    Raises PoiseError when another process holds it, which it names, or the folder cannot be made.
+    """
+
+    def __init__(self, path: Path):
+        self.path, self._file = path, -1
+        self._made = not path.exists()
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_RDONLY)
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(self._file)
+            self._file = -1
+            raise PoiseError(f"{path}: {_holder(path)} is writing there") from None
+        except OSError as error:
+            raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
+        with contextlib.suppress(OSError):  # a full disk: the run says so where it matters
+            (path / HOLDER).write_text(f"{os.getpid()}\n{_command()}\n{socket.gethostname()}\n")
+        _remove_parts(path)
+
+    def __enter__(self) -> FolderLock:
+        return self
+
+    def __exit__(
+        self, kind: type | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Let others write."""
+        if self._file < 0:
+            return
+        with contextlib.suppress(OSError):
+            (self.path / HOLDER).unlink()
+        if self._made:
+            with contextlib.suppress(OSError):  # something was written
+                self.path.rmdir()
+        os.close(self._file)
+        self._file = -1
+
+    def __del__(self) -> None:
+        if self._file >= 0:
+            self.release()
+
+
+def _command() -> str:
+    return shlex.join([os.path.basename(sys.argv[0]), *sys.argv[1:]]).replace("\n", " ")
+
+
+def _holder(path: Path) -> str:
+    """The process that holds the lock, in words."""
+    try:
+        process, command, host = (path / HOLDER).read_text().splitlines()
+    except (OSError, ValueError):
+        return "another process"
+    elsewhere = f" on {host}" if host != socket.gethostname() else ""
+    return f"process {process}{elsewhere} ({command})"
+
+
+def _remove_parts(path: Path) -> None:
+    """What `write_atomic` and `video.record` had not finished when their process was killed."""
+    for part in path.glob(".*.part*"):
+        found = re.fullmatch(r"\..*\.(\d+)\.part(\.mp4)?", part.name)
+        if found and not _alive(int(found[1])):
+            with contextlib.suppress(OSError):
+                part.unlink()
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # of another user
+        return True
+    return True

@@ -1,0 +1,72 @@
+"""A file of finished trials, one JSON line each, that a kill or a full disk cannot spoil."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from poise.configs.errors import PoiseError
+from poise.configs.files import write_atomic
+from poise.configs.reading import is_file, parse_json, read_lines
+
+
+def read_log(path: Path) -> tuple[list[tuple[Any, Any]], int]:
+    """(key, value) of every line, and how many lines could not be read; a missing file is empty.
+
+    A kill cuts off the last line; lines that a broken disk spoils are left out alike.
+    Raises ConfigError for a file of more than 128 MiB.
+    """
+    entries, damaged = [], 0
+    for line in read_lines(path) if is_file(path) else []:
+        try:
+            key, value = parse_json(line)
+            entries.append((key, value))
+        except (ValueError, TypeError):
+            damaged += 1
+    return entries, damaged
+
+
+class TrialLog:
+    """Opens the file with the entries that it is to have, whole lines only, and appends to it.
+
+    Raises PoiseError when the file cannot be written.
+    """
+
+    def __init__(self, path: Path, entries: Mapping[Any, Any]):
+        self.path = path
+        write_atomic(path, "".join(_line(key, value) for key, value in entries.items()))
+        try:
+            self._file: BinaryIO = path.open("ab", buffering=0)
+        except OSError as error:
+            raise self._error(error) from None
+
+    def append(self, key: Any, value: Any) -> None:
+        """Write an entry to the disk, whole or not at all; raises PoiseError."""
+        line, size = _line(key, value).encode(), os.stat(self.path).st_size
+        try:
+            if self._file.write(line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.truncate(self.path, size)
+            raise self._error(error) from None
+
+    def close(self) -> None:
+        """Stop; what was appended stays."""
+        self._file.close()
+
+    def _error(self, error: OSError) -> PoiseError:
+        return PoiseError(
+            f"{self.path}: cannot be written ({error.strerror}); the finished trials are kept: "
+            "run the same command again to go on"
+        )
+
+
+def _line(key: Any, value: Any) -> str:
+    return json.dumps([key, value]) + "\n"

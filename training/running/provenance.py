@@ -1,0 +1,87 @@
+"""Where a result comes from: command, versions, machine, commit and time."""
+
+import importlib.metadata
+import os
+import platform
+import shlex
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import poise
+
+LIBRARIES = ("mujoco", "numpy", "numba", "torch", "stable-baselines3", "gymnasium", "scipy")
+
+
+def circumstances(started: float, workers: int, **more: Any) -> dict[str, Any]:
+    """What a result says of how it was made; `started` is of `time.perf_counter`."""
+    return {
+        "command": shlex.join(sys.argv),
+        "versions": versions(),
+        "machine": machine(),
+        "workers": workers,
+        **more,
+        "commit": commit(),
+        "seconds": round(time.perf_counter() - started, 1),
+    }
+
+
+def versions(names: tuple[str, ...] = LIBRARIES) -> dict[str, str]:
+    """Versions of Python, Poise and the libraries."""
+    found = {"python": platform.python_version(), "poise": poise.__version__}
+    for name in names:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def machine() -> dict[str, Any]:
+    """System, processor and number of usable cores."""
+    return {
+        "system": platform.platform(),
+        "processor": _processor(),
+        "cores": usable_cores(),
+    }
+
+
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def commit() -> str | None:
+    """The commit of Poise's own checkout, with "+" where files differ from it; else None."""
+    root = Path(__file__).resolve().parents[2]
+    top = _git(root, "rev-parse", "--show-toplevel")
+    if top is None or Path(top).resolve() != root:
+        return None
+    head = _git(root, "rev-parse", "HEAD")
+    changed = _git(root, "status", "--porcelain", "--untracked-files=no")
+    return f"{head}+" if head and changed else head
+
+
+def _git(folder: Path, *arguments: str) -> str | None:
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(folder), *arguments],
+            capture_output=True, text=True, timeout=10, check=False,
+        )  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()

@@ -1,0 +1,237 @@
+"""J50 per direction, its mean over directions and paired gains, with bootstrap intervals.
+
+Trials are resampled within their direction (the stratum). Two controllers that met the same trials
+are resampled together: a replicate that draws a trial draws it for both, so that what makes a trial
+hard for both cancels in the gain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .fits import LogisticFit, check_trials, fit_logistic, solve_weighted
+from .rates import Interval, check_confidence, percentile_interval
+
+PARAMETERS = 2  # of one logistic fit
+
+
+@dataclass(frozen=True)
+class DirectionFit:
+    """Logistic fit of one direction, with intervals of J50 and J90."""
+
+    fit: LogisticFit
+    j50_ci: Interval
+    j90_ci: Interval
+
+
+@dataclass(frozen=True)
+class EnvelopeFit:
+    """Fits of all directions of one controller, and their mean J50.
+
+    `bounded` counts the directions whose J50 is only a bound (see `LogisticFit.bound`): with any,
+    the mean is one too.
+    """
+
+    directions: tuple[float, ...]
+    fits: tuple[DirectionFit, ...]
+    j50_mean: float
+    j50_mean_ci: Interval
+    bounded: int
+
+
+@dataclass(frozen=True)
+class Gain:
+    """J50 of a candidate over a reference: difference and ratio minus one.
+
+    `bounded` counts the J50s behind it that are only bounds. The relative gain is NaN where the
+    J50 of the reference is zero.
+    """
+
+    absolute: float
+    absolute_ci: Interval
+    relative: float
+    relative_ci: Interval
+    bounded: int
+
+
+@dataclass(frozen=True)
+class EnvelopeGain:
+    """Gain of the mean J50 over directions, and the gain in each direction."""
+
+    mean: Gain
+    directions: tuple[float, ...]
+    gains: tuple[Gain, ...]
+
+
+def direction_fit(
+    impulse: ArrayLike,
+    recovered: ArrayLike,
+    *,
+    resamples: int = 1000,
+    confidence: float = 0.95,
+    seed: int = 0,
+) -> DirectionFit:
+    """Logistic fit of the trials of one direction, with bootstrap intervals.
+
+    The percentile intervals are expanded for the number of trials (`percentile_interval`). In
+    simulations the 95 % interval of J50 holds the truth in 90–94 % of cases at 20 to 30 trials and
+    in 92–95 % at 60. That of J90 holds it in 78–92 % only: so few trials hardly show the scale.
+
+    Args:
+        impulse, recovered: (n,) trials, as for `fit_logistic`.
+
+    Raises:
+        ValueError: as `fit_logistic`, or confidence outside (0, 1).
+    """
+    check_confidence(confidence)
+    impulse, recovered = check_trials(impulse, recovered)
+    weights = _resample(impulse.size, resamples, np.random.SeedSequence(seed).spawn(1)[0])
+    return _direction_fit(impulse, recovered, weights, confidence)[0]
+
+
+def mean_over_directions(
+    direction: ArrayLike,
+    impulse: ArrayLike,
+    recovered: ArrayLike,
+    *,
+    resamples: int = 1000,
+    confidence: float = 0.95,
+    seed: int = 0,
+) -> EnvelopeFit:
+    """Fit every direction, and the mean of their J50 with a stratified bootstrap interval.
+
+    Every direction has the same weight in the mean, however many trials it has.
+
+    Args:
+        direction: (n,) direction of each trial [°]. Equal values make one direction.
+        impulse, recovered: (n,) trials, as for `fit_logistic`.
+
+    Raises:
+        ValueError: as `direction_fit`, or a direction that is not finite.
+    """
+    check_confidence(confidence)
+    impulse, recovered = check_trials(impulse, recovered)
+    directions, rows = _strata(direction, impulse.size)
+    seeds = np.random.SeedSequence(seed).spawn(len(rows))
+    parts = [
+        _direction_fit(impulse[i], recovered[i], _resample(i.size, resamples, s), confidence)
+        for i, s in zip(rows, seeds, strict=True)
+    ]
+    fits = tuple(part[0] for part in parts)
+    replicates = np.mean([part[1] for part in parts], axis=0)
+    return EnvelopeFit(
+        directions=directions,
+        fits=fits,
+        j50_mean=float(np.mean([f.fit.j50 for f in fits])),
+        j50_mean_ci=percentile_interval(
+            replicates, confidence, freedom=(impulse.size, PARAMETERS * len(rows))
+        ),
+        bounded=sum(f.fit.bound is not None for f in fits),
+    )
+
+
+def j50_gain(
+    direction: ArrayLike,
+    impulse: ArrayLike,
+    recovered_reference: ArrayLike,
+    recovered_candidate: ArrayLike,
+    *,
+    resamples: int = 1000,
+    confidence: float = 0.95,
+    seed: int = 0,
+) -> EnvelopeGain:
+    """Paired gain in J50 of a candidate over a reference that met the same trials.
+
+        absolute = J50_candidate − J50_reference,   relative = absolute / J50_reference
+
+    per direction, and for the mean J50 over directions (the ratio of the means, not the mean of the
+    ratios). Each bootstrap replicate draws the same trials for both.
+
+    Args:
+        direction, impulse: (n,) trials, as for `mean_over_directions`.
+        recovered_reference, recovered_candidate: (n,) outcomes of the same trials.
+
+    Raises:
+        ValueError: as `mean_over_directions`.
+    """
+    check_confidence(confidence)
+    impulse, reference = check_trials(impulse, recovered_reference)
+    impulse, candidate = check_trials(impulse, recovered_candidate)
+    directions, rows = _strata(direction, impulse.size)
+    seeds = np.random.SeedSequence(seed).spawn(len(rows))
+
+    gains, j50s, replicates = [], [], []
+    for i, s in zip(rows, seeds, strict=True):
+        weights = _resample(i.size, resamples, s)
+        fits = [fit_logistic(impulse[i], outcome[i]) for outcome in (reference, candidate)]
+        j50 = np.array([f.j50 for f in fits])
+        drawn = np.array(
+            [solve_weighted(impulse[i], out[i], weights)[0] for out in (reference, candidate)]
+        )
+        bounded = sum(f.bound is not None for f in fits)
+        gains.append(_gain(j50, drawn, confidence, (i.size, PARAMETERS), bounded))
+        j50s.append(j50)
+        replicates.append(drawn)
+    mean = _gain(
+        np.mean(j50s, axis=0),
+        np.mean(replicates, axis=0),
+        confidence,
+        (impulse.size, PARAMETERS * len(rows)),
+        sum(gain.bounded for gain in gains),
+    )
+    return EnvelopeGain(mean, directions, tuple(gains))
+
+
+def _direction_fit(
+    impulse: np.ndarray, recovered: np.ndarray, weights: np.ndarray, confidence: float
+) -> tuple[DirectionFit, np.ndarray]:
+    """Fit and its J50 replicates, (resamples,)."""
+    j50, j90, _, _ = solve_weighted(impulse, recovered, weights)
+    freedom = (impulse.size, PARAMETERS)
+    fit = DirectionFit(
+        fit_logistic(impulse, recovered),
+        percentile_interval(j50, confidence, freedom=freedom),
+        percentile_interval(j90, confidence, freedom=freedom),
+    )
+    return fit, j50
+
+
+def _gain(
+    j50: np.ndarray,
+    replicates: np.ndarray,
+    confidence: float,
+    freedom: tuple[int, int],
+    bounded: int,
+) -> Gain:
+    """Gain from J50 of reference and candidate, (2,), and their replicates, (2, resamples)."""
+
+    def relative(pair: np.ndarray) -> np.ndarray:
+        return np.divide(
+            pair[1] - pair[0], pair[0], out=np.full_like(pair[0], np.nan), where=pair[0] > 0
+        )
+
+    return Gain(
+        absolute=float(j50[1] - j50[0]),
+        absolute_ci=percentile_interval(replicates[1] - replicates[0], confidence, freedom=freedom),
+        relative=float(relative(j50[:, None])[0]),
+        relative_ci=percentile_interval(relative(replicates), confidence, freedom=freedom),
+        bounded=bounded,
+    )
+
+
+def _resample(trials: int, resamples: int, seed: np.random.SeedSequence) -> np.ndarray:
+    """How often each trial is drawn in each bootstrap replicate, (resamples, trials)."""
+    even = np.full(trials, 1 / trials)
+    return np.random.default_rng(seed).multinomial(trials, even, size=resamples).astype(float)
+
+
+def _strata(direction: ArrayLike, trials: int) -> tuple[tuple[float, ...], list[np.ndarray]]:
+    """The distinct directions in rising order, and the row numbers of each."""
+    angles = np.asarray(direction, dtype=float)
+    if angles.shape != (trials,) or not np.all(np.isfinite(angles)):
+        raise ValueError(f"direction must be finite, of shape ({trials},), got {angles.shape}")
+    distinct = np.unique(angles)
+    return tuple(distinct.tolist()), [np.flatnonzero(angles == d) for d in distinct]

@@ -1,0 +1,141 @@
+"""Who is evaluated: a controller by its name, ready to act in an environment of its own."""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from poise.baselines.allowance import is_outside
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.plugins import find_outside, make_outside, outside_config
+from poise.baselines.registry import controller_config
+from poise.configs.errors import ConfigError, shown
+from poise.configs.files import packaged
+from poise.configs.reading import is_file, is_folder
+from poise.configs.schema import to_dict, to_yaml
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.robots.robot import Robot
+
+SHIPPED, NO_CONTROL = "residual", "zero"
+
+
+@dataclass(frozen=True, eq=False)
+class Player:
+    """A name, an environment, and what to do in it.
+
+    Attributes:
+        name: as the user wrote it.
+        env: the environment it acts in.
+        act: deterministic action (na,) for an observation (no,).
+        fingerprint: hash of the controller's configuration and the policy's weights.
+        begin: called at the start of every trial, for policies with a memory.
+    """
+
+    name: str
+    env: BalanceEnv
+    act: Callable[[np.ndarray], np.ndarray]
+    fingerprint: str
+    begin: Callable[[], Any] | None = None
+
+
+def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
+    """A player from the name of a controller.
+
+    Args:
+        name: a packaged controller or a path to a ``.yaml`` of one (played with action zero),
+            a packaged policy (``residual``), ``zero`` (no torque at all), a folder written by
+            ``poise train``, or ``module:Class`` or ``file.py:Class`` of a controller or a policy.
+        robot: who is controlled. A policy must have been trained on it.
+        overrides: arguments of the environment, or fields of its `EnvConfig`.
+
+    Raises:
+        ConfigError: no such controller, or one that is not valid or is for another robot; or one
+            from outside that the user has not allowed, see `allowing`.
+    """
+    if name == NO_CONTROL:
+        return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
+    policies = packaged("policies")
+    if name in policies or is_folder(name):
+        return _policy(name, robot, overrides)
+    if is_outside(name) and not _is_controller(name, robot):
+        return _outside_policy(name, robot, overrides)
+    names = packaged("controllers")
+    found = is_file(name) and Path(name).suffix in (".yaml", ".yml")
+    if name not in names and not found and not is_outside(name):
+        raise ConfigError(
+            f"no such controller: {shown(name)}; give a name, a .yaml file of a controller, "
+            "a folder written by poise train, or module:Class",
+            field="controller",
+            choices=(*names, *policies, NO_CONTROL),
+        )
+    config = controller_config(name)
+    return _idle(name, ResidualBalanceEnv(robot, controller=config, **overrides), to_yaml(config))
+
+
+def _idle(name: str, env: BalanceEnv, content: str) -> Player:
+    """A player whose action is always zero."""
+    action = np.zeros(len(env.action_names))
+    return Player(name, env, lambda observation: action, _hash(content.encode()))
+
+
+def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
+    from poise.training.learning.checkpoints import controller_fingerprint
+    from poise.training.learning.policy import (
+        load_policy,  # loads torch, which the other players do without
+    )
+
+    policy = load_policy(name, robot)
+    env = policy.make_env(robot=robot, **overrides)
+    sizes = (policy.layers[0][0].shape[0], policy.layers[-1][0].shape[1])
+    expected = (env.episode.observation.size, len(env.action_names))
+    if sizes != expected:
+        raise ConfigError(
+            f"the policy has {sizes[0]} observations and {sizes[1]} actions, the environment of "
+            f"{robot.name!r} has {expected[0]} and {expected[1]}",
+            source=name,
+        )
+    world = {k: v for k, v in to_dict(policy.config).items() if k not in TRAINING}
+    below = controller_fingerprint(policy.config)
+    content = _hash(to_yaml(world).encode(), below.encode(), *policy.content())
+    return Player(name, env, policy.act, content)
+
+
+# fields of a training configuration that do not change how its policy plays
+TRAINING = ("seed", "steps", "threads", "start_from", "ppo", "curriculum", "evaluation")
+ENVIRONMENTS = {
+    "residual": ResidualBalanceEnv,
+    "step": ResidualStepEnv,
+    "torque": TorqueBalanceEnv,
+}
+
+
+def _is_controller(name: str, robot: Robot) -> bool:
+    """Whether a class, or what a function makes, gives torques."""
+    found = find_outside(name)
+    return hasattr(found if isinstance(found, type) else make_outside(name, robot), "torques")
+
+
+def _outside_policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
+    """A policy from outside: `act(observation)` in the environment that it names, or makes."""
+    policy = make_outside(name, robot)
+    if not hasattr(policy, "act"):
+        raise ConfigError("has neither torques (a controller) nor act (a policy)", source=name)
+    if hasattr(policy, "make_env"):
+        env = policy.make_env(robot=robot, **overrides)
+    else:
+        kind = getattr(policy, "environment", "torque")
+        if kind not in ENVIRONMENTS:
+            raise ConfigError(f"no such environment: {shown(kind)}", source=name,
+                              field="environment", choices=ENVIRONMENTS)  # fmt: skip
+        env = ENVIRONMENTS[kind](robot, **overrides)
+    content = to_yaml(outside_config(name)).encode()
+    return Player(name, env, policy.act, _hash(content), getattr(policy, "reset", None))
+
+
+def _hash(*parts: bytes) -> str:
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()

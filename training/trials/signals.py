@@ -1,0 +1,54 @@
+"""What a trial looks like over time: CoM, CoP, capture point, angular momentum, torque."""
+
+from typing import Any
+
+import numpy as np
+
+from poise.envs.balance.base import BalanceEnv
+
+
+class Signals:
+    """Keeps the signals of a trial, in the heading frame of its start; hand it to `run_trial`.
+
+    After the trial, `t` is the time (n,) [s] and `columns` has
+
+    - com, cop, capture_point (n, 2): forward and left [m]
+    - support (n, 2, 2): extent of the support polygon, [:, axis, (low, high)] [m]
+    - angular_momentum (n, 3): about the CoM; forward, left and up axis [kg·m²/s]
+    - torque (n,): largest |τ| / τ_max over the motors
+    """
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[Any, ...]] = []
+        self._origin, self._axes = np.zeros(2), np.eye(2)
+
+    def __call__(self, env: BalanceEnv) -> None:
+        state = env.simulation.state
+        if not self._rows:
+            cos, sin = state.heading
+            self._origin, self._axes = state.origin[:2].copy(), np.array([[cos, -sin], [sin, cos]])
+        support = self._local(state.support_polygon)
+        load = np.abs(env.simulation.plant.ctrl) / env.robot.torque_limit
+        momentum = state.angular_momentum
+        self._rows.append((
+            env.simulation.time,
+            self._local(state.com[:2]),
+            self._local(state.cop),
+            self._local(state.capture_point),
+            np.stack([support.min(axis=0), support.max(axis=0)], axis=1),
+            np.append(momentum[:2] @ self._axes, momentum[2]),
+            float(load.max()),
+        ))  # fmt: skip
+
+    @property
+    def t(self) -> np.ndarray:
+        return np.array([row[0] for row in self._rows])
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        names = ("com", "cop", "capture_point", "support", "angular_momentum", "torque")
+        columns = zip(*(row[1:] for row in self._rows), strict=True)
+        return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
+
+    def _local(self, points: np.ndarray) -> np.ndarray:
+        return (points - self._origin) @ self._axes

@@ -1,0 +1,1 @@
+"""Gains by CMA-ES."""

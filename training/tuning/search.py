@@ -1,0 +1,247 @@
+"""Tuning a controller's gains by CMA-ES on seeded pushes [Hansen16].
+
+Candidates of one generation meet the same pushes; every generation draws new ones, so that
+gains are not fitted to a few trials. Needs the `cma` package (`pip install poise[dev]`).
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from poise.baselines.allowance import allows
+from poise.configs.errors import ConfigError
+from poise.configs.files import resolve, write_atomic
+from poise.configs.reading import is_file, parse_json, read_lines
+from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
+from poise.envs.robots.robot import load_robot
+from poise.training.running.crew import Crew
+from poise.training.running.folder_lock import FolderLock
+from poise.training.running.stopping import keeps
+
+from .candidates import Candidate, TuningPushes, follow, play
+from .gains import Gains
+
+CONFIG, GAINS, HISTORY = "config.yaml", "gains.yaml", "history.jsonl"
+AVERAGED = 16  # generations whose better halves the result is the mean of
+
+
+@dataclass(frozen=True)
+class TuneConfig:
+    """Everything that decides a search; written beside its results.
+
+    Attributes:
+        controller: where the search starts: a packaged controller or a .yaml file.
+        gains: the range of each number that is searched, by its path in the controller's
+            configuration (``com.weight``); on a log scale if both ends are above 0.
+        policy: a policy on top of the candidates counts too, by `policy_share` of the whole.
+        in_place: a foot that moves is no recovery.
+        generations, population, spread: of CMA-ES; spread is the first standard deviation, as a
+            share of each range.
+    """
+
+    controller: str
+    gains: dict[str, tuple[float, float]]
+    robot: str = "humanoid"
+    pushes: TuningPushes = field(default_factory=TuningPushes)
+    policy: str | None = None
+    policy_share: float = field(default=0.4, metadata={"min": 0.0, "max": 1.0})
+    in_place: bool = False
+    generations: int = field(default=60, metadata={"min": 1})
+    population: int = field(default=14, metadata={"min": 4})
+    spread: float = field(default=0.15, metadata={"above": 0.0, "max": 1.0})
+    seed: int = field(default=0, metadata={"min": 0})
+
+    def __post_init__(self) -> None:
+        if not self.gains:
+            raise ValueError("gains: must name one or more")
+        for path, (low, high) in self.gains.items():
+            if not low < high:
+                raise ValueError(f"gains.{path}: must be [low, high] with low < high")
+
+
+def tune_config(name_or_path: str | Path, **fields: Any) -> TuneConfig:
+    """A packaged tuning configuration (`configs/tuning`) or a path to one; `base` names another.
+
+    `fields` replace its own.
+
+    Raises ConfigError naming the file, the field and the choices.
+    """
+    path = resolve("tuning", name_or_path)
+    return build(TuneConfig, {**on_base(read_yaml(path), "tuning", path), **fields}, str(path))
+
+
+@allows()
+def tune(
+    config: TuneConfig,
+    out: Path,
+    workers: int = 2,
+    resume: bool = False,
+    console: Console | None = None,
+    allow: str | Iterable[str] = (),
+) -> dict[str, Any]:
+    """Search; returns the controller's configuration at the mean of the last candidates.
+
+    Writes `out/gains.yaml`, that controller, after each generation, and `out/history.jsonl` with
+    all that was tried, from which `resume` goes on as if nothing had happened. A controller from
+    outside (``module:Class``) that the configuration or the policy names must be among `allow`.
+
+    Raises ConfigError for a configuration that is not valid or names what is not allowed, a folder
+    that holds another search, or where the library `cma` is missing; PoiseError when another
+    process searches there, or a file cannot be written.
+    """
+    gains = Gains(config.controller, config.gains, config.robot)
+    if config.policy is not None:
+        from poise.training.learning.policy import load_policy
+
+        load_policy(config.policy, load_robot(config.robot))
+    search = _Search(config, gains)
+    _known(config, out, resume)  # what is refused makes no folder
+    console = console or Console(quiet=True)
+    keeps(out / HISTORY, f"the finished generations are kept in {out}; go on with --resume")
+    with FolderLock(out), Crew("local", workers) as crew:
+        rows = _known(config, out, resume)  # another search may have ended since
+        for row in rows:
+            search.again(row, out / HISTORY)
+        write_atomic(out / CONFIG, to_yaml(config))
+        while search.generation < config.generations:
+            rows.append(search.step(crew))
+            write_atomic(out / GAINS, to_yaml(gains.at(search.mean)))
+            write_atomic(out / HISTORY, "".join(json.dumps(row) + "\n" for row in rows))
+            console.print(search.words(rows[-1]), highlight=False)
+    return gains.at(search.mean)
+
+
+def _known(config: TuneConfig, out: Path, resume: bool) -> list[dict[str, Any]]:
+    """What an earlier call has tried."""
+    if not is_file(out / CONFIG):
+        if resume:
+            raise ConfigError("holds no search to resume", source=out, field="resume")
+        return []
+    if not resume:
+        raise ConfigError(
+            "already holds a search; go on with --resume or choose another folder",
+            source=out, field="out",
+        )  # fmt: skip
+    before = to_dict(build(TuneConfig, read_yaml(out / CONFIG), out / CONFIG))
+    for name, value in to_dict(config).items():
+        if name != "generations" and before[name] != value:
+            raise ConfigError("is not that of the search here", source=out / CONFIG, field=name)
+    if not is_file(out / HISTORY):
+        return []
+    try:
+        rows = [parse_json(line) for line in read_lines(out / HISTORY)]
+    except ValueError as error:
+        raise ConfigError(f"not valid JSON: {error}", source=out / HISTORY) from None
+    for number, row in enumerate(rows, 1):
+        if not isinstance(row, dict):
+            raise ConfigError(f"line {number} must be a mapping", source=out / HISTORY)
+    return rows
+
+
+class _Search:
+    """CMA-ES, and how far the pushes have followed the candidates."""
+
+    def __init__(self, config: TuneConfig, gains: Gains):
+        try:
+            import cma
+        except ImportError:
+            raise ConfigError("needs the library cma: pip install 'poise[dev]'") from None
+
+        self.config, self.gains, self.robot = config, gains, load_robot(config.robot)
+        rng = np.random.default_rng(config.seed)
+        options = {
+            "bounds": [0, 1], "popsize": config.population, "verbose": -9, "seed": np.nan,
+            "randn": lambda *shape: rng.standard_normal(shape),
+        }  # fmt: skip
+        self.cma = cma.CMAEvolutionStrategy(gains.first(), config.spread, options)
+        first = np.full(len(config.pushes.directions), config.pushes.impulse * self.robot.mass)
+        self.limits = [first, first]  # alone, under the policy
+        self.generation = 0
+        self.mean = gains.first()  #: what the search has found
+        self.centres: list[np.ndarray] = []
+
+    def step(self, crew: Crew) -> dict[str, Any]:
+        """A generation; returns its line of the history."""
+        config = self.config
+        units = [np.asarray(u) for u in self.cma.ask()]
+        seeds = [config.seed + 100_000 * (2 * self.generation + k + 1) for k in range(2)]
+        with_policy = config.policy is not None and config.policy_share > 0.0
+        alone, below = (
+            tuple(config.pushes.draw(seed, self.robot, limits))
+            for seed, limits in zip(seeds, self.limits, strict=True)
+        )
+        if with_policy and config.policy_share == 1.0:
+            alone = ()
+        jobs = [
+            Candidate(
+                number, config.robot, self.gains.at(u), config.pushes.seconds, config.in_place,
+                alone, config.policy if with_policy else None, below if with_policy else (),
+            )
+            for number, u in enumerate(units)
+        ]  # fmt: skip
+        found = {job.number: values for job, values in crew.each(play, jobs)}
+        values = [[found[k][player] for k in range(len(units))] for player in range(2)]
+        row = {
+            "generation": self.generation,
+            "units": [u.tolist() for u in units],
+            "alone": values[0],
+            "below": values[1],
+        }
+        self._take(units, values)
+        row["limits"] = [limits.tolist() for limits in self.limits]
+        return row
+
+    def again(self, row: dict[str, Any], source: Path) -> None:
+        """A generation that has been played before."""
+        units = [np.asarray(u) for u in self.cma.ask()]
+        try:
+            values = [row["alone"], row["below"]]
+            same = np.allclose(units, row["units"], rtol=0.0, atol=1e-12)
+            same = same and all(self._are_worths(each) for each in values)
+        except (KeyError, TypeError, ValueError, OverflowError):
+            same = False
+        if not same:
+            raise ConfigError(
+                f"line {self.generation + 1} is not what this search tries there", source=source
+            )
+        self._take(units, values)
+
+    def _are_worths(self, values: Any) -> bool:
+        """Whether these are values of all candidates and pushes, or of no pushes."""
+        found, pushes = np.asarray(values, float), self.config.pushes
+        trials = len(pushes.directions) * len(pushes.levels)
+        sizes = [(self.config.population, count) for count in (0, trials)]
+        return found.shape in sizes and bool(np.all((found >= 0.0) & (found <= 1.0)))
+
+    def _take(self, units: list[np.ndarray], values: list[list[list[float]]]) -> None:
+        share = self.config.policy_share if values[1][0] else 0.0
+        scores = np.zeros(len(units))
+        shape = (len(units), len(self.limits[0]), len(self.config.pushes.levels))
+        for player, weight in enumerate((1.0 - share, share)):
+            if values[player][0]:
+                found = np.reshape(values[player], shape)
+                scores += weight * found.mean(axis=(1, 2))
+                self.limits[player] = follow(self.limits[player], found)
+        self.cma.tell(units, (-scores).tolist())
+        better = np.argsort(-scores, kind="stable")[: (len(units) + 1) // 2]
+        self.centres.append(np.mean([units[k] for k in better], axis=0))
+        # a generation's own mean follows the chance of its pushes
+        self.mean = np.mean(self.centres[-AVERAGED:], axis=0)
+        self.scores = scores
+        self.generation += 1
+
+    def words(self, row: dict[str, Any]) -> str:
+        """A line for the terminal."""
+        text = f"generation {self.generation} of {self.config.generations}"
+        text += f": score {self.scores.mean():.2f}, best {self.scores.max():.2f}"
+        for name, limits in zip(("alone", "below"), self.limits, strict=True):
+            if row[name][0]:
+                who = "alone" if name == "alone" else f"under {self.config.policy}"
+                text += f"; half recovered {who} at {limits.mean():.1f} N·s"
+                text += f" (worst {limits.min():.1f})"
+        return text
