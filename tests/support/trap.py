@@ -26,7 +26,7 @@ from poise.training.running.files import csv_text
 from poise.training.running.provenance import versions
 from poise.training.suites.registry import load_suite
 from poise.training.trials.stage import Stage
-from poise.training.trials.trial import Trial, row
+from poise.training.trials.trial import COLUMNS, Trial, row
 from tests.support.benchmarks_small import write_small
 from tests.support.shared import robot
 
@@ -101,7 +101,7 @@ class Ground:
         entry = {"trials": 1, "recovered": 0, "recovered_rate": 0.0, "falls": 0}
         summary = {"suite": "quiet", "robot": "humanoid", "controllers": {controller: entry}}
         (out / "settings.yaml").write_text(to_yaml(settings))
-        (out / "trials.csv").write_text(csv_text([line]))
+        (out / "trials.csv").write_text(csv_text([line], COLUMNS))
         (out / "summary.json").write_text(json.dumps(summary))
         return out
 
@@ -114,7 +114,16 @@ class Ground:
             versions(("mujoco", "numpy", "numba")), {controller: "0"},
         )  # fmt: skip
         line = case_row(Cases(suite, robot(), 0).first[0], controller, failed(ValueError()))
-        summary = {"benchmark": FORMAT, "controllers": {controller: {"trials": 1}}}
+        entry = {"trials": 1, "errors": 0, "j50_bounded": 0, "directions": [], "factors": []}
+        numbers = ("root_force_max", "j50_mean", "eta_mean", "eta_min")
+        intervals = {"j50_mean_ci95": [0.0, 0.0], "eta_mean_ci95": [0.0, 0.0]}
+        summary = {
+            "benchmark": FORMAT, "suite": self.suite(), "seed": 0, "robot": {"name": "humanoid"},
+            "controllers": {controller: {**entry, **dict.fromkeys(numbers, 0.0), **intervals,
+                                         "tick_us": None}},
+            "reference": controller, "ranking": [controller], "pairs": [], "seeds": [],
+            "versions": {}, "machine": {"processor": "", "cores": 1}, "commit": None,
+        }  # fmt: skip
         (out / "settings.yaml").write_text(to_yaml(settings))
         (out / "trials.csv").write_text(csv_text([line], CASE_COLUMNS))
         (out / "trials.jsonl").touch()

@@ -1,5 +1,5 @@
 """`python -m poise.training.cli`, where no script is installed."""
 
-from . import main
+from .commands import command
 
-main()
+command()

@@ -426,7 +426,3 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "qp-set": qp_set,
     "list": list_names,
 }
-
-
-if __name__ == "__main__":
-    command()

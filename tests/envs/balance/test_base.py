@@ -242,8 +242,8 @@ def test_a_simulation_that_diverges_is_a_fall(make, tmp_path, monkeypatch):
         (lambda a: np.where(np.arange(len(a)) == 1, np.nan, a), ["[-1, 1]", "nan"]),
         (lambda a: np.where(np.arange(len(a)) == 1, np.inf, a), ["[-1, 1]", "inf"]),
         (lambda a: np.where(np.arange(len(a)) == 1, -1.01, a), ["[-1, 1]", "-1.01"]),
-        (lambda a: "left", ["numbers", "str"]),
-        (lambda a: None, ["numbers", "NoneType"]),
+        (lambda a: "left", ["numbers", "left"]),
+        (lambda a: None, ["shape"]),
     ],
 )
 def test_bad_actions_are_refused(make, spoil, named):
