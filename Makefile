@@ -3,7 +3,7 @@
 # make check   format, lint and types       make format  put the format and imports right
 # make build   the wheel, tried alone       make bench   time the parts of a control tick
 # make clean   remove what was built (not .venv)
-# make test-processors   the tests as other processors would run them, three times each: an hour
+# make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
 #
@@ -15,6 +15,7 @@ PYTHON311 ?= $(shell command -v python3.11 || command -v python3)
 PIP_ARGS ?=
 LOCKED ?=
 PYTEST_ARGS ?=
+PYTEST_WORKERS ?= -n auto --maxprocesses 4
 MINUTES ?= 30
 WORKERS ?= 1
 SEED ?=
@@ -34,7 +35,7 @@ $(STAMP): pyproject.toml setup.py constraints.txt
 	touch $@
 
 test: setup
-	$(PYTHON) -m pytest -q $(PYTEST_ARGS)
+	$(PYTHON) -m pytest -q $(PYTEST_WORKERS) $(PYTEST_ARGS)
 
 test-processors: setup
 	$(PYTHON) -m tests.processors --repeat 3 $(PYTEST_ARGS)

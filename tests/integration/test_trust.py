@@ -524,7 +524,7 @@ DANGEROUS = {
         "baselines/plugins.py",
         "baselines/solvers/registry.py",
         "envs/compiled/calls.py",
-    },  # fmt: skip
+    },
     "exec_module": {"baselines/plugins.py"},
     "find_outside": {"baselines/plugins.py", "training/trials/players.py"},
     "OutsideConfig": {"baselines/plugins.py", "baselines/registry.py"},
