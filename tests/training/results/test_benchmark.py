@@ -254,7 +254,7 @@ def test_ticks_are_timed_and_leave_no_trace() -> None:
 
 
 def test_the_committed_leaderboard_is_generated() -> None:
-    """docs/leaderboard.md is what the command that it names makes of the files beside it."""
+    """docs/leaderboard.md is what the command that it names makes of the results that it names."""
     root = Path(__file__).parents[3]
     text = (root / "docs/leaderboard.md").read_text()
     (command,) = re.findall("`poise leaderboard ([^`]+)`", text)
