@@ -1,5 +1,5 @@
 """The command `poise`: what its subcommands take, and what they call."""
 
-from .commands import main
+from .commands import command, main
 
-__all__ = ["main"]
+__all__ = ["command", "main"]
