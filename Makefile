@@ -1,6 +1,7 @@
 # make setup   .venv with everything in it (once; again when the requirements change)
 # make test    the tests                    make demo    the main job, with a table and plots
 # make check   format, lint and types       make format  put the format and imports right
+# make docs    the site of docs/ and the docstrings, in build/site
 # make build   the wheel, tried alone       make bench   time the parts of a control tick
 # make clean   remove what was built (not .venv)
 # make test-processors   the tests as other processors would run them, three times each: hours
@@ -22,8 +23,9 @@ SEED ?=
 FUZZ_ARGS ?=
 PYTHON := .venv/bin/python
 STAMP := .venv/.poise-setup
+DOCS := .venv/.poise-docs
 
-.PHONY: setup test test-processors demo check format build bench fuzz lock audit clean types-tree
+.PHONY: setup test test-processors demo check docs format build bench fuzz lock audit clean types-tree
 
 setup: $(STAMP)
 
@@ -47,6 +49,13 @@ check: setup types-tree
 	.venv/bin/ruff format --check .
 	.venv/bin/ruff check .
 	$(PYTHON) -m mypy
+
+$(DOCS): $(STAMP)
+	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt --no-build-isolation -e ".[docs]"
+	touch $@
+
+docs: $(DOCS) types-tree
+	NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build -q
 
 format: setup
 	.venv/bin/ruff check --fix .

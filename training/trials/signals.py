@@ -13,7 +13,7 @@ class Signals:
     After the trial, `t` is the time (n,) [s] and `columns` has
 
     - com, cop, capture_point (n, 2): forward and left [m]
-    - support (n, 2, 2): extent of the support polygon, [:, axis, (low, high)] [m]
+    - support (n, 2, 2): extent [m] of the support polygon, [:, axis, (low, high)]
     - angular_momentum (n, 3): about the CoM; forward, left and up axis [kg·m²/s]
     - torque (n,): largest |τ| / τ_max over the motors
     """

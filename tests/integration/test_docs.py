@@ -1,0 +1,168 @@
+"""README and docs/: every Python block runs, every command parses, every named file exists.
+
+A Python block is run as a script in a folder that looks like the root of the repository. It is not
+run where `<!-- not run: reason -->` stands above it.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import re
+import runpy
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from poise.training.cli import commands, train
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+LANGUAGES = {"python", "bash", "yaml", ""}  # "" is a figure: an equation, a tree, a listing
+SCRIPTS = ("git ", "tensorboard ", "pip install ")  # commands of others
+INLINE = re.compile(r"`(poise\s[^`]+)`")
+FOLDERS = "envs|baselines|training|configs|tests|examples"
+PLACES = {"N": "1", "K": "1", "…": "", "CONTROLLER…": "momentum-qp"}  # where a page names no value
+NEEDED = {"train": "--out", "benchmark": "--out", "tune": "--out", "qp-set": "--out"}
+
+
+class Block(NamedTuple):
+    """A fenced block: where it begins, its language, its text, and why it is not run."""
+
+    where: str
+    language: str
+    text: str
+    reason: str
+
+
+def blocks() -> list[Block]:
+    """All of all pages, in order."""
+    found = []
+    fence = re.compile(r"(?:<!-- not run: ([^>]+) -->\n)?^```(\w*)\n(.*?)^```$", re.M | re.S)
+    for page in PAGES:
+        text = page.read_text()
+        for match in fence.finditer(text):
+            where = f"{page.relative_to(ROOT)}:{text[: match.start()].count(chr(10)) + 1}"
+            found.append(Block(where, match[2], match[3], match[1] or ""))
+    return found
+
+
+def of(language: str) -> list[Block]:
+    return [block for block in blocks() if block.language == language]
+
+
+def inline() -> list[tuple[str, str]]:
+    """Commands within a sentence or a table: page, command."""
+    found = []
+    for page in PAGES:
+        prose = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)
+        for command in INLINE.findall(prose):
+            found.append((str(page.relative_to(ROOT)), " ".join(command.split())))
+    return sorted(set(found))
+
+
+def ids(items: list[Block]) -> list[str]:
+    return [block.where for block in items]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with the folders that a page may name."""
+    for name in ("configs", "docs", "examples"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def parsed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the sub-commands that were called, in place of what they do."""
+    called: list[str] = []
+
+    def recorder(name: str, function: Callable[..., object]) -> Callable[..., object]:
+        @functools.wraps(function)
+        def record(*_: object, **__: object) -> None:
+            called.append(name)
+
+        return record
+
+    recorders = {name: recorder(name, function) for name, function in commands.COMMANDS.items()}
+    monkeypatch.setattr(commands, "COMMANDS", recorders)
+    monkeypatch.setattr(train, "run", lambda args: (train.parse(args), called.append("train")))
+    return called
+
+
+def test_no_block_is_of_another_language() -> None:
+    """One with a misspelt language would not be looked at; commands are not merely indented."""
+    assert {block.language for block in blocks()} <= LANGUAGES
+    indented = [
+        f"{page.name}: {line}"
+        for page in PAGES
+        for line in re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S).splitlines()
+        if re.match(r"    (poise|python|pip|make) ", line)
+    ]
+    assert indented == []
+
+
+@pytest.mark.parametrize("block", of("python"), ids=ids(of("python")))
+def test_python_runs(block: Block, folder: Path) -> None:
+    """As a script; it raises nothing."""
+    if block.reason:
+        pytest.skip(block.reason)
+    path = folder / "block.py"
+    path.write_text(block.text)
+    runpy.run_path(str(path), run_name="__main__")
+
+
+@pytest.mark.parametrize("block", of("bash"), ids=ids(of("bash")))
+def test_commands_parse(block: Block, parsed: list[str]) -> None:
+    """`poise …` by the command's own parser, `python -m …` and `make …` by what exists."""
+    for line in block.text.splitlines():
+        words = shlex.split(re.sub(r"^([A-Z_]+=\S+ )+", "", line), comments=True)
+        if words[0] == "poise":
+            parse(words[1:], parsed)
+        elif words[:2] == ["python", "-m"]:
+            assert importlib.util.find_spec(words[2]), line
+        elif words[0] == "make":
+            assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(), re.M), line
+        else:
+            assert line.startswith(SCRIPTS), line
+
+
+@pytest.mark.parametrize(("page", "command"), inline(), ids=lambda value: value)
+def test_commands_of_sentences_parse(page: str, command: str, parsed: list[str]) -> None:
+    """Placeholders get a value; of `a|b|c` the first is taken; `--out` may be left out."""
+    words = [PLACES.get(word, word) for word in re.sub(r"(\\\|\w+)+", "", command).split()[1:]]
+    words = [word for word in words if word]
+    if len(words) == 1 or words[1] == "--help":
+        assert words[0] in {*commands.COMMANDS, "COMMAND"}, page
+        return
+    if words[0] in NEEDED and "--out" not in words:
+        words += ["--out", "out"]
+    parse(words, parsed)
+
+
+def parse(words: list[str], parsed: list[str]) -> None:
+    """Fails with the parser's message where it refuses the words."""
+    parsed.clear()
+    assert commands.main(words) == 0
+    assert parsed == words[:1]
+
+
+def test_files_that_pages_name_exist() -> None:
+    """Paths of the repository in backticks, and modules of tests."""
+    wrong = []
+    for page in PAGES:
+        if "log" in page.parts:  # of then
+            continue
+        text = page.read_text()
+        for path in re.findall(rf"`((?:{FOLDERS})/[a-z0-9_./-]+)`", text):
+            if not (ROOT / path).exists():
+                wrong.append(f"{page.name}: {path}")
+        for module in re.findall(r"`?python -m (tests[\w.]+)", text):
+            if not (ROOT / (module.replace(".", "/") + ".py")).exists():
+                wrong.append(f"{page.name}: {module}")
+    assert wrong == []
