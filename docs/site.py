@@ -16,7 +16,8 @@ from mkdocs.structure.pages import Page
 ROOT = Path(__file__).parents[1]
 PACKAGES = {"src/poise": "poise", "envs": "poise.envs", "baselines": "poise.baselines"}
 PACKAGES |= {"training": "poise.training", "configs": "poise.configs"}
-TOP = re.compile(r"\]\((?!https?:|#|docs/)([^)#]*?)/?\)")  # links of README to what has no page
+# Links of README to what has no page.
+TOP = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|#|docs/)([^)#]*?)/?\)")
 DIFFERENT = {"README.md": "index.md", "CHANGELOG.md": "changelog.md"}
 
 
@@ -60,8 +61,12 @@ def from_top(name: str) -> str:
     text = (ROOT / name).read_text()
     for other, page in DIFFERENT.items():
         text = text.replace(f"]({other}", f"](docs/{page}")
-    text = re.sub(r"\[([^\]]+)" + TOP.pattern, r"\1 (`\2`)", text)
-    return text.replace("](docs/", "](")
+    return TOP.sub(lambda found: without_page(*found.groups()), text).replace("](docs/", "](")
+
+
+def without_page(text: str, path: str) -> str:
+    """A link to a file that has no page, as text."""
+    return f"`{path}`" if text.rstrip("/") == path else f"{text} (`{path}`)"
 
 
 def rooms() -> dict[str, list[str]]:
