@@ -14,12 +14,11 @@ from poise.training.statistics.fits import LogisticFit
 from poise.training.statistics.rates import wilson_interval
 from poise.training.trials.step_limits import shown_out_to
 
-from .svg import Chart, Svg, colour, dash, ticks
+from .svg import Chart, Svg, colour, dash, right_angle, ticks
 
 RADIUS, MIDDLE = 150.0, (200.0, 196.0)  # of the polar plot
 SMALL = (312.0, 312.0)  # of one controller's own picture
 OUT = 1.0 + 16.0 / RADIUS  # where the names of directions stand
-NAMES = {0: "forward", 90: "left", 180: "backward", 270: "right"}
 
 
 @dataclass(frozen=True)
@@ -109,7 +108,7 @@ def polar(
         if marked is None:
             x, y = middle[0] + (x - middle[0]) * OUT, middle[1] + (y - middle[1]) * OUT
             side = "middle" if angle in (0, 180) else "end" if angle < 180 else ""
-            svg.text(float(x), float(y) + 4, NAMES.get(angle, f"{angle}°"), f"tick {side}")
+            svg.text(float(x), float(y) + 4, right_angle(angle), f"tick {side}")
     if limit is not None:
         svg.path(*place(*limit), "limit", close=True)
     for k, (angles, values) in enumerate((steps or {}).values(), 1):

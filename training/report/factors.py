@@ -15,6 +15,7 @@ from poise.training.statistics.seeds import FIGURES
 
 from .cells import Cell, Column, Table, cell, name_cell, p_cell
 from .charts import Series, level_curves, level_text
+from .svg import right_angle
 
 TITLES = {
     "duration": "duration of the push [s]",
@@ -25,7 +26,6 @@ TITLES = {
     "mass_error": "error of the masses",
     "pushes": "number of pushes",
 }
-RIGHT_ANGLES = {0: "forward", 90: "left", 180: "backward", 270: "right"}
 
 
 def factor_levels(results: Results) -> list[tuple[str, str, Mapping[str, Any], str]]:
@@ -152,7 +152,7 @@ def indicators(results: Results, order: Sequence[str]) -> Table | None:
         Column("recovery_time_trials", "of trials", "that came to rest by this measure"),
     ]
     for angle in angles:
-        to, key = RIGHT_ANGLES.get(round(angle), f"{angle:g}°"), f"margin_{angle:g}"
+        to, key = right_angle(angle), f"margin_{angle:g}"
         columns += [
             Column(f"{key}_force", f"Margin {to} [N]", "largest with < 30 % falls in 10 runs"),
             Column(f"{key}_force_normalised", "at human size [N]", f"margin {to}, normalised"),

@@ -13,6 +13,8 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import ArrayLike
 
+DIRECTIONS = ("forward", "forward left", "left", "backward left", "backward", "backward right",
+              "right", "forward right")  # fmt: skip
 COLOURS = 8  # classes s0 … s7 of the style sheet
 DASHES = ("", "7 3", "2 3")  # of the first eight series, the next eight, …
 MARKERS = ("circle", "square", "up", "diamond", "down", "plus")
@@ -154,6 +156,17 @@ def ticks(low: float, high: float, count: int = 5) -> list[float]:
 def number_text(value: float, form: str) -> str:
     """A number for people: with a real minus."""
     return format(value, form).replace("-", "−")
+
+
+def towards(direction: float) -> str:
+    """The nearest of the eight `DIRECTIONS`; `direction` in degrees."""
+    return DIRECTIONS[round(direction % 360.0 / 45.0) % 8]
+
+
+def right_angle(direction: float) -> str:
+    """The name of a right angle, such as "left" for 90; degrees for all others."""
+    angle = round(direction)
+    return towards(angle) if angle in range(0, 360, 90) else f"{direction:g}°"
 
 
 def colour(index: int) -> str:

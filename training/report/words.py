@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from poise.training.results.read import Record, Results
 from poise.training.results.values import interval, number
 
-from .svg import number_text
+from .svg import number_text, towards
 from .tables import assisted, ranked
 
 
@@ -42,7 +42,7 @@ def push_text(record: Record) -> str:
     share += "".join(f"; {text}" for text in _world(record.line))
     return (
         f"{record.impulse:.1f}\u00a0N·s in {record.duration:.2f}\u00a0s on {record.line['body']}, "
-        f"towards {record.direction:.0f}° ({_towards(record.direction)}){share}."
+        f"towards {record.direction:.0f}° ({towards(record.direction)}){share}."
     )
 
 
@@ -67,9 +67,3 @@ def _world(line: Mapping[str, str]) -> list[str]:
     if int(line.get("pushes") or 1) > 1:
         said.append(f"{line['pushes']} pushes, {float(line['interval']):g}\u00a0s apart")
     return said
-
-
-def _towards(direction: float) -> str:
-    names = ("forward", "forward left", "left", "backward left", "backward", "backward right",
-             "right", "forward right")  # fmt: skip
-    return names[round(direction % 360.0 / 45.0) % 8]
