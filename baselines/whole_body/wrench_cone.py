@@ -1,10 +1,10 @@
 """The cone of wrenches that a flat sole can transmit without sliding or tipping."""
 
-import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from poise.envs.robots.robot import Robot, Sole
+from poise.envs.robots.ground import contact_friction
+from poise.envs.robots.robot import Robot
 
 
 def wrench_cone(polygon: np.ndarray, friction: float) -> np.ndarray:
@@ -30,32 +30,17 @@ def wrench_cone(polygon: np.ndarray, friction: float) -> np.ndarray:
     return facets[:, [0, 1, 5, 2, 3, 4]]
 
 
-def sole_friction(robot: Robot, sole: Sole) -> float:
-    """Sliding friction of a sole on the ground, as MuJoCo combines it; the least of its geoms.
-
-    An explicit contact pair has its own; else the geom of higher priority decides, or the larger
-    of the two.
-    """
-    return min(_pair_friction(robot.model, geom, robot.ground_geom_id) for geom in sole.geom_ids)
-
-
-def _pair_friction(model: mujoco.MjModel, geom: int, ground: int) -> float:
-    for i in range(model.npair):
-        if {int(model.pair_geom1[i]), int(model.pair_geom2[i])} == {geom, ground}:
-            return float(model.pair_friction[i, 0])
-    friction, priority = model.geom_friction[:, 0], model.geom_priority
-    if priority[geom] != priority[ground]:
-        return float(friction[geom if priority[geom] > priority[ground] else ground])
-    return float(max(friction[geom], friction[ground]))
-
-
 def robot_cones(robot: Robot, friction_share: float, polygon_share: float) -> np.ndarray:
     """Cones (nc, r, 6) of all soles, with a share of the real friction and of the real polygon.
 
     Rows are padded with zeros, so that soles of any polygon have the same count.
     """
+    model, ground = robot.model, robot.ground_geom_id
     cones = [
-        wrench_cone(polygon_share * sole.polygon, friction_share * sole_friction(robot, sole))
+        wrench_cone(
+            polygon_share * sole.polygon,
+            friction_share * contact_friction(model, ground, sole.geom_ids),
+        )
         for sole in robot.soles
     ]
     rows = max(len(cone) for cone in cones)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import mujoco
 import numpy as np
 
@@ -73,6 +75,25 @@ def can_touch(model: mujoco.MjModel, geom: int, other: int) -> bool:
         or model.geom_contype[other] & model.geom_conaffinity[geom]
         or {geom, other} in [set(p) for p in zip(model.pair_geom1, model.pair_geom2, strict=True)]
     )
+
+
+def contact_friction(model: mujoco.MjModel, ground: int, geoms: Iterable[int]) -> float:
+    """The least sliding friction that MuJoCo gives the ground's contacts with any of `geoms`.
+
+    An explicit contact pair has its own; otherwise the geom of higher priority decides, and
+    between equals the larger coefficient counts.
+    """
+    return min(_pair_friction(model, geom, ground) for geom in geoms)
+
+
+def _pair_friction(model: mujoco.MjModel, geom: int, other: int) -> float:
+    for i in range(model.npair):
+        if {int(model.pair_geom1[i]), int(model.pair_geom2[i])} == {geom, other}:
+            return float(model.pair_friction[i, 0])
+    friction, priority = model.geom_friction[:, 0], model.geom_priority
+    if priority[geom] != priority[other]:
+        return float(friction[geom if priority[geom] > priority[other] else other])
+    return float(max(friction[geom], friction[other]))
 
 
 def add_contact_sensors(spec: mujoco.MjSpec, description: RobotDescription, ground: str) -> None:

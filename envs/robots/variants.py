@@ -39,9 +39,3 @@ def altered_robot(robot: Robot, *, friction: float | None = None, mass_error: fl
         mass=float(model.body_subtreemass[robot.root_body_id]),
         fingerprint=fingerprint(model, robot.standing_qpos),
     )
-
-
-def floor_friction(robot: Robot) -> float:
-    """Sliding friction between the ground and the first sole, as MuJoCo combines the two."""
-    geoms = [robot.ground_geom_id, *robot.soles[0].geom_ids]
-    return float(max(robot.model.geom_friction[i, 0] for i in geoms))

@@ -28,8 +28,8 @@ import tsid
 
 from poise.baselines.registry import load_controller
 from poise.baselines.whole_body.momentum_qp import MomentumQP
-from poise.baselines.whole_body.wrench_cone import sole_friction
 from poise.envs.physics.state import RobotState
+from poise.envs.robots.ground import contact_friction
 from poise.envs.robots.robot import Robot
 from tests.performance.recoveries import record
 from tests.performance.tick_clock import TickClock
@@ -97,7 +97,8 @@ class TsidTick:
         weight = self.robot.mass * 9.81
         contact = tsid.Contact6d(
             sole.name, self.wrapper, f"sole_{sole.name}", corners, np.array([0.0, 0.0, 1.0]),
-            sole_friction(self.robot, sole), 0.0, 10.0 * weight,
+            contact_friction(self.robot.model, self.robot.ground_geom_id, sole.geom_ids),
+            0.0, 10.0 * weight,
         )  # fmt: skip
         contact.setKp(np.zeros(6))
         contact.setKd(np.full(6, damping))

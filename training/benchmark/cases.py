@@ -11,8 +11,8 @@ import numpy as np
 
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
+from poise.envs.robots.ground import contact_friction
 from poise.envs.robots.robot import Robot
-from poise.envs.robots.variants import floor_friction
 from poise.training.statistics.fits import fit_logistic
 from poise.training.suites.base import generator, start_seed
 from poise.training.trials.push_limits import PushLimits
@@ -40,11 +40,12 @@ class Cases:
         self._data = mujoco.MjData(robot.model)
         self._data.qpos[:] = robot.standing_qpos
         mujoco.mj_kinematics(robot.model, self._data)
+        soles = [geom for sole in robot.soles for geom in sole.geom_ids]
         self.standard: dict[str, str] = {
             "duration": f"{suite.push_duration:g}",
             "body": self.bodies[0],
             "height": f"{self._height(self.bodies[0]):.2f}",
-            "friction": f"{floor_friction(robot):g}",
+            "friction": f"{contact_friction(robot.model, robot.ground_geom_id, soles):g}",
             "delay": "0",
             "mass_error": "0",
             "pushes": "1",

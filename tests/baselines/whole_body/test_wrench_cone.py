@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from poise.baselines.whole_body.wrench_cone import robot_cones, sole_friction, wrench_cone
+from poise.baselines.whole_body.wrench_cone import robot_cones, wrench_cone
 from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.ground import contact_friction
 from tests.support.physics import robot_named
 
 MU = 0.8
@@ -101,7 +102,7 @@ def test_cones_of_a_robot(name):
     cones = robot_cones(robot, 0.5, 0.9)
     assert cones.shape[0] == 2 and cones.shape[1] >= 32
     for cone, sole in zip(cones, robot.soles, strict=True):
-        mu = 0.5 * sole_friction(robot, sole)
+        mu = 0.5 * contact_friction(robot.model, robot.ground_geom_id, sole.geom_ids)
         assert (cone @ [0.99 * mu, 0, 1, 0, 0, 0]).max() <= 0.0
         assert (cone @ [1.01 * mu, 0, 1, 0, 0, 0]).max() > 0.0
         for vertex in sole.polygon:
@@ -122,4 +123,6 @@ def test_friction_is_what_the_simulator_uses(name):
             if set(contact.geom) & set(sole.geom_ids) and robot.ground_geom_id in contact.geom
         ]
         assert used
-        np.testing.assert_allclose(used, sole_friction(robot, sole))
+        np.testing.assert_allclose(
+            used, contact_friction(robot.model, robot.ground_geom_id, sole.geom_ids)
+        )

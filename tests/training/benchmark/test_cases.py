@@ -106,6 +106,15 @@ def test_levels_meet_the_same_starts_directions_and_fractions() -> None:
     assert bodies == set(robot().description.push_bodies[1:])
 
 
+def test_the_standard_friction_is_that_of_the_contacts() -> None:
+    """Soles of a priority of their own decide it: `compact` stands on 0.8, though its ground has
+    1.0, and the suite's level 1.0 is another cell."""
+    cases = Cases(load_benchmark("standard"), robot("compact"), 0)
+    assert cases.standard["friction"] == "0.8"
+    levels = {case.friction for case in cases.others if case.factor == "friction"}
+    assert levels == {0.4, 0.6, 1.0}
+
+
 def test_a_height_is_a_point_of_the_first_push_body() -> None:
     """At 1.0 the point lies at the height of the robot's CoM."""
     cases = small(factors={"trials": 1, "levels": {"height": [1.0]}})
