@@ -17,7 +17,7 @@ def altered_robot(robot: Robot, *, friction: float | None = None, mass_error: fl
     `robot` fits. The copy serves to be simulated; `robot` is not changed.
 
     Args:
-        friction: sliding coefficient of every geom; None: as it is.
+        friction: sliding coefficient of every geom and contact pair; None: as it is.
         mass_error: −0.1 makes every body a tenth lighter.
 
     Raises ValueError for a friction that is not positive or masses that would not be.
@@ -29,6 +29,7 @@ def altered_robot(robot: Robot, *, friction: float | None = None, mass_error: fl
     model = copy.copy(robot.model)
     if friction is not None:
         model.geom_friction[:, 0] = friction
+        model.pair_friction[:, :2] = friction
     if mass_error != 0.0:
         model.body_mass *= 1.0 + mass_error
         model.body_inertia *= 1.0 + mass_error

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.ground import contact_friction
-from poise.envs.robots.robot import Robot
+from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.robots.variants import altered_robot
 from tests.support.shared import robot
+from tests.support.small_biped import BOX_FOOT, motors, write_biped
 
 
 def test_masses_and_what_follows_from_them_are_scaled() -> None:
@@ -53,6 +56,25 @@ def test_friction_is_what_the_soles_meet() -> None:
         simulation.step(np.zeros(one.model.nu), 50)
         moved.append(float(np.linalg.norm(simulation.state.origin[:2] - start[:2])))
     assert moved[1] > 3 * moved[0]
+
+
+def test_contact_pairs_take_the_friction(tmp_path: Path) -> None:
+    """Soles that meet the ground only as explicit pairs have the altered friction in contacts."""
+    foot = BOX_FOOT.replace("/>", ' contype="0" conaffinity="0"/>')
+    pairs = "".join(f'<pair geom1="{s}_sole" geom2="floor"/>' for s in ("left", "right"))
+    path = write_biped(
+        tmp_path,
+        foot=foot,
+        extra=motors(ctrlrange="-9 9") + f"<contact>{pairs}</contact>",
+        world='<geom name="floor" type="plane" size="1 1 1"/>',
+        options={"friction": 0.6},
+    )
+    smooth = altered_robot(load_robot(path), friction=0.05)
+    assert friction(load_robot(path)) == 0.6 and friction(smooth) == 0.05
+    simulation = Simulation(smooth)
+    simulation.step(np.zeros(smooth.model.nu), 5)
+    contacts = [contact.friction[:2].tolist() for contact in simulation.data.contact]
+    assert contacts and all(found == [0.05, 0.05] for found in contacts)
 
 
 @pytest.mark.parametrize("change", [{"friction": 0.0}, {"mass_error": -1.0}])
