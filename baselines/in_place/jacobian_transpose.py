@@ -53,13 +53,13 @@ class JacobianTranspose(Copyable):
 
     def virtual_wrench(self, state: RobotState, targets: Targets) -> np.ndarray:
         """(6,) [F; N] about the CoM, what the ground is to press with."""
-        c, m = self.config, self.arrays.mass
-        omega = np.sqrt(self.arrays.gravity / self.arrays.height_com)
+        c, units = self.config, self.arrays.units
+        m, omega = units.mass, units.omega
         s = c.com_stiffness * omega**2
         damping = 2.0 * c.com_damping * np.sqrt(s)
         force = m * (s * (targets.com - state.com) + damping * (targets.com_vel - state.com_vel))
-        force[2] += m * self.arrays.gravity
-        k = c.root_stiffness * m * self.arrays.gravity * self.arrays.height_com
+        force[2] += units.force
+        k = c.root_stiffness * m * units.gravity * units.height
         rate = state.root_axes @ (targets.root_vel - state.qvel[3:6])
         turn = rotation_vector(targets.root_axes @ state.root_axes.T)
         return np.concatenate([force, k * (turn + c.root_damping / omega * rate)])

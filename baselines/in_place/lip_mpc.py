@@ -50,9 +50,8 @@ class LIPMPC(Guided):
     def __init__(self, robot: Robot, config: LIPMPCConfig | None = None):
         self.config = config or LIPMPCConfig()
         super().__init__(robot, self.config.qp)
-        omega = float(np.sqrt(self.qp.arrays.gravity / self.qp.arrays.height_com))
-        self.omega = omega
-        self.A, self.B = lip_step(omega, self.config.step)
+        self.omega = robot.omega
+        self.A, self.B = lip_step(self.omega, self.config.step)
         self._ticks = max(1, round(self.config.replan / self.period))
         self._build()
         self.reset()

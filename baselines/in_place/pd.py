@@ -42,9 +42,9 @@ class PDConfig:
 def joint_gains(robot: RobotArrays, gains: PDGains) -> tuple[np.ndarray, np.ndarray]:
     """(nv−6,) stiffness [N·m/rad] and damping [N·m·s/rad]."""
     kinds = np.minimum(joint_kinds(robot), 2)
-    moment = robot.mass * robot.gravity * robot.height_com
-    stiffness = moment * np.choose(kinds, [gains.free, gains.leg, gains.trunk])
-    return stiffness, gains.damping * stiffness / np.sqrt(robot.gravity / robot.height_com)
+    units = robot.units
+    stiffness = units.moment * np.choose(kinds, [gains.free, gains.leg, gains.trunk])
+    return stiffness, gains.damping * stiffness / units.omega
 
 
 def holding_torques(state: RobotState) -> np.ndarray:

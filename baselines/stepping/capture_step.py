@@ -96,10 +96,10 @@ def check_qps(config: CaptureStepConfig) -> None:
 
 def step_gains(robot: Robot, config: CaptureStepConfig, period: float) -> StepGains:
     """`config` in m and s, for one robot."""
-    c, h, g = config, robot.height_com, -robot.model.opt.gravity[2]
-    rate = float(np.sqrt(g / h))
+    c, units = config, robot.units
+    h, rate = units.height, units.omega
     return StepGains(
-        trigger=c.trigger * h, spin=float(c.spin * rate / (robot.mass * g)),
+        trigger=c.trigger * h, spin=c.spin * rate / units.force,
         again=c.again * h, gain=float(c.gain), hips=c.hips * h, leg=c.stretch * h, sink=c.sink * h,
         ramp=c.ramp / rate, unload=c.unload / rate, pause=c.pause / rate,
         root_accel=c.root_accel * rate**2, swing_accel=c.swing_accel * rate**2,
@@ -142,7 +142,7 @@ class CaptureStep(AroundQP):
         self.planner = self._planner(self.reach)
         self.h, self.rate = self.planner.h, self.planner.rate
         self.shift = self.planner.shift  #: what a policy adds
-        self._swing = Swing(np.zeros(3), 0.0, self.config.swing, self.h)
+        self._swing = Swing(np.zeros(3), 0.0, self.config.swing, robot.units)
         self.home = home_arrays(robot, self.config.home)
         self.memory = allocate_step_memory(self.reach.arrays)
         self.tau = apart(len(self.qp.parameters.torque_limit))  #: (nv−6,) of the last tick [N·m]

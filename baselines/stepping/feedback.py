@@ -104,8 +104,7 @@ def feedback_arrays(
     robot: Robot, always: StepFeedback, falls: Mapping[str, FallFeedback]
 ) -> FeedbackArrays:
     """Both scaled by the robot's mass and height."""
-    h, g = robot.height_com, -float(robot.model.opt.gravity[2])
-    rate = float(np.sqrt(g / h))
+    h, rate = robot.height_com, robot.omega
     units = np.array([h, h, 1.0 / rate, h])
     rising, size = sorted(falls.values(), key=lambda fall: fall.angle), (4, len(SIGNALS))
     law, gains, angles = apart(size), apart(size), apart(len(rising))
@@ -113,7 +112,7 @@ def feedback_arrays(
     law[:] = gains[:] = units[:, None] * always.matrix()
     for k, fall in enumerate(rising):
         angles[k], added_at[k] = np.radians(fall.angle), units[:, None] * fall.matrix()
-    upright, spin = robot_arrays(robot).root_standing[2].copy(), rate / (robot.mass * g * h)
+    upright, spin = robot_arrays(robot).root_standing[2].copy(), rate / robot.units.moment
     return FeedbackArrays(
         law, angles, added_at, gains, upright, float(h), float(spin),
         apart(2), apart(len(SIGNALS)), apart(4),

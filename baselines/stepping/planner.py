@@ -87,8 +87,7 @@ class StepPlanner(Copyable):
         falls: Mapping[str, FallFeedback] | None = None,
     ):
         self.reach, self.limits, self.choice = reach, limits, choice
-        self.h = robot.height_com
-        self.rate = float(np.sqrt(-robot.model.opt.gravity[2] / self.h))  # ω
+        self.h, self.rate = robot.height_com, robot.omega
         self.sides = sides(robot)
         self.shift = StepShift()  #: what a policy adds
         self.feedback = feedback_arrays(robot, feedback or StepFeedback(), falls or {})

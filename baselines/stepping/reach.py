@@ -49,7 +49,7 @@ def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.nd
     body = foot.body_id
     R = data.xmat[body].reshape(3, 3) @ foot.rotation
     point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot.position
-    weight = robot.mass * -model.opt.gravity[2]
+    weight = robot.units.force
     normals, offsets, bounds = [], [], []
     for joint in range(model.njnt):
         dof = model.jnt_dofadr[joint]

@@ -96,8 +96,7 @@ class HomeArrays(Block):
 
 def home_arrays(robot: Robot, home: StepHome) -> HomeArrays:
     """`home` for one robot."""
-    c, h = home, robot.height_com
-    rate = float(np.sqrt(-float(robot.model.opt.gravity[2]) / h))
+    c, h, rate = home, robot.height_com, robot.omega
     feet = standing_feet(robot)
     return HomeArrays(
         c.far * h, c.calm * h * rate, float(np.cos(np.radians(c.tilt))), c.after / rate,

@@ -9,6 +9,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
+from poise.envs.maths.pendulum import Units
 from poise.envs.maths.vectors import copy, rotation_error
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.state import RobotState
@@ -127,7 +128,8 @@ class Swing(Copyable):
 
     FROZEN = FROZEN
 
-    def __init__(self, point: np.ndarray, duration: float, task: SwingTask, height: float):
+    def __init__(self, point: np.ndarray, duration: float, task: SwingTask, units: Units):
+        height = units.height
         speed = task.landing_speed * height * np.sqrt(GRAVITY / height)
         self.task = task
         self.arrays = SwingArrays(

@@ -93,8 +93,7 @@ class Simbicon(Copyable):
         self.robot, self.config = robot, config or SimbiconConfig()
         self.period = self.config.period
         self.arrays = robot_arrays(robot)
-        self.rate = float(np.sqrt(self.arrays.gravity / robot.height_com))  # ω
-        self.moment = self.arrays.mass * self.arrays.gravity * robot.height_com
+        self.rate, self.moment = robot.omega, robot.units.moment
         self.ankles = Reach(robot).middle
         self.sides = sides(robot)
         self.legs = [_leg(robot, i) for i in range(2)]
@@ -190,7 +189,7 @@ class Simbicon(Copyable):
         """(6 nc,) sole wrenches: m g (c − p)/z_c through the ankle of one sole."""
         p = self._ankle(state, sole)
         way = state.com - p
-        force = self.arrays.mass * self.arrays.gravity * way / max(way[2], 0.1)
+        force = self.robot.units.force * way / max(way[2], 0.1)
         w = np.zeros(len(state.J))
         w[6 * sole : 6 * sole + 3] = force
         w[6 * sole + 3 : 6 * sole + 6] = np.cross(p - state.sole_points[sole], force)

@@ -26,9 +26,8 @@ def joint_kinds(robot: RobotArrays) -> np.ndarray:
 
 def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig") -> QPParameters:
     """Scale `config` by the robot's mass m and CoM height h (see `tasks.py`)."""
-    m, g, h = arrays.mass, arrays.gravity, arrays.height_com
-    omega = np.sqrt(g / h)
-    force, moment = m * g, m * g * h
+    units = arrays.units
+    h, omega, force, moment = units.height, units.omega, units.force, units.moment
     kinds = joint_kinds(arrays)
     nj = len(kinds)
     posture, com, cop = config.posture, config.com, config.cop

@@ -44,7 +44,7 @@ class EnvConfig:
 
 
 def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: Any) -> EnvConfig:
-    """An EnvConfig from a packaged name, a path, a mapping or an object; `overrides` win.
+    """An EnvConfig from a .yaml file, a mapping or an object; `overrides` win.
 
     Raises ConfigError naming the file, the field and the choices, UnknownArgument for an override
     that is no field.

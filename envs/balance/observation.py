@@ -28,7 +28,7 @@ class Scales(Block):
 
 def scales(robot: RobotArrays, support: np.ndarray) -> Scales:
     """Scales of a robot whose standing support polygon is `support` (k, 2), heading frame [m]."""
-    omega = float(np.sqrt(robot.gravity / robot.height_com))
+    omega = robot.units.omega
     half = 0.5 * (support.max(axis=0) - support.min(axis=0))
     return Scales(
         support_x=float(half[0]),
@@ -37,7 +37,7 @@ def scales(robot: RobotArrays, support: np.ndarray) -> Scales:
         velocity=0.2 * omega * robot.height_com,
         momentum=0.1 * robot.mass * robot.height_com**2 * omega,
         omega=omega,
-        weight=robot.mass * robot.gravity,
+        weight=robot.units.force,
     )
 
 

@@ -1,13 +1,48 @@
-"""The linear inverted pendulum c̈ = ω² (c − p) + F/m: what it holds, and where it gets to."""
+"""The linear inverted pendulum c̈ = ω² (c − p) + F/m: its units, what it holds, where it gets to."""
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from poise.envs.compiled.jit import compiled
-from poise.envs.robots.robot import Robot
 
 Profile = Literal["square", "half-sine"]
+
+
+def pendulum_rate(gravity: float, height: float) -> float:
+    """ω = √(g/z_c) [1/s]: `gravity` g [m/s²], `height` z_c of the centre of mass [m]."""
+    return np.sqrt(gravity / height)  # type: ignore[no-any-return]
+
+
+compiled_rate = compiled(pendulum_rate)  #: the same, for kernels
+
+
+@dataclass(frozen=True)
+class Units:
+    """What gains and costs without units are measured in: m, g and h of one robot, standing.
+
+    Lengths in h, times in 1/ω, forces in m g, moments in m g h.
+    """
+
+    mass: float  #: m [kg]
+    gravity: float  #: g [m/s²]
+    height: float  #: h, of the centre of mass above the ground [m]
+
+    @property
+    def omega(self) -> float:
+        """ω = √(g/h) [1/s]."""
+        return float(pendulum_rate(self.gravity, self.height))
+
+    @property
+    def force(self) -> float:
+        """m g [N]."""
+        return self.mass * self.gravity
+
+    @property
+    def moment(self) -> float:
+        """m g h [N·m]."""
+        return self.mass * self.gravity * self.height
 
 
 def duration_factor(omega: float, duration: float, profile: Profile = "square") -> float:
@@ -32,11 +67,6 @@ def ankle_limit(omega: float, margin: float, duration: float, profile: Profile =
     ω δ · ωT/(1 − e^(−ωT)). `omega` [1/s], `duration` T [s]. [Stephens07], [Koolen12]
     """
     return omega * margin * duration_factor(omega, duration, profile)
-
-
-def pendulum_rate(robot: Robot) -> float:
-    """ω = √(g/z_c) of the standing robot [1/s]."""
-    return float(np.sqrt(np.linalg.norm(robot.model.opt.gravity) / robot.height_com))
 
 
 def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float | np.ndarray) -> np.ndarray:

@@ -13,7 +13,9 @@ from numpy.lib.stride_tricks import as_strided
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.copies import portable
+from poise.envs.maths.pendulum import Units
 from poise.envs.robots.robot import Robot
+from poise.envs.robots.soles import MAX_VERTICES
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,11 @@ class RobotArrays(Block):
     M_colind: np.ndarray
     ground_sensor: int  #: address in `sensordata`: contacts of anything with the ground
     sole_sensor: np.ndarray  #: (nc,) addresses: contacts of that foot with the ground
+
+    @property
+    def units(self) -> Units:
+        """As of `Robot`."""
+        return Units(self.mass, self.gravity, self.height_com)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +87,6 @@ class Plant(Block):
         return self  # views can be of this data only
 
 
-MAX_VERTICES = 8
-
-
 def robot_arrays(robot: Robot) -> RobotArrays:
     """Constants of `robot` for compiled code."""
     model, soles = robot.model, robot.soles
@@ -97,7 +101,7 @@ def robot_arrays(robot: Robot) -> RobotArrays:
     mujoco.mju_quat2Mat(rotation, robot.standing_qpos[3:7])
     return RobotArrays(
         timestep=float(model.opt.timestep),
-        gravity=float(-model.opt.gravity[2]),
+        gravity=robot.units.gravity,
         mass=float(robot.mass),
         height_com=float(robot.height_com),
         root_body=int(robot.root_body_id),

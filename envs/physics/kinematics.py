@@ -13,10 +13,12 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import GAP, apart
+from poise.envs.maths.pendulum import compiled_rate
 from poise.envs.maths.polygons import convex_hull
 from poise.envs.maths.vectors import copy
+from poise.envs.robots.soles import MAX_VERTICES
 
-from .arrays import MAX_VERTICES, Plant, RobotArrays
+from .arrays import Plant, RobotArrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +241,7 @@ def _contact(robot, plant, s):
     else:  # no support: there is no CoP; the middle of the soles is what can be reached next
         s.cop[0], s.cop[1] = s.origin[0], s.origin[1]
     height = max(s.com[2] - s.origin[2], 0.2 * robot.height_com)
-    s.omega[0] = np.sqrt(robot.gravity / height)
+    s.omega[0] = compiled_rate(robot.gravity, height)
     for a in range(2):
         s.capture_point[a] = s.com[a] + s.com_vel[a] / s.omega[0]
     feet = 0.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build, to_dict
-from poise.envs.maths.pendulum import Profile, ankle_limit, pendulum_rate
+from poise.envs.maths.pendulum import Profile, ankle_limit
 from poise.envs.robots.robot import Robot
 
 from .push import Kick, Push
@@ -68,7 +68,7 @@ def to_impulse(
         raise ConfigError(f"unknown unit {shown(unit)}", field="unit", choices=MAGNITUDES)
     if margin is None:
         raise ConfigError("needs a support margin, unknown here", field=unit)
-    limit = ankle_limit(pendulum_rate(robot), margin(direction), duration, profile)
+    limit = ankle_limit(robot.omega, margin(direction), duration, profile)
     return value * robot.mass * limit
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from poise.configs.errors import ConfigError
-from poise.envs.maths.pendulum import Profile, duration_factor, pendulum_rate
+from poise.envs.maths.pendulum import Profile, duration_factor
 from poise.envs.robots.robot import Robot
 
 from .options import Margin, check_body, to_impulse
@@ -134,7 +134,7 @@ class PushSampler:
                 raise ConfigError(
                     "needs the controller's limits, unknown here", field="limit_table"
                 )
-            omega = pendulum_rate(robot)
+            omega = robot.omega
             longer = duration_factor(omega, duration, self.profile)
             impulse = value * limits(direction) * longer / duration_factor(omega, LIMIT_DURATION)
         else:

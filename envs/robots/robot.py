@@ -13,6 +13,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
 from poise.envs.compiled.copies import Copyable
+from poise.envs.maths.pendulum import Units
 
 from .actuators import install_motors
 from .description import RobotDescription
@@ -84,6 +85,16 @@ class Robot(Copyable):
     torque_limit: np.ndarray
     sensor_adr: dict[str, int]
     fingerprint: str
+
+    @property
+    def units(self) -> Units:
+        """The robot's mass, gravity and standing height, and what follows from them."""
+        return Units(self.mass, -float(self.model.opt.gravity[2]), self.height_com)
+
+    @property
+    def omega(self) -> float:
+        """ω = √(g/h) of the standing robot [1/s]."""
+        return self.units.omega
 
 
 def load_robot(name_or_path: str | Path = "humanoid") -> Robot:

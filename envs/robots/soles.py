@@ -17,7 +17,7 @@ FLATNESS = 0.005  # [m] a point of the foot this close to the sole plane belongs
 MAX_TILT = np.deg2rad(15.0)  # of a foot before levelling
 SIDE_ANGLE = np.deg2rad(2.0)  # between facets that count as one side of a foot
 MIN_SPAN = 0.01  # [m] a sole that is narrower than this cannot bear a moment
-MAX_VERTICES = 8
+MAX_VERTICES = 8  # of a sole
 RIM_POINTS = 16  # by which the rim of a cylinder is sampled
 
 

@@ -23,8 +23,8 @@ MOST = 14  # files in a room
 FLOORS = """
  1 configs, training/statistics
  2 envs/compiled, baselines/allowance
- 3 envs/robots, baselines/solvers, baselines/warmup, training/running
- 4 envs/maths
+ 3 envs/maths, baselines/solvers, baselines/warmup, training/running
+ 4 envs/robots
  5 envs/pushes
  6 envs/physics
  7 envs/sensors, envs/viewing, baselines/controller

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from poise.envs.maths.pendulum import pendulum_rate
 from poise.training.evaluation.summary import counts, envelope, pushes, won
 from poise.training.statistics.bootstrap import mean_over_directions
 from poise.training.statistics.differences import paired_rates, relative_gain
@@ -194,7 +193,7 @@ def robot_figures(limits: PushLimits) -> dict[str, Any]:
     return {
         "mass": limits.robot.mass,
         "height_com": limits.robot.height_com,
-        "omega": pendulum_rate(limits.robot),
+        "omega": limits.robot.omega,
         "human_com_height": HUMAN_COM_HEIGHT,
         "ankle_limit": [[angle, limits.ankle(angle, 0.1)] for angle in fine],
     }

@@ -6,7 +6,7 @@ from pathlib import Path
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, resolve, write_atomic
 from poise.configs.schema import build, read_yaml, to_yaml
-from poise.envs.maths.pendulum import ankle_limit, duration_factor, pendulum_rate
+from poise.envs.maths.pendulum import ankle_limit, duration_factor
 from poise.envs.physics.simulation import Simulation
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import LIMIT_DURATION, LimitTable
@@ -36,7 +36,7 @@ class PushLimits:
     def __init__(self, robot: Robot, table: LimitTable | None = None):
         self.robot, self.table = robot, table
         self.scale = "ankle limit" if table is None else "baseline J50"
-        self.omega = pendulum_rate(robot)
+        self.omega = robot.omega
         self.standing = Simulation(robot).state.copy()
 
     def margin(self, direction: float) -> float:

@@ -72,7 +72,7 @@ def test_a_running_step_is_planned_as_by_the_readable_planner(shift, feedback):
     for seed in range(8):
         state, yaw, rng = falling(seed)
         foot = seed % 2
-        swing = Swing(state.sole_points[foot], 0.35, SwingTask(), plans.h)
+        swing = Swing(state.sole_points[foot], 0.35, SwingTask(), robot().units)
         swing.arrays.shift[0] = shift
         swing.aim(state.sole_points[foot, :2] + rng.uniform(-0.2, 0.2, 2))
         for _ in range(rng.integers(1, 60)):

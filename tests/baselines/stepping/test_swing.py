@@ -4,17 +4,19 @@ import numpy as np
 import pytest
 
 from poise.baselines.stepping.swing import Swing, SwingTask, quintic, swing_rows
+from poise.envs.maths.pendulum import Units
 from poise.envs.maths.vectors import rotation_error
 from poise.envs.physics.simulation import Simulation
 from tests.support import stepping_reference as readable
 from tests.support.shared import generic_state, robot
 
 DT, HEIGHT = 0.004, 0.8
+UNITS = Units(60.0, 9.81, HEIGHT)
 
 
 def way(moves=(), duration=0.3, after=0.05):
     """(n, 3, 3) reference of a step of 0.4 m; `moves` are (time, foothold, duration)."""
-    swing = Swing(np.array([0.1, 0.2, 0.0]), duration, SwingTask(), HEIGHT)
+    swing = Swing(np.array([0.1, 0.2, 0.0]), duration, SwingTask(), UNITS)
     swing.aim(np.array([0.5, 0.2]))
     rows, moves = [swing.reference.copy()], list(moves)
     while swing.time < swing.duration + after:
@@ -46,7 +48,7 @@ def test_quintic_is_its_own_derivative():
 
 def test_the_way_is_that_of_the_readable_form():
     """Every tick's reference follows from the last one: to the apex, down, and on."""
-    swing = Swing(np.array([0.1, 0.2, 0.01]), 0.3, SwingTask(), HEIGHT)
+    swing = Swing(np.array([0.1, 0.2, 0.01]), 0.3, SwingTask(), UNITS)
     swing.aim(np.array([0.5, 0.1]))
     while swing.time < 0.34:
         expected = readable.advanced(swing, DT)
@@ -85,7 +87,7 @@ def test_late_ground_is_sought_at_the_landing_speed():
 
 def test_foothold_is_fixed_shortly_before_touchdown():
     """In the last 30 ms another foothold changes nothing."""
-    swing = Swing(np.zeros(3), 0.2, SwingTask(), HEIGHT)
+    swing = Swing(np.zeros(3), 0.2, SwingTask(), UNITS)
     swing.aim(np.array([0.3, 0.0]))
     while swing.remaining > Swing.FROZEN:
         swing.advance(DT)

@@ -1,12 +1,13 @@
 """Pushes from dictionaries: what is set, in which units, and what is refused."""
 
-from types import SimpleNamespace
+import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.envs.maths.pendulum import ankle_limit, pendulum_rate
+from poise.envs.maths.pendulum import ankle_limit
 from poise.envs.pushes.options import body_names, parse_pushes, to_impulse
 from poise.envs.pushes.push import Kick, Push
 from poise.envs.robots.robot import load_robot
@@ -48,7 +49,7 @@ def test_units_of_the_magnitude(robot):
     assert to_impulse("specific_impulse", 0.4, **args) == pytest.approx(0.4 * robot.mass)
     force_push = Push("torso", 0.0, 0.2, to_impulse("force", 50.0, **half_sine), 90.0)
     assert Push(**{**vars(force_push), "profile": "half-sine"}).peak_force == pytest.approx(50.0)
-    limit = robot.mass * ankle_limit(pendulum_rate(robot), 0.12, 0.2)
+    limit = robot.mass * ankle_limit(robot.omega, 0.12, 0.2)
     margin = {90.0: 0.12}.__getitem__  # asks for the push's own direction
     assert to_impulse("ankle_fraction", 0.5, **args, margin=margin) == pytest.approx(0.5 * limit)
     (push,) = parse_pushes(
@@ -102,8 +103,11 @@ def test_bad_pushes_are_refused(robot, value, named):
         assert word in str(error.value)
 
 
-def test_ankle_fraction_uses_gravity_and_height():
+def test_ankle_fraction_uses_gravity_and_height(robot):
     """ω = √(g/z_c) comes from the robot, not from a constant."""
-    opt = SimpleNamespace(gravity=np.array([0.0, 0.0, -1.6]))
-    moon = SimpleNamespace(model=SimpleNamespace(opt=opt), height_com=0.4)
-    assert pendulum_rate(moon) == pytest.approx(2.0)
+    model = copy.copy(robot.model)
+    model.opt.gravity[2] = -1.6
+    moon = replace(robot, model=model, height_com=0.4)
+    assert moon.omega == pytest.approx(2.0)
+    assert moon.units.force == pytest.approx(1.6 * robot.mass)
+    assert moon.units.moment == pytest.approx(0.64 * robot.mass)

@@ -8,7 +8,7 @@ import pytest
 
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
-from poise.envs.maths.pendulum import duration_factor, pendulum_rate
+from poise.envs.maths.pendulum import duration_factor
 from poise.envs.pushes.options import body_names
 from poise.envs.pushes.push import Kick
 from poise.envs.pushes.sampler import LimitTable, PushSampler
@@ -115,7 +115,7 @@ def test_controller_fraction_follows_limit_and_duration(robot):
 
     longer = replace(sampler, duration=(0.3, 0.3), profile="half-sine")
     (push,) = longer.sample(np.random.default_rng(0), robot)
-    omega = pendulum_rate(robot)
+    omega = robot.omega
     growth = duration_factor(omega, 0.3, "half-sine") / duration_factor(omega, 0.1)
     assert growth > 1.2
     assert push.impulse == pytest.approx(7.5 * growth)
@@ -132,7 +132,7 @@ def test_ankle_fraction_asks_for_the_margin_of_its_direction(robot):
         np.random.default_rng(0), robot, margin=lambda angle: asked.append(angle) or 0.1
     )
     assert asked == [30.0]
-    omega = pendulum_rate(robot)
+    omega = robot.omega
     assert push.impulse == pytest.approx(robot.mass * omega * 0.1 * duration_factor(omega, 0.1))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.envs.maths.pendulum import ankle_limit, pendulum_rate
+from poise.envs.maths.pendulum import ankle_limit
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import LimitTable, push_bodies
 from poise.envs.robots.robot import Robot, load_robot
@@ -23,7 +23,7 @@ def robot() -> Robot:
 def test_the_ankle_limit_is_the_formula_of_the_standing_posture(robot: Robot) -> None:
     """J = m ω δ ωT/(1 − e^(−ωT)), with δ to the front larger than to the back."""
     limits = PushLimits(robot)
-    expected = robot.mass * ankle_limit(pendulum_rate(robot), limits.margin(0.0), 0.1)
+    expected = robot.mass * ankle_limit(robot.omega, limits.margin(0.0), 0.1)
     assert limits.ankle(0.0, 0.1) == expected
     assert limits.margin(90.0) == pytest.approx(limits.margin(270.0), abs=2e-3)
     assert limits.ankle(0.0, 0.3) > expected
