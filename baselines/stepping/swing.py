@@ -14,7 +14,6 @@ from poise.envs.maths.vectors import copy, rotation_error
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.state import RobotState
 
-GRAVITY = 9.81  # [m/s²] of the landing speed's unit
 LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
 FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
 
@@ -130,7 +129,7 @@ class Swing(Copyable):
 
     def __init__(self, point: np.ndarray, duration: float, task: SwingTask, units: Units):
         height = units.height
-        speed = task.landing_speed * height * np.sqrt(GRAVITY / height)
+        speed = task.landing_speed * height * units.omega
         self.task = task
         self.arrays = SwingArrays(
             apart((3, 3)), apart(2), apart(1), apart(1), apart(1), apart(1),

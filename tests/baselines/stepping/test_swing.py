@@ -31,6 +31,16 @@ def generic_ends(seed):
     return np.random.default_rng(seed).normal(size=(2, 3))
 
 
+def test_the_landing_speed_goes_by_the_gravity_of_the_robot():
+    """Its unit is h ω: a quarter of the gravity halves it."""
+    here, moon = (
+        Swing(np.zeros(3), 0.3, SwingTask(), Units(60.0, gravity, HEIGHT)).landing_speed
+        for gravity in (9.81, 0.25 * 9.81)
+    )
+    assert here == pytest.approx(SwingTask().landing_speed * np.sqrt(9.81 * HEIGHT))
+    assert moon == pytest.approx(0.5 * here)
+
+
 def test_quintic_meets_both_ends():
     """Position, velocity and acceleration at 0 and T are those asked for."""
     start, end = generic_ends(0)
