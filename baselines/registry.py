@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from poise.baselines.in_place.abe07 import Abe07, Abe07Config
 from poise.baselines.in_place.capture_point import CapturePoint, CapturePointConfig
 from poise.baselines.in_place.jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
 from poise.baselines.in_place.kudoh02 import Kudoh02, Kudoh02Config
@@ -31,7 +30,6 @@ KINDS: dict[str, tuple[type, type]] = {
     "stable-pd": (StablePDConfig, StablePD),
     "jacobian-transpose": (JacobianTransposeConfig, JacobianTranspose),
     "kudoh02": (Kudoh02Config, Kudoh02),
-    "abe07": (Abe07Config, Abe07),
     "macchietto09": (Macchietto09Config, Macchietto09),
     "capture-point": (CapturePointConfig, CapturePoint),
     "lqr-lip": (LQRLIPConfig, LQRLIP),

@@ -1,4 +1,4 @@
-"""QP for large deviations, PD for small ones; and Abe's weights that vary with the state."""
+"""QP for large deviations, PD for small ones; controllers by name."""
 
 from dataclasses import replace
 
@@ -7,7 +7,6 @@ import pytest
 
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.in_place.abe07 import Abe07, Abe07Config
 from poise.baselines.in_place.kudoh02 import Kudoh02, Kudoh02Config
 from poise.baselines.registry import (
     KINDS,
@@ -63,27 +62,15 @@ def test_thresholds_in_the_wrong_order_are_refused():
         load_controller({"kind": "kudoh02", "near": 0.1, "far": 0.05}, robot())
 
 
-def test_tracking_gives_way_as_the_com_leaves(standing):
-    """β falls from 1 to its floor; at 1 the QP is the momentum QP without CoP control."""
-    simulation, targets = standing
-    state, config = simulation.state, Abe07Config(distance=0.05, floor=0.2)
-    controller = Abe07(robot(), config)
-    com = simulation.state_arrays.com
-    com[:2] = targets.com[:2]
-    assert controller.tracking(state, targets) == 1.0
-    cop = replace(config.qp.cop, weight=0.0, yaw_weight=0.0)
-    plain = MomentumQP(robot(), replace(config.qp, cop=cop))
-    np.testing.assert_array_equal(controller.torques(state, targets), plain.torques(state, targets))
-    betas = []
-    for distance in (0.0, 0.02, 0.05, 0.5):
-        com[0] = targets.com[0] + distance * robot().height_com
-        betas.append(controller.tracking(state, targets))
-    assert np.all(np.diff(betas) < 0.0)
-    assert betas[2] == pytest.approx(0.2 + 0.8 / np.e) and betas[3] == pytest.approx(0.2)
-    controller.torques(state, targets)
-    np.testing.assert_allclose(
-        controller.qp.parameters.accel_weight, 0.2 * plain.parameters.accel_weight
-    )
+def test_abe07_is_the_momentum_qp_without_cop_control():
+    """Its weights fall with the CoM's distance, and nothing asks for a centre of pressure."""
+    found, baseline = controller_config("abe07"), controller_config("momentum-qp")
+    posture, cop = found.posture, found.cop
+    assert posture.far_share == 0.02 and posture.far_distance == 0.02
+    assert cop.weight == 0.0 and cop.yaw_weight == 0.0
+    assert found == replace(baseline, posture=posture, cop=cop)
+    controller = load_controller("abe07", robot())
+    np.testing.assert_array_equal(controller.parameters.angular_weight, 0.0)
 
 
 @pytest.mark.parametrize("name", packaged("controllers"))
@@ -121,7 +108,7 @@ def test_kinds_are_named_in_the_error():
 def test_some_commands_need_a_momentum_qp():
     """Others are refused by name, with those that will do."""
     assert momentum_qp_config("moskalev24").root == "soft"
-    choices = "choices: momentum-qp, momentum-qp-osqp, moskalev24, root-assist"
+    choices = "choices: abe07, momentum-qp, momentum-qp-osqp, moskalev24, root-assist"
     with pytest.raises(ConfigError, match=f"lip-mpc.*{choices}"):
         momentum_qp_config("lip-mpc")
 
