@@ -7,6 +7,7 @@ import numpy as np
 
 from poise.baselines.controller import Targets
 from poise.envs.compiled.copies import Copyable
+from poise.envs.maths.vectors import rotation_vector
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -71,11 +72,3 @@ class JacobianTranspose(Copyable):
         tau += self.stiffness * (targets.q_ref - state.q)
         tau += self.damping * (targets.v_ref - state.qvel[6:])
         return motor_torques(self.arrays, tau)
-
-
-def rotation_vector(R: np.ndarray) -> np.ndarray:
-    """(3,) φ with R = exp(skew(φ)), |φ| < π [rad]."""
-    axis = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine = float(np.linalg.norm(axis))
-    angle = np.arctan2(sine, 0.5 * (np.trace(R) - 1.0))
-    return axis if sine < 1e-9 else axis * (angle / sine)

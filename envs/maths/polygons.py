@@ -93,6 +93,19 @@ def clipped(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarra
     return np.array(kept)
 
 
+def ray_to_edge(polygon: np.ndarray, point: np.ndarray, ray: np.ndarray) -> float:
+    """How far it is from `point` (2,) along the unit vector `ray` (2,) to the edge of a
+    counter-clockwise polygon (k, 2); zero where the point is outside."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)  # outward
+    gaps = np.einsum("ij,ij->i", normals, polygon - point)
+    if np.any(gaps < 0.0):
+        return 0.0
+    speeds = normals @ ray
+    ahead = speeds > 1e-12
+    return float(np.min(gaps[ahead] / speeds[ahead]))
+
+
 def stacked(polygons: list[np.ndarray]) -> np.ndarray:
     """(n, k, 2) polygons of up to k corners, the last one repeated where there are fewer."""
     most = max(len(polygon) for polygon in polygons)

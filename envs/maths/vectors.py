@@ -33,6 +33,15 @@ def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray):
         out[a] = 0.5 * total
 
 
+def rotation_vector(R: np.ndarray) -> np.ndarray:
+    """(3,) angle times axis of a rotation: φ with R = exp(skew(φ)), |φ| < π [rad]."""
+    sine_axis = np.empty(3)
+    rotation_error(np.eye(3), np.array(R), sine_axis)
+    sine = float(np.linalg.norm(sine_axis))
+    angle = np.arctan2(sine, 0.5 * (np.trace(R) - 1.0))
+    return sine_axis if sine < 1e-9 else sine_axis * (angle / sine)
+
+
 def skew(r: np.ndarray) -> np.ndarray:
     """(3, 3) matrix of the cross product: skew(r) f = r × f."""
     return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])

@@ -3,6 +3,7 @@
 import numpy as np
 
 from poise.envs.compiled.copies import Copyable
+from poise.envs.maths.polygons import ray_to_edge
 
 from .arrays import RobotArrays
 from .kinematics import StateArrays, support_distance, update_support
@@ -184,15 +185,7 @@ class RobotState(Copyable):
         """
         angle = np.radians(direction) + self.heading_yaw
         ray = np.array([np.cos(angle), np.sin(angle)])
-        polygon = self.support_polygon
-        edges = np.roll(polygon, -1, axis=0) - polygon
-        normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)  # outward
-        gaps = np.einsum("ij,ij->i", normals, polygon - self.com[:2])
-        if np.any(gaps < 0.0):
-            return 0.0
-        speeds = normals @ ray
-        ahead = speeds > 1e-12
-        return float(np.min(gaps[ahead] / speeds[ahead]))
+        return ray_to_edge(self.support_polygon, self.com[:2], ray)
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:

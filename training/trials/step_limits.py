@@ -11,6 +11,7 @@ import numpy as np
 from poise.baselines.stepping.planner import StepLimits
 from poise.baselines.stepping.reach import Reach
 from poise.envs.maths.pendulum import capture_distance, duration_factor
+from poise.envs.maths.polygons import ray_to_edge
 
 from .players import Player
 from .push_limits import PushLimits
@@ -43,13 +44,7 @@ class NStepLimit:
 
     def reach(self, direction: float) -> float:
         """r [m], `direction` in degrees."""
-        ray, region = _unit(direction), self._region
-        edges = np.roll(region, -1, axis=0) - region
-        normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
-        speeds = normals @ ray
-        ahead = speeds > 1e-12
-        gaps = np.einsum("ij,ij->i", normals, region)
-        return float(np.min(gaps[ahead] / speeds[ahead]))
+        return ray_to_edge(self._region, np.zeros(2), _unit(direction))
 
     def length(self, direction: float) -> float:
         """l [m], `direction` in degrees: within the box and the speeds of `steps`."""

@@ -289,7 +289,9 @@ def test_the_gate_opens_with_the_capture_point():
         assert opened == pytest.approx(share, abs=1e-9)
 
 
-@pytest.mark.parametrize("changes", [{"smoothing": 0.05}, {"gate": 0.04}, {"controller": "macchietto09"}])
+@pytest.mark.parametrize(
+    "changes", [{"smoothing": 0.05}, {"gate": 0.04}, {"controller": "macchietto09"}]
+)
 def test_a_replica_acts_alike(changes):
     """Whatever an environment was made with, its copies have too: the same bits."""
     first = ResidualBalanceEnv(robot(), pushes=None, **changes)

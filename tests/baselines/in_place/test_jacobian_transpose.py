@@ -5,8 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.controller import Targets
-from poise.baselines.in_place.jacobian_transpose import JacobianTranspose, rotation_vector
+from poise.baselines.in_place.jacobian_transpose import JacobianTranspose
 from poise.baselines.in_place.wrenches import joint_torques, sole_wrenches
+from poise.envs.maths.vectors import rotation_vector
 from tests.support.shared import generic_state, robot
 
 
