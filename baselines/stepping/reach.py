@@ -10,7 +10,7 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
 from poise.envs.maths.polygons import clipped, convex_hull, stacked
-from poise.envs.maths.vectors import turn
+from poise.envs.maths.vectors import placed, turn, turned
 from poise.envs.robots.robot import Robot
 
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
@@ -86,8 +86,7 @@ def distance_beyond(r, fx, fy, sx, sy, cos, sin, x, y):
     worst = -np.inf
     for d in range(r.directions.shape[0]):
         # the direction, turned
-        dx = cos * r.directions[d, 0] - sin * r.directions[d, 1]
-        dy = sin * r.directions[d, 0] + cos * r.directions[d, 1]
+        dx, dy = turned(cos, sin, r.directions[d, 0], r.directions[d, 1])
         a, b = fx * dx + fy * dy, sx * dx + sy * dy
         reach = -np.inf
         for k in range(r.shares.shape[0]):
@@ -110,7 +109,7 @@ def reach_of_one(r, sole, point, cos, sin, out):
     """What a sole at `point` reaches alone into rows of `out` (≥ k, 2); how many they are."""
     for i in range(r.corners[sole]):
         u, v = r.alone[sole, i, 0], r.alone[sole, i, 1]
-        out[i, 0], out[i, 1] = point[0] + cos * u - sin * v, point[1] + sin * u + cos * v
+        out[i, 0], out[i, 1] = placed(point[0], point[1], cos, sin, u, v)
     return r.corners[sole]
 
 
@@ -127,7 +126,7 @@ def reach_of_two(r, points, cos, sin, cloud, out):
         x, y = a * points[0, 0] + b * points[1, 0], a * points[0, 1] + b * points[1, 1]
         for i in range(r.sums.shape[1]):
             u, v = r.sums[k, i, 0], r.sums[k, i, 1]
-            cloud[n, 0], cloud[n, 1] = x + cos * u - sin * v, y + sin * u + cos * v
+            cloud[n, 0], cloud[n, 1] = placed(x, y, cos, sin, u, v)
             n += 1
     return convex_hull(cloud, n, LINE, out)
 

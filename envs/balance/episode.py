@@ -8,6 +8,7 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
+from poise.envs.maths.vectors import along
 from poise.envs.physics.arrays import Plant, RobotArrays
 from poise.envs.physics.kinematics import StateArrays, support_distance, update_support
 
@@ -234,12 +235,12 @@ def judge_step(
     for a in range(e.action.shape[0]):
         action += e.action[a] ** 2 / e.action.shape[0]
         action_rate += (e.action[a] - e.last_action[a]) ** 2 / e.action.shape[0]
-    along = (cos * com_x + sin * com_y) / scale.support_x
-    across = (cos * com_y - sin * com_x) / scale.support_y
-    com_error = along * along + across * across
-    along = (cos * xi_x + sin * xi_y) / scale.support_x
-    across = (cos * xi_y - sin * xi_x) / scale.support_y
-    capture_error = along * along + across * across
+    x, y = along(cos, sin, com_x, com_y)
+    x, y = x / scale.support_x, y / scale.support_y
+    com_error = x * x + y * y
+    x, y = along(cos, sin, xi_x, xi_y)
+    x, y = x / scale.support_x, y / scale.support_y
+    capture_error = x * x + y * y
     terms = e.reward_terms
     terms[0] = 1.0
     terms[1] = np.exp(-4.0 * com_error)

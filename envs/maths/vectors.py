@@ -22,6 +22,24 @@ def cross(a, b, out):
 
 
 @compiled
+def along(cos: float, sin: float, x: float, y: float) -> tuple[float, float]:
+    """A horizontal vector (x, y) of the world along the axes of a frame turned by (cos, sin)."""
+    return cos * x + sin * y, cos * y - sin * x
+
+
+@compiled
+def turned(cos: float, sin: float, x: float, y: float) -> tuple[float, float]:
+    """(x, y) along the axes of a frame turned by (cos, sin), in the world; undoes `along`."""
+    return cos * x - sin * y, sin * x + cos * y
+
+
+@compiled
+def placed(ox: float, oy: float, cos: float, sin: float, x: float, y: float) -> tuple[float, float]:
+    """The point (x, y) of a frame at (ox, oy) turned by (cos, sin), in the world."""
+    return ox + cos * x - sin * y, oy + sin * x + cos * y
+
+
+@compiled
 def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray):
     """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn from
     one to the other."""
