@@ -1,11 +1,13 @@
 """What every controller is: state and targets in, joint torques out."""
 
+import inspect
 from dataclasses import dataclass, field, fields
 from operator import is_not
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import apart
@@ -104,8 +106,12 @@ class Targets(Copyable):
         return self._block
 
 
+@runtime_checkable
 class Controller(Protocol):
-    """A balance controller. It knows no environment and never sees a push."""
+    """A balance controller. It knows no environment and never sees a push.
+
+    These three are enough. One that derives from `BaseController` can tell more of itself.
+    """
 
     period: float  #: seconds between two calls of `torques`
 
@@ -114,3 +120,137 @@ class Controller(Protocol):
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] to hold for one `period`."""
+
+
+NO_WRENCH = np.zeros(6)
+NO_WRENCH.flags.writeable = False
+
+
+class BaseController(Copyable):
+    """A `Controller`, and what environments and reports ask of one besides, with defaults.
+
+    A subclass has `robot` and `period`, defines `torques`, and replaces what is different for it.
+    """
+
+    robot: Robot  #: that it is made for
+    period: float  #: seconds between two calls of `torques`
+    config: Any = None  #: that it was made from
+    com_offset: float = 0.0  #: forward, of the CoM that it stands with from the motion's [m]
+
+    @property
+    def failures(self) -> int:
+        """The ticks since the reset at which it found no solution."""
+        return 0
+
+    @property
+    def root_wrench(self) -> np.ndarray:
+        """(6,) force [N] and moment [N·m] about the CoM that it asks for on the root, if soft."""
+        return NO_WRENCH
+
+    @property
+    def unwrapped(self) -> Controller:
+        """The controller that decides: the inner one of a `WrappedController`, else itself."""
+        return self
+
+    def reset(self, state: RobotState) -> None:
+        """Forget everything; a new trial starts at `state`. By default there is nothing."""
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] to hold for one `period`."""
+        raise NotImplementedError
+
+    def another(self) -> "BaseController":
+        """A new controller like this one, with a memory of its own.
+
+        Raises ConfigError where `robot` and `config` are not all that it is made from.
+        """
+        if tuple(inspect.signature(type(self)).parameters) != ("robot", "config"):
+            raise cannot_be_shared()
+        maker: Any = type(self)
+        return maker(self.robot, self.config)
+
+
+class CompiledController(BaseController):
+    """A controller whose tick compiled code can run, without a call of Python.
+
+    The environment then never calls `torques`. So a subclass that defines `torques` anew runs from
+    Python, unless it also defines `compiled_tick` anew.
+    """
+
+    _same_tick = True  # whether `compiled_tick` is of the class that `torques` is of, or below it
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "torques" in vars(cls) or "compiled_tick" in vars(cls):
+            cls._same_tick = "compiled_tick" in vars(cls)
+
+    @property
+    def compiled(self) -> bool:
+        """Whether `compiled_tick` does what `torques` does; else `torques` is called."""
+        return self._same_tick
+
+    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Block]:
+        """A kernel's address and the block it works on: one call is one tick, see `outputs`."""
+        raise NotImplementedError
+
+    def outputs(self) -> Outputs:
+        """The arrays in which a tick leaves its results."""
+        raise NotImplementedError
+
+    def gains(self) -> Any:
+        """The block of gains that `compiled_tick` is bound to: it is bound anew to another one."""
+        raise NotImplementedError
+
+
+class WrappedController(BaseController):
+    """A controller around another one, `inner`, of which it tells what that tells of itself.
+
+    It calls `torques` of the inner one, which may be any `Controller`, for `robot`.
+    """
+
+    def __init__(self, inner: Controller, robot: Robot):
+        self.inner, self.period = inner, inner.period
+        self._told = inner if isinstance(inner, BaseController) else BaseController()
+        self.robot = inner.robot if isinstance(inner, BaseController) else robot
+        self.com_offset = self._told.com_offset
+
+    @property
+    def failures(self) -> int:
+        """See `BaseController`."""
+        return self._told.failures
+
+    @property
+    def root_wrench(self) -> np.ndarray:
+        """See `BaseController`."""
+        return self._told.root_wrench
+
+    @property
+    def unwrapped(self) -> Controller:
+        """The innermost controller."""
+        return self.inner.unwrapped if isinstance(self.inner, BaseController) else self.inner
+
+    def reset(self, state: RobotState) -> None:
+        """Forget everything; a new trial starts at `state`."""
+        self.inner.reset(state)
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] to hold for one `period`."""
+        return self.inner.torques(state, targets)
+
+    def another(self) -> BaseController:
+        """Raises ConfigError: the inner one may be of any kind."""
+        raise cannot_be_shared()
+
+
+def told_by(controller: Controller, robot: Robot) -> BaseController:
+    """The controller, with the defaults of a `BaseController` where it is none."""
+    if isinstance(controller, BaseController):
+        return controller
+    return WrappedController(controller, robot)
+
+
+def cannot_be_shared() -> ConfigError:
+    """The error of an environment that is asked for another one like it."""
+    return ConfigError(
+        "one object cannot control several environments: give each its own", field="controller"
+    )

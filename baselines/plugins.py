@@ -16,12 +16,11 @@ from typing import Any, Literal
 import numpy as np
 
 from poise.configs.errors import ConfigError, PoiseError
-from poise.envs.compiled.copies import Copyable
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .allowance import NAME, allowing, check_allowed, is_outside
-from .controller import Targets
+from .controller import BaseController, Controller, Targets, WrappedController
 
 METHODS = ("period", "reset", "torques")
 
@@ -82,20 +81,22 @@ def make_outside(name: str, robot: Robot, arguments: dict[str, Any] | None = Non
         ) from error
 
 
-class OutsideController(Copyable):
+class OutsideController(WrappedController):
     """A controller from outside, whose torques are checked before they act.
 
     A wrong shape or a number that is not finite is an error: MuJoCo would act on zeros instead.
+    One that derives from `BaseController` tells more than its torques.
     """
 
     def __init__(self, robot: Robot, config: OutsideConfig):
-        self.robot, self.config = robot, config
         with allowing(config.name):
-            self.inner = make_outside(config.name, robot, config.arguments)
-        missing = [name for name in METHODS if not hasattr(self.inner, name)]
-        if missing:
+            inner = make_outside(config.name, robot, config.arguments)
+        if not isinstance(inner, Controller):
+            missing = [name for name in METHODS if not hasattr(inner, name)]
             raise ConfigError(f"is no controller: it lacks {', '.join(missing)}",
                               source=config.name)  # fmt: skip
+        super().__init__(inner, robot)
+        self.robot, self.config = robot, config
         try:
             self.period = float(self.inner.period)
         except (TypeError, ValueError):
@@ -104,17 +105,12 @@ class OutsideController(Copyable):
             raise ConfigError(f"must be seconds, at most 1, not {self.inner.period!r}",
                               source=config.name, field="period")  # fmt: skip
 
-    def __getattr__(self, name: str) -> Any:  # failures, root_wrench, com_offset
-        if name == "inner" or name.startswith("__"):  # a copy in the making has none yet
-            raise AttributeError(name)
-        return getattr(self.inner, name)
-
     def __reduce__(self) -> tuple[Any, ...]:
         return _blank, (type(self), self.config.name), self.__getstate__()
 
-    def reset(self, state: RobotState) -> None:
-        """Forget everything; a new trial starts at `state`."""
-        self.inner.reset(state)
+    def another(self) -> BaseController:
+        """The same class with the same arguments, made anew."""
+        return type(self)(self.robot, self.config)
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m]; raises PoiseError for any that are none."""

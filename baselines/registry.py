@@ -21,6 +21,7 @@ from poise.configs.schema import build, on_base, read_yaml
 from poise.envs.robots.robot import Robot
 
 from .allowance import is_outside
+from .controller import Controller
 from .plugins import OutsideConfig, OutsideController, outside_config
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration).
@@ -39,8 +40,6 @@ KINDS: dict[str, tuple[type, type]] = {
     "ipm-step": (IPMStepConfig, IPMStep),
     "simbicon": (SimbiconConfig, Simbicon),
 }
-
-CONTROLLERS = tuple(controller for _, controller in KINDS.values())
 
 
 def controller_config(controller: str | Path | Mapping[str, Any]) -> Any:
@@ -85,7 +84,7 @@ def load_controller(controller: Any, robot: Robot) -> Any:
     for config_class, controller_class in KINDS.values():
         if type(controller) is config_class:
             return controller_class(robot, controller)
-    if all(hasattr(controller, name) for name in ("period", "reset", "torques")):
+    if isinstance(controller, Controller):
         return controller
     raise ConfigError(
         f"must be a name, a .yaml file, a mapping or a controller, not {shown(controller)}",

@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import allowing, named
-from poise.baselines.controller import Controller, Targets
+from poise.baselines.controller import CompiledController, Controller, Targets, told_by
 from poise.baselines.motions.motion import ReferenceMotion, load_motion
 from poise.baselines.motions.targets import Motion
-from poise.baselines.registry import CONTROLLERS, load_controller
-from poise.baselines.stepping.capture_step import CaptureStep
-from poise.baselines.stepping.ipm_step import IPMStep
+from poise.baselines.registry import load_controller
 from poise.baselines.warmup import prepare
-from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.base import BalanceEnv, EnvConfig
@@ -40,8 +38,6 @@ from .policy_step import (
     set_offsets,
     soft_root_force,
 )
-
-COMPILED = (MomentumQP, CaptureStep, IPMStep)  # controllers with a `compiled_tick`
 
 
 @dataclass(frozen=True)
@@ -292,18 +288,19 @@ class ResidualBalanceEnv(BalanceEnv):
 
     @controller.setter
     def controller(self, controller: Any) -> None:
-        made_for = getattr(controller, "robot", self.robot)
+        told = told_by(controller, self.robot)
+        made_for = told.robot
         if made_for.fingerprint != self.robot.fingerprint:  # compiled code trusts array sizes
             raise ConfigError(
                 f"is for the robot {made_for.name!r}, not {self.robot.name!r}", field="controller"
             )
-        period = controller.period
+        period = told.period
         self.control_substeps = self._whole(period, self.arrays.timestep, "controller period")
         self.ticks = self._whole(self.config.policy_period, period, "policy_period")
-        self._controller = controller
-        # other solvers and controllers are called from Python, tick by tick
-        self._compiled = type(controller) in COMPILED and controller.solver is None
-        self._com_offset = float(getattr(controller, "com_offset", 0.0))
+        self._controller, self._told = controller, told
+        # all others are called from Python, tick by tick
+        self._compiled = isinstance(controller, CompiledController) and controller.compiled
+        self._com_offset = float(told.com_offset)
         self._step = None
         self._bound: tuple[ResidualStep, Any]  # what `_step` works on, the gains when it was made
         self._aim: Aim | None = None
@@ -312,16 +309,11 @@ class ResidualBalanceEnv(BalanceEnv):
     def arguments(self) -> dict[str, Any]:
         """What makes another environment like this one; robot and motion are shared.
 
-        Raises ConfigError for a controller from outside: its memory cannot be shared.
+        Raises ConfigError for a controller that cannot be made anew: its memory cannot be shared.
         """
-        if type(self.controller) not in CONTROLLERS:
-            raise ConfigError(
-                "one object cannot control several environments: give each its own",
-                field="controller",
-            )
         return {
             **super().arguments(),
-            "controller": self.controller.config,
+            "controller": self._told.another(),
             "motion": self.motion,
             "residual": self.residual,
             "smoothing": self.smoothing,
@@ -356,7 +348,7 @@ class ResidualBalanceEnv(BalanceEnv):
         """See `BalanceEnv`: controllers with a compiled tick and solver."""
         if not self._compiled:
             return None
-        known, gains, pushes = self._step, self.controller.parameters, self.simulation.push_table
+        known, gains, pushes = self._step, self.controller.gains(), self.simulation.push_table
         if known is not None:
             bound, made_with = self._bound
             if bound.episode is self.episode and bound.pushes is pushes and made_with is gains:
@@ -399,11 +391,11 @@ class ResidualBalanceEnv(BalanceEnv):
         for _ in range(self.ticks):
             self._update_targets()
             ctrl[:] = self.controller.torques(sim.state, self.targets)
-            wrench[:] = getattr(self.controller, "root_wrench", 0.0)
+            wrench[:] = self._told.root_wrench
             self._push_root(wrench)
             record(accounts)
             sim.step(ctrl, self.control_substeps)
-        e.metrics[FAILURES] = getattr(self.controller, "failures", 0)
+        e.metrics[FAILURES] = self._told.failures
         judge_step(
             self.arrays, sim.plant, s, self.scales, self.judge, self.targets.q_ref,
             ctrl, sim.time, e,

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 
-from poise.baselines.controller import Targets
+from poise.baselines.controller import Controller, Targets, WrappedController
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.episode import judge_step, record_tick
 from poise.envs.balance.torque import TorqueBalanceEnv
-from poise.envs.compiled.copies import Copyable
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 from poise.envs.sensors.delayed import SensedSimulation
@@ -21,17 +19,12 @@ from .residual import ResidualBalanceEnv
 from .stepping import ResidualStepEnv
 
 
-class SensingController(Copyable):
+class SensingController(WrappedController):
     """Hands the believed state to a controller, whatever state it is called with."""
 
-    def __init__(self, controller: Any):
-        self.inner, self.period = controller, controller.period
+    def __init__(self, controller: Controller, robot: Robot):
+        super().__init__(controller, robot)
         self.simulation: SensedSimulation | None = None
-
-    def __getattr__(self, name: str) -> Any:  # failures, root_wrench, com_offset, robot, ...
-        if name == "inner" or name.startswith("__"):  # a copy in the making has none yet
-            raise AttributeError(name)
-        return getattr(self.inner, name)
 
     def _believed(self) -> RobotState:
         assert self.simulation is not None
@@ -117,7 +110,7 @@ def sensed_env(env: BalanceEnv) -> SensedResidualEnv | SensedTorqueEnv:
         return kind(
             env.robot,
             env.config,
-            controller=SensingController(env.controller),
+            controller=SensingController(env.controller, env.robot),
             motion=env.motion,
             residual=env.residual,
             smoothing=env.smoothing,

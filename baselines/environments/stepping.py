@@ -8,16 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.stepping.offsets import (
-    COM,
-    COP,
-    FOOTHOLD,
-    HEIGHT,
-    LEAN,
-    TIME,
-    TRIGGER,
-    StepShift,
-)
+from poise.baselines.controller import told_by
+from poise.baselines.stepping.controller import SteppingController
 from poise.baselines.stepping.swing import SwingArrays, time_left
 from poise.baselines.stepping.tick import StepMemory
 from poise.configs.errors import ConfigError
@@ -167,8 +159,8 @@ class ResidualStepEnv(ResidualBalanceEnv):
 
     Info: besides those of `ResidualBalanceEnv`, "steps", begun in this episode.
 
-    Arguments: as of `ResidualBalanceEnv`; `controller` must be one that steps, with a `shift` and
-    `stepping` as in `stepping/offsets.py`; `residual` is a `StepScales`.
+    Arguments: as of `ResidualBalanceEnv`; `controller` must be a `SteppingController`;
+    `residual` is a `StepScales`.
 
     Version history: v0, first release.
     """
@@ -188,13 +180,12 @@ class ResidualStepEnv(ResidualBalanceEnv):
     @ResidualBalanceEnv.controller.setter  # type: ignore[attr-defined]
     def controller(self, controller: Any) -> None:
         """As of `ResidualBalanceEnv`; raises ConfigError for one that does not step."""
-        if not hasattr(controller, "shift") or not hasattr(controller, "stepping"):
+        stepper = told_by(controller, self.robot).unwrapped
+        if not isinstance(stepper, SteppingController):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
         ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
-        if isinstance(controller.shift, StepShift):  # one array is both
-            self._offsets = controller.shift.values
-        else:
-            self._offsets = apart(len(self._offsets))
+        self.stepper = stepper  #: the controller that steps, of which `controller` may be a wrapper
+        self._offsets = stepper.shift.values  # one array is both
         self._residual = replace(self._residual, offsets=self._offsets)
 
     def _observation_terms(self, soles: list[str]) -> list[Term]:
@@ -214,23 +205,13 @@ class ResidualStepEnv(ResidualBalanceEnv):
 
     def _observe(self) -> None:
         super()._observe()
-        told, sight = np.array(self.controller.stepping().told()), self.scales
+        told, sight = np.array(self.stepper.stepping().told()), self.scales
         observe_step(
             StepSight(
                 self.simulation.state_arrays, told, sight.height, sight.omega,
                 self.episode.observation,
             )
         )  # fmt: skip
-
-    def _set_offsets(self) -> None:
-        super()._set_offsets()
-        offsets, shift = self._offsets, self.controller.shift
-        if getattr(shift, "values", None) is offsets:
-            return
-        shift.com, shift.cop, shift.lean, shift.foothold = (
-            offsets[first : first + 2].copy() for first in (COM, COP, LEAN, FOOTHOLD)
-        )
-        shift.height, shift.time, shift.trigger = offsets[[HEIGHT, TIME, TRIGGER]].tolist()
 
     def _whole_step(self, bound: ResidualStep) -> CompiledStep:
         alone = super()._whole_step(bound)
@@ -248,7 +229,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
 
     def info(self) -> dict[str, Any]:
         """As of `ResidualBalanceEnv`, and the number of steps."""
-        return {**super().info(), "steps": self.controller.stepping().steps}
+        return {**super().info(), "steps": self.stepper.stepping().steps}
 
 
 vector_env = partial(make_vector_env, ResidualStepEnv)  # for gymnasium.make_vec

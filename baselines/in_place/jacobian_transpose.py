@@ -5,8 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from poise.baselines.controller import Targets
-from poise.envs.compiled.copies import Copyable
+from poise.baselines.controller import BaseController, Targets
 from poise.envs.maths.vectors import rotation_vector
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
@@ -32,7 +31,7 @@ class JacobianTransposeConfig:
     posture: PDGains = field(default_factory=lambda: PDGains(leg=0.1, trunk=0.5, damping=0.3))
 
 
-class JacobianTranspose(Copyable):
+class JacobianTranspose(BaseController):
     """τ = h − J_soleᵀ w + posture PD, w the smallest sole wrenches of the virtual wrench.
 
         F = m g e_z + m (s (c_ref − c) + 2 ζ √s (ċ_ref − ċ))       on the CoM

@@ -5,9 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from poise.baselines.controller import Targets
+from poise.baselines.controller import BaseController, Targets
 from poise.baselines.whole_body.parameters import joint_kinds
-from poise.envs.compiled.copies import Copyable
 from poise.envs.physics.arrays import RobotArrays, robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -52,7 +51,7 @@ def holding_torques(state: RobotState) -> np.ndarray:
     return joint_torques(state, sole_wrenches(state, state.A_bias))
 
 
-class PD(Copyable):
+class PD(BaseController):
     """τ = τ_hold + K (q_ref − q) + D (v_ref − v), clipped to the motors' limits."""
 
     def __init__(self, robot: Robot, config: PDConfig | None = None):
@@ -93,7 +92,7 @@ class StablePDConfig:
     feedforward: bool = True
 
 
-class StablePD(Copyable):
+class StablePD(BaseController):
     """τ = τ_hold + K (q_ref − q − Δt v) + D (v_ref − v − Δt v̇), soles at rest.
 
     v̇ solves, with K and D on the joints only,

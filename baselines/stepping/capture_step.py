@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from poise.baselines.controller import Outputs, Targets
+from poise.baselines.controller import CompiledController, Outputs, Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets, contact_tick
 from poise.baselines.whole_body.momentum_qp import (
@@ -21,6 +21,7 @@ from poise.envs.compiled.memory import apart
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
+from .controller import SteppingController
 from .feedback import FallFeedback, StepFeedback
 from .offsets import STANDING, Stepping
 from .planner import Foothold, StepLimits, StepPlanner
@@ -117,7 +118,7 @@ def allocate_step_memory(reach: ReachArrays) -> StepMemory:
     )  # fmt: skip
 
 
-class CaptureStep(AroundQP):
+class CaptureStep(AroundQP, CompiledController, SteppingController):
     """The momentum QP with feet in place, and steps by capturability where those cannot hold.
 
     Stands by `qp`, bit for bit, until the capture point ξ leaves what the CoP can reach; then
@@ -169,6 +170,20 @@ class CaptureStep(AroundQP):
     @property
     def parameters(self) -> QPParameters:
         """Of the QP with feet in place."""
+        return self.qp.parameters
+
+    @property
+    def step_limits(self) -> StepLimits:
+        """See `SteppingController`."""
+        return self.planner.limits
+
+    @property
+    def compiled(self) -> bool:
+        """See `CompiledController`; other solvers are called from Python."""
+        return super().compiled and self.solver is None
+
+    def gains(self) -> Any:
+        """See `CompiledController`."""
         return self.qp.parameters
 
     def outputs(self) -> Outputs:

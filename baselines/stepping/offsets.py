@@ -1,6 +1,6 @@
 """What a policy adds to a stepping controller's choices, and where that is in its steps.
 
-A controller with a `shift` and a method `stepping` can be used by `environments/stepping.py`.
+A `SteppingController` has both, and can be used by `environments/stepping.py`.
 """
 
 from typing import NamedTuple

@@ -6,11 +6,10 @@ from typing import Literal
 import mujoco
 import numpy as np
 
-from poise.baselines.controller import Targets
+from poise.baselines.controller import BaseController, Targets
 from poise.baselines.in_place.pd import PDGains, joint_gains, motor_torques
 from poise.baselines.stepping.reach import Reach, sides
 from poise.configs.errors import ConfigError
-from poise.envs.compiled.copies import Copyable
 from poise.envs.maths.vectors import turn
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
@@ -69,7 +68,7 @@ class SimbiconConfig:
     joints: PDGains = field(default_factory=PDGains)  # of waist and arms
 
 
-class Simbicon(Copyable):
+class Simbicon(BaseController):
     """Marks time: left and right foot in turn, each lifted for a time, then lowered to the ground.
 
     Four states, two for each foot [Yin07; Notes, lecture 11]. In each

@@ -1,17 +1,16 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from poise.baselines.controller import Outputs, Targets
+from poise.baselines.controller import BaseController, CompiledController, Outputs, Targets
 from poise.baselines.solvers import QP, Status, make_solver
 from poise.baselines.solvers.dual_active_set import solve_dual
 from poise.baselines.solvers.scaled_rows import INFEASIBLE
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import address_of, call
-from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
 from poise.envs.maths.vectors import copy
@@ -146,7 +145,7 @@ def momentum_tick(t: Tick):
     accept(a.state, a.parameters, a.workspace, t.memory)
 
 
-class MomentumQP(Copyable):
+class MomentumQP(CompiledController):
     """Tracks a posture, the CoM through linear and the CoP through angular momentum.
 
     `torques` solves the reduced problem of `reduced_qp.py`, whose readable form is
@@ -208,6 +207,15 @@ class MomentumQP(Copyable):
         tick = self.tick(state, targets)
         return address_of(momentum_tick, tick), tick
 
+    @property
+    def compiled(self) -> bool:
+        """See `CompiledController`; other solvers are called from Python."""
+        return super().compiled and self.solver is None
+
+    def gains(self) -> Any:
+        """See `CompiledController`."""
+        return self.parameters
+
     def outputs(self) -> Outputs:
         """See `Outputs`."""
         ws, p = self.workspace, self.parameters
@@ -258,7 +266,7 @@ class MomentumQP(Copyable):
         return ws.tau[self._motor_joints].copy()
 
 
-class AroundQP(Copyable):
+class AroundQP(BaseController):
     """Holds the QP in `qp` and tells what it tells: period, CoM offset, failures, root wrench."""
 
     def __init__(self, robot: Robot, qp: MomentumQPConfig):

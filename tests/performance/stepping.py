@@ -11,6 +11,7 @@ from collections import defaultdict
 
 import numpy as np
 
+from poise.baselines.controller import WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 
@@ -26,15 +27,12 @@ PUSHES = [
 SECONDS = 2.0
 
 
-class Clocked:
+class Clocked(WrappedController):
     """A stepping controller whose ticks are timed by what they do."""
 
-    def __init__(self, controller):
-        self.inner, self.period = controller, controller.period
+    def __init__(self, controller, robot):
+        super().__init__(controller, robot)
         self.seconds: dict[str, list[float]] = defaultdict(list)
-
-    def __getattr__(self, name):
-        return getattr(self.inner, name)
 
     def torques(self, state, targets):
         begun = time.thread_time()
@@ -70,7 +68,7 @@ def main() -> None:
         for name, env in envs.items():
             steps[name] += play(env, push)
     stepping = envs["ResidualStep-v0, capture-step"]
-    clocked = stepping.controller = Clocked(stepping.controller)
+    clocked = stepping.controller = Clocked(stepping.controller, stepping.robot)
     for push in PUSHES:
         play(stepping, push)
     print("| path | median | mean | steps per second |")

@@ -8,22 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.controller import Controller, WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.envs.robots.robot import Robot
 from poise.training.trials.players import Player
 
 ROUNDS = 3  # in which every controller has its turn
 SECONDS = 0.6  # of simulated time in a round, with a push at its start
 
 
-class Clocked:
+class Clocked(WrappedController):
     """A controller whose calls of `torques` are timed."""
 
-    def __init__(self, controller: Any):
-        self.inner, self.period = controller, controller.period
+    def __init__(self, controller: Controller, robot: Robot):
+        super().__init__(controller, robot)
         self.seconds: list[float] = []
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.inner, name)
 
     def torques(self, *arguments: Any) -> np.ndarray:
         begun = time.perf_counter()
@@ -53,11 +52,11 @@ class _Clock:
 
     def play(self, seed: int) -> None:
         env, act = self.player.env, self._timed(self.player.act)
-        inner = getattr(env, "controller", None)
+        inner = env.controller if isinstance(env, ResidualBalanceEnv) else None
         try:
             clocked = None
             if isinstance(env, ResidualBalanceEnv):
-                clocked = env.controller = Clocked(inner)
+                clocked = env.controller = Clocked(env.controller, env.robot)
             push = {"specific_impulse": 0.2, "start": 0.05}
             observation, _ = env.reset(seed=seed, options={"push": push})
             for _ in range(round(SECONDS / env.config.policy_period)):

@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.controller import told_by
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.stepping.controller import SteppingController
 from poise.baselines.stepping.planner import StepLimits
 from poise.baselines.stepping.reach import Reach
 from poise.envs.maths.pendulum import capture_distance, duration_factor
@@ -90,14 +93,21 @@ def stepping_limits(
         return {}
     planned, others = {}, {}
     for player in players:
-        planner = getattr(getattr(player.env, "controller", None), "planner", None)
-        own = getattr(planner, "limits", None)
+        own = _own_limits(player)
         stepped = [o.stepped and o.steps > 0 for o in outcomes[player.name] if o.recovered]
-        if isinstance(own, StepLimits):
+        if own is not None:
             planned[player.name] = NStepLimit(limits, own)
         elif stepped and np.mean(stepped) > STEPPING:
             others[player.name] = NStepLimit(limits)
     return planned | others
+
+
+def _own_limits(player: Player) -> StepLimits | None:
+    env = player.env
+    if not isinstance(env, ResidualBalanceEnv):
+        return None
+    controller = told_by(env.controller, env.robot).unwrapped
+    return controller.step_limits if isinstance(controller, SteppingController) else None
 
 
 def groups(steps: Mapping[str, NStepLimit]) -> dict[StepLimits, list[str]]:

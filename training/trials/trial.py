@@ -146,7 +146,6 @@ def run_trial(
 def _record(env: BalanceEnv, trial: Trial) -> dict[str, Any]:
     """What the environment has recorded about the episode."""
     m = env.episode.metrics
-    controller = getattr(env, "controller", None)
     recovered = env.recovered and not env.fallen
     pushed = max((push.start for push in trial.options["push"]), default=0.0)
     return {
@@ -162,7 +161,7 @@ def _record(env: BalanceEnv, trial: Trial) -> dict[str, Any]:
         "energy": _finite(m[episode.ENERGY]),
         "peak_torque": _finite(m[episode.PEAK_TORQUE]),
         "saturation": float(m[episode.SATURATED] / max(m[episode.TICKS], 1.0)),
-        "solver_failures": int(getattr(controller, "failures", 0)),
+        "solver_failures": int(m[episode.FAILURES]),
         "final_speed": _finite(float(np.linalg.norm(env.simulation.state.com_vel))),
         "root_force": _finite(m[episode.ROOT_FORCE]),
     }
