@@ -83,7 +83,7 @@ types-tree:
 	mkdir -p build/types/poise
 	for folder in envs baselines training configs; do \
 		ln -sfn ../../../$$folder build/types/poise/$$folder; done
-	ln -sf ../../../src/poise/__init__.py ../../../src/poise/py.typed build/types/poise/
+	ln -sf ../../../src/poise/__init__.py ../../../src/poise/lazy.py ../../../src/poise/py.typed build/types/poise/
 
 # The second environment holds the wheel alone; its dependencies are those of .venv, by a path
 # file, which does not bring the editable install with it.

@@ -2,3 +2,50 @@
 
 if __name__ == "baselines":
     raise ImportError("this folder is the package poise.baselines: write `import poise.baselines`")
+
+from typing import TYPE_CHECKING
+
+from poise.lazy import lazy
+
+__all__ = [
+    "BaseController",
+    "CaptureStep",
+    "CaptureStepConfig",
+    "CompiledController",
+    "Controller",
+    "MomentumQP",
+    "MomentumQPConfig",
+    "ReferenceMotion",
+    "ResidualBalanceEnv",
+    "ResidualScales",
+    "ResidualStepEnv",
+    "StepScales",
+    "SteppingController",
+    "Targets",
+    "load_controller",
+    "load_motion",
+]
+
+if TYPE_CHECKING:
+    from poise.baselines.controller import BaseController, CompiledController, Controller, Targets
+    from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
+    from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
+    from poise.baselines.motions.motion import ReferenceMotion, load_motion
+    from poise.baselines.registry import load_controller
+    from poise.baselines.stepping.capture_step import CaptureStep, CaptureStepConfig
+    from poise.baselines.stepping.controller import SteppingController
+    from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+else:
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "controller": ("BaseController", "CompiledController", "Controller", "Targets"),
+            "environments.residual": ("ResidualBalanceEnv", "ResidualScales"),
+            "environments.stepping": ("ResidualStepEnv", "StepScales"),
+            "motions.motion": ("ReferenceMotion", "load_motion"),
+            "registry": ("load_controller",),
+            "stepping.capture_step": ("CaptureStep", "CaptureStepConfig"),
+            "stepping.controller": ("SteppingController",),
+            "whole_body.momentum_qp": ("MomentumQP", "MomentumQPConfig"),
+        },
+    )

@@ -2,3 +2,68 @@
 
 if __name__ == "envs":
     raise ImportError("this folder is the package poise.envs: write `import poise.envs`")
+
+from typing import TYPE_CHECKING
+
+from poise.lazy import lazy
+
+__all__ = [
+    "BalanceEnv",
+    "BalanceVectorEnv",
+    "Camera",
+    "EnvBatch",
+    "EnvConfig",
+    "FallLimits",
+    "Kick",
+    "Push",
+    "PushSampler",
+    "RewardWeights",
+    "Robot",
+    "RobotState",
+    "SceneRenderer",
+    "Simulation",
+    "TorqueBalanceEnv",
+    "choose_gl_backend",
+    "load_robot",
+    "observation_table",
+    "parse_pushes",
+    "replicate",
+]
+
+if TYPE_CHECKING:
+    from poise.envs.balance.base import BalanceEnv
+    from poise.envs.balance.config import EnvConfig
+    from poise.envs.balance.episode import FallLimits, RewardWeights
+    from poise.envs.balance.observation import observation_table
+    from poise.envs.balance.torque import TorqueBalanceEnv
+    from poise.envs.physics.simulation import Simulation
+    from poise.envs.physics.state import RobotState
+    from poise.envs.pushes.options import parse_pushes
+    from poise.envs.pushes.push import Kick, Push
+    from poise.envs.pushes.sampler import PushSampler
+    from poise.envs.robots.robot import Robot, load_robot
+    from poise.envs.vector.batch import EnvBatch, replicate
+    from poise.envs.vector.vector_env import BalanceVectorEnv
+    from poise.envs.viewing.gl import choose_gl_backend
+    from poise.envs.viewing.renderer import Camera, SceneRenderer
+else:
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "balance.base": ("BalanceEnv",),
+            "balance.config": ("EnvConfig",),
+            "balance.episode": ("FallLimits", "RewardWeights"),
+            "balance.observation": ("observation_table",),
+            "balance.torque": ("TorqueBalanceEnv",),
+            "physics.simulation": ("Simulation",),
+            "physics.state": ("RobotState",),
+            "pushes.options": ("parse_pushes",),
+            "pushes.push": ("Kick", "Push"),
+            "pushes.sampler": ("PushSampler",),
+            "robots.robot": ("Robot", "load_robot"),
+            "vector.batch": ("EnvBatch", "replicate"),
+            "vector.vector_env": ("BalanceVectorEnv",),
+            "viewing.gl": ("choose_gl_backend",),
+            "viewing.renderer": ("Camera", "SceneRenderer"),
+        },
+    )

@@ -3,20 +3,15 @@
     python examples/own_controller.py
 
 `StifferAnkles` wraps the momentum QP and moves its CoP target with the capture point. It is a
-`poise.baselines.controller.Controller`: `period`, `reset(state)`, `torques(state, targets)`.
+`poise.baselines.Controller`: `period`, `reset(state)`, `torques(state, targets)`.
 """
 
 import gymnasium
 import numpy as np
 
 import poise  # noqa: F401  (registers the environments)
-from poise.baselines.controller import Targets
-from poise.baselines.registry import load_controller
-from poise.baselines.whole_body.momentum_qp import MomentumQP
-from poise.envs.physics.simulation import Simulation
-from poise.envs.physics.state import RobotState
-from poise.envs.pushes.options import parse_pushes
-from poise.envs.robots.robot import Robot, load_robot
+from poise.baselines import MomentumQP, Targets, load_controller
+from poise.envs import Robot, RobotState, Simulation, load_robot, parse_pushes
 
 PUSH = {"impulse": 8.0, "direction": 90.0, "duration": 0.1, "start": 0.5, "body": "torso"}
 

@@ -5,15 +5,15 @@ python examples/push_strip.py docs/images/push_strip.png
 
 import sys
 
-from poise.envs.viewing.gl import choose_gl_backend
+from poise.envs import choose_gl_backend
 
 choose_gl_backend()  # before anything loads MuJoCo
 
 import numpy as np  # noqa: E402
 
-from poise.baselines.environments.residual import ResidualBalanceEnv  # noqa: E402
-from poise.envs.viewing.renderer import SceneRenderer  # noqa: E402
-from poise.training.figures.video import frame_strip  # noqa: E402
+from poise.baselines import ResidualBalanceEnv  # noqa: E402
+from poise.envs import SceneRenderer  # noqa: E402
+from poise.training import frame_strip  # noqa: E402
 
 PUSH = {"impulse": 16.0, "direction": 0.0, "duration": 0.1, "start": 0.5, "body": "torso"}
 STEPS = (25, 30, 40, 48, 60, 80, 110, 150)  # policy steps of 20 ms

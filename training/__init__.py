@@ -2,3 +2,59 @@
 
 if __name__ == "training":
     raise ImportError("this folder is the package poise.training: write `import poise.training`")
+
+from typing import TYPE_CHECKING
+
+from poise.lazy import lazy
+
+__all__ = [
+    "Policy",
+    "ThreadedVecEnv",
+    "TrainConfig",
+    "compare",
+    "evaluate",
+    "frame_strip",
+    "load_policy",
+    "load_results",
+    "record",
+    "replay",
+    "run_benchmark",
+    "train",
+    "train_seeds",
+    "tune",
+    "write_report",
+]
+
+if TYPE_CHECKING:
+    from poise.training.benchmark.run import benchmark as run_benchmark
+    from poise.training.evaluation.evaluate import evaluate
+    from poise.training.figures.video import frame_strip, record
+    from poise.training.learning.config import TrainConfig
+    from poise.training.learning.policy import Policy, load_policy
+    from poise.training.learning.train import train
+    from poise.training.learning.train_seeds import train_seeds
+    from poise.training.learning.vec_env import ThreadedVecEnv
+    from poise.training.report.page import write_report
+    from poise.training.results.compare import compare
+    from poise.training.results.read import load_results
+    from poise.training.results.replay import replay
+    from poise.training.tuning.search import tune
+else:
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "benchmark.run": ("benchmark as run_benchmark",),
+            "evaluation.evaluate": ("evaluate",),
+            "figures.video": ("frame_strip", "record"),
+            "learning.config": ("TrainConfig",),
+            "learning.policy": ("Policy", "load_policy"),
+            "learning.train": ("train",),
+            "learning.train_seeds": ("train_seeds",),
+            "learning.vec_env": ("ThreadedVecEnv",),
+            "report.page": ("write_report",),
+            "results.compare": ("compare",),
+            "results.read": ("load_results",),
+            "results.replay": ("replay",),
+            "tuning.search": ("tune",),
+        },
+    )

@@ -1,1 +1,25 @@
 """The momentum QP: tasks, contacts and limits, as the papers write it and compiled."""
+
+from typing import TYPE_CHECKING
+
+from poise.lazy import lazy
+
+__all__ = [
+    "Bounds",
+    "Rows",
+    "build",
+]
+
+if TYPE_CHECKING:
+    from poise.baselines.whole_body.constraint_rows import Bounds
+    from poise.baselines.whole_body.formulation import build
+    from poise.baselines.whole_body.task_rows import Rows
+else:
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "constraint_rows": ("Bounds",),
+            "formulation": ("build",),
+            "task_rows": ("Rows",),
+        },
+    )

@@ -8,16 +8,27 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gymnasium.envs.registration import register
 
-if TYPE_CHECKING:
-    from poise.baselines.allowance import allowing
-    from poise.training.learning.policy import load_policy
+from poise.lazy import lazy
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "allowing", "load_policy"]
+__all__ = [
+    "ConfigError",
+    "PoiseError",
+    "__version__",
+    "allowing",
+    "baselines",
+    "benchmark",
+    "envs",
+    "evaluate",
+    "load_controller",
+    "load_policy",
+    "load_robot",
+    "training",
+]
 
 if "numba" not in sys.modules:
     # Numba takes these from a .numba_config.yaml of the current folder, too, wherever that came
@@ -42,14 +53,26 @@ register(
     vector_entry_point="poise.baselines.environments.stepping:vector_env",
 )
 
-
-def __getattr__(name: str) -> Any:
-    if name == "load_policy":
-        from poise.training.learning.policy import load_policy
-
-        return load_policy
-    if name == "allowing":
-        from poise.baselines.allowance import allowing
-
-        return allowing
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+if TYPE_CHECKING:
+    from poise import baselines, envs, training
+    from poise.baselines.allowance import allowing
+    from poise.baselines.registry import load_controller
+    from poise.configs.errors import ConfigError, PoiseError
+    from poise.envs.robots.robot import load_robot
+    from poise.training.benchmark.run import benchmark
+    from poise.training.evaluation.evaluate import evaluate
+    from poise.training.learning.policy import load_policy
+else:
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "": ("baselines", "envs", "training"),
+            "baselines.allowance": ("allowing",),
+            "baselines.registry": ("load_controller",),
+            "configs.errors": ("ConfigError", "PoiseError"),
+            "envs.robots.robot": ("load_robot",),
+            "training.benchmark.run": ("benchmark",),
+            "training.evaluation.evaluate": ("evaluate",),
+            "training.learning.policy": ("load_policy",),
+        },
+    )

@@ -63,7 +63,7 @@ def main(args: list[str] | None = None) -> None:
     with tempfile.TemporaryDirectory() as room:
         path = package(Path(room))
         empty = best("pass", path)
-        for code in ("import gymnasium", "import poise", "import poise.envs.balance.base"):
+        for code in ("import gymnasium", "import poise", "from poise.envs import BalanceEnv"):
             spent = best(code, path)
             print(f"| {code} | {spent.clock - empty.clock:.2f} s | {spent.cpu - empty.cpu:.2f} s |")
         if "--no-compile" not in args:
