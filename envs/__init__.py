@@ -44,8 +44,9 @@ if TYPE_CHECKING:
     from poise.envs.robots.robot import Robot, load_robot
     from poise.envs.vector.batch import EnvBatch, replicate
     from poise.envs.vector.vector_env import BalanceVectorEnv
+    from poise.envs.viewing.camera import Camera
     from poise.envs.viewing.gl import choose_gl_backend
-    from poise.envs.viewing.renderer import Camera, SceneRenderer
+    from poise.envs.viewing.renderer import SceneRenderer
 else:
     __getattr__, __dir__ = lazy(
         __name__,
@@ -63,7 +64,8 @@ else:
             "robots.robot": ("Robot", "load_robot"),
             "vector.batch": ("EnvBatch", "replicate"),
             "vector.vector_env": ("BalanceVectorEnv",),
+            "viewing.camera": ("Camera",),
             "viewing.gl": ("choose_gl_backend",),
-            "viewing.renderer": ("Camera", "SceneRenderer"),
+            "viewing.renderer": ("SceneRenderer",),
         },
     )

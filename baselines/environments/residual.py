@@ -223,8 +223,10 @@ class ResidualBalanceEnv(BalanceEnv):
     `motion` (a name, a .yaml file or a `ReferenceMotion`), `residual` (what an action of 1 adds, a
     `ResidualScales`), `smoothing` (time constant of the action [s]), `gate` (distance from rest at
     which the residual opens [m]), `render_mode` (None,
-    "rgb_array" or "human"), and the fields of `EnvConfig` by name: policy_period, duration, pushes,
-    noise, fall, reward. Fields may be plain mappings. Raises ConfigError naming what is wrong.
+    "rgb_array" or "human"), `width` and `height` of a frame [pixels], `camera` (None for Poise's
+    own, a `Camera`, or the name or id of one of the model's), and the fields of `EnvConfig` by
+    name: policy_period, duration, pushes, noise, fall, reward. Fields may be plain mappings. Raises
+    ConfigError naming what is wrong.
 
     Version history: v0, first release.
     """

@@ -5,11 +5,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
+import mujoco
 import numpy as np
 from gymnasium import spaces
 
 from poise.configs.errors import ConfigError, PoiseError, shown
-from poise.configs.numbers import finite_array, option_mapping, real_array, seed_number
+from poise.configs.numbers import (
+    finite_array,
+    option_mapping,
+    real_array,
+    seed_number,
+    whole_number,
+)
 from poise.envs.compiled.calls import CompiledStep
 from poise.envs.compiled.copies import Copyable
 from poise.envs.physics.arrays import RobotArrays
@@ -18,6 +25,7 @@ from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import push_info
 from poise.envs.robots.mirror import Mirror, mirror_robot
 from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.viewing.camera import Camera, find_camera
 
 from .config import EnvConfig as EnvConfig
 from .config import env_config
@@ -54,6 +62,9 @@ class BalanceEnv(Copyable, gymnasium.Env):
         config: EnvConfig | str | Path | Mapping | None = None,
         *,
         render_mode: str | None = None,
+        width: int = 640,
+        height: int = 480,
+        camera: Camera | Mapping[str, Any] | str | int | None = None,
         **overrides: Any,
     ):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
@@ -66,6 +77,9 @@ class BalanceEnv(Copyable, gymnasium.Env):
         self.robot = robot if isinstance(robot, Robot) else load_robot(robot)
         self.config = env_config(config, **overrides)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.policy_period)}
+        self.width = whole_number(width, 1, "width", "environment")  #: of a frame [pixels]
+        self.height = whole_number(height, 1, "height", "environment")
+        self.camera = find_camera(camera, self.robot.model)
         self.push_sampler = self.config.pushes  #: may be replaced between episodes
         self.simulation = Simulation(self.robot)
         self.arrays: RobotArrays = self.simulation.arrays
@@ -108,9 +122,20 @@ class BalanceEnv(Copyable, gymnasium.Env):
         self._simulation = simulation
         self._step: Any = None  # what compiled code is bound to, with the simulation of before
 
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model, for reading: environments of one robot share it."""
+        return self.simulation.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data of this environment, current after `reset` and after every `step`."""
+        return self.simulation.data
+
     def arguments(self) -> dict[str, Any]:
         """What makes another environment like this one; the robot is shared."""
-        return {"robot": self.robot, "config": self.config, "render_mode": self.render_mode}
+        names = ("robot", "config", "render_mode", "width", "height", "camera")
+        return {name: vars(self)[name] for name in names}
 
     @staticmethod
     def _whole(period: float, step: float, name: str) -> int:
@@ -331,13 +356,15 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return [info.copy() for info in infos]
 
     def render(self) -> np.ndarray | None:
-        """A frame (h, w, 3) for "rgb_array"; shows it for "human"."""
+        """A frame (height, width, 3) for "rgb_array"; shows it for "human"."""
         if self.render_mode is None:
             return None
         if self._renderer is None:
             from poise.envs.viewing.renderer import SceneRenderer
 
-            self._renderer = SceneRenderer(self.simulation, human=self.render_mode == "human")
+            self._renderer = SceneRenderer(
+                self.simulation, self.render_mode == "human", self.width, self.height, self.camera
+            )
         return self._renderer.render()
 
     def close(self) -> None:

@@ -215,8 +215,10 @@ class TorqueBalanceEnv(BalanceEnv):
 
     Arguments: `robot` (a name, a .yaml file or a `Robot`), `config` (an `EnvConfig`, a .yaml file
     or a mapping), `render_mode` (None,
-    "rgb_array" or "human"), and the fields of `EnvConfig` by name: policy_period, duration, pushes,
-    noise, fall, reward. Fields may be plain mappings. Raises ConfigError naming what is wrong.
+    "rgb_array" or "human"), `width` and `height` of a frame [pixels], `camera` (None for Poise's
+    own, a `Camera`, or the name or id of one of the model's), and the fields of `EnvConfig` by
+    name: policy_period, duration, pushes, noise, fall, reward. Fields may be plain mappings. Raises
+    ConfigError naming what is wrong.
 
     Version history: v0, first release.
     """

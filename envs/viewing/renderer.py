@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from poise.envs.physics.simulation import Simulation
 
 from .appearance import looks
+from .camera import Camera, find_camera, point
 from .offscreen import OffScreen
 from .overlays import draw, marks
 from .window import Viewer
@@ -19,15 +21,6 @@ MAX_GEOMS = 10_000
 XRAY = 0.55  # how strongly an overlay shines through what hides it
 LOOK_AT = 0.92  # height that the camera looks at, over the CoM height
 FOLLOW = 0.4  # [s] time constant with which the camera follows
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Where the camera stands, seen from the robot in its standing posture."""
-
-    azimuth: float = field(default=50.0)  # [deg] counter-clockwise: 0 = in front, 90 = left
-    elevation: float = field(default=22.0, metadata={"min": 0.0, "max": 90.0})  # [deg] above it
-    distance: float = field(default=4.7, metadata={"above": 0.0})  # over the CoM height
 
 
 class SceneRenderer:
@@ -42,9 +35,10 @@ class SceneRenderer:
         human: open MuJoCo's passive viewer, at most in real time, instead of returning frames.
         width: of a frame [pixels].
         height: of a frame [pixels].
-        camera: where it stands.
+        camera: where it stands, or which camera of the model it is, see `find_camera`.
 
     Raises:
+        ConfigError: there is no such camera.
         PoiseError: there is no OpenGL to draw with, or no display for the viewer.
     """
 
@@ -54,11 +48,12 @@ class SceneRenderer:
         human: bool,
         width: int = 640,
         height: int = 480,
-        camera: Camera | None = None,
+        camera: Camera | Mapping[str, Any] | str | int | None = None,
     ):
         self.simulation = simulation
-        self.camera = camera or Camera()
-        self.model = looks(simulation.robot, width, height, self.camera.azimuth)
+        self.camera = find_camera(camera, simulation.model)
+        own = self.camera if isinstance(self.camera, Camera) else Camera()
+        self.model = looks(simulation.robot, width, height, own.azimuth)
         self.data = mujoco.MjData(self.model)
         self.shown = np.inf  # simulation time of the last picture [s]
         self.due = 0.0  # wall clock at which the next one is shown [s]
@@ -66,9 +61,7 @@ class SceneRenderer:
         self.screen = None if human else OffScreen(self.model, width, height)
         self.viewer = Viewer(self.model, self.data) if human else None
         self.view = self.viewer.handle.cam if self.viewer else mujoco.MjvCamera()
-        self.view.azimuth = self.camera.azimuth + 180.0
-        self.view.elevation = -self.camera.elevation
-        self.view.distance = self.camera.distance * simulation.robot.height_com
+        point(self.view, self.camera, simulation.robot.height_com)
 
     @property
     def is_open(self) -> bool:

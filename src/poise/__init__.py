@@ -36,7 +36,8 @@ if "numba" not in sys.modules:
     for _name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
         os.environ.setdefault(_name, "")
 
-# No max_episode_steps: the environments end their episodes themselves, from their own config.
+# No max_episode_steps: the environments end their episodes themselves, after `duration`; a number
+# here would cut off those that are made longer.
 register(
     "poise/TorqueBalance-v0",
     entry_point="poise.envs.balance.torque:TorqueBalanceEnv",

@@ -1,131 +1,198 @@
-"""What a controller is given and what it must not know."""
+"""baselines/controller.py: what environments ask of a controller, and what it is by default."""
 
-from dataclasses import fields
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from poise.baselines.controller import Controller, Targets
-from poise.baselines.registry import load_controller
-from poise.baselines.whole_body.momentum_qp import MomentumQP
-from poise.configs.errors import ConfigError
-from poise.envs.physics.simulation import Simulation
-from tests.support.physics import controller, push, robot_named
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_named("humanoid")
-
-
-def test_standing_targets_are_met_by_the_standing_robot(robot):
-    """Of a robot that stands as described, every target is where it is."""
-    state = Simulation(robot).state
-    targets = Targets.standing(robot, state)
-    np.testing.assert_allclose(targets.q_ref, state.q, atol=1e-12)
-    np.testing.assert_allclose(targets.root_axes, state.root_axes, atol=1e-6)
-    assert targets.com[2] == pytest.approx(state.com[2], abs=1e-6)
-    np.testing.assert_allclose(targets.com[:2], np.mean(state.sole_points, axis=0)[:2], atol=1e-12)
-    np.testing.assert_array_equal(targets.cop, targets.com[:2])
-    for name in ("v_ref", "a_ref", "root_vel", "root_acc", "com_vel", "com_acc"):
-        assert not getattr(targets, name).any()
-
-
-def test_targets_are_shared_with_compiled_code(robot):
-    """Writing into a target reaches the controller; two Targets share nothing."""
-    state = Simulation(robot).state
-    first, second = Targets.standing(robot, state), Targets.standing(robot, state)
-    arrays = first.arrays()
-    first.com[0] += 0.05
-    assert arrays.com[0] == first.com[0] != second.com[0]
-    first.com_vel[0] = 1.0
-    assert second.com_vel[0] == 0.0
-    qp = controller(robot)
-    moved = qp.torques(state, first)
-    qp.reset(state)
-    assert np.abs(moved - qp.torques(state, second)).max() > 1.0
-
-
-def test_targets_take_the_values_of_others(robot):
-    """Every field, into arrays of their own."""
-    state = Simulation(robot).state
-    ours, theirs = (Targets.standing(robot, state) for _ in range(2))
-    for i, item in enumerate(fields(Targets)):
-        getattr(theirs, item.name)[:] = i + 1.0
-    ours.take(theirs)
-    for item in fields(Targets):
-        own, other = getattr(ours, item.name), getattr(theirs, item.name)
-        np.testing.assert_array_equal(own, other)
-        assert own is not other
-
-
-def test_momentum_qp_is_a_controller(robot):
-    """It has a period, `reset` and `torques`, and returns its own array of torques."""
-    qp: Controller = load_controller("momentum-qp", robot)
-    state = Simulation(robot).state
-    qp.reset(state)
-    torques = qp.torques(state, Targets.standing(robot, state))
-    assert isinstance(qp, MomentumQP) and qp.period > 0.0
-    assert torques.shape == (robot.model.nu,)
-    kept = torques.copy()
-    qp.torques(state, Targets.standing(robot, state))
-    np.testing.assert_array_equal(torques, kept)
-
-
-def test_a_controller_does_not_see_the_push(robot):
-    """While a push acts, torques are those for the same state without one; later they differ."""
-    pushed, calm = Simulation(robot), Simulation(robot)
-    pushed.reset(pushes=[push(robot, 0.3, 0.0, start=0.0)])
-    calm.reset()
-    ours, theirs = controller(robot), controller(robot)
-    targets = Targets.standing(robot, calm.state)
-    # the push is on from the first instant, and has moved nothing yet
-    np.testing.assert_array_equal(
-        ours.torques(pushed.state, targets), theirs.torques(calm.state, targets)
-    )
-    for simulation in (pushed, calm):
-        simulation.step(np.zeros(robot.model.nu), 2)
-    assert np.abs(pushed.data.xfrc_applied).max() > 10.0
-    assert np.abs(pushed.state.qvel - calm.state.qvel).max() > 0.01
-    # the same state without the push gives the same torques as with it
-    copy = pushed.state.copy()
-    ours.reset(copy)
-    theirs.reset(copy)
-    with_push = ours.torques(pushed.state, targets)
-    pushed.set_pushes([])
-    pushed.data.xfrc_applied[:] = 0.0
-    np.testing.assert_array_equal(theirs.torques(copy, targets), with_push)
-
-
-def test_reset_forgets(robot):
-    """After a reset, the same states give the same torques, bit for bit."""
-    qp, simulation = controller(robot), Simulation(robot)
-
-    def trial():
-        state = simulation.reset(pushes=[push(robot, 0.3, 45.0)])
-        qp.reset(state)
-        targets = Targets.standing(robot, state)
-        out = []
-        for _ in range(60):
-            out.append(qp.torques(state, targets))
-            state = simulation.step(out[-1], 2)
-        return np.array(out)
-
-    np.testing.assert_array_equal(trial(), trial())
-
-
-@pytest.mark.parametrize(
-    ("config", "field"),
-    [
-        ({"solver": "simplex"}, "solver"),
-        ({"solver": "osqp", "solver_options": {"eps": 1e-3}}, "eps"),
-        ({"root": "firm"}, "root"),
-        ({"posture": {"stifness": 3.0}}, "stifness"),
-        ({"com": {"weight": -1.0}}, "weight"),
-        ({"period": float("nan")}, "period"),
-    ],
+import poise
+from poise.baselines import (
+    BaseController,
+    CaptureStep,
+    CompiledController,
+    Controller,
+    MomentumQP,
+    ResidualBalanceEnv,
+    ResidualStepEnv,
+    SteppingController,
+    Targets,
+    load_controller,
 )
-def test_bad_configurations_are_refused(robot, config, field):
-    """The error names the field."""
-    with pytest.raises(ConfigError, match=field):
-        load_controller(config, robot)
+from poise.baselines.controller import WrappedController, told_by
+from poise.baselines.registry import KINDS
+from poise.configs.files import packaged
+from poise.envs import RobotState, Simulation, replicate
+from tests.support.shared import robot
+
+FOLDERS = ("baselines/environments", "training/trials", "training/benchmark")
+
+
+class Plain:
+    """Has the three that a controller needs, and nothing else."""
+
+    period = 0.004
+
+    def reset(self, state: RobotState) -> None:
+        """Nothing is remembered."""
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        return np.zeros(21)
+
+
+class Telling(BaseController):
+    """Tells of itself, and derives from nothing compiled."""
+
+    def __init__(self) -> None:
+        self.robot, self.period, self.com_offset = robot(), 0.004, 0.01
+
+    @property
+    def failures(self) -> int:
+        return 7
+
+    @property
+    def root_wrench(self) -> np.ndarray:
+        return np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        return np.zeros(21)
+
+
+class Changed(MomentumQP):
+    """Its torques are not those of the tick that it inherits."""
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        targets.com[0] += 0.01
+        return super().torques(state, targets)
+
+
+class Renamed(MomentumQP):
+    """A momentum QP, tick and all."""
+
+
+class Lagging(MomentumQP):
+    """Made from more than a robot and a configuration."""
+
+    def __init__(self, robot: Any, config: Any = None, lag: float = 0.1):
+        super().__init__(robot, config)
+        self.lag = lag
+
+
+def env_of(controller: Any, **arguments: Any) -> ResidualBalanceEnv:
+    return ResidualBalanceEnv(robot(), controller=controller, pushes=None, **arguments)
+
+
+@pytest.mark.parametrize("name", packaged("controllers"))
+def test_packaged_controllers_declare_what_is_asked(name: str) -> None:
+    controller = load_controller(name, robot())
+    assert isinstance(controller, BaseController) and isinstance(controller, Controller)
+    assert controller.unwrapped is controller and controller.failures == 0
+    assert controller.root_wrench.shape == (6,) and not controller.root_wrench.any()
+    assert (
+        controller.robot is robot() and type(controller.config) is KINDS[controller.config.kind][0]
+    )
+    other = controller.another()
+    assert type(other) is type(controller) and other is not controller
+    assert other.config == controller.config
+
+
+def test_three_members_are_enough() -> None:
+    """Outside of any base class the rest has its default; two are too few."""
+    given = Plain()
+    told = told_by(given, robot())
+    assert (told.failures, told.com_offset, told.robot) == (0, 0.0, robot())
+    assert told.unwrapped is given and not told.root_wrench.any()
+    env = env_of(given)
+    env.reset(seed=0)
+    info = env.step(np.zeros(4))[4]
+    assert env.controller is given
+    assert info["solver_failures"] == 0 and not info["root_wrench"].any()
+    with pytest.raises(poise.ConfigError, match="must be a name.*or a controller"):
+        env_of(type("Two", (), {"period": 0.004, "reset": None})())
+
+
+def test_what_a_controller_tells_reaches_the_environment() -> None:
+    """From the base class, also through a wrapper."""
+    for controller in (Telling(), WrappedController(Telling(), robot())):
+        env = env_of(controller)
+        env.reset(seed=0, options={"noise": 0.0})
+        info = env.step(np.zeros(4))[4]
+        assert info["solver_failures"] == 7 and info["root_wrench"][2] == 1.0
+        reference = env_of(Plain())
+        reference.reset(seed=0, options={"noise": 0.0})
+        assert np.linalg.norm(env.targets.com - reference.targets.com) == pytest.approx(0.01)
+
+
+def test_a_subclass_runs_compiled_unless_its_torques_are_its_own() -> None:
+    """The compiled tick would not know of them."""
+    assert Renamed(robot()).compiled and MomentumQP(robot()).compiled
+    assert not Changed(robot()).compiled and isinstance(Changed(robot()), CompiledController)
+    expected, found = env_of(Renamed(robot())), env_of(Changed(robot()))
+    assert expected.compiled_step() is not None and found.compiled_step() is None
+    ends = []
+    for env in (env_of(MomentumQP(robot())), expected, found):
+        env.reset(seed=3)
+        for _ in range(10):
+            env.step(np.zeros(4))
+        ends.append(env.data.qpos.copy())
+    assert np.array_equal(ends[0], ends[1]) and not np.array_equal(ends[0], ends[2])
+
+
+def test_another_solver_is_called_from_python() -> None:
+    controller = load_controller({"solver": "daqp"}, robot())
+    assert isinstance(controller, CompiledController) and not controller.compiled
+    stepping = load_controller({"kind": "capture-step", "qp": {"solver": "daqp"}}, robot())
+    assert isinstance(stepping, CaptureStep) and not stepping.compiled
+
+
+def test_an_environment_is_replicated_with_a_controller_of_the_same_class() -> None:
+    """A subclass stays one; what is made from more than robot and configuration is refused."""
+    envs = replicate(env_of(Renamed(robot())), 2)
+    assert type(envs[1].controller) is Renamed and envs[1].controller is not envs[0].controller
+    for controller in (Lagging(robot()), Plain(), WrappedController(MomentumQP(robot()), robot())):
+        with pytest.raises(poise.ConfigError, match="controller: .*give each its own"):
+            replicate(env_of(controller), 2)
+
+
+def test_steps_are_moved_through_a_wrapper() -> None:
+    """It is not compiled, and the shift is that of the controller inside."""
+    inner = load_controller("capture-step", robot())
+    assert isinstance(inner, SteppingController)
+    assert inner.step_limits is inner.planner.limits
+    ends = []
+    for controller in (inner, WrappedController(load_controller("capture-step", robot()), robot())):
+        env = ResidualStepEnv(robot(), controller=controller, pushes=None)
+        push = {"impulse": 22.0, "direction": 0.0, "body": "torso", "start": 0.1}
+        env.reset(seed=0, options={"push": push})
+        action = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0])
+        for _ in range(40):
+            info = env.step(action)[4]
+        ends.append((env.data.qpos.copy(), info["steps"], env.stepper.shift.foothold[0]))
+    assert ends[0][1] == ends[1][1] >= 1 and ends[0][2] == ends[1][2] > 0.0
+    assert np.array_equal(ends[0][0], ends[1][0])
+    with pytest.raises(poise.ConfigError, match="does not step"):
+        ResidualStepEnv(robot(), controller=WrappedController(MomentumQP(robot()), robot()))
+
+
+def test_a_base_class_alone_controls_nothing() -> None:
+    state = Simulation(robot()).state
+    with pytest.raises(NotImplementedError):
+        BaseController().torques(state, Targets.standing(robot(), state))
+
+
+def test_nobody_asks_a_controller_for_what_it_does_not_declare() -> None:
+    """No `getattr` with a default and no `hasattr` of a controller in what plays one."""
+    root = Path(__file__).parents[2]
+    probes = {
+        f"{path.name}: {ast.unparse(node)}"
+        for folder in FOLDERS
+        for path in (root / folder).glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) in ("getattr", "hasattr")
+        and "controller" in ast.unparse(node)
+    }
+    assert probes == set()

@@ -13,7 +13,8 @@ import numpy as np
 
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.viewing.renderer import Camera, SceneRenderer
+from poise.envs.viewing.camera import Camera
+from poise.envs.viewing.renderer import SceneRenderer
 
 from .style import saved_figure
 
@@ -29,7 +30,7 @@ def record(
     fps: float = 25.0,
     slow_motion: float = 1.0,
     size: tuple[int, int] = (640, 480),
-    camera: Camera | None = None,
+    camera: Camera | str | int | None = None,
 ) -> dict[str, Any]:
     """Play one episode and write it as an MP4 (H.264, yuv420p) that browsers play.
 
@@ -44,7 +45,7 @@ def record(
         fps: frames a second that are wanted [1/s].
         slow_motion: how much longer the video takes than the episode.
         size: width and height [pixels], even.
-        camera: where it stands.
+        camera: where it stands, or which one of the model it is, see `find_camera`.
 
     Returns:
         "path", "frames", "fps" (as written), "seconds" (of the episode), "fallen", "recovered"

@@ -71,6 +71,32 @@ class Policy(Copyable):
             mean = 0.5 * (mean + done(self._mean_action(seen(observation))))
         return np.clip(mean, -1.0, 1.0)
 
+    def predict(
+        self,
+        observation: np.ndarray,
+        state: tuple[np.ndarray, ...] | None = None,
+        episode_start: np.ndarray | None = None,
+        deterministic: bool = True,
+    ) -> tuple[np.ndarray, None]:
+        """`act` as Stable-Baselines3 calls it, for code that takes one of its models.
+
+        Args:
+            observation: (..., no), raw.
+            state: not looked at, for the policy has no memory.
+            episode_start: not looked at, either.
+            deterministic: must be true: of the Gaussian only the mean is kept.
+
+        Returns:
+            The action (..., na), float32 as the environment's action space, and None.
+
+        Raises:
+            ConfigError: `deterministic` is false.
+        """
+        if not deterministic:
+            raise ConfigError("knows the mean of its actions only, no random ones",
+                              source="policy", field="deterministic")  # fmt: skip
+        return self.act(observation).astype(np.float32), None
+
     def _mean_action(self, observation: np.ndarray) -> np.ndarray:
         x = np.clip((observation - self._mean) * self._scale, -self._clip, self._clip)
         x = x[..., None, :]

@@ -11,9 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from stable_baselines3.common.evaluation import evaluate_policy
 
 import poise
 from poise.configs.errors import ConfigError
+from poise.envs import replicate
+from poise.training import ThreadedVecEnv
 from poise.training.learning.checkpoints import (
     CONFIG,
     FILES,
@@ -62,6 +65,27 @@ def test_it_acts_as_sb3_does(model):
     actions = policy.act(seen)
     assert actions.shape == expected.shape and np.ptp(expected) > 0.5
     np.testing.assert_allclose(actions, expected, atol=1e-5)
+
+
+def test_predict_is_act_as_sb3_calls_it():
+    """One observation or several, in the action space's numbers; code for SB3's models takes it."""
+    policy = poise.load_policy()
+    env = policy.make_env(duration=0.2)
+    observation, _ = env.reset(seed=0)
+    batch = np.stack([observation, 0.5 * observation])
+    action, state = policy.predict(observation)
+    assert state is None and env.action_space.contains(action)
+    assert np.array_equal(action, policy.act(observation).astype(np.float32))
+    starts = np.array([True, False])
+    actions, state = policy.predict(batch, state=None, episode_start=starts, deterministic=True)
+    assert state is None and actions.shape == (2, *env.action_space.shape)
+    assert np.array_equal(actions[0], action) and np.any(actions[1] != action)
+    with pytest.raises(ConfigError, match="deterministic: knows the mean of its actions only"):
+        policy.predict(observation, deterministic=False)
+    envs = ThreadedVecEnv(replicate(env, 2))
+    mean, _ = evaluate_policy(policy, envs, n_eval_episodes=2, warn=False)
+    assert mean > 5.0  # ten steps upright
+    envs.close()
 
 
 def test_an_entry_that_never_changed_is_no_division_by_zero(folder):

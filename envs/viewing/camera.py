@@ -1,0 +1,57 @@
+"""Where the camera stands: Poise's own, which follows the robot, or one of the robot's model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from poise.configs.errors import ConfigError, shown
+from poise.configs.schema import build, to_dict
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the camera stands, seen from the robot in its standing posture."""
+
+    azimuth: float = field(default=50.0)  # [deg] counter-clockwise: 0 = in front, 90 = left
+    elevation: float = field(default=22.0, metadata={"min": 0.0, "max": 90.0})  # [deg] above it
+    distance: float = field(default=4.7, metadata={"above": 0.0})  # over the CoM height
+
+
+def find_camera(camera: Any, model: mujoco.MjModel) -> Camera | int:
+    """A `Camera`, or the id of one of the model's.
+
+    Args:
+        camera: None for Poise's own as it is by default, a `Camera` or a mapping of its fields for
+            it elsewhere, a name or an id for a camera of the model.
+        model: of the robot.
+
+    Raises:
+        ConfigError: the model has no such camera, or a field of a `Camera` is not valid.
+    """
+    if camera is None:
+        return Camera()
+    if isinstance(camera, (Camera, Mapping)):
+        return build(Camera, to_dict(camera), "camera")
+    names = [model.camera(i).name or i for i in range(model.ncam)]
+    if isinstance(camera, str) and camera in names:
+        return names.index(camera)
+    whole = isinstance(camera, (int, np.integer)) and not isinstance(camera, bool)
+    if whole and 0 <= camera < model.ncam:
+        return int(camera)
+    raise ConfigError(f"the robot's model has no camera {shown(camera)}", field="camera",
+                      choices=[None, *names])  # fmt: skip
+
+
+def point(view: mujoco.MjvCamera, camera: Camera | int, size: float) -> None:
+    """Make `view` the camera's; `size` [m] is the robot's CoM height."""
+    if isinstance(camera, int):
+        view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, camera
+        return
+    view.azimuth = camera.azimuth + 180.0
+    view.elevation = -camera.elevation
+    view.distance = camera.distance * size
