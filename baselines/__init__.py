@@ -22,12 +22,19 @@ __all__ = [
     "StepScales",
     "SteppingController",
     "Targets",
+    "WrappedController",
     "load_controller",
     "load_motion",
 ]
 
 if TYPE_CHECKING:
-    from poise.baselines.controller import BaseController, CompiledController, Controller, Targets
+    from poise.baselines.controller import (
+        BaseController,
+        CompiledController,
+        Controller,
+        Targets,
+        WrappedController,
+    )
     from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
     from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
     from poise.baselines.motions.motion import ReferenceMotion, load_motion
@@ -39,7 +46,13 @@ else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
-            "controller": ("BaseController", "CompiledController", "Controller", "Targets"),
+            "controller": (
+                "BaseController",
+                "CompiledController",
+                "Controller",
+                "Targets",
+                "WrappedController",
+            ),
             "environments.residual": ("ResidualBalanceEnv", "ResidualScales"),
             "environments.stepping": ("ResidualStepEnv", "StepScales"),
             "motions.motion": ("ReferenceMotion", "load_motion"),

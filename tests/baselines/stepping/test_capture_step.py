@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from poise.baselines.controller import WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.stepping.capture_step import CaptureStep, CaptureStepConfig
@@ -76,14 +77,12 @@ def test_feet_do_not_cross():
     assert min(widths) > 0.1
 
 
-class Watched:
+class Watched(WrappedController):
     """A controller of which `look(controller, state, targets, torques)` sees every tick."""
 
     def __init__(self, inner, look):
-        self.inner, self.look, self.seen, self.period = inner, look, [], inner.period
-
-    def __getattr__(self, name):
-        return getattr(self.inner, name)
+        super().__init__(inner, inner.robot)
+        self.look, self.seen = look, []
 
     def torques(self, state, targets):
         tau = self.inner.torques(state, targets)

@@ -16,7 +16,7 @@ from poise.envs.viewing.camera import find_camera, point
 TORQUE = "poise/TorqueBalance-v0"
 
 
-def frame(**arguments: Any) -> np.ndarray:
+def frame(**arguments: Any) -> Any:
     """The first picture of an episode without noise."""
     env = gymnasium.make(TORQUE, render_mode="rgb_array", pushes=None, **arguments)
     env.reset(seed=0, options={"noise": 0.0})
@@ -98,7 +98,7 @@ def test_a_time_limit_of_gymnasium_s_own_comes_on_top() -> None:
     """The spec has none, so that a longer `duration` holds; whoever wants one names it."""
     long = gymnasium.make(TORQUE, duration=7.0)
     assert long.spec.max_episode_steps is None and long.unwrapped.max_steps == 350
-    short = gymnasium.make(TORQUE, pushes=None, max_episode_steps=2)
+    short: Any = gymnasium.make(TORQUE, pushes=None, max_episode_steps=2)
     short.reset(seed=0)
     zero = np.zeros(short.action_space.shape, dtype=np.float32)
     assert [short.step(zero)[3] for _ in range(2)] == [False, True]

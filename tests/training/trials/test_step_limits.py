@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from poise.baselines.registry import controller_config
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.stepping.planner import StepLimits
 from poise.envs.maths.pendulum import drifted, duration_factor
 from poise.training.benchmark.case import Result
@@ -105,7 +106,9 @@ def test_without_a_planner_it_is_who_steps_that_counts(limit: NStepLimit) -> Non
     """One step in twenty recoveries is none, nor is a foot that lands where it was; the defaults
     come after what a planner says."""
     own = StepLimits(speed=0.4)
-    planner = SimpleNamespace(controller=SimpleNamespace(planner=SimpleNamespace(limits=own)))
+    controller = load_controller("capture-step", robot())
+    controller.planner.limits = own
+    planner = ResidualBalanceEnv(robot(), controller=controller)
     cases = [stander("often", 10), stander("rare", 1), stander("tilts", 10, False)]
     cases.append((Player("planned", planner, np.asarray, ""), []))
     outcomes = {player.name: results for player, results in cases}
