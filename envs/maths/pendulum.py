@@ -12,7 +12,7 @@ Profile = Literal["square", "half-sine"]
 
 def pendulum_rate(gravity: float, height: float) -> float:
     """ω = √(g/z_c) [1/s]: `gravity` g [m/s²], `height` z_c of the centre of mass [m]."""
-    return np.sqrt(gravity / height)  # type: ignore[no-any-return]
+    return np.sqrt(gravity / height)
 
 
 compiled_rate = compiled(pendulum_rate)  #: the same, for kernels
