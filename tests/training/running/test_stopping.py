@@ -19,15 +19,16 @@ from poise.training.running.stopping import Stopped, stop_code, stoppable, unint
 from tests.endurance.processes import Running, heed_interrupts, kill
 from tests.support.evaluations import RANDOM, write_suite
 
-# A native call of minutes that no signal interrupts, as a compilation is.
+# A native call of minutes that no signal interrupts, as a compilation is. It speaks from within the
+# call: a signal before it would be heard.
 DEAF = """
-import hashlib, multiprocessing, time
+import hashlib, multiprocessing, threading, time
 from poise.training.running.stopping import stoppable
 if __name__ == "__main__":
     with stoppable():
         child = multiprocessing.get_context("fork").Process(target=time.sleep, args=(600,))
         child.start()
-        print(child.pid, flush=True)
+        threading.Timer(0.2, print, (child.pid,), {"flush": True}).start()
         hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
 """
 LATE = 20.0  # [s] for what takes one, on a machine that is busy with other tests
