@@ -155,7 +155,7 @@ def parse(words: list[str], parsed: list[str]) -> None:
 
 
 def test_files_that_pages_name_exist() -> None:
-    """Paths of the repository in backticks, and modules of tests; Python makes its caches itself."""
+    """Paths of the repository in backticks, and modules of tests. Python makes caches itself."""
     wrong = []
     for page in PAGES:
         text = page.read_text()
