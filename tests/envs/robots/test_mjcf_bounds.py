@@ -4,7 +4,6 @@ envs/robots/mjcf_bounds.py.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import mujoco
@@ -13,6 +12,7 @@ import pytest
 from poise.configs.errors import ConfigError
 from poise.envs.robots.mjcf import read_mjcf
 from poise.envs.robots.mjcf_bounds import ASSET_BYTES, MJCF_BYTES
+from tests.support.hangs import no_hang
 
 BODY = '<body><joint/><geom size="1"/></body>'
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(8) + (60_000).to_bytes(4) * 2
@@ -85,10 +85,8 @@ def test_a_bomb_is_refused_at_once(tmp_path: Path, what: str) -> None:
     content, problem = BOMBS[what]
     path = tmp_path / "bomb.xml"
     path.write_text(f"<mujoco>{content}</mujoco>")
-    begin = time.process_time()
-    with pytest.raises(ConfigError) as caught:
+    with no_hang(), pytest.raises(ConfigError) as caught:
         read_mjcf(path, (), "robot.yaml")
-    assert time.process_time() - begin < 1.0
     text = str(caught.value)
     assert text.isprintable() and any(word in text for word in problem.split("|")), text
 

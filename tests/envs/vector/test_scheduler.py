@@ -1,6 +1,5 @@
 """Steps that threads share out: each is played whole, in order, by one thread at a time."""
 
-import os
 import time
 from dataclasses import dataclass
 from threading import Barrier, Thread
@@ -110,6 +109,9 @@ def test_a_thread_alone_plays_all():
     assert [step.block.ticks[0] for step in steps] == [2] * len(steps)
 
 
+ENOUGH = 10_000  # rounds within which a helper finds a core even where other jobs hold them
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3])
 @pytest.mark.parametrize("pause", [0.0, 0.02])
 def test_helpers_stay_for_the_next_call(threads, pause, monkeypatch):
@@ -118,15 +120,16 @@ def test_helpers_stay_for_the_next_call(threads, pause, monkeypatch):
     turns, helpers = Turns(np.array([step.row() for step in steps]), threads), Helpers()
     woken, ask = [], helpers.ask
     monkeypatch.setattr(helpers, "ask", lambda work, k: (woken.append(k), ask(work, k)))
-    rounds = 30
-    for _ in range(rounds):
+    rounds = 0
+    waits = threads > 1 and pause == 0.0
+    while rounds < 30 or (waits and len(woken) == rounds * (threads - 1) < ENOUGH):
         turns.play_all(helpers)
         time.sleep(pause)
+        rounds += 1
     assert [step.block.ticks[0] for step in steps] == [2 * rounds] * len(steps)
     assert not any(step.block.clashes[0] for step in steps)
     assert set(woken) == set(range(1, threads))
-    # where other jobs hold the cores, a helper has waited in vain before its caller comes back
-    if threads > 1 and pause == 0.0 and os.getloadavg()[0] < (os.cpu_count() or 1):
+    if waits:
         assert len(woken) < rounds * (threads - 1)
     if threads > 1 and pause > 0.0:
         assert len(woken) > threads - 1
