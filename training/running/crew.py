@@ -115,12 +115,15 @@ class Crew:
         ray = self.backend == "ray"
         call: Callable = joblib.delayed(do)
         tasks = [call(function, job, number, tuple(sys.path)) for number, job in jobs.items()]
-        # Ray's backend gives results only when all are there: so a few at a time
+        # Ray's backend gives results only when all are there: so a few at a time, by one set of
+        # processes
         block = BLOCK * self.workers if ray else len(tasks)
         way = "list" if ray else "generator_unordered"
-        with joblib.parallel_config("ray" if ray else "loky", n_jobs=self.workers):
+        with (
+            joblib.parallel_config("ray" if ray else "loky", n_jobs=self.workers),
+            joblib.Parallel(return_as=way, batch_size=1) as parallel,
+        ):
             for first in range(0, len(tasks), block):
-                parallel = joblib.Parallel(return_as=way, batch_size=1)
                 with uninterrupted():
                     results = parallel(tasks[first : first + block])
                 yield from results

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, resolve, write_atomic
 from poise.configs.schema import build, read_yaml, to_yaml
@@ -34,6 +35,7 @@ class PushLimits:
     """
 
     def __init__(self, robot: Robot, table: LimitTable | None = None):
+        prepare()  # what this process compiles itself has other last bits than what others read
         self.robot, self.table = robot, table
         self.scale = "ankle limit" if table is None else "baseline J50"
         self.omega = robot.omega

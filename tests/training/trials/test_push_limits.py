@@ -12,6 +12,7 @@ from poise.envs.maths.pendulum import ankle_limit
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import LimitTable, push_bodies
 from poise.envs.robots.robot import Robot, load_robot
+from poise.training.trials import push_limits
 from poise.training.trials.push_limits import PushLimits, load_limits, write_limits
 
 
@@ -68,3 +69,17 @@ def test_push_bodies_come_from_the_description(robot: Robot) -> None:
     wrong = replace(robot, description=replace(robot.description, push_bodies=("tail",)))
     with pytest.raises(ConfigError, match="tail.*choices: torso"):
         push_bodies(wrong)
+
+
+def test_kernels_are_compiled_before_the_first_is_used(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a cold cache the margins, and all that this process plays, would have other bits."""
+    order: list[str] = []
+    simulate = push_limits.Simulation
+    monkeypatch.setattr(push_limits, "prepare", lambda: order.append("compiled"))
+    monkeypatch.setattr(
+        push_limits, "Simulation", lambda robot: (order.append("used"), simulate(robot))[1]
+    )
+    PushLimits(robot)
+    assert order == ["compiled", "used"]
