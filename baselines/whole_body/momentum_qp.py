@@ -19,16 +19,13 @@ from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .parameters import qp_parameters
-from .reduced_qp import (
-    Assembly,
-    QPParameters,
-    Workspace,
-    allocate_workspace,
-    assemble,
-    recover,
-)
-from .tasks import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
+from .contacts.contact import BoundContact, Contact, bind_contacts, contact_arrays
+from .gains import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
+from .parameters import QPParameters, qp_parameters
+from .reduced_qp import Assembly, assemble, recover
+from .stack import fill_from_python, make_stack
+from .tasks.task import BoundTask, Task, bind_tasks
+from .workspace import Workspace, allocate_workspace
 
 COMPILED_SOLVER = "active-set"
 MAX_ITERATIONS = 200
@@ -39,7 +36,9 @@ class MomentumQPConfig:
     """Tasks, contacts, limits and how they are solved [Macchietto09, Moskalev24 §2].
 
     `root`: "hard" lets nothing but the ground push the root (physics); "soft" adds a penalised
-    wrench u_root on it (a game character that must not fail).
+    wrench u_root on it (a game character that must not fail). `tasks`: what else v̇ is to do, each
+    under a name of its own, see `tasks/`; `contacts`: what touches the world besides the soles, see
+    `contacts/`.
     """
 
     kind: Literal["momentum-qp"] = "momentum-qp"
@@ -54,6 +53,8 @@ class MomentumQPConfig:
     contact: SoleContact = field(default_factory=SoleContact)
     torque: TorqueLimit = field(default_factory=TorqueLimit)
     joint: JointLimit = field(default_factory=JointLimit)
+    tasks: dict[str, Task] = field(default_factory=dict, metadata={"omit": "empty"})
+    contacts: dict[str, Contact] = field(default_factory=dict, metadata={"omit": "empty"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +90,8 @@ FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the who
 @compiled
 def release_joints(ws: Workspace):
     """Take away the joint limits, the last rows of the problem."""
-    first = ws.l.shape[0] - ws.tau.shape[0]
-    ws.l[first:] = -np.inf
-    ws.u[first:] = np.inf
+    ws.l[ws.first_joint :] = -np.inf
+    ws.u[ws.first_joint :] = np.inf
 
 
 @compiled
@@ -132,8 +132,8 @@ class Tick(Block):
 
     problem: Assembly
     memory: Memory
-    assemble: int
-    solve: int
+    assemble: int  # address of `assemble(problem)`
+    solve: int  # address of `solve(problem.workspace)`
 
 
 @compiled
@@ -149,8 +149,14 @@ class MomentumQP(CompiledController):
     """Tracks a posture, the CoM through linear and the CoP through angular momentum.
 
     `torques` solves the reduced problem of `reduced_qp.py`, whose readable form is
-    `formulation.py`. After a call, `vdot`, `wrenches`, `root_wrench` and `failures` tell what was
-    found. Raises ConfigError for an unknown solver or solver option.
+    `formulation.py`. After a call, `vdot`, `wrenches`, `forces`, `root_wrench` and `failures` tell
+    what was found. Raises ConfigError for an unknown solver or solver option, and for a task or a
+    contact of a body that the robot does not have.
+
+    Attributes:
+        tasks: those of the configuration by name; the arrays of a task's `block`, such as its
+            reference, may be written to at any time.
+        contacts: likewise.
     """
 
     def __init__(self, robot: Robot, config: MomentumQPConfig | None = None):
@@ -159,8 +165,15 @@ class MomentumQP(CompiledController):
         self.period = self.config.period
         self.arrays = robot_arrays(robot)
         self.parameters = qp_parameters(robot, self.arrays, self.config)
+        self.tasks: dict[str, BoundTask] = bind_tasks(self.config.tasks, robot)
+        self.contacts: dict[str, BoundContact] = bind_contacts(self.config.contacts, robot)
+        points = self.contacts.values()
         self.workspace = allocate_workspace(
-            self.arrays, self.parameters.cone.shape[1], self.config.root == "soft"
+            self.arrays,
+            self.parameters.cone.shape[1],
+            self.config.root == "soft",
+            [point.chain for point in points],
+            sum(point.contact.cone_rows for point in points),
         )
         self.memory = allocate_memory(self.parameters.torque_limit)
         self.com_offset = self.config.com.offset * robot.height_com
@@ -184,7 +197,13 @@ class MomentumQP(CompiledController):
     @property
     def wrenches(self) -> np.ndarray:
         """(6 nc,) sole wrenches of the last solution, world axes, at the sole points."""
-        return self.workspace.wrenches.copy()
+        return self.workspace.wrenches[: 6 * len(self.robot.soles)].copy()
+
+    @property
+    def forces(self) -> dict[str, np.ndarray]:
+        """(3,) force [N] on each of `contacts` in the last solution, world axes."""
+        rest = self.workspace.wrenches[6 * len(self.robot.soles) :].reshape(-1, 3)
+        return {name: force.copy() for name, force in zip(self.contacts, rest, strict=True)}
 
     @property
     def root_wrench(self) -> np.ndarray:
@@ -209,8 +228,9 @@ class MomentumQP(CompiledController):
 
     @property
     def compiled(self) -> bool:
-        """See `CompiledController`; other solvers are called from Python."""
-        return super().compiled and self.solver is None
+        """See `CompiledController`; other solvers, and tasks without kernel, need Python."""
+        kernels = all(bound.task.kernel is not None for bound in self.tasks.values())
+        return super().compiled and self.solver is None and kernels
 
     def gains(self) -> Any:
         """See `CompiledController`."""
@@ -228,8 +248,20 @@ class MomentumQP(CompiledController):
             known is None or known.state is not s or known.targets is not t
             or known.parameters is not self.parameters
         ):  # fmt: skip
-            known = Assembly(self.arrays, s, self.parameters, t, self.period, self.workspace)
-            self._assembly = known
+            ws = self.workspace
+            points = list(self.contacts.values())
+            known = self._assembly = Assembly(
+                robot=self.arrays,
+                state=s,
+                contacts=contact_arrays(
+                    s, points, ws.contact_accel, ws.force_weights, ws.force_des
+                ),
+                parameters=self.parameters,
+                targets=t,
+                period=self.period,
+                tasks=make_stack(self.tasks.values(), s, ws),
+                workspace=ws,
+            )
         return known
 
     def tick(self, state: RobotState, targets: Targets) -> Tick:
@@ -240,21 +272,27 @@ class MomentumQP(CompiledController):
             self._tick = Tick(problem, self.memory, *stages)
         return self._tick
 
+    def _filled(self, state: RobotState, targets: Targets) -> Assembly:
+        """`assembly`, with the rows of tasks that Python fills."""
+        problem = self.assembly(state, targets)
+        fill_from_python(problem.tasks, self.tasks.values(), state)
+        return problem
+
     def problem(self, state: RobotState, targets: Targets) -> QP:
         """The reduced QP of this state: pure, nothing is solved or remembered."""
         ws = self.workspace
         before = ws.cop_prev.copy()
-        assemble(self.assembly(state, targets))
+        assemble(self._filled(state, targets))
         ws.cop_prev[:] = before
         return QP(ws.H.copy(), ws.g.copy(), ws.C.copy(), ws.l.copy(), ws.u.copy())
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
-        ws = self.workspace
+        ws, problem = self.workspace, self._filled(state, targets)
         if self.solver is None:
             momentum_tick(self.tick(state, targets))
         else:
-            assemble(self.assembly(state, targets))
+            assemble(problem)
             solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
             if solution.status is Status.INFEASIBLE:
                 release_joints(ws)

@@ -2,9 +2,11 @@
 
 import importlib
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
@@ -117,3 +119,34 @@ def play_one(kernel: int, block: int, ticks: int):
     """Call `kernel` `ticks` times."""
     for _ in range(ticks):
         call(kernel, block)
+
+
+@dataclass(frozen=True, eq=False)
+class Calls(Block):
+    """Kernels and the block that each works on, for `call_all`; made by `calls_of`."""
+
+    table: np.ndarray  # (n, 2) int: addresses of kernels and of blocks
+
+    pairs: ClassVar[tuple[tuple[Address, Block], ...]] = ()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return calls_of, (self.pairs,)
+
+    def __copy__(self) -> "Calls":
+        return calls_of(self.pairs)
+
+
+def calls_of(pairs: Iterable[tuple[Address, Block]]) -> Calls:
+    """Calls of kernels by address (see `address_of`), each with its block, in order."""
+    pairs = tuple(pairs)
+    rows = [(int(address), block.address) for address, block in pairs]
+    calls = Calls(np.array(rows, dtype=np.int64).reshape(len(rows), 2))
+    object.__setattr__(calls, "pairs", pairs)
+    return calls
+
+
+@compiled
+def call_all(calls: Calls):
+    """All the calls, one after the other."""
+    for i in range(calls.table.shape[0]):
+        call(calls.table[i, 0], calls.table[i, 1])

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
@@ -98,3 +99,12 @@ def _at(spatial: np.ndarray, r: np.ndarray) -> np.ndarray:
     """(k, 6) linear and angular part at r of spatial vectors [ω; v] at the origin."""
     angular, linear = spatial[:, :3], spatial[:, 3:]
     return np.hstack([linear + np.cross(angular, r), angular])
+
+
+def standing_frame(robot: Robot, point: BodyPoint) -> tuple[np.ndarray, np.ndarray]:
+    """Position (3,) [m] of the point and axes (3, 3) of its body in the standing posture."""
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_kinematics(robot.model, data)
+    axes = data.xmat[point.body].reshape(3, 3).copy()
+    return data.xpos[point.body] + axes @ point.offset, axes
