@@ -37,6 +37,7 @@ def kind_of(cls: Any) -> str:
 
 
 def _below(cls: type) -> Iterator[type]:
+    each: type
     for each in cls.__subclasses__():
         yield each
         yield from _below(each)
