@@ -24,6 +24,7 @@ def swing_rows(state, sole, reference, axes, task):
 #: kind → a task of the humanoid whose rows have a part of everything
 EXAMPLES = {
     "orientation": {"body": "left_upper_arm", "stiffness": 30.0, "damping_ratio": 0.7},
+    "position": {"body": "right_lower_arm", "point": [0.18, 0.18, 0.18], "damping_ratio": 0.6},
 }
 
 
