@@ -209,7 +209,8 @@ for _name in packaged("controllers"):
         KINDS[f"env of {_name}"] = _with(_name)
 for _name in ("momentum-qp", "capture-step", "feedback-step", "ipm-step", "kudoh02", "lqr-lip"):
     KINDS[_name] = partial(make_loop, _name), play_loop
-_TASKS = {"base": "momentum-qp", "tasks": described()}  # whose kernels a stack calls by address
+_HAND = {"kind": "point", "body": "left_lower_arm", "normal": [0, 0, 1], "largest_force": 0.01}
+_TASKS = {"base": "momentum-qp", "tasks": described(), "contacts": {"hand": _HAND}}
 KINDS["env of tasks"], KINDS["tasks"] = _with(_TASKS), (partial(make_loop, _TASKS), play_loop)
 
 
