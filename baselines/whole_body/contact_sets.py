@@ -24,29 +24,30 @@ from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .contacts.contact import contact_arrays
-from .momentum_qp import Memory, MomentumQPConfig, accept, allocate_memory, forget, solve
+from .momentum_qp import MomentumQPConfig
 from .parameters import QPParameters, qp_parameters
 from .reduced_qp import Assembly, assemble
 from .stack import make_stack, put_rows
 from .tasks.task import BoundTask, Rows, bind_tasks
+from .tick import Memory, accept, allocate_memory, forget, solve
 from .workspace import Workspace, allocate_workspace
 
 
 @dataclass(frozen=True, eq=False)
 class ContactTick(Block):
-    """What a tick of one subset works on."""
+    """All that a tick of one subset works on."""
 
-    source: StateArrays  # of all soles
-    pick: np.ndarray  # (nc,) int: soles of the subset
-    problem: Assembly  # of these
+    source: StateArrays  # with all soles
+    pick: np.ndarray  # (nc,) int: the soles of the subset
+    problem: Assembly  # with these soles only
     memory: Memory
     load_limits: np.ndarray  # (nc,) [N]
-    limited: np.ndarray  # (1,) int: whether they count
+    limited: np.ndarray  # (1,) int: 1 where these limits count
     applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
     jump: np.ndarray  # (nv−6,) the most that they may change [N·m]
-    follows: np.ndarray  # (1,) int: whether there was a last tick
+    follows: np.ndarray  # (1,) int: 1 where there was a last tick
     chosen: np.ndarray  # (1,) int: the subset of the last tick, −1: none
-    index: int  # of this one
+    index: int  # number of this subset
     assemble: int  # address of `assemble(problem)`, compiled already
     solve: int  # address of `solve(problem.workspace)`
 
@@ -127,7 +128,7 @@ def solve_contacts(t: ContactTick):
 
 @compiled
 def contact_tick(t: ContactTick):
-    """One tick with a subset: its workspace's `tau` (nv−6,) holds torques."""
+    """Run one tick with a subset: its workspace's `tau` (nv−6,) then holds torques."""
     assemble_contacts(t)
     solve_contacts(t)
 
@@ -171,7 +172,7 @@ class ContactSet(Copyable):
         tasks: Iterable[BoundTask] = (),
         rows: int = 0,
     ) -> ContactTick:
-        """What a tick from `s` works on; `block` from then on.
+        """Return what a tick from `s` works on, which is `block` from then on.
 
         Its stack has the tasks of the configuration, then `tasks`, then so many `rows` that are
         written by hand.

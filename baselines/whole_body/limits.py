@@ -16,7 +16,7 @@ from .workspace import Workspace
 def build_constraints(
     robot: RobotArrays, s: StateArrays, p: QPParameters, c: ContactArrays, ws: Workspace
 ):
-    """C, l and u: the cones of the soles and of other contacts, torque limits, joint limits."""
+    """Fill C, l and u: the cones of soles and of other contacts, torque limits, joint limits."""
     _sole_cones(s, p, ws)
     _point_cones(c, ws)
     _torque_limits(p, ws)
@@ -25,7 +25,7 @@ def build_constraints(
 
 @compiled
 def _sole_cones(s: StateArrays, p: QPParameters, ws: Workspace):
-    """cone · w ≤ 0 in each sole's own axes."""
+    """Fill cone · w ≤ 0 in each sole's own axes."""
     nc, rows = p.cone.shape[0], p.cone.shape[1]
     for i in range(nc):
         axes, first = s.sole_axes[i], i * rows
@@ -45,7 +45,7 @@ def _sole_cones(s: StateArrays, p: QPParameters, ws: Workspace):
 
 @compiled
 def _point_cones(c: ContactArrays, ws: Workspace):
-    """cone · f ≤ bound of each point, whose force is among the unknowns."""
+    """Fill cone · f ≤ bound of each point, whose force is among the unknowns."""
     for i in range(c.positions.shape[0]):
         for r in range(c.rows[i], c.rows[i + 1]):
             row = ws.first_point + r
@@ -57,7 +57,7 @@ def _point_cones(c: ContactArrays, ws: Workspace):
 
 @compiled
 def _torque_limits(p: QPParameters, ws: Workspace):
-    """|τ₀ + T x| ≤ τ_max."""
+    """Fill |τ₀ + T x| ≤ τ_max."""
     first = ws.first_torque
     for a in range(ws.tau0.shape[0]):
         copy(ws.T[a], ws.C[first + a])
@@ -67,7 +67,7 @@ def _torque_limits(p: QPParameters, ws: Workspace):
 
 @compiled
 def _joint_limits(robot: RobotArrays, s: StateArrays, p: QPParameters, ws: Workspace):
-    """Joint accelerations v̇₀ + V x within `braking_bounds`."""
+    """Keep joint accelerations v̇₀ + V x within `braking_bounds`."""
     first = ws.first_joint
     for a in range(ws.tau0.shape[0]):
         copy(ws.V[6 + a], ws.C[first + a])
@@ -82,7 +82,7 @@ def _joint_limits(robot: RobotArrays, s: StateArrays, p: QPParameters, ws: Works
 def braking_bounds(
     q: float, v: float, q_min: float, q_max: float, accel: float, horizon: float, floor: float
 ) -> tuple[float, float]:
-    """Bounds on q̈ that let a joint stop before its limit.
+    """Return bounds on q̈ that let a joint stop before its limit.
 
     The bound brings v within `horizon` to the fastest velocity from which `accel` still stops in
     the distance left (see `stopping_speed`), asking for no more than `floor`.
@@ -97,7 +97,7 @@ def braking_bounds(
 
 @compiled
 def stopping_speed(distance: float, accel: float, horizon: float) -> float:
-    """Speed v that stops within a distance after a reaction time r: r v + v²/(2 accel) = distance.
+    """Return the speed v that stops in a distance after a time r: r v + v²/(2 accel) = distance.
 
     r = 4·horizon makes the way to the limit critically damped: no overshoot. Beyond the limit the
     speed leads back to it.

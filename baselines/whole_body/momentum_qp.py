@@ -7,28 +7,21 @@ import numpy as np
 
 from poise.baselines.controller import BaseController, CompiledController, Outputs, Targets
 from poise.baselines.solvers import QP, Status, make_solver
-from poise.baselines.solvers.dual_active_set import solve_dual
-from poise.baselines.solvers.scaled_rows import INFEASIBLE
-from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import address_of, call
-from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
-from poise.envs.maths.vectors import copy
+from poise.envs.compiled.calls import address_of
 from poise.envs.physics.arrays import robot_arrays
-from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .contacts.contact import BoundContact, Contact, bind_contacts, contact_arrays
 from .gains import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
-from .parameters import QPParameters, qp_parameters
-from .reduced_qp import Assembly, assemble, recover
+from .parameters import qp_parameters
+from .reduced_qp import Assembly, assemble
 from .stack import fill_from_python, make_stack
 from .tasks.task import BoundTask, Task, bind_tasks
-from .workspace import Workspace, allocate_workspace
+from .tick import Tick, accept, allocate_memory, forget, momentum_tick, release_joints, solve
+from .workspace import allocate_workspace
 
 COMPILED_SOLVER = "active-set"
-MAX_ITERATIONS = 200
 
 
 @dataclass(frozen=True)
@@ -55,94 +48,6 @@ class MomentumQPConfig:
     joint: JointLimit = field(default_factory=JointLimit)
     tasks: dict[str, Task] = field(default_factory=dict, metadata={"omit": "empty"})
     contacts: dict[str, Contact] = field(default_factory=dict, metadata={"omit": "empty"})
-
-
-@dataclass(frozen=True, eq=False)
-class Memory(Block):
-    """What outlives a tick: the torques to fall back on and the count of failures."""
-
-    torques: np.ndarray  # (nj,) of the last solved tick [N·m]
-    damping: np.ndarray  # (nj,) joint-space damping to fall back on [N·m·s/rad]
-    streak: np.ndarray  # (1,) int: failures since then
-    failures: np.ndarray  # (1,) int: failures since the reset
-
-
-def allocate_memory(torque_limit: np.ndarray) -> Memory:
-    """Nothing remembered yet; `torque_limit` (nj,) [N·m]."""
-    return Memory(
-        torques=apart(len(torque_limit)),
-        damping=torque_limit / FALLBACK_SPEED,
-        streak=apart(1, dtype=np.int64),
-        failures=apart(1, dtype=np.int64),
-    )
-
-
-def forget(memory: Memory) -> None:
-    """As before the first tick."""
-    memory.torques[:] = 0.0
-    memory.streak[0] = memory.failures[0] = 0
-
-
-FALLBACK_DECAY = 0.8  # per tick: share that the last good torques keep
-FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the whole torque limit
-
-
-@compiled
-def release_joints(ws: Workspace):
-    """Take away the joint limits, the last rows of the problem."""
-    ws.l[ws.first_joint :] = -np.inf
-    ws.u[ws.first_joint :] = np.inf
-
-
-@compiled
-def solve(ws: Workspace):
-    """Solve the assembled problem, starting from the last tick's active rows."""
-    for _ in range(2):
-        ws.status[0] = solve_dual(
-            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS,
-            True,
-        )  # fmt: skip
-        if ws.status[0] != INFEASIBLE:
-            return
-        release_joints(ws)  # always their fault, and the joints hold their limits by themselves
-
-
-@compiled
-def accept(s: StateArrays, p: QPParameters, ws: Workspace, memory: Memory):
-    """Torques from a solved QP; otherwise the last good ones, blended into damping."""
-    if ws.status[0] == 0:
-        recover(p, ws)
-        if np.all(np.isfinite(ws.tau)):
-            copy(ws.tau, memory.torques)
-            memory.streak[0] = 0
-            return
-    memory.streak[0] += 1
-    memory.failures[0] += 1
-    keep = FALLBACK_DECAY ** memory.streak[0]
-    ws.root_wrench[:] = 0.0
-    for a in range(ws.tau.shape[0]):
-        speed = s.qvel[6 + a] if np.isfinite(s.qvel[6 + a]) else 0.0
-        torque = keep * memory.torques[a] - (1.0 - keep) * memory.damping[a] * speed
-        ws.tau[a] = min(max(torque, -p.torque_limit[a]), p.torque_limit[a])
-
-
-@dataclass(frozen=True, eq=False)
-class Tick(Block):
-    """What a control tick works on; the kernels of its stages, by address, are compiled once."""
-
-    problem: Assembly
-    memory: Memory
-    assemble: int  # address of `assemble(problem)`
-    solve: int  # address of `solve(problem.workspace)`
-
-
-@compiled
-def momentum_tick(t: Tick):
-    """One control tick with the compiled solver: `tau` (nj,) of the workspace holds torques."""
-    a = t.problem
-    call(t.assemble, a)
-    call(t.solve, a.workspace)
-    accept(a.state, a.parameters, a.workspace, t.memory)
 
 
 class MomentumQP(CompiledController):
@@ -222,27 +127,27 @@ class MomentumQP(CompiledController):
             self.solver.reset()
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Tick]:
-        """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""
+        """The kernel that compiled code calls for `torques`, and its block; see `outputs`."""
         tick = self.tick(state, targets)
         return address_of(momentum_tick, tick), tick
 
     @property
     def compiled(self) -> bool:
-        """See `CompiledController`; other solvers, and tasks without kernel, need Python."""
+        """True with the compiled solver, and kernels for all tasks; see `CompiledController`."""
         kernels = all(bound.task.kernel is not None for bound in self.tasks.values())
         return super().compiled and self.solver is None and kernels
 
     def gains(self) -> Any:
-        """See `CompiledController`."""
+        """The parameters in SI units; see `CompiledController`."""
         return self.parameters
 
     def outputs(self) -> Outputs:
-        """See `Outputs`."""
+        """The arrays in which a tick leaves its results."""
         ws, p = self.workspace, self.parameters
         return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root)
 
     def assembly(self, state: RobotState, targets: Targets) -> Assembly:
-        """What `assemble` fills the workspace from."""
+        """The block that `assemble` fills the workspace from."""
         s, t, known = state.arrays, targets.arrays(), self._assembly
         if (
             known is None or known.state is not s or known.targets is not t
@@ -265,7 +170,7 @@ class MomentumQP(CompiledController):
         return known
 
     def tick(self, state: RobotState, targets: Targets) -> Tick:
-        """What `momentum_tick` works on."""
+        """The block that `momentum_tick` works on."""
         problem = self.assembly(state, targets)
         if self._tick is None or self._tick.problem is not problem:
             stages = address_of(assemble, problem), address_of(solve, self.workspace)

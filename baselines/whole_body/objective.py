@@ -14,7 +14,7 @@ from .workspace import Workspace
 
 @compiled
 def desired_accelerations(s: StateArrays, p: QPParameters, t: TargetArrays, ws: Workspace):
-    """a_ref + k_t (q_ref ⊖ q) + d_t (v_ref − v); the root's orientation error is a rotation."""
+    """Fill a_ref + k_t (q_ref ⊖ q) + d_t (v_ref − v), of the root's axes by a rotation vector."""
     error = ws.y
     scale = turn_error(s.root_axes, t.root_axes, error)
     for a in range(3):
@@ -41,7 +41,7 @@ def desired_momentum_rate(
     period: float,
     ws: Workspace,
 ):
-    """Ṗ_des from the CoM's PD law; L̇_des = (p_des − c) × (Ṗ_des − m g) − k_L L."""
+    """Fill Ṗ_des from the CoM's PD law, and L̇_des = (p_des − c) × (Ṗ_des − m g) − k_L L."""
     for a in range(2):
         if np.isnan(ws.cop_prev[a]):
             ws.cop_prev[a] = s.cop[a]
@@ -69,7 +69,7 @@ def desired_momentum_rate(
 
 @compiled
 def carry_momentum(p: QPParameters, t: TargetArrays, ws: Workspace):
-    """Posture velocities that carry L_ref: a_des += d_t V z, the least z with B z = [0; L_ref].
+    """Let the posture carry L_ref: a_des += d_t V z, with the least z that has B z = [0; L_ref].
 
     The soles and the CoM stay where they are (A_P V z = 0), so this asks the trunk and arms to
     turn, which is what the posture's own damping holds back.
@@ -110,9 +110,10 @@ def carry_momentum(p: QPParameters, t: TargetArrays, ws: Workspace):
 
 
 @compiled
-def tracking_share(s: StateArrays, p: QPParameters, t: TargetArrays) -> float:
-    """β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally: what the posture's weights keep."""
-    x, y = s.com[0] - t.com[0], s.com[1] - t.com[1]
+def posture_fraction(p: QPParameters, com: np.ndarray, com_ref: np.ndarray) -> float:
+    """The fraction β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally, that the weights of the
+    posture keep."""
+    x, y = com[0] - com_ref[0], com[1] - com_ref[1]
     away = (x * x + y * y) / (p.far_distance * p.far_distance)
     return p.far_share + (1.0 - p.far_share) * np.exp(-away)
 
@@ -121,16 +122,16 @@ def tracking_share(s: StateArrays, p: QPParameters, t: TargetArrays) -> float:
 def build_objective(
     robot: RobotArrays, s: StateArrays, p: QPParameters, t: TargetArrays, ws: Workspace
 ):
-    """H and g: ½ the weighted squares of posture, Ṗ, L̇, and small costs of wrenches, torques and x.
+    """Fill H and g: ½ the weighted squares of posture, Ṗ, L̇, wrenches, torques and x.
 
     What is wanted of v̇ lies in the workspace already, and so do the weights and wanted forces of
     contacts other than soles.
     """
     nv, n = ws.V.shape
     nz, weights = ws.first_internal, ws.weights
-    share = tracking_share(s, p, t)
+    fraction = posture_fraction(p, s.com, t.com)
     for j in range(nv):
-        ws.accel_weights[j] = share * p.accel_weight[j]
+        ws.accel_weights[j] = fraction * p.accel_weight[j]
     for a in range(3):
         ws.momentum_weights[a], ws.momentum_weights[3 + a] = p.com_weight[a], p.angular_weight[a]
         ws.wrench_des[a], ws.wrench_des[3 + a] = ws.momentum_rate[a], ws.momentum_rate[3 + a]

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class QPParameters(Block):
-    """What tasks, contacts and limits hand to the compiled code (nv dofs, nc soles)."""
+    """The numbers of tasks, contacts and limits in SI units, for nv dofs and nc soles."""
 
     accel_weight: np.ndarray  # (nv,) posture
-    far_share: float  # of these weights, with the CoM far from c_ref
+    far_share: float  # the fraction of these weights with the CoM far from c_ref
     far_distance: float  # [m]
     stiffness: np.ndarray  # (nv,) k_t [1/s²]
     damping: np.ndarray  # (nv,) d_t [1/s]

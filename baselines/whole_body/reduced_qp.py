@@ -18,7 +18,7 @@ import numpy as np
 
 from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import call_all
+from poise.envs.compiled.calls import run
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import copy
 from poise.envs.physics.arrays import RobotArrays
@@ -34,13 +34,13 @@ from .objective import (
     desired_momentum_rate,
 )
 from .parameters import QPParameters
-from .stack import TaskStack, add_stack, fill_stack
+from .stack import TaskStack, add_stack
 from .workspace import Workspace
 
 
 @dataclass(frozen=True, eq=False)
 class Assembly(Block):
-    """What the reduced problem of a tick is made from, and where it is put."""
+    """All that the reduced problem of a tick is made from, and its workspace."""
 
     robot: RobotArrays
     state: StateArrays
@@ -60,36 +60,35 @@ def assemble(a: Assembly):
     desired_momentum_rate(robot, s, p, t, a.period, ws)
     _update_contacts(s, c)
     _eliminate_contacts(s, c, p, ws)
-    _share_wrench(s, c, p, ws)
+    _distribute_wrench(s, c, p, ws)
     carry_momentum(p, t, ws)
     _torques(s, c, ws)
     build_objective(robot, s, p, t, ws)
     build_constraints(robot, s, p, c, ws)
     if a.tasks.b.shape[0] > 0:
-        fill_stack(a.tasks)
         add_stack(a.tasks, ws)
 
 
 @compiled
 def _update_contacts(s: StateArrays, c: ContactArrays):
-    """J of the soles and the points, and what else the points have; without points it is s.J."""
+    """Fill J of the soles and the points, and the rows of the points; without points J is s.J."""
     if c.positions.shape[0] > 0:
         for r in range(s.J.shape[0]):
             copy(s.J[r], c.J[r])
-        call_all(c.fill)
+        run(c.fill)
 
 
 @compiled
 def _eliminate_contacts(s: StateArrays, c: ContactArrays, p: QPParameters, ws: Workspace):
-    """v̇₀ and V from J v̇ = −k_v J v − J̇ v."""
+    """Solve J v̇ = −k_v J v − J̇ v of the soles, and of the points likewise, for v̇₀ and V."""
     for r in range(s.J.shape[0]):
         ws.contact_accel[r] = -p.sole_damping * s.J_v[r] - s.Jdot_v[r]
     solve_resting(c.J, ws.contact_accel, ws.space, ws.vdot0, ws.V)
 
 
 @compiled
-def _share_wrench(s: StateArrays, c: ContactArrays, p: QPParameters, ws: Workspace):
-    """B, W₀ and the sole wrenches w = w₀ + E x: W/nc each, plus internal wrenches."""
+def _distribute_wrench(s: StateArrays, c: ContactArrays, p: QPParameters, ws: Workspace):
+    """Fill B, W₀ and the sole wrenches w = w₀ + E x: W/nc each, plus internal wrenches."""
     nc = s.sole_point.shape[0]
     n = ws.g.shape[0]
     soft, internal = ws.first_root, ws.first_internal
@@ -99,22 +98,22 @@ def _share_wrench(s: StateArrays, c: ContactArrays, p: QPParameters, ws: Workspa
         for j in range(ws.vdot0.shape[0]):
             total += s.A[a, j] * ws.vdot0[j]
         ws.W0[a] = total
-    share = 1.0 / nc
+    part = 1.0 / nc
     for i in range(nc):
         E, w0 = ws.E[6 * i : 6 * i + 6], ws.w0[6 * i : 6 * i + 6]
         for a in range(6):
-            w0[a] = share * ws.W0[a]
+            w0[a] = part * ws.W0[a]
             for j in range(n):
-                E[a, j] = share * ws.B[a, j]
+                E[a, j] = part * ws.B[a, j]
             if i < nc - 1:
                 E[a, internal + 6 * i + a] = 1.0
             else:
                 for other in range(nc - 1):
                     E[a, internal + 6 * other + a] = -1.0
             if p.soft_root:
-                E[a, soft + a] = -share
+                E[a, soft + a] = -part
         for k in range(c.positions.shape[0]):
-            _take_force(c.positions[k], s.com, share, ws.first_force + 3 * k, E)
+            _take_force(c.positions[k], s.com, part, ws.first_force + 3 * k, E)
         # about the CoM → about the sole: the force's moment over the arm is subtracted
         rx = s.sole_point[i, 0] - s.com[0]
         ry = s.sole_point[i, 1] - s.com[1]
@@ -130,19 +129,19 @@ def _share_wrench(s: StateArrays, c: ContactArrays, p: QPParameters, ws: Workspa
 
 
 @compiled
-def _take_force(position: np.ndarray, com: np.ndarray, share: float, first: int, E: np.ndarray):
-    """Take a share of [f; (r − c) × f] off a sole's wrench; f are the unknowns from `first` on."""
+def _take_force(position: np.ndarray, com: np.ndarray, part: float, first: int, E: np.ndarray):
+    """Take a part of [f; (r − c) × f] off a sole's wrench; f are the unknowns from `first` on."""
     rx, ry, rz = position[0] - com[0], position[1] - com[1], position[2] - com[2]
     for a in range(3):
-        E[a, first + a] = -share
-    E[3, first + 1], E[3, first + 2] = share * rz, -share * ry
-    E[4, first], E[4, first + 2] = -share * rz, share * rx
-    E[5, first], E[5, first + 1] = share * ry, -share * rx
+        E[a, first + a] = -part
+    E[3, first + 1], E[3, first + 2] = part * rz, -part * ry
+    E[4, first], E[4, first + 2] = -part * rz, part * rx
+    E[5, first], E[5, first + 1] = part * ry, -part * rx
 
 
 @compiled
 def _torques(s: StateArrays, c: ContactArrays, ws: Workspace):
-    """τ = τ₀ + T x on every joint's row of M v̇ + h − Jᵀw."""
+    """Fill τ = τ₀ + T x, every joint's row of M v̇ + h − Jᵀw."""
     nj, n = ws.T.shape
     np.dot(s.M[6:], ws.V, ws.T)
     np.dot(c.J.T, ws.E, ws.JtE)
@@ -160,7 +159,7 @@ def _torques(s: StateArrays, c: ContactArrays, ws: Workspace):
 
 @compiled
 def recover(p: QPParameters, ws: Workspace):
-    """Accelerations, wrenches and torques from the solution x."""
+    """Compute accelerations, wrenches and torques from the solution x."""
     np.dot(ws.rows, ws.x, ws.values)
     for r in range(ws.values.shape[0]):
         ws.values[r] += ws.offsets[r]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import Calls, address_of, call_all, calls_of
+from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
 from poise.envs.physics.kinematics import StateArrays
@@ -25,7 +25,7 @@ class TaskStack(Block):
     weights: np.ndarray  # (k,)
     AV: np.ndarray  # (k, n) scratch
     weighted: np.ndarray  # (k, n) scratch
-    fill: Calls  # the kernels of the tasks, each with its rows
+    fill: Program  # the kernels of the tasks, each with its rows
 
 
 def make_stack(
@@ -40,10 +40,10 @@ def make_stack(
         own = slice(first, first + task.size)
         tick = TaskTick(state, block, RowArrays(A[own], b[own], weights[own]))
         if task.kernel is not None:
-            calls.append((address_of(task.kernel, tick), tick))
+            calls.append((task.kernel, tick))
         first = own.stop
     return TaskStack(
-        A=A, b=b, weights=weights, AV=apart((k, n)), weighted=apart((k, n)), fill=calls_of(calls)
+        A=A, b=b, weights=weights, AV=apart((k, n)), weighted=apart((k, n)), fill=Program.of(calls)
     )
 
 
@@ -65,14 +65,9 @@ def fill_from_python(stack: TaskStack, tasks: Iterable[BoundTask], state: RobotS
 
 
 @compiled
-def fill_stack(stack: TaskStack):
-    """The rows of all tasks that have a kernel."""
-    call_all(stack.fill)
-
-
-@compiled
 def add_stack(stack: TaskStack, ws: Workspace):
-    """Add ½ Σ weights (A v̇ − b)², v̇ = v̇₀ + V x, to the objective."""
+    """Add ½ Σ weights (A v̇ − b)², v̇ = v̇₀ + V x, to the objective; kernels fill their rows first."""
+    run(stack.fill)
     A, AV = stack.A, stack.AV
     np.dot(A, ws.V, AV)
     for r in range(A.shape[0]):

@@ -13,6 +13,7 @@ from poise.envs.physics.state import RobotState
 
 from .constraint_rows import torque_matrix
 from .contacts.contact import ContactRows
+from .objective import posture_fraction
 from .parameters import QPParameters
 from .tasks.task import Rows
 
@@ -30,13 +31,8 @@ def posture_rows(state: RobotState, targets: Targets, p: QPParameters) -> Rows:
     a_ref = np.concatenate([np.zeros(3), targets.root_acc, targets.a_ref])
     v_ref = v_ref + carrying_velocity(state, targets.angular_momentum)
     desired = a_ref + p.stiffness * error + p.damping * (v_ref - state.qvel)
-    return Rows(np.eye(len(desired)), desired, tracking_share(state, targets, p) * p.accel_weight)
-
-
-def tracking_share(state: RobotState, targets: Targets, p: QPParameters) -> float:
-    """β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally: what the posture's weights keep."""
-    away = float(np.linalg.norm(state.com[:2] - targets.com[:2])) / p.far_distance
-    return p.far_share + (1.0 - p.far_share) * float(np.exp(-(away**2)))
+    fraction = posture_fraction(p, state.com, targets.com)
+    return Rows(np.eye(len(desired)), desired, fraction * p.accel_weight)
 
 
 def carrying_velocity(state: RobotState, angular_momentum: np.ndarray) -> np.ndarray:

@@ -37,7 +37,7 @@ class Layout(NamedTuple):
 
     @property
     def parts(self) -> tuple[slice, slice, slice, slice]:
-        """Of `rows`: v̇, W, w and τ."""
+        """The parts v̇, W, w and τ of `rows`."""
         nv, k = self.nv, self.k
         return slice(0, nv), slice(nv, nv + 6), slice(nv + 6, nv + 6 + k), slice(nv + 6 + k, self.r)
 

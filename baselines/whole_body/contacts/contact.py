@@ -1,4 +1,4 @@
-"""What the momentum QP knows of what touches the world, whether a foot or not."""
+"""Contacts of the momentum QP: points in contact, and the Jacobian of these and the soles."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import Calls, address_of, calls_of
+from poise.envs.compiled.calls import Program
 from poise.envs.compiled.memory import apart
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
@@ -30,7 +30,7 @@ class ContactRows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ContactRowArrays(Block):
-    """Where a contact puts its `ContactRows`."""
+    """The arrays that a contact writes its `ContactRows` to."""
 
     position: np.ndarray
     J: np.ndarray
@@ -43,7 +43,7 @@ class ContactRowArrays(Block):
 
 @dataclass(frozen=True, eq=False)
 class PointTick(Block):
-    """What a contact's kernel works on."""
+    """All that a contact's kernel works on."""
 
     state: StateArrays
     contact: Any  # the contact's own block, made by `bind`
@@ -116,7 +116,7 @@ class ContactArrays(Block):
     cone: np.ndarray  # (rows, 3) of the points, one below the other
     rows: np.ndarray  # (np + 1,) int: the first row of each point's cone; the last one's end
     bound: np.ndarray  # (rows,) [N]
-    fill: Calls  # the kernels of the points, each with its rows
+    fill: Program  # the kernels of the points, each with its rows
 
 
 def contact_arrays(
@@ -146,5 +146,5 @@ def contact_arrays(
         tick = PointTick(state, block, ContactRowArrays(
             positions[i], J[own], accel[own], cone[rows], bound[rows], weights[own], force[own],
         ))  # fmt: skip
-        calls.append((address_of(contact.kernel, tick), tick))
-    return ContactArrays(J, positions, cone, ends.astype(np.int64), bound, calls_of(calls))
+        calls.append((contact.kernel, tick))
+    return ContactArrays(J, positions, cone, ends.astype(np.int64), bound, Program.of(calls))

@@ -47,8 +47,8 @@ def fill_point(t: PointTick):
 
 @dataclass(frozen=True)
 class PointContact(Contact):
-    """J v̇ + J̇ v = −k_v J v and |f_1| + |f_2| ≤ μ f_n, f_n ≤ f_max: a point that neither moves nor
-    turns anything, with ½ ω_f ‖f − f_des n‖² added to the objective.
+    """J v̇ + J̇ v = −k_v J v and |f_1| + |f_2| ≤ μ f_n, f_n ≤ f_max: a point that does not move and
+    transmits no moment, with ½ ω_f ‖f − f_des n‖² added to the objective.
 
     f is the surface's force on the robot, n the normal out of the surface, f_1 and f_2 its parts
     along two tangents. A point that leaves its place is not brought back.
@@ -72,7 +72,7 @@ class PointContact(Contact):
             raise ValueError("normal: must not be zero")
 
     def bind(self, robot: Robot) -> PointContactBlock:
-        """See `Contact`."""
+        """The contact in SI units, its normal of length one."""
         units = robot.units
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         return PointContactBlock(
@@ -85,11 +85,11 @@ class PointContact(Contact):
         )  # fmt: skip
 
     def chain(self, block: PointContactBlock) -> np.ndarray:
-        """See `Contact`."""
+        """The degrees of freedom that move the point."""
         return block.point.chain
 
     def rows(self, state: RobotState, block: PointContactBlock) -> ContactRows:
-        """See `Contact`."""
+        """Motion, cone and load in NumPy."""
         motion = point_motion(state, block.point)
         return ContactRows(
             position=motion.position,

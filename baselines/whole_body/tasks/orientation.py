@@ -29,7 +29,7 @@ class OrientationBlock(Block):
 
     point: BodyPoint
     axes: np.ndarray  # (3, 3) R_ref in the heading frame, or in the world
-    turns: bool  # whether the reference turns with the heading
+    turns: bool  # true: the reference turns with the heading
     k: float  # [1/s²]
     d: float  # [1/s]
     weight: float  # per (rad/s²)²
@@ -75,7 +75,7 @@ class Orientation(Task):
     damping_ratio: float = field(default=1.0, metadata={"min": 0.0})  #: ζ
 
     def bind(self, robot: Robot) -> OrientationBlock:
-        """See `Task`."""
+        """The task in SI units, its reference that of the standing robot."""
         units, point = robot.units, body_point(robot, self.body, (0.0, 0.0, 0.0))
         k, d = spring(units, self.stiffness, self.damping_ratio)
         return OrientationBlock(
@@ -85,7 +85,7 @@ class Orientation(Task):
         )  # fmt: skip
 
     def rows(self, state: RobotState, block: OrientationBlock) -> Rows:
-        """See `Task`."""
+        """The rows in v̇, in NumPy."""
         motion = point_motion(state, block.point)
         yaw = state.heading_yaw if block.turns else 0.0
         wanted = Rotation.from_euler("z", yaw).as_matrix() @ block.axes

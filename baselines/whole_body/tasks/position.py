@@ -27,7 +27,7 @@ class PositionBlock(Block):
 
     point: BodyPoint
     reference: np.ndarray  # (3, 3) x_ref, ẋ_ref, ẍ_ref [m, s], heading frame or world
-    turns: bool  # whether the reference is in the heading frame
+    turns: bool  # true: the reference is in the heading frame
     k: float  # [1/s²]
     d: float  # [1/s]
     weight: float  # per (m/s²)²
@@ -77,7 +77,7 @@ class Position(Task):
     damping_ratio: float = field(default=1.0, metadata={"min": 0.0})  #: ζ
 
     def bind(self, robot: Robot) -> PositionBlock:
-        """See `Task`."""
+        """The task in SI units, its reference that of the standing robot."""
         units, point = robot.units, body_point(robot, self.body, self.point)
         k, d = spring(units, self.stiffness, self.damping_ratio)
         place = standing_frame(robot, point)[0]
@@ -89,7 +89,7 @@ class Position(Task):
         )  # fmt: skip
 
     def rows(self, state: RobotState, block: PositionBlock) -> Rows:
-        """See `Task`."""
+        """The rows in v̇, in NumPy."""
         motion = point_motion(state, block.point)
         place, velocity, accel = block.reference
         if block.turns:

@@ -67,7 +67,7 @@ class SolePose(Task):
     kernel = staticmethod(fill_sole_pose)
 
     def rows(self, state: RobotState, block: SolePoseBlock) -> Rows:
-        """See `Task`."""
+        """The rows in v̇, in NumPy."""
         own, gains, reference = (
             slice(6 * block.sole, 6 * block.sole + 6),
             block.gains,

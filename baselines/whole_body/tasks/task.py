@@ -1,4 +1,4 @@
-"""What a task of the momentum QP is: rows of ½ Σ weights (A v̇ − b)² from gains without units."""
+"""Tasks of the momentum QP: rows of ½ Σ weights (A v̇ − b)² from gains without units."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RowArrays(Block):
-    """Where a task puts its k rows: its part of the stack."""
+    """The part of the stack that a task writes its k rows to."""
 
     A: np.ndarray  # (k, nv); zero before the first tick
     b: np.ndarray  # (k,)
@@ -34,7 +34,7 @@ class RowArrays(Block):
 
 @dataclass(frozen=True, eq=False)
 class TaskTick(Block):
-    """What a task's kernel works on."""
+    """All that a task's kernel works on."""
 
     state: StateArrays
     task: Any  # the task's own block, made by `bind`
