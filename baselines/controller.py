@@ -1,8 +1,8 @@
-"""What every controller is: state and targets in, joint torques out."""
+"""The interface of controllers: state and targets in, joint torques out."""
 
 import inspect
 from dataclasses import dataclass, field, fields
-from operator import is_not
+from operator import attrgetter, is_not
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -16,7 +16,7 @@ from poise.envs.robots.robot import Robot
 
 
 class Outputs(NamedTuple):
-    """Where compiled code finds what a controller's tick gave."""
+    """The arrays in which compiled code finds what a controller's tick gave."""
 
     tau: np.ndarray  # (nv−6,) joint torques [N·m]
     root_wrench: np.ndarray  # (6,) of a soft root
@@ -26,7 +26,7 @@ class Outputs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TargetArrays(Block):
-    """What the controller is asked to reach (nj = nv−6 joints), world axes."""
+    """All that a controller is asked to reach (nj = nv−6 joints), world axes."""
 
     q_ref: np.ndarray  # (nj,)
     v_ref: np.ndarray  # (nj,)
@@ -39,6 +39,10 @@ class TargetArrays(Block):
     com_acc: np.ndarray  # (3,)
     cop: np.ndarray  # (2,) p_ref
     angular_momentum: np.ndarray  # (3,) L_ref that the posture is to carry; zero: none
+
+
+#: the arrays of `Targets`, in the order of the fields of `TargetArrays`
+_MEMBERS = attrgetter(*(item.name for item in fields(TargetArrays)))
 
 
 @dataclass
@@ -92,10 +96,7 @@ class Targets(Copyable):
             own[:] = array
 
     def _own(self) -> tuple[np.ndarray, ...]:
-        return (
-            self.q_ref, self.v_ref, self.a_ref, self.root_axes, self.root_vel, self.root_acc,
-            self.com, self.com_vel, self.com_acc, self.cop, self.angular_momentum,
-        )  # fmt: skip
+        return _MEMBERS(self)
 
     def arrays(self) -> TargetArrays:
         """The same arrays, not copies, for compiled code."""
@@ -186,7 +187,7 @@ class CompiledController(BaseController):
 
     @property
     def compiled(self) -> bool:
-        """Whether `compiled_tick` does what `torques` does; else `torques` is called."""
+        """True where `compiled_tick` does what `torques` does; otherwise `torques` is called."""
         return self._same_tick
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Block]:

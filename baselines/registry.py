@@ -106,9 +106,10 @@ def _described(controller: str | Path | Mapping[str, Any]) -> Any:
 def _build(data: dict[str, Any], source: str) -> Any:
     """A configuration; `qp` may be the name of one of the momentum QP, or its mapping.
 
-    `base` names a controller whose fields hold where `data` has none of its own.
+    `base` names a controller whose fields hold where `data` has none of its own; within `qp` and
+    `step_qp` one of the momentum QP.
     """
-    data = on_base(data, "controllers", source)
+    data = on_base(data, "controllers", source, parts=("qp", "step_qp"))
     kind = data.get("kind", "momentum-qp")
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigError(

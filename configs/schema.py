@@ -13,6 +13,7 @@ import yaml
 
 from .errors import ConfigError, shown
 from .files import packaged, resolve
+from .kinds import OfKind, kind_of
 from .reading import read_yaml
 from .yaml_loader import DEPTH
 
@@ -22,12 +23,23 @@ MOST_ENTRIES = 1_000_000  # of an array among the values of a configuration
 
 
 def on_base(
-    data: dict[str, Any], kind: str, source: str | Path, above: tuple[Path, ...] = ()
+    data: dict[str, Any],
+    kind: str,
+    source: str | Path,
+    above: tuple[Path, ...] = (),
+    parts: tuple[str, ...] = (),
 ) -> dict[str, Any]:
     """`data` over the file of `kind` that its `base` names, mappings merged; as it is without one.
 
+    Each of the fields `parts` may have a `base` of that kind, too. It is looked up before anything
+    is merged, so a file's own base of a part hides what its base has there.
+
     Raises ConfigError for a base that does not exist, cannot be read, or leads back to itself.
     """
+
+    for part in parts:
+        if isinstance(data.get(part), dict):
+            data = {**data, part: on_base(data[part], kind, f"{source}: {part}", above)}
     if "base" not in data:
         return data
     if not isinstance(data["base"], str):
@@ -39,7 +51,7 @@ def on_base(
         raise ConfigError(
             f"{shown(data['base'])} leads back to itself", source=source, field="base"
         )
-    base = on_base(read_yaml(path), kind, path, (*above, path))
+    base = on_base(read_yaml(path), kind, path, (*above, path), parts)
     return _merged(base, {key: value for key, value in data.items() if key != "base"})
 
 
@@ -75,13 +87,17 @@ def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
 def to_dict(obj: Any, levels: int = DEPTH) -> Any:
     """A dataclass as plain dicts, lists, strings and numbers; the inverse of :func:`build`.
 
+    A field with ``metadata={"omit": "empty"}`` is left out where it is empty: what was written
+    before there was such a field, and hashes of it, stay as they are.
+
     Raises ConfigError for more `levels` than a file may have, and an array of more entries.
     """
     if levels < 0:
         raise ConfigError(f"more than {DEPTH} levels")
     if dataclasses.is_dataclass(obj) and not isinstance(obj, type):
-        fields = [f.name for f in dataclasses.fields(obj) if f.init]
-        return {name: to_dict(getattr(obj, name), levels - 1) for name in fields}
+        fields = [f for f in dataclasses.fields(obj) if f.init]
+        names = [f.name for f in fields if "omit" not in f.metadata or getattr(obj, f.name)]
+        return {name: to_dict(getattr(obj, name), levels - 1) for name in names}
     if isinstance(obj, dict):
         return {key: to_dict(value, levels - 1) for key, value in obj.items()}
     if isinstance(obj, (list, tuple)):
@@ -108,7 +124,7 @@ def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:
     if hint is Any:
         return value
     if dataclasses.is_dataclass(hint):
-        return _build_dataclass(hint, value, source, path)
+        return _build_dataclass(_of_kind(hint, value, source, path), value, source, path)
     if origin in (Union, types.UnionType):
         return _build_union(args, value, source, path, bounds)
     if origin is Literal:
@@ -174,6 +190,18 @@ def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
         return cls(**values)
     except ValueError as error:
         raise ConfigError(str(error), source=source, field=path or None) from error
+
+
+def _of_kind(cls: Any, data: Any, source: str, path: str) -> Any:
+    """The class that the `kind` of the data names, where `cls` is the base of several."""
+    if not issubclass(cls, OfKind) or kind_of(cls) or not isinstance(data, dict):
+        return cls
+    kinds, field = cls.kinds(), f"{path}.kind" if path else "kind"
+    kind = data.get("kind")
+    if not isinstance(kind, str) or kind not in kinds:
+        problem = "this field is missing" if kind is None else f"no such kind: {shown(kind)}"
+        raise ConfigError(problem, source=source, field=field, choices=kinds)
+    return kinds[kind]
 
 
 def _build_union(args: tuple, value: Any, source: str, path: str, bounds: Any) -> Any:

@@ -21,7 +21,8 @@ def _standing() -> tuple[MomentumQP, RobotState, Targets]:
     """The baseline, in a state that is all zeros."""
     robot = load_robot("humanoid")
     qp = MomentumQP(robot)
-    state = RobotState(qp.arrays, allocate_state(robot.model.nv, len(robot.soles)))
+    model = robot.model
+    state = RobotState(qp.arrays, allocate_state(model.nv, len(robot.soles), model.nbody))
     return qp, state, Targets.standing(robot, state)
 
 

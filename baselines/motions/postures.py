@@ -1,4 +1,4 @@
-"""Where the centre of mass and the root of a posture are, with the soles on the ground."""
+"""The centre of mass and the root of a posture whose soles are on the ground."""
 
 from typing import NamedTuple
 

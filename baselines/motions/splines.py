@@ -45,7 +45,15 @@ def piecewise(splines: Sequence[BSpline]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @compiled
-def evaluate(knots, coeffs, loop, t, out_pos, out_vel, out_acc):
+def evaluate(
+    knots: np.ndarray,
+    coeffs: np.ndarray,
+    loop: bool,
+    t: float,
+    out_pos: np.ndarray,
+    out_vel: np.ndarray,
+    out_acc: np.ndarray,
+):
     """Position, velocity and acceleration at time t [s], into three arrays of one length.
 
     `knots`, `coeffs` as `piecewise` gives them; the first len(out_pos) columns are evaluated.

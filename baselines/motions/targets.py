@@ -71,7 +71,13 @@ def update_targets(
 
 
 @compiled
-def _root_reference(robot, cos, sin, samples, t):
+def _root_reference(
+    robot: RobotArrays,
+    cos: float,
+    sin: float,
+    samples: np.ndarray,
+    t: TargetArrays,
+):
     """Root axes, and angular velocity and acceleration in body axes, from φ, φ̇, φ̈."""
     phi = samples[0]
     angle = np.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)

@@ -33,19 +33,19 @@ CHECKS = 20  # times that a finished solution may be found wanting and taken up 
 
 
 @compiled
-def scratch_size(n, m):
+def scratch_size(n: int, m: int) -> int:
     """Number of float64 that `solve_dual` needs for n variables and m rows."""
     return ALIGNMENT + (2 * n + 6) * padded(n) + (n + 5) * padded(m)
 
 
 @compiled
-def iscratch_size(n, m):
+def iscratch_size(n: int, m: int) -> int:
     """Number of int64 that `solve_dual` needs for n variables and m rows."""
     return 2 + 4 * n
 
 
 @compiled
-def _size(x, start):
+def _size(x: np.ndarray, start: float) -> float:
     """‖x‖, and where x is all but zero a trace of ‖x‖ at the unconstrained minimum."""
     total = 0.0
     for j in range(x.shape[0]):
@@ -54,7 +54,21 @@ def _size(x, start):
 
 
 @compiled
-def _correct(Jt, Rt, Ct, q, active, sign, bound, x, start, e, z, s, product):
+def _correct(
+    Jt: np.ndarray,
+    Rt: np.ndarray,
+    Ct: np.ndarray,
+    q: int,
+    active: np.ndarray,
+    sign: np.ndarray,
+    bound: np.ndarray,
+    x: np.ndarray,
+    start: float,
+    e: np.ndarray,
+    z: np.ndarray,
+    s: np.ndarray,
+    product: np.ndarray,
+):
     """Recomputes s from x and takes out of both what rounding has left on the active rows."""
     for _ in range(3):
         s[:] = 0.0
@@ -71,7 +85,13 @@ def _correct(Jt, Rt, Ct, q, active, sign, bound, x, start, e, z, s, product):
 
 
 @compiled
-def _step_length(r, mult, equalities, q, dependent):
+def _step_length(
+    r: np.ndarray,
+    mult: np.ndarray,
+    equalities: int,
+    q: int,
+    dependent: bool,
+) -> tuple[int, float]:
     """Largest step that keeps the multipliers of inequalities ≥ 0, and the one that blocks it."""
     largest = 0.0
     for k in range(q):
@@ -86,9 +106,28 @@ def _step_length(r, mult, equalities, q, dependent):
 
 @compiled
 def _resume(
-    Jt, Rt, Ct, q, equalities, rows, sides, active, sign, bound, mult, lower, upper, x, trace,
-    d, z, r, normal, s, work,
-):  # fmt: skip
+    Jt: np.ndarray,
+    Rt: np.ndarray,
+    Ct: np.ndarray,
+    q: int,
+    equalities: int,
+    rows: np.ndarray,
+    sides: np.ndarray,
+    active: np.ndarray,
+    sign: np.ndarray,
+    bound: np.ndarray,
+    mult: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    x: np.ndarray,
+    trace: float,
+    d: np.ndarray,
+    z: np.ndarray,
+    r: np.ndarray,
+    normal: np.ndarray,
+    s: np.ndarray,
+    work: np.ndarray,
+) -> int:
     """Makes `rows` active at once and lets go of those that pull; returns the number of rows.
 
     What is left is a start as good as any for the method: x is optimal for the rows it holds.
@@ -136,7 +175,19 @@ def _resume(
 
 
 @compiled
-def solve_dual(H, g, C, l, u, x, lam, scratch, iscratch, max_iter, warm=False):  # noqa: E741
+def solve_dual(
+    H: np.ndarray,
+    g: np.ndarray,
+    C: np.ndarray,
+    l: np.ndarray,  # noqa: E741
+    u: np.ndarray,
+    x: np.ndarray,
+    lam: np.ndarray,
+    scratch: np.ndarray,
+    iscratch: np.ndarray,
+    max_iter: int,
+    warm: bool = False,
+) -> int:
     """Minimises ½ xᵀHx + gᵀx subject to l ≤ Cx ≤ u; returns the status.
 
     H (n, n) symmetric positive definite, g (n,), C (m, n); l, u (m,) may be ∓inf, l == u means

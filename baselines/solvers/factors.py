@@ -16,13 +16,13 @@ SMALLEST_PIVOT = 1e-14  # of H, relative to its diagonal entry
 
 
 @compiled
-def padded(k):
+def padded(k: int) -> int:
     """The next multiple of 8."""
     return (k + 7) // 8 * 8
 
 
 @compiled
-def factorise(H, Jt):
+def factorise(H: np.ndarray, Jt: np.ndarray) -> float:
     """Jt ← L⁻¹ with H = LLᵀ; returns trace(H⁻¹) = ‖J‖², or −1 if H is not positive definite.
 
     Eliminates [H | I] in place: up to step k the first k columns of a row hold the inverse, the
@@ -69,7 +69,7 @@ def factorise(H, Jt):
 
 
 @compiled
-def _finish_row(Jt, k, scale):
+def _finish_row(Jt: np.ndarray, k: int, scale: float):
     for j in range(k + 1):
         Jt[k, j] *= scale
     for j in range(k + 1, Jt.shape[0]):
@@ -77,7 +77,13 @@ def _finish_row(Jt, k, scale):
 
 
 @compiled
-def split(Jt, q, normal, d, z):
+def split(
+    Jt: np.ndarray,
+    q: int,
+    normal: np.ndarray,
+    d: np.ndarray,
+    z: np.ndarray,
+) -> tuple[float, float]:
     """d = Jᵀn and z = J₂d₂; returns ‖d₂‖² (= nᵀz) and ‖d‖²."""
     n, p = Jt.shape
     active, free = 0.0, 0.0
@@ -98,7 +104,7 @@ def split(Jt, q, normal, d, z):
 
 
 @compiled
-def solve_upper(Rt, q, d, r):
+def solve_upper(Rt: np.ndarray, q: int, d: np.ndarray, r: np.ndarray):
     """r = R⁻¹d₁."""
     for j in range(q):
         r[j] = d[j]
@@ -110,7 +116,7 @@ def solve_upper(Rt, q, d, r):
 
 
 @compiled
-def lift(Jt, Rt, q, e, z):
+def lift(Jt: np.ndarray, Rt: np.ndarray, q: int, e: np.ndarray, z: np.ndarray):
     """z = J₁R⁻ᵀe, the smallest step (in the metric of H) with Nᵀz = e; e is overwritten."""
     p = Jt.shape[1]
     for j in range(p):
@@ -125,7 +131,7 @@ def lift(Jt, Rt, q, e, z):
 
 
 @compiled
-def append(Jt, Rt, q, d, z, free):
+def append(Jt: np.ndarray, Rt: np.ndarray, q: int, d: np.ndarray, z: np.ndarray, free: float):
     """Adds the row that gave d, z and free = ‖d₂‖²; d and z are overwritten.
 
     A reflection turns d₂ into (σ, 0, …); its product with J₂ᵀ is z − σ J₂e₁, so it costs one
@@ -147,7 +153,7 @@ def append(Jt, Rt, q, d, z, free):
 
 
 @compiled
-def remove(Jt, Rt, q, k):
+def remove(Jt: np.ndarray, Rt: np.ndarray, q: int, k: int):
     """Deletes column k of R; rotations of neighbouring rows of Jᵀ make R triangular again."""
     p = Jt.shape[1]
     for j in range(k, q - 1):

@@ -38,7 +38,7 @@ class QP:
 
 
 class Status(StrEnum):
-    """How a solver ended."""
+    """The way in which a solver ended."""
 
     SOLVED = "solved"
     INACCURATE = "inaccurate"  # near a solution, but not within the tolerances
@@ -66,7 +66,7 @@ class Solution:
 
 
 class Residuals(NamedTuple):
-    """How far a solution is from the conditions of optimality; all are zero at the optimum."""
+    """The distance of a solution from the conditions of optimality; all are zero at the optimum."""
 
     primal: float  # largest violation of a row
     dual: float  # ‖Hx + g + Cᵀlam‖∞

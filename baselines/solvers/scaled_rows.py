@@ -12,7 +12,15 @@ SOLVED, INFEASIBLE, ITERATION_LIMIT, INVALID = 0, 1, 2, 3  # status of `solve_du
 
 
 @compiled
-def scale_rows(C, l, u, Ct, scale, lower, upper):  # noqa: E741
+def scale_rows(
+    C: np.ndarray,
+    l: np.ndarray,  # noqa: E741
+    u: np.ndarray,
+    Ct: np.ndarray,
+    scale: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> int:
     """Ct (n, p) = (C / row norms)ᵀ and its bounds; returns SOLVED, INFEASIBLE or INVALID."""
     m, n = C.shape
     p = Ct.shape[1]
@@ -47,7 +55,7 @@ def scale_rows(C, l, u, Ct, scale, lower, upper):  # noqa: E741
 
 
 @compiled
-def advance(Ct, z, t, s, product):
+def advance(Ct: np.ndarray, z: np.ndarray, t: float, s: np.ndarray, product: np.ndarray):
     """s += t Cz."""
     n, p = Ct.shape
     for i in range(p):
@@ -61,7 +69,12 @@ def advance(Ct, z, t, s, product):
 
 
 @compiled
-def most_violated(s, lower, upper, violation):
+def most_violated(
+    s: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    violation: np.ndarray,
+) -> tuple[int, float]:
     """Index and violation of the most violated row; −1 and 0 if there is none."""
     for i in range(s.shape[0]):
         below, above = lower[i] - s[i], s[i] - upper[i]

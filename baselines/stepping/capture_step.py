@@ -14,7 +14,7 @@ from poise.baselines.whole_body.momentum_qp import (
     MomentumQPConfig,
     momentum_tick,
 )
-from poise.baselines.whole_body.reduced_qp import QPParameters
+from poise.baselines.whole_body.parameters import QPParameters
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.calls import address_of
 from poise.envs.compiled.memory import apart
@@ -27,7 +27,7 @@ from .offsets import STANDING, Stepping
 from .planner import Foothold, StepLimits, StepPlanner
 from .reach import Reach, ReachArrays
 from .recentring import StepHome, home_arrays, leave_home
-from .swing import Swing, SwingTask, swing_gains
+from .swing import Swing, SwingTask, swing_gains, swing_task
 from .tick import CaptureTick, StepGains, StepMemory, capture_tick
 
 
@@ -180,7 +180,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     @property
     def compiled(self) -> bool:
         """See `CompiledController`; other solvers are called from Python."""
-        return super().compiled and self.solver is None
+        return super().compiled and self.qp.compiled
 
     def gains(self) -> Any:
         """See `CompiledController`."""
@@ -241,7 +241,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             or known.place.problem.parameters is not self.qp.parameters
         ):  # fmt: skip
             blocks = self.blocks(state, targets)
-            place = address_of(momentum_tick, blocks.place) if self.solver is None else 0
+            place = address_of(momentum_tick, blocks.place) if self.qp.compiled else 0
             contacts = address_of(contact_tick, blocks.both)
             known = self._tick = replace(blocks, place_kernel=place, contact_kernel=contacts)
         return known
@@ -251,15 +251,18 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         if self._guided is None:
             self._guided = Targets.standing(self.robot, state)
         s, guided, sets, reach = state.arrays, self._guided.arrays(), self.sets, self.reach.arrays
+        gains = swing_gains(self.qp.arrays, self.config.swing)
+        reference, axes = self._swing.reference, self.memory.level
         one, two, both = (
-            sets.sets[soles].bind(s, guided, 6 * (len(soles) == 1), sets)
-            for soles in ((0,), (1,), (0, 1))
+            sets.sets[soles].bind(
+                s, guided, sets, [swing_task(foot, reference, axes, gains) for foot in swinging]
+            )
+            for soles, swinging in (((0,), (1,)), ((1,), (0,)), ((0, 1), ()))
         )
         return CaptureTick(
             self.qp.arrays, s, targets.arrays(), guided,
             step_gains(self.robot, self.config, self.period),
-            self.planner.search(state), self._swing.arrays,
-            swing_gains(self.qp.arrays, self.config.swing), self.memory, self.home,
+            self.planner.search(state), self._swing.arrays, self.memory, self.home,
             self.shift.values, one, two, both, self.qp.tick(state, targets), self.tau,
             self._failures, apart(1, dtype=np.int64), apart(reach.alone.shape[1:]),
             apart((len(self.memory.region) // 2, 2)), apart(2), apart(3), 0, 0,

@@ -4,15 +4,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from poise.baselines.whole_body.task_rows import Rows
+from poise.baselines.whole_body.tasks.sole_pose import SolePose, SolePoseBlock, SolePoseGains
+from poise.baselines.whole_body.tasks.task import BoundTask
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
 from poise.envs.maths.pendulum import Units
-from poise.envs.maths.vectors import copy, rotation_error
 from poise.envs.physics.arrays import RobotArrays
-from poise.envs.physics.state import RobotState
 
 LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
 FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
@@ -22,7 +21,7 @@ FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
 class SwingTask:
     """J_swing v̇ + J̇ v = a_ref + k (x_ref ⊖ x) + d (ẋ_ref − ẋ), k = `stiffness`, d = 2 ζ √k.
 
-    Units as in `whole_body/tasks.py`: weights per g² and (g/h)², a stiffness of 1 is ω²,
+    Units as in `whole_body/gains.py`: weights per g² and (g/h)², a stiffness of 1 is ω²,
     lengths in h.
     """
 
@@ -178,54 +177,20 @@ class Swing(Copyable):
         return self.reference.copy()
 
 
-@dataclass(frozen=True, eq=False)
-class SwingGains(Block):
-    """A `SwingTask` in SI units."""
-
-    stiffness: float
-    damping: float
-    weight: float
-    turn_weight: float
-    yaw_weight: float
-    error: np.ndarray  # (3,) scratch
-
-
-def swing_gains(robot: RobotArrays, task: SwingTask) -> SwingGains:
+def swing_gains(robot: RobotArrays, task: SwingTask) -> SolePoseGains:
     """`task` for one robot."""
     g, rate2 = robot.gravity, robot.gravity / robot.height_com
     k = task.stiffness * rate2
     d = 2.0 * task.damping_ratio * np.sqrt(k)
     turn = task.turn_weight / rate2**2
-    return SwingGains(
+    return SolePoseGains(
         stiffness=float(k), damping=float(d), weight=float(task.weight / g**2),
         turn_weight=float(turn), yaw_weight=float(task.yaw_share * turn), error=apart(3),
     )  # fmt: skip
 
 
-@compiled
-def fill_swing_rows(s, sole, reference, axes, gains, A, b, weights):
-    """Rows of a sole's task, see `SwingTask`, into `A` (6, nv), `b` and `weights` (6,)."""
-    k, d, turn = gains.stiffness, gains.damping, gains.error
-    rotation_error(s.sole_axes[sole], axes, turn)
-    for a in range(3):
-        r = 6 * sole + a
-        b[a] = (
-            reference[2, a] + k * (reference[0, a] - s.sole_point[sole, a])
-            + d * (reference[1, a] - s.J_v[r]) - s.Jdot_v[r]
-        )  # fmt: skip
-        b[3 + a] = k * turn[a] - d * s.J_v[3 + r] - s.Jdot_v[3 + r]
-        weights[a], weights[3 + a] = gains.weight, gains.turn_weight
-    weights[5] = gains.yaw_weight
-    for r in range(6):
-        copy(s.J[6 * sole + r], A[r])
-
-
-def swing_rows(
-    state: RobotState, sole: int, reference: np.ndarray, axes: np.ndarray, task: SwingTask
-) -> Rows:
-    """Rows (6, nv) in v̇ of one sole's SE(3) task: `reference` (3, 3), sole `axes` (3, 3)."""
-    A, b, weights = apart((6, len(state.qvel))), apart(6), apart(6)
-    frames = np.array(reference, dtype=float), np.array(axes, dtype=float)
-    gains = swing_gains(state.robot, task)
-    fill_swing_rows(state.arrays, sole, *frames, gains, A, b, weights)
-    return Rows(A, b, weights)
+def swing_task(
+    sole: int, reference: np.ndarray, axes: np.ndarray, gains: SolePoseGains
+) -> BoundTask:
+    """The task of the QP that moves a sole along `reference` (3, 3), its `axes` (3, 3) fixed."""
+    return BoundTask(SolePose(), SolePoseBlock(sole, reference, axes, gains))

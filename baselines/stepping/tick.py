@@ -35,10 +35,8 @@ from .swing import (
     FROZEN,
     LANDING,
     SwingArrays,
-    SwingGains,
     advance_swing,
     aim_swing,
-    fill_swing_rows,
     start_swing,
     time_left,
 )
@@ -94,7 +92,6 @@ class CaptureTick(Block):
     gains: StepGains
     search: Search
     swing: SwingArrays
-    task: SwingGains
     memory: StepMemory
     home: HomeArrays
     shift: np.ndarray  # see `StepShift`
@@ -210,7 +207,6 @@ def swing_tick(t: CaptureTick):
         return
     advance_swing(w, g.period)
     chosen = t.second if foot == 0 else t.first
-    fill_swing_rows(s, foot, w.reference, level, t.task, chosen.A, chosen.b, chosen.weights)
     chosen.limited[0] = 0
     solve_set(t, chosen)
 

@@ -13,13 +13,13 @@ __all__ = [
 if TYPE_CHECKING:
     from poise.baselines.whole_body.constraint_rows import Bounds
     from poise.baselines.whole_body.formulation import build
-    from poise.baselines.whole_body.task_rows import Rows
+    from poise.baselines.whole_body.tasks.task import Rows
 else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
             "constraint_rows": ("Bounds",),
             "formulation": ("build",),
-            "task_rows": ("Rows",),
+            "tasks.task": ("Rows",),
         },
     )

@@ -1,8 +1,10 @@
 """Dynamics, contacts and limits of the readable momentum QP: each gives rows l ≤ C x ≤ u.
 
-x = (v̇, w) or (v̇, w, u_root); see `formulation.py`.
+x = (v̇, w) or (v̇, w, u_root); see `formulation.py`. w are the wrenches of the soles, then the forces
+of `points`, contacts of other bodies.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +12,8 @@ from scipy.linalg import block_diag
 
 from poise.envs.physics.state import RobotState
 
-from .reduced_qp import QPParameters
+from .contacts.contact import ContactRows
+from .parameters import QPParameters
 
 
 class Bounds(NamedTuple):
@@ -21,9 +24,14 @@ class Bounds(NamedTuple):
     u: np.ndarray  # (k,)
 
 
-def root_dynamics(state: RobotState, p: QPParameters) -> Bounds:
+def contact_jacobian(state: RobotState, points: Sequence[ContactRows] = ()) -> np.ndarray:
+    """(k, nv) J of everything in contact: six rows a sole, three a point."""
+    return np.vstack([state.J, *(point.J for point in points)])
+
+
+def root_dynamics(state: RobotState, p: QPParameters, points: Sequence[ContactRows] = ()) -> Bounds:
     """The root's six rows of M v̇ + h = Sᵀτ + Jᵀw + u_root, where no motor helps."""
-    C = np.hstack([state.M[:6], -state.J.T[:6]])
+    C = np.hstack([state.M[:6], -contact_jacobian(state, points).T[:6]])
     if p.soft_root:
         C = np.hstack([C, -_root_force_matrix(state)])
     return Bounds(C, -state.h[:6], -state.h[:6])
@@ -33,6 +41,18 @@ def sole_motion(state: RobotState, p: QPParameters) -> Bounds:
     """J v̇ + J̇ v = −k_v J v: soles do not accelerate, and what speed they have dies out."""
     accel = -p.sole_damping * state.J_v - state.Jdot_v
     return Bounds(state.J, accel, accel)
+
+
+def point_motion_bounds(points: Sequence[ContactRows]) -> Bounds:
+    """J v̇ + J̇ v = what each point in contact is to have."""
+    accel = np.concatenate([point.accel for point in points])
+    return Bounds(np.vstack([point.J for point in points]), accel, accel)
+
+
+def point_cones(state: RobotState, points: Sequence[ContactRows]) -> Bounds:
+    """cone · f ≤ bound of each point in contact."""
+    C = _after(len(state.qvel) + len(state.J), block_diag(*(point.cone for point in points)))
+    return Bounds(C, np.full(len(C), -np.inf), np.concatenate([point.bound for point in points]))
 
 
 def sole_cones(state: RobotState, p: QPParameters) -> Bounds:
@@ -45,10 +65,10 @@ def sole_cones(state: RobotState, p: QPParameters) -> Bounds:
     return Bounds(C, np.full(len(C), -np.inf), np.zeros(len(C)))
 
 
-def torque_limits(state: RobotState, p: QPParameters) -> Bounds:
+def torque_limits(state: RobotState, p: QPParameters, points: Sequence[ContactRows] = ()) -> Bounds:
     """|τ| ≤ τ_max; a joint without a motor has τ_max = 0."""
     h = state.h[6:]
-    return Bounds(torque_matrix(state), -p.torque_limit - h, p.torque_limit - h)
+    return Bounds(torque_matrix(state, points), -p.torque_limit - h, p.torque_limit - h)
 
 
 def joint_limits(state: RobotState, p: QPParameters) -> Bounds:
@@ -74,9 +94,9 @@ def _stopping_speed(distance: np.ndarray, p: QPParameters) -> np.ndarray:
     return np.where(distance < 0.0, distance / reaction, speed)
 
 
-def torque_matrix(state: RobotState) -> np.ndarray:
-    """(nv−6, nv+6nc) T with τ = T (v̇, w) + h."""
-    return np.hstack([state.M, -state.J.T])[6:]
+def torque_matrix(state: RobotState, points: Sequence[ContactRows] = ()) -> np.ndarray:
+    """(nv−6, nv+k) T with τ = T (v̇, w) + h."""
+    return np.hstack([state.M, -contact_jacobian(state, points).T])[6:]
 
 
 def _root_force_matrix(state: RobotState) -> np.ndarray:

@@ -1,16 +1,17 @@
 """The momentum QP with any subset of the soles in contact.
 
 One reduced problem for each subset (see `reduced_qp.py`), built on arrays that hold the soles in
-contact only; what else is asked of v̇, such as the way of a swing foot, comes as further rows.
+contact only. A stack of tasks says what else is asked of v̇, such as the way of a swing foot.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from poise.baselines.controller import TargetArrays, Targets
 from poise.baselines.solvers import QP
+from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import address_of, call
 from poise.envs.compiled.copies import Copyable
@@ -22,34 +23,33 @@ from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .momentum_qp import Memory, MomentumQPConfig, accept, allocate_memory, forget, solve
-from .parameters import qp_parameters
-from .reduced_qp import Assembly, QPParameters, Workspace, allocate_workspace, assemble
-from .task_rows import Rows
+from .contacts.contact import contact_arrays
+from .momentum_qp import MomentumQPConfig
+from .parameters import QPParameters, qp_parameters
+from .reduced_qp import Assembly, assemble
+from .stack import make_stack, put_rows
+from .tasks.task import BoundTask, Rows, bind_tasks
+from .tick import Memory, accept, allocate_memory, forget, solve
+from .workspace import Workspace, allocate_workspace
 
 
 @dataclass(frozen=True, eq=False)
 class ContactTick(Block):
-    """What a tick of one subset works on; k further rows in v̇, n unknowns."""
+    """All that a tick of one subset works on."""
 
-    source: StateArrays  # of all soles
-    pick: np.ndarray  # (nc,) int: soles of the subset
-    problem: Assembly  # of these
+    source: StateArrays  # with all soles
+    pick: np.ndarray  # (nc,) int: the soles of the subset
+    problem: Assembly  # with these soles only
     memory: Memory
-    A: np.ndarray  # (k, nv)
-    b: np.ndarray  # (k,)
-    weights: np.ndarray  # (k,)
-    AV: np.ndarray  # (k, n) scratch
-    weighted: np.ndarray  # (k, n) scratch
     load_limits: np.ndarray  # (nc,) [N]
-    limited: np.ndarray  # (1,) int: whether they count
+    limited: np.ndarray  # (1,) int: 1 where these limits count
     applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
     jump: np.ndarray  # (nv−6,) the most that they may change [N·m]
-    follows: np.ndarray  # (1,) int: whether there was a last tick
+    follows: np.ndarray  # (1,) int: 1 where there was a last tick
     chosen: np.ndarray  # (1,) int: the subset of the last tick, −1: none
-    index: int  # of this one
-    assemble: int  # addresses of kernels that are compiled already
-    solve: int
+    index: int  # number of this subset
+    assemble: int  # address of `assemble(problem)`, compiled already
+    solve: int  # address of `solve(problem.workspace)`
 
 
 @compiled
@@ -73,27 +73,6 @@ def pick_soles(source: StateArrays, pick: np.ndarray, own: StateArrays):
 
 
 @compiled
-def add_rows(t: ContactTick):
-    """Add ½ Σ weights (A v̇ − b)², v̇ = v̇₀ + V x, to the objective."""
-    ws, A, AV = t.problem.workspace, t.A, t.AV
-    np.dot(A, ws.V, AV)
-    for r in range(A.shape[0]):
-        offset = -t.b[r]
-        for j in range(A.shape[1]):
-            offset += A[r, j] * ws.vdot0[j]
-        for i in range(AV.shape[1]):
-            t.weighted[r, i] = t.weights[r] * AV[r, i]
-            ws.g[i] += offset * t.weighted[r, i]
-    n = AV.shape[1]
-    for i in range(n):
-        for j in range(n):
-            total = 0.0
-            for r in range(A.shape[0]):
-                total += AV[r, i] * t.weighted[r, j]
-            ws.H[i, j] += total
-
-
-@compiled
 def choose_set(t: ContactTick):
     """Forget what this subset remembers of earlier ticks, if the last one was another's."""
     if t.chosen[0] != t.index:
@@ -110,8 +89,6 @@ def assemble_contacts(t: ContactTick):
     choose_set(t)
     pick_soles(t.source, t.pick, t.problem.state)
     call(t.assemble, t.problem)
-    if t.A.shape[0] > 0:
-        add_rows(t)
     if t.limited[0]:
         for i in range(cone.shape[0]):
             row = (i + 1) * cone.shape[1] - 1
@@ -125,9 +102,8 @@ def assemble_contacts(t: ContactTick):
 def bound_torques(t: ContactTick, jumps: bool):
     """Keep τ = τ₀ + T x within its limits, and within `jump` of the last tick's or not."""
     ws, limit = t.problem.workspace, t.problem.parameters.torque_limit
-    nj = limit.shape[0]
-    first = ws.l.shape[0] - 2 * nj  # rows before the joint limits
-    for a in range(nj):
+    first = ws.first_torque
+    for a in range(limit.shape[0]):
         low, high = -limit[a], limit[a]
         if jumps:
             low, high = max(low, t.applied[a] - t.jump[a]), min(high, t.applied[a] + t.jump[a])
@@ -152,7 +128,7 @@ def solve_contacts(t: ContactTick):
 
 @compiled
 def contact_tick(t: ContactTick):
-    """One tick with a subset: its workspace's `tau` (nv−6,) holds torques."""
+    """Run one tick with a subset: its workspace's `tau` (nv−6,) then holds torques."""
     assemble_contacts(t)
     solve_contacts(t)
 
@@ -189,20 +165,34 @@ class ContactSet(Copyable):
         return own
 
     def bind(
-        self, s: StateArrays, targets: TargetArrays, rows: int, sets: "ContactSets"
+        self,
+        s: StateArrays,
+        targets: TargetArrays,
+        sets: "ContactSets",
+        tasks: Iterable[BoundTask] = (),
+        rows: int = 0,
     ) -> ContactTick:
-        """What a tick from `s` with so many further rows works on; `block` from then on."""
-        if (s, targets, rows) != self._bound_to:  # blocks are equal where they are the same
-            ws, nv, n = self.workspace, len(s.qvel), len(self.workspace.g)
-            own = replace(s, **self._own)
-            problem = Assembly(self.arrays, own, self.parameters, targets, sets.period, ws)
-            self.block = ContactTick(
-                s, self.pick, problem, sets.memory, apart((rows, nv)), apart(rows), apart(rows),
-                apart((rows, n)), apart((rows, n)), apart(len(self.soles)),
-                apart(1, dtype=np.int64), sets.applied, sets.jump, sets.follows, sets.chosen,
-                self.index, address_of(assemble, problem), address_of(solve, ws),
+        """Return what a tick from `s` works on, which is `block` from then on.
+
+        Its stack has the tasks of the configuration, then `tasks`, then so many `rows` that are
+        written by hand.
+        """
+        wanted = (s, targets, *tasks, rows)
+        if wanted != self._bound_to:  # blocks are equal where they are the same
+            ws, own = self.workspace, replace(s, **self._own)
+            problem = Assembly(
+                robot=self.arrays, state=own, contacts=contact_arrays(own),
+                parameters=self.parameters, targets=targets, period=sets.period,
+                tasks=make_stack([*sets.tasks.values(), *tasks], s, ws, rows), workspace=ws,
             )  # fmt: skip
-            self._bound_to = (s, targets, rows)
+            self.block = ContactTick(
+                source=s, pick=self.pick, problem=problem, memory=sets.memory,
+                load_limits=apart(len(self.soles)), limited=apart(1, dtype=np.int64),
+                applied=sets.applied, jump=sets.jump, follows=sets.follows, chosen=sets.chosen,
+                index=self.index, assemble=address_of(assemble, problem),
+                solve=address_of(solve, ws),
+            )  # fmt: skip
+            self._bound_to = wanted
         return self.block
 
 
@@ -215,7 +205,13 @@ class ContactSets(Copyable):
     """
 
     def __init__(self, robot: Robot, config: MomentumQPConfig, jump: float = np.inf):
+        if config.contacts:
+            raise ConfigError("has the soles in contact alone", field="contacts")
         self.robot, self.config, self.period = robot, config, config.period
+        self.tasks = bind_tasks(config.tasks, robot)
+        for name, (task, _) in self.tasks.items():
+            if task.kernel is None:
+                raise ConfigError("has no kernel", field=f"tasks.{name}")
         self.arrays = robot_arrays(robot)
         self.parameters = parameters = qp_parameters(robot, self.arrays, config)
         count = len(robot.soles)
@@ -266,19 +262,15 @@ class ContactSets(Copyable):
         """The reduced QP with `soles` in contact.
 
         Args:
-            tasks: further rows in v̇: nv columns.
+            tasks: further rows in v̇: nv columns; the configuration's are there already.
             load_limits: (len(soles),) largest vertical force of each sole [N]; none if left out.
         """
         chosen = self.sets[soles]
         ws = chosen.workspace
         rows = sum(len(task.b) for task in tasks)
-        block = chosen.bind(state.arrays, targets.arrays(), rows, self)
-        first = 0
-        for task in tasks:
-            last = first + len(task.b)
-            block.A[first:last], block.b[first:last] = task.A, task.b
-            block.weights[first:last] = task.weights
-            first = last
+        block = chosen.bind(state.arrays, targets.arrays(), self, rows=rows)
+        stack = block.problem.tasks
+        put_rows(stack, tasks, len(stack.b) - rows)
         block.limited[0] = load_limits is not None
         if load_limits is not None:
             block.load_limits[:] = load_limits

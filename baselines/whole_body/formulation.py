@@ -6,9 +6,9 @@
            cone · w ≤ 0,  |τ| ≤ τ_max,  v̇ within what joint limits leave
 
 with τ = M v̇ + h − Jᵀw on the joints' rows; u_root only with a soft root [Moskalev24 §2.1,
-Macchietto09]. `MomentumQP` solves the same problem, compiled and with the equalities eliminated
-(`reduced_qp.py`), and is tested against this one. To try another task or limit, hand its rows to
-`build`:
+Macchietto09]. w are the wrenches of the soles, then the forces of other points in contact.
+`MomentumQP` solves the same problem, compiled and with the equalities eliminated (`reduced_qp.py`),
+and is tested against this one. To try another task or limit, hand its rows to `build`:
 
     qp = build(state, targets, controller.parameters, tasks=[Rows(A, b, weights)])
     solution = make_solver("active-set").solve(qp)
@@ -26,15 +26,18 @@ from poise.envs.physics.state import RobotState
 
 from .constraint_rows import (
     Bounds,
+    contact_jacobian,
     joint_limits,
+    point_cones,
+    point_motion_bounds,
     root_dynamics,
     sole_cones,
     sole_motion,
     torque_limits,
 )
-from .reduced_qp import QPParameters
+from .contacts.contact import ContactRows
+from .parameters import QPParameters
 from .task_rows import (
-    Rows,
     accel_rows,
     angular_momentum_rows,
     linear_momentum_rows,
@@ -43,27 +46,28 @@ from .task_rows import (
     torque_rows,
     wrench_rows,
 )
+from .tasks.task import Rows
 
 
 class Unknowns(NamedTuple):
     """The parts of x: accelerations, sole wrenches, and a soft root's wrench about the CoM."""
 
     vdot: np.ndarray  # (nv,)
-    w: np.ndarray  # (6 nc,) at the sole points, world axes: force, moment
+    w: np.ndarray  # (k,) world axes: force, moment at the sole points, then forces of points
     u_root: np.ndarray  # (6,) world axes: force, moment; zero with a hard root
 
 
-def unknowns(state: RobotState, x: np.ndarray) -> Unknowns:
+def unknowns(state: RobotState, x: np.ndarray, points: Sequence[ContactRows] = ()) -> Unknowns:
     """x taken apart."""
-    nv, k = len(state.qvel), len(state.J)
+    nv, k = len(state.qvel), len(state.J) + 3 * len(points)
     root = x[nv + k :] if len(x) > nv + k else np.zeros(6)
     return Unknowns(x[:nv], x[nv : nv + k], root)
 
 
-def torques_of(state: RobotState, x: np.ndarray) -> np.ndarray:
+def torques_of(state: RobotState, x: np.ndarray, points: Sequence[ContactRows] = ()) -> np.ndarray:
     """(nv−6,) joint torques τ = (M v̇ + h − Jᵀw) on the joints' rows [N·m]."""
-    vdot, w, _ = unknowns(state, x)
-    return (state.M @ vdot + state.h - state.J.T @ w)[6:]
+    vdot, w, _ = unknowns(state, x, points)
+    return (state.M @ vdot + state.h - contact_jacobian(state, points).T @ w)[6:]
 
 
 def build(
@@ -73,12 +77,15 @@ def build(
     cop_vel: np.ndarray | None = None,
     tasks: Sequence[Rows] = (),
     constraints: Sequence[Bounds] = (),
+    points: Sequence[ContactRows] = (),
 ) -> QP:
     """The QP of one tick in x = (v̇, w) or (v̇, w, u_root), with `tasks` and `constraints` added.
 
     Args:
         parameters: gains and limits in SI units: `MomentumQP.parameters`, or `qp_parameters`.
         cop_vel: (2,) ṗ, which a controller measures between its ticks; at rest if left out.
+        tasks: such as `[task.rows(state) for task in controller.tasks.values()]`.
+        points: contacts of other bodies, likewise of `controller.contacts`.
     """
     p = parameters
     cop_vel = np.zeros(2) if cop_vel is None else cop_vel
@@ -86,26 +93,29 @@ def build(
         posture_rows(state, targets, p),
         linear_momentum_rows(state, targets, p),
         angular_momentum_rows(state, targets, p, cop_vel),
-        wrench_rows(state, p),
-        torque_rows(state, p),
+        wrench_rows(state, p, points),
+        torque_rows(state, p, points),
         accel_rows(state, p),
         *tasks,
     ]
     bounds = [
-        root_dynamics(state, p),
+        root_dynamics(state, p, points),
         sole_motion(state, p),
         sole_cones(state, p),
-        torque_limits(state, p),
+        torque_limits(state, p, points),
         joint_limits(state, p),
         *constraints,
     ]
+    if points:
+        bounds += [point_motion_bounds(points), point_cones(state, points)]
     if p.soft_root:
-        terms.append(root_rows(state, p))
+        terms.append(root_rows(state, p, points))
     # Zero wherever the soles do not move, so it changes no solution; but H becomes positive
     # definite even if no task weighs the root's linear acceleration.
     motion = sole_motion(state, p)
     terms.append(Rows(motion.C, motion.l, np.full(len(motion.l), p.accel_weight.max())))
-    return assemble(terms, bounds, len(state.qvel) + len(state.J) + (6 if p.soft_root else 0))
+    k = len(state.J) + 3 * len(points)
+    return assemble(terms, bounds, len(state.qvel) + k + (6 if p.soft_root else 0))
 
 
 def assemble(tasks: Sequence[Rows], constraints: Sequence[Bounds], n: int) -> QP:

@@ -7,31 +7,21 @@ import numpy as np
 
 from poise.baselines.controller import BaseController, CompiledController, Outputs, Targets
 from poise.baselines.solvers import QP, Status, make_solver
-from poise.baselines.solvers.dual_active_set import solve_dual
-from poise.baselines.solvers.scaled_rows import INFEASIBLE
-from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import address_of, call
-from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
-from poise.envs.maths.vectors import copy
+from poise.envs.compiled.calls import address_of
 from poise.envs.physics.arrays import robot_arrays
-from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
+from .contacts.contact import BoundContact, Contact, bind_contacts, contact_arrays
+from .gains import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
 from .parameters import qp_parameters
-from .reduced_qp import (
-    Assembly,
-    QPParameters,
-    Workspace,
-    allocate_workspace,
-    assemble,
-    recover,
-)
-from .tasks import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
+from .reduced_qp import Assembly, assemble
+from .stack import fill_from_python, make_stack
+from .tasks.task import BoundTask, Task, bind_tasks
+from .tick import Tick, accept, allocate_memory, forget, momentum_tick, release_joints, solve
+from .workspace import allocate_workspace
 
 COMPILED_SOLVER = "active-set"
-MAX_ITERATIONS = 200
 
 
 @dataclass(frozen=True)
@@ -39,7 +29,9 @@ class MomentumQPConfig:
     """Tasks, contacts, limits and how they are solved [Macchietto09, Moskalev24 §2].
 
     `root`: "hard" lets nothing but the ground push the root (physics); "soft" adds a penalised
-    wrench u_root on it (a game character that must not fail).
+    wrench u_root on it (a game character that must not fail). `tasks`: what else v̇ is to do, each
+    under a name of its own, see `tasks/`; `contacts`: what touches the world besides the soles, see
+    `contacts/`.
     """
 
     kind: Literal["momentum-qp"] = "momentum-qp"
@@ -54,103 +46,22 @@ class MomentumQPConfig:
     contact: SoleContact = field(default_factory=SoleContact)
     torque: TorqueLimit = field(default_factory=TorqueLimit)
     joint: JointLimit = field(default_factory=JointLimit)
-
-
-@dataclass(frozen=True, eq=False)
-class Memory(Block):
-    """What outlives a tick: the torques to fall back on and the count of failures."""
-
-    torques: np.ndarray  # (nj,) of the last solved tick [N·m]
-    damping: np.ndarray  # (nj,) joint-space damping to fall back on [N·m·s/rad]
-    streak: np.ndarray  # (1,) int: failures since then
-    failures: np.ndarray  # (1,) int: failures since the reset
-
-
-def allocate_memory(torque_limit: np.ndarray) -> Memory:
-    """Nothing remembered yet; `torque_limit` (nj,) [N·m]."""
-    return Memory(
-        torques=apart(len(torque_limit)),
-        damping=torque_limit / FALLBACK_SPEED,
-        streak=apart(1, dtype=np.int64),
-        failures=apart(1, dtype=np.int64),
-    )
-
-
-def forget(memory: Memory) -> None:
-    """As before the first tick."""
-    memory.torques[:] = 0.0
-    memory.streak[0] = memory.failures[0] = 0
-
-
-FALLBACK_DECAY = 0.8  # per tick: share that the last good torques keep
-FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the whole torque limit
-
-
-@compiled
-def release_joints(ws: Workspace):
-    """Take away the joint limits, the last rows of the problem."""
-    first = ws.l.shape[0] - ws.tau.shape[0]
-    ws.l[first:] = -np.inf
-    ws.u[first:] = np.inf
-
-
-@compiled
-def solve(ws: Workspace):
-    """Solve the assembled problem, starting from the last tick's active rows."""
-    for _ in range(2):
-        ws.status[0] = solve_dual(
-            ws.H, ws.g, ws.C, ws.l, ws.u, ws.x, ws.lam, ws.scratch, ws.iscratch, MAX_ITERATIONS,
-            True,
-        )  # fmt: skip
-        if ws.status[0] != INFEASIBLE:
-            return
-        release_joints(ws)  # always their fault, and the joints hold their limits by themselves
-
-
-@compiled
-def accept(s: StateArrays, p: QPParameters, ws: Workspace, memory: Memory):
-    """Torques from a solved QP; otherwise the last good ones, blended into damping."""
-    if ws.status[0] == 0:
-        recover(p, ws)
-        if np.all(np.isfinite(ws.tau)):
-            copy(ws.tau, memory.torques)
-            memory.streak[0] = 0
-            return
-    memory.streak[0] += 1
-    memory.failures[0] += 1
-    keep = FALLBACK_DECAY ** memory.streak[0]
-    ws.root_wrench[:] = 0.0
-    for a in range(ws.tau.shape[0]):
-        speed = s.qvel[6 + a] if np.isfinite(s.qvel[6 + a]) else 0.0
-        torque = keep * memory.torques[a] - (1.0 - keep) * memory.damping[a] * speed
-        ws.tau[a] = min(max(torque, -p.torque_limit[a]), p.torque_limit[a])
-
-
-@dataclass(frozen=True, eq=False)
-class Tick(Block):
-    """What a control tick works on; the kernels of its stages, by address, are compiled once."""
-
-    problem: Assembly
-    memory: Memory
-    assemble: int
-    solve: int
-
-
-@compiled
-def momentum_tick(t: Tick):
-    """One control tick with the compiled solver: `tau` (nj,) of the workspace holds torques."""
-    a = t.problem
-    call(t.assemble, a)
-    call(t.solve, a.workspace)
-    accept(a.state, a.parameters, a.workspace, t.memory)
+    tasks: dict[str, Task] = field(default_factory=dict, metadata={"omit": "empty"})
+    contacts: dict[str, Contact] = field(default_factory=dict, metadata={"omit": "empty"})
 
 
 class MomentumQP(CompiledController):
     """Tracks a posture, the CoM through linear and the CoP through angular momentum.
 
     `torques` solves the reduced problem of `reduced_qp.py`, whose readable form is
-    `formulation.py`. After a call, `vdot`, `wrenches`, `root_wrench` and `failures` tell what was
-    found. Raises ConfigError for an unknown solver or solver option.
+    `formulation.py`. After a call, `vdot`, `wrenches`, `forces`, `root_wrench` and `failures` tell
+    what was found. Raises ConfigError for an unknown solver or solver option, and for a task or a
+    contact of a body that the robot does not have.
+
+    Attributes:
+        tasks: those of the configuration by name; the arrays of a task's `block`, such as its
+            reference, may be written to at any time.
+        contacts: likewise.
     """
 
     def __init__(self, robot: Robot, config: MomentumQPConfig | None = None):
@@ -159,8 +70,15 @@ class MomentumQP(CompiledController):
         self.period = self.config.period
         self.arrays = robot_arrays(robot)
         self.parameters = qp_parameters(robot, self.arrays, self.config)
+        self.tasks: dict[str, BoundTask] = bind_tasks(self.config.tasks, robot)
+        self.contacts: dict[str, BoundContact] = bind_contacts(self.config.contacts, robot)
+        points = self.contacts.values()
         self.workspace = allocate_workspace(
-            self.arrays, self.parameters.cone.shape[1], self.config.root == "soft"
+            self.arrays,
+            self.parameters.cone.shape[1],
+            self.config.root == "soft",
+            [point.chain for point in points],
+            sum(point.contact.cone_rows for point in points),
         )
         self.memory = allocate_memory(self.parameters.torque_limit)
         self.com_offset = self.config.com.offset * robot.height_com
@@ -184,7 +102,13 @@ class MomentumQP(CompiledController):
     @property
     def wrenches(self) -> np.ndarray:
         """(6 nc,) sole wrenches of the last solution, world axes, at the sole points."""
-        return self.workspace.wrenches.copy()
+        return self.workspace.wrenches[: 6 * len(self.robot.soles)].copy()
+
+    @property
+    def forces(self) -> dict[str, np.ndarray]:
+        """(3,) force [N] on each of `contacts` in the last solution, world axes."""
+        rest = self.workspace.wrenches[6 * len(self.robot.soles) :].reshape(-1, 3)
+        return {name: force.copy() for name, force in zip(self.contacts, rest, strict=True)}
 
     @property
     def root_wrench(self) -> np.ndarray:
@@ -203,58 +127,77 @@ class MomentumQP(CompiledController):
             self.solver.reset()
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Tick]:
-        """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""
+        """The kernel that compiled code calls for `torques`, and its block; see `outputs`."""
         tick = self.tick(state, targets)
         return address_of(momentum_tick, tick), tick
 
     @property
     def compiled(self) -> bool:
-        """See `CompiledController`; other solvers are called from Python."""
-        return super().compiled and self.solver is None
+        """True with the compiled solver, and kernels for all tasks; see `CompiledController`."""
+        kernels = all(bound.task.kernel is not None for bound in self.tasks.values())
+        return super().compiled and self.solver is None and kernels
 
     def gains(self) -> Any:
-        """See `CompiledController`."""
+        """The parameters in SI units; see `CompiledController`."""
         return self.parameters
 
     def outputs(self) -> Outputs:
-        """See `Outputs`."""
+        """The arrays in which a tick leaves its results."""
         ws, p = self.workspace, self.parameters
         return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root)
 
     def assembly(self, state: RobotState, targets: Targets) -> Assembly:
-        """What `assemble` fills the workspace from."""
+        """The block that `assemble` fills the workspace from."""
         s, t, known = state.arrays, targets.arrays(), self._assembly
         if (
             known is None or known.state is not s or known.targets is not t
             or known.parameters is not self.parameters
         ):  # fmt: skip
-            known = Assembly(self.arrays, s, self.parameters, t, self.period, self.workspace)
-            self._assembly = known
+            ws = self.workspace
+            points = list(self.contacts.values())
+            known = self._assembly = Assembly(
+                robot=self.arrays,
+                state=s,
+                contacts=contact_arrays(
+                    s, points, ws.contact_accel, ws.force_weights, ws.force_des
+                ),
+                parameters=self.parameters,
+                targets=t,
+                period=self.period,
+                tasks=make_stack(self.tasks.values(), s, ws),
+                workspace=ws,
+            )
         return known
 
     def tick(self, state: RobotState, targets: Targets) -> Tick:
-        """What `momentum_tick` works on."""
+        """The block that `momentum_tick` works on."""
         problem = self.assembly(state, targets)
         if self._tick is None or self._tick.problem is not problem:
             stages = address_of(assemble, problem), address_of(solve, self.workspace)
             self._tick = Tick(problem, self.memory, *stages)
         return self._tick
 
+    def _filled(self, state: RobotState, targets: Targets) -> Assembly:
+        """`assembly`, with the rows of tasks that Python fills."""
+        problem = self.assembly(state, targets)
+        fill_from_python(problem.tasks, self.tasks.values(), state)
+        return problem
+
     def problem(self, state: RobotState, targets: Targets) -> QP:
         """The reduced QP of this state: pure, nothing is solved or remembered."""
         ws = self.workspace
         before = ws.cop_prev.copy()
-        assemble(self.assembly(state, targets))
+        assemble(self._filled(state, targets))
         ws.cop_prev[:] = before
         return QP(ws.H.copy(), ws.g.copy(), ws.C.copy(), ws.l.copy(), ws.u.copy())
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
-        ws = self.workspace
+        ws, problem = self.workspace, self._filled(state, targets)
         if self.solver is None:
             momentum_tick(self.tick(state, targets))
         else:
-            assemble(self.assembly(state, targets))
+            assemble(problem)
             solution = self.solver.solve(QP(ws.H, ws.g, ws.C, ws.l, ws.u))
             if solution.status is Status.INFEASIBLE:
                 release_joints(ws)

@@ -1,10 +1,11 @@
-"""Accelerations that keep the soles where they are: the null space of J, compiled.
+"""Accelerations that keep the contacts where they are: the null space of J, compiled.
 
-Only the joints between the root and a sole (the *held* ones) have columns in J. So the null space
-is one orthonormal vector for each other joint, its own acceleration, and an orthonormal basis of
-the held part, from Householder's QR of Jᵀ with column pivoting.
+Only the joints between the root and a contact (the *held* ones) have columns in J. So the null
+space is one orthonormal vector for each other joint, its own acceleration, and an orthonormal basis
+of the held part, from Householder's QR of Jᵀ with column pivoting.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ DEPENDENT = 1e-6  # pivot, relative to the first, below which a row of J follows
 
 @dataclass(frozen=True, eq=False)
 class NullSpace(Block):
-    """Scratch for `solve_soles`: nh held degrees of freedom, k rows of J, padded to kp."""
+    """Scratch for `solve_resting`: nh held degrees of freedom, k rows of J, padded to kp."""
 
     held: np.ndarray  # (nh,) int
     free: np.ndarray  # (nv − nh,) int
@@ -32,15 +33,12 @@ class NullSpace(Block):
     basis: np.ndarray  # (nh, 8 or more) null vectors, then v̇₀, as columns
 
 
-def allocate_null_space(robot: RobotArrays) -> NullSpace:
-    """Zeroed scratch for one robot."""
+def allocate_null_space(robot: RobotArrays, points: Sequence[np.ndarray] = ()) -> NullSpace:
+    """Zeroed scratch for one robot: its soles, and points with these chains of joints."""
     nv = len(robot.q_standing) + 6
-    k = 6 * len(robot.sole_body)
-    held = np.unique(
-        np.concatenate(
-            [chain[:n] for chain, n in zip(robot.chain, robot.chain_length, strict=True)]
-        )
-    )
+    k = 6 * len(robot.sole_body) + 3 * len(points)
+    chains = [chain[:n] for chain, n in zip(robot.chain, robot.chain_length, strict=True)]
+    held = np.unique(np.concatenate([*chains, *points]))
     nh, steps = len(held), min(k, len(held))
     width, basis_width = (-(-columns // 8) * 8 for columns in (k, nh - steps + 1))
     zeros = apart
@@ -58,7 +56,9 @@ def allocate_null_space(robot: RobotArrays) -> NullSpace:
 
 
 @compiled
-def solve_soles(J, rhs, space, vdot0, V):
+def solve_resting(
+    J: np.ndarray, rhs: np.ndarray, space: NullSpace, vdot0: np.ndarray, V: np.ndarray
+):
     """v̇ = v̇₀ + V z for any z solves J v̇ = rhs; v̇₀ is the least solution.
 
     In: J (k, nv), rhs (k,). Out: vdot0 (nv,), and in the first columns of V (nv, n) an orthonormal
@@ -93,7 +93,7 @@ def solve_soles(J, rhs, space, vdot0, V):
 
 
 @compiled
-def _reduce(J, space):
+def _reduce(J: np.ndarray, space: NullSpace):
     """Householder's QR of Jᵀ: `reflectors`, `beta`, `pivot`, and R in `rows`.
 
     All columns are treated alike: those that are finished are zero where a reflector acts.
@@ -129,7 +129,7 @@ def _reduce(J, space):
 
 
 @compiled
-def _reflect(v, beta, start, columns, product):
+def _reflect(v: np.ndarray, beta: float, start: int, columns: np.ndarray, product: np.ndarray):
     """columns ← (I − β v vᵀ) columns, for a v that counts from `start`; `product` is scratch."""
     width = columns.shape[1]
     for j in range(width):

@@ -1,17 +1,49 @@
 """From unit-free costs and gains to the numbers that compiled code uses for one robot."""
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from poise.envs.compiled.block import Block
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.robots.robot import Robot
 
-from .reduced_qp import QPParameters
-from .wrench_cone import robot_cones
+from .contacts.wrench_cone import robot_cones
 
 if TYPE_CHECKING:
     from .momentum_qp import MomentumQPConfig
+
+
+@dataclass(frozen=True, eq=False)
+class QPParameters(Block):
+    """The numbers of tasks, contacts and limits in SI units, for nv dofs and nc soles."""
+
+    accel_weight: np.ndarray  # (nv,) posture
+    far_share: float  # the fraction of these weights with the CoM far from c_ref
+    far_distance: float  # [m]
+    stiffness: np.ndarray  # (nv,) k_t [1/s²]
+    damping: np.ndarray  # (nv,) d_t [1/s]
+    com_weight: np.ndarray  # (3,) ω_c per N²
+    com_stiffness: np.ndarray  # (3,) s_c [1/s²]
+    com_damping: np.ndarray  # (3,) d_c [1/s]
+    angular_weight: np.ndarray  # (3,) ω_p per (N·m)²
+    angular_damping: float  # k_L [1/s]
+    cop_stiffness: float  # s_p [1/s²]
+    cop_damping: float  # d_p [1/s]
+    cop_horizon: float  # [s] over which p̈_des is integrated
+    force_weight: float  # per N²
+    moment_weight: float  # per (N·m)²
+    torque_weight: np.ndarray  # (nv−6,) per (N·m)²
+    accel_floor: float  # per (unit of z)²
+    sole_damping: float  # k_v [1/s]
+    cone: np.ndarray  # (nc, rows, 6) cone · w_sole ≤ 0
+    torque_limit: np.ndarray  # (nv−6,) 0 for a joint without a motor
+    brake_accel: float  # [rad/s²] that braking may assume
+    brake_horizon: float  # [s]
+    brake_floor: float  # [rad/s²] braking is never asked to exceed
+    soft_root: bool
+    root_weight: np.ndarray  # (6,) ω_root per N² and per (N·m)²
 
 
 def joint_kinds(robot: RobotArrays) -> np.ndarray:
@@ -25,7 +57,7 @@ def joint_kinds(robot: RobotArrays) -> np.ndarray:
 
 
 def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig") -> QPParameters:
-    """Scale `config` by the robot's mass m and CoM height h (see `tasks.py`)."""
+    """Scale `config` by the robot's mass m and CoM height h (see `gains.py`)."""
     units = arrays.units
     h, omega, force, moment = units.height, units.omega, units.force, units.moment
     kinds = joint_kinds(arrays)

@@ -1,9 +1,9 @@
-"""Tasks of the readable momentum QP: each gives rows A, b and weights of ½ Σ weight (A x − b)².
+"""The built-in tasks of the readable momentum QP: rows A, b and weights of ½ Σ weight (A x − b)².
 
 x = (v̇, w) or (v̇, w, u_root); see `formulation.py`. Gains and weights come from `QPParameters`.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,15 +12,10 @@ from poise.baselines.controller import Targets
 from poise.envs.physics.state import RobotState
 
 from .constraint_rows import torque_matrix
-from .reduced_qp import QPParameters
-
-
-class Rows(NamedTuple):
-    """A task: ½ Σ weights (A x − b)². A may stop short: the columns left out are zero."""
-
-    A: np.ndarray  # (k, ≤ n)
-    b: np.ndarray  # (k,)
-    weights: np.ndarray  # (k,)
+from .contacts.contact import ContactRows
+from .objective import posture_fraction
+from .parameters import QPParameters
+from .tasks.task import Rows
 
 
 def posture_rows(state: RobotState, targets: Targets, p: QPParameters) -> Rows:
@@ -36,13 +31,8 @@ def posture_rows(state: RobotState, targets: Targets, p: QPParameters) -> Rows:
     a_ref = np.concatenate([np.zeros(3), targets.root_acc, targets.a_ref])
     v_ref = v_ref + carrying_velocity(state, targets.angular_momentum)
     desired = a_ref + p.stiffness * error + p.damping * (v_ref - state.qvel)
-    return Rows(np.eye(len(desired)), desired, tracking_share(state, targets, p) * p.accel_weight)
-
-
-def tracking_share(state: RobotState, targets: Targets, p: QPParameters) -> float:
-    """β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally: what the posture's weights keep."""
-    away = float(np.linalg.norm(state.com[:2] - targets.com[:2])) / p.far_distance
-    return p.far_share + (1.0 - p.far_share) * float(np.exp(-(away**2)))
+    fraction = posture_fraction(p, state.com, targets.com)
+    return Rows(np.eye(len(desired)), desired, fraction * p.accel_weight)
 
 
 def carrying_velocity(state: RobotState, angular_momentum: np.ndarray) -> np.ndarray:
@@ -94,11 +84,15 @@ def angular_momentum_rows(
     return Rows(state.A[3:], b, p.angular_weight)
 
 
-def wrench_rows(state: RobotState, p: QPParameters) -> Rows:
-    """Small wrenches: ‖w‖², which also says how two soles share one load."""
-    nv, k = len(state.qvel), len(state.J)
-    weights = np.tile(np.repeat([p.force_weight, p.moment_weight], 3), k // 6)
-    return Rows(np.eye(k, nv + k, nv), np.zeros(k), weights)
+def wrench_rows(state: RobotState, p: QPParameters, points: Sequence[ContactRows] = ()) -> Rows:
+    """Small wrenches of soles, ‖w‖², which also says how two share one load; forces of points as
+    these want them."""
+    nv, soles = len(state.qvel), len(state.J)
+    weights = np.tile(np.repeat([p.force_weight, p.moment_weight], 3), soles // 6)
+    weights = np.concatenate([weights, *(point.weights for point in points)])
+    wanted = np.concatenate([np.zeros(soles), *(point.force for point in points)])
+    k = len(wanted)
+    return Rows(np.eye(k, nv + k, nv), wanted, weights)
 
 
 def accel_rows(state: RobotState, p: QPParameters) -> Rows:
@@ -107,12 +101,12 @@ def accel_rows(state: RobotState, p: QPParameters) -> Rows:
     return Rows(np.eye(nv), np.zeros(nv), np.full(nv, p.accel_floor))
 
 
-def torque_rows(state: RobotState, p: QPParameters) -> Rows:
+def torque_rows(state: RobotState, p: QPParameters, points: Sequence[ContactRows] = ()) -> Rows:
     """Small torques: ‖τ‖²."""
-    return Rows(torque_matrix(state), -state.h[6:], p.torque_weight)
+    return Rows(torque_matrix(state, points), -state.h[6:], p.torque_weight)
 
 
-def root_rows(state: RobotState, p: QPParameters) -> Rows:
+def root_rows(state: RobotState, p: QPParameters, points: Sequence[ContactRows] = ()) -> Rows:
     """ω_root ‖u_root‖²: what a soft root must not lean on."""
-    start = len(state.qvel) + len(state.J)
+    start = len(state.qvel) + len(state.J) + 3 * len(points)
     return Rows(np.eye(6, start + 6, start), np.zeros(6), p.root_weight)

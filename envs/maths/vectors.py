@@ -39,6 +39,12 @@ def placed(ox: float, oy: float, cos: float, sin: float, x: float, y: float) -> 
     return ox + cos * x - sin * y, oy + sin * x + cos * y
 
 
+# A turn from one frame to another has two errors. `turn_error` is the angle times the axis: it
+# grows up to half a turn, and is what tasks follow. `rotation_error` is the sine times the axis:
+# cheaper, the same for small angles, but falling beyond a quarter turn; the swing foot follows it,
+# whose turns are small.
+
+
 @compiled
 def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray):
     """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn from
@@ -49,6 +55,22 @@ def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray):
         for k in range(3):
             total += wanted[j, k] * axes[i, k] - wanted[i, k] * axes[j, k]
         out[a] = 0.5 * total
+
+
+@compiled
+def turn_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> float:
+    """The turn that leads from a frame R to another one D, in the axes of R: sine times axis of
+    RᵀD into `out` (3,); returned is angle/sine, by which `out` becomes angle times axis."""
+    trace = 0.0  # of RᵀD; its skew part is axis · sin(angle)
+    for a in range(3):
+        i, j = (a + 1) % 3, (a + 2) % 3
+        skew = 0.0
+        for b in range(3):
+            trace += axes[b, a] * wanted[b, a]
+            skew += axes[b, j] * wanted[b, i] - axes[b, i] * wanted[b, j]
+        out[a] = 0.5 * skew
+    sine = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
+    return np.arctan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 1e-9 else 1.0
 
 
 def rotation_vector(R: np.ndarray) -> np.ndarray:

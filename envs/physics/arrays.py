@@ -95,7 +95,7 @@ def robot_arrays(robot: Robot) -> RobotArrays:
     chain, chain_length = np.zeros((nc, nv), dtype=np.int64), np.zeros(nc, dtype=np.int64)
     for i, sole in enumerate(soles):
         polygons[i, : len(sole.polygon)] = sole.polygon
-        dofs = _chain(model, sole.body_id)
+        dofs = dof_chain(model, sole.body_id)
         chain[i, : len(dofs)], chain_length[i] = dofs, len(dofs)
     rotation = np.zeros(9)
     mujoco.mju_quat2Mat(rotation, robot.standing_qpos[3:7])
@@ -137,7 +137,7 @@ def plant_views(model: mujoco.MjModel, data: mujoco.MjData) -> Plant:
     return plant
 
 
-def _chain(model: mujoco.MjModel, body: int) -> list[int]:
+def dof_chain(model: mujoco.MjModel, body: int) -> list[int]:
     """Degrees of freedom between the world and `body`, from the root outwards."""
     while model.body_dofnum[body] == 0:
         body = model.body_parentid[body]

@@ -19,6 +19,7 @@ from poise.envs.maths.vectors import copy
 from poise.envs.robots.soles import MAX_VERTICES
 
 from .arrays import Plant, RobotArrays
+from .jacobian import point_jacobian
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +51,15 @@ class StateArrays(Block):
     other_contacts: np.ndarray  # (1,)
     support: np.ndarray  # (8 nc, 2)
     support_size: np.ndarray  # (1,) int
+    body_position: np.ndarray  # (nb, 3)
+    body_axes: np.ndarray  # (nb, 3, 3)
+    dof_axes: np.ndarray  # (nv, 6)
+    dof_axes_dot: np.ndarray  # (nv, 6)
+    tree_com: np.ndarray  # (3,)
 
 
-def allocate_state(nv: int, nc: int) -> StateArrays:
-    """Zeroed storage for a robot of `nv` degrees of freedom and `nc` soles."""
+def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
+    """Zeroed storage for `nv` degrees of freedom, `nc` soles and `nb` bodies, the world's too."""
     zeros = apart
     return StateArrays(
         qpos=zeros(nv + 1),
@@ -81,6 +87,11 @@ def allocate_state(nv: int, nc: int) -> StateArrays:
         other_contacts=zeros(1),
         support=zeros((MAX_VERTICES * nc, 2)),
         support_size=zeros(1, dtype=np.int64),
+        body_position=zeros((nb, 3)),
+        body_axes=zeros((nb, 3, 3)),
+        dof_axes=zeros((nv, 6)),
+        dof_axes_dot=zeros((nv, 6)),
+        tree_com=zeros(3),
     )
 
 
@@ -91,6 +102,7 @@ def update_state(robot: RobotArrays, plant: Plant, s: StateArrays):
     _momentum(robot, plant, s)
     _soles(robot, plant, s)
     _contact(robot, plant, s)
+    _bodies(robot, plant, s)
 
 
 @compiled
@@ -175,40 +187,13 @@ def _soles(robot, plant, s):
 
 @compiled
 def _sole_jacobian(robot, plant, s, i):
-    """Rows 6i..6i+6 of J, J v and J̇ v: linear velocity of the reference point, then angular.
-
-    MuJoCo keeps dof axes and spatial velocities at the subtree CoM o; a point at r moves with
-    ṙ = lin + ang × (r − o), and its acceleration has the additional ω × ṙ.
-    """
-    point, row = s.sole_point[i], 6 * i
-    rx = point[0] - plant.subtree_com[robot.tree_body, 0]
-    ry = point[1] - plant.subtree_com[robot.tree_body, 1]
-    rz = point[2] - plant.subtree_com[robot.tree_body, 2]
-    for a in range(6):
-        s.J_v[row + a] = 0.0
-        s.Jdot_v[row + a] = 0.0
-    for k in range(robot.chain_length[i]):
-        d = robot.chain[i, k]
-        speed = plant.qvel[d]
-        wx, wy, wz = plant.cdof[d, 0], plant.cdof[d, 1], plant.cdof[d, 2]
-        s.J[row, d] = plant.cdof[d, 3] + wy * rz - wz * ry
-        s.J[row + 1, d] = plant.cdof[d, 4] + wz * rx - wx * rz
-        s.J[row + 2, d] = plant.cdof[d, 5] + wx * ry - wy * rx
-        s.J[row + 3, d], s.J[row + 4, d], s.J[row + 5, d] = wx, wy, wz
-        for a in range(6):
-            s.J_v[row + a] += s.J[row + a, d] * speed
-        wx, wy, wz = plant.cdof_dot[d, 0], plant.cdof_dot[d, 1], plant.cdof_dot[d, 2]
-        s.Jdot_v[row] += speed * (plant.cdof_dot[d, 3] + wy * rz - wz * ry)
-        s.Jdot_v[row + 1] += speed * (plant.cdof_dot[d, 4] + wz * rx - wx * rz)
-        s.Jdot_v[row + 2] += speed * (plant.cdof_dot[d, 5] + wx * ry - wy * rx)
-        s.Jdot_v[row + 3] += speed * wx
-        s.Jdot_v[row + 4] += speed * wy
-        s.Jdot_v[row + 5] += speed * wz
-    vx, vy, vz = s.J_v[row], s.J_v[row + 1], s.J_v[row + 2]
-    wx, wy, wz = s.J_v[row + 3], s.J_v[row + 4], s.J_v[row + 5]
-    s.Jdot_v[row] += wy * vz - wz * vy
-    s.Jdot_v[row + 1] += wz * vx - wx * vz
-    s.Jdot_v[row + 2] += wx * vy - wy * vx
+    """Rows 6i..6i+6 of J, J v and J̇ v, see `point_jacobian`."""
+    point, tree, rows = s.sole_point[i], plant.subtree_com[robot.tree_body], slice(6 * i, 6 * i + 6)
+    point_jacobian(
+        plant.cdof, plant.cdof_dot, plant.qvel, robot.chain[i], robot.chain_length[i],
+        point[0] - tree[0], point[1] - tree[1], point[2] - tree[2],
+        s.J[rows], s.J_v[rows], s.Jdot_v[rows],
+    )  # fmt: skip
 
 
 @compiled
@@ -250,6 +235,21 @@ def _contact(robot, plant, s):
         s.contacts[i] = 1.0 if found > 0.0 else 0.0
         feet += found
     s.other_contacts[0] = plant.sensordata[robot.ground_sensor] - feet
+
+
+@compiled
+def _bodies(robot, plant, s):
+    """Where the bodies are, and the axes of the degrees of freedom: what any point's J needs."""
+    for i in range(s.body_position.shape[0]):
+        for a in range(3):
+            s.body_position[i, a] = plant.xpos[i, a]
+            for b in range(3):
+                s.body_axes[i, a, b] = plant.xmat[i, 3 * a + b]
+    for d in range(s.dof_axes.shape[0]):
+        for a in range(6):
+            s.dof_axes[d, a] = plant.cdof[d, a]
+            s.dof_axes_dot[d, a] = plant.cdof_dot[d, a]
+    copy(plant.subtree_com[robot.tree_body], s.tree_com)
 
 
 AIRBORNE = 0.02  # [h]: a sole without contact that is this far above the lowest one is in the air

@@ -66,7 +66,7 @@ class Simulation(Copyable):
         self.data = mujoco.MjData(robot.model)
         self.arrays = robot_arrays(robot)
         self.plant = plant_views(robot.model, self.data)
-        self.state_arrays = allocate_state(robot.model.nv, len(robot.soles))
+        self.state_arrays = allocate_state(robot.model.nv, len(robot.soles), robot.model.nbody)
         self.clock = apart(1, dtype=np.int64)
         self._count = apart(1, dtype=np.int64)
         self.pushes: tuple[Push | Kick, ...] = ()

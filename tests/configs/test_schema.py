@@ -15,6 +15,7 @@ from poise.configs import files as file_names
 from poise.configs import schema
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.files import packaged, resolve, write_atomic
+from poise.configs.kinds import OfKind
 from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
 
 
@@ -337,3 +338,65 @@ def test_a_base_that_is_none(tmp_path: Path) -> None:
     other.write_text(f"base: {one}\n")
     with pytest.raises(ConfigError, match=r"other.yaml: base: .*one.yaml' leads back to itself"):
         on_base({"base": str(one)}, "training", "c.yaml")
+
+
+@dataclass(frozen=True)
+class Shape(OfKind):
+    """Base of two kinds."""
+
+
+@dataclass(frozen=True)
+class Disc(Shape):
+    radius: float
+    kind: Literal["disc"] = "disc"
+
+
+@dataclass(frozen=True)
+class Ring(Shape):
+    radius: float
+    kind: Literal["ring"] = "ring"
+    width: float = 1.0
+
+
+@dataclass(frozen=True)
+class Sketch:
+    shapes: dict[str, Shape] = field(default_factory=dict, metadata={"omit": "empty"})
+    more: list[int] = field(default_factory=list)
+
+
+def test_a_kind_chooses_the_class() -> None:
+    """In whatever file it is; writing and building are each other's inverse."""
+    data = {"shapes": {"a": {"kind": "ring", "radius": 2}, "b": {"kind": "disc", "radius": 1}}}
+    sketch = build(Sketch, data, "f.yaml")
+    assert sketch.shapes == {"a": Ring(2.0), "b": Disc(1.0)}
+    assert build(Sketch, to_dict(sketch), "f.yaml") == sketch
+    for shape, message in (
+        ({"radius": 1}, r"f.yaml: shapes.a.kind: this field is missing \(choices: disc, ring\)"),
+        ({"kind": "cone"}, r"f.yaml: shapes.a.kind: no such kind: 'cone' \(choices: disc, ring\)"),
+        ({"kind": "disc", "radius": 1, "width": 2}, "shapes.a.width: unknown field"),
+        ([], "shapes.a: must be a mapping"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            build(Sketch, {"shapes": {"a": shape}}, "f.yaml")
+
+
+def test_an_empty_field_may_be_left_out() -> None:
+    """Only one that says so; with something in it, it is written."""
+    assert to_dict(Sketch()) == {"more": []}
+    assert list(to_dict(Sketch({"a": Disc(1.0)}))) == ["shapes", "more"]
+
+
+def test_a_part_may_have_a_base(tmp_path: Path) -> None:
+    """Looked up before the file is merged with its own base, whose part it hides."""
+    (tmp_path / "inner.yaml").write_text("x: 1\ny: 1\n")
+    (tmp_path / "other.yaml").write_text("x: 2\nz: 2\n")
+    inner, other, outer = (f"{tmp_path}/{name}.yaml" for name in ("inner", "other", "outer"))
+    (tmp_path / "outer.yaml").write_text(f"a: 1\npart: {{base: {inner}, y: 5}}\n")
+    whole = on_base({"base": outer, "part": {"w": 3}}, "training", "c.yaml", parts=("part",))
+    assert whole == {"a": 1, "part": {"x": 1, "y": 5, "w": 3}}
+    data = {"base": outer, "part": {"base": other}}
+    assert on_base(data, "training", "c.yaml", parts=("part",))["part"] == {"x": 2, "y": 5, "z": 2}
+    untouched = {"part": {"base": other}}
+    assert on_base(untouched, "training", "c.yaml") == untouched
+    with pytest.raises(ConfigError, match=r"^c.yaml: part: base: must be a name"):
+        on_base({"part": {"base": 3}}, "training", "c.yaml", parts=("part",))

@@ -57,7 +57,7 @@ class Rig:
     def __init__(self, robot: Robot, simulation: Simulation):
         self.controller = MomentumQP(robot)
         self.plant = simulation.plant
-        self.s = allocate_state(robot.model.nv, len(robot.soles))
+        self.s = allocate_state(robot.model.nv, len(robot.soles), robot.model.nbody)
         self.state = RobotState(self.controller.arrays, self.s)
         self.update()
         self.targets = Targets.standing(robot, self.state)

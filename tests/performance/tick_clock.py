@@ -59,7 +59,7 @@ class TickClock:
         self.model = controller.robot.model
         self.data = mujoco.MjData(self.model)
         self.plant = plant_views(self.model, self.data)
-        self.state = allocate_state(self.model.nv, len(controller.robot.soles))
+        self.state = allocate_state(self.model.nv, len(controller.robot.soles), self.model.nbody)
         self._buffer = np.zeros(2, dtype=np.int64)
 
     def time(self, tick: Tick) -> TickTimes:

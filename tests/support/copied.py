@@ -28,6 +28,7 @@ from poise.envs.vector.vector_env import BalanceVectorEnv
 from poise.training.learning.policy import load_policy
 from poise.training.learning.vec_env import ThreadedVecEnv
 from tests.support.shared import robot
+from tests.support.tasks import described
 
 PUSH = {"impulse": 14.0, "direction": 60.0, "duration": 0.2, "start": 0.04}  # still acts at BEFORE
 PUSHES = {"magnitude": [0.1, 0.5], "unit": "specific_impulse", "start": [0.0, 0.1]}
@@ -111,7 +112,7 @@ def play_loop(loop: Any) -> list[Any]:
     return [torques, simulation.data.qpos.copy()]
 
 
-def make_loop(name: str) -> dict[str, Any]:
+def make_loop(name: Any) -> dict[str, Any]:
     """Some ticks after the start."""
     simulation = Simulation(robot())
     state = simulation.reset(pushes=())
@@ -199,7 +200,7 @@ KINDS: dict[str, tuple[Callable[[], Any], Callable[[Any], list[Any]]]] = {
 }
 
 
-def _with(name: str) -> tuple[Callable[[], Any], Callable[[Any], list[Any]]]:
+def _with(name: Any) -> tuple[Callable[[], Any], Callable[[Any], list[Any]]]:
     return lambda: _begin(env_of(ResidualBalanceEnv, controller=name)), play_env
 
 
@@ -208,6 +209,9 @@ for _name in packaged("controllers"):
         KINDS[f"env of {_name}"] = _with(_name)
 for _name in ("momentum-qp", "capture-step", "feedback-step", "ipm-step", "kudoh02", "lqr-lip"):
     KINDS[_name] = partial(make_loop, _name), play_loop
+_HAND = {"kind": "point", "body": "left_lower_arm", "normal": [0, 0, 1], "largest_force": 0.01}
+_TASKS = {"base": "momentum-qp", "tasks": described(), "contacts": {"hand": _HAND}}
+KINDS["env of tasks"], KINDS["tasks"] = _with(_TASKS), (partial(make_loop, _TASKS), play_loop)
 
 
 def digest(seen: Any) -> str:

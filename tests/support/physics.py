@@ -10,7 +10,7 @@ import numpy as np
 
 from poise.baselines.controller import Targets
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
-from poise.baselines.whole_body.reduced_qp import QPParameters
+from poise.baselines.whole_body.parameters import QPParameters
 from poise.envs.physics.kinematics import update_state
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState

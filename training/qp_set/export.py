@@ -40,12 +40,17 @@ def qp_of(tick: Tick, controller: MomentumQP, form: Form) -> dict[str, Any]:
     if form == "reduced":
         qp, T, offset = tick.reduced, tick.torque_matrix, tick.torque_offset
     else:
-        qp = formulation.build(tick.state, tick.targets, controller.parameters, tick.cop_vel)
+        state = tick.state
+        tasks = [task.rows(state) for task in controller.tasks.values()]
+        points = [contact.rows(state) for contact in controller.contacts.values()]
+        qp = formulation.build(
+            state, tick.targets, controller.parameters, tick.cop_vel, tasks, points=points
+        )
         joints = controller.arrays.motor_dofs - 6
         T = np.zeros((len(joints), len(qp.g)))
-        rows = torque_matrix(tick.state)[joints]
+        rows = torque_matrix(state, points)[joints]
         T[:, : rows.shape[1]] = rows
-        offset = tick.state.h[6:][joints]
+        offset = state.h[6:][joints]
     return {
         **problem_arrays(qp),
         "torque_matrix": T,

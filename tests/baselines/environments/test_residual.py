@@ -12,8 +12,8 @@ from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualSc
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.targets import Motion, update_targets
 from poise.baselines.registry import controller_config, load_controller
+from poise.baselines.whole_body.gains import CoMTask
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
-from poise.baselines.whole_body.tasks import CoMTask
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import EnvConfig
 from poise.envs.balance.episode import RewardWeights

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from poise.baselines.stepping.swing import Swing, SwingTask, quintic, swing_rows
+from poise.baselines.stepping.swing import Swing, SwingTask, quintic
 from poise.envs.maths.pendulum import Units
 from poise.envs.maths.vectors import rotation_error
 from poise.envs.physics.simulation import Simulation
 from tests.support import stepping_reference as readable
 from tests.support.shared import generic_state, robot
+from tests.support.tasks import swing_rows
 
 DT, HEIGHT = 0.004, 0.8
 UNITS = Units(60.0, 9.81, HEIGHT)

@@ -6,7 +6,7 @@ import pytest
 
 from poise.baselines.whole_body.constraint_rows import joint_limits, root_dynamics, sole_cones
 from poise.baselines.whole_body.formulation import torques_of
-from poise.baselines.whole_body.reduced_qp import braking_bounds
+from poise.baselines.whole_body.limits import braking_bounds
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import (
     contact_forces,

@@ -5,13 +5,14 @@ import pytest
 
 from poise.baselines.controller import Targets
 from poise.baselines.solvers import make_solver, residuals
-from poise.baselines.stepping.swing import SwingTask, swing_rows
+from poise.baselines.stepping.swing import SwingTask
 from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.baselines.whole_body.formulation import build, unknowns
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 from tests.support.shared import generic_state, robot
+from tests.support.tasks import swing_rows
 
 SETS = [(0,), (1,), (0, 1)]
 

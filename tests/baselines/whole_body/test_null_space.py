@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from poise.baselines.whole_body.null_space import allocate_null_space, solve_soles
+from poise.baselines.whole_body.null_space import allocate_null_space, solve_resting
 from poise.envs.physics.arrays import robot_arrays
 from tests.support.physics import robot_named
 
@@ -13,7 +13,7 @@ def solved(J, rhs, space):
     """v̇₀ (nv,) and the null space (nv, nz) that the kernel finds."""
     nv = J.shape[1]
     vdot0, V = np.full(nv, np.nan), np.full((nv, nv), np.nan)
-    solve_soles(J, rhs, space, vdot0, V)
+    solve_resting(J, rhs, space, vdot0, V)
     nz = nv - len(space.beta)
     assert not V[:, nz:].any()
     return vdot0, V[:, :nz]

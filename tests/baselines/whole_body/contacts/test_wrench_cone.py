@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from poise.baselines.whole_body.wrench_cone import robot_cones, wrench_cone
+from poise.baselines.whole_body.contacts.wrench_cone import robot_cones, wrench_cone
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.ground import contact_friction
 from tests.support.physics import robot_named

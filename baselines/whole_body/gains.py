@@ -1,5 +1,5 @@
-"""What the momentum QP is asked for and what it must respect; all costs and gains are numbers
-without units, so that one set serves every robot.
+"""Gains of the built-in tasks, contacts and limits of the momentum QP: numbers without units, so
+that one set serves every robot.
 
 Accelerations are measured in g (linear) and g/h (angular, h the CoM's standing height), forces
 in m g, moments in m g h; a stiffness of 1 is ω² = g/h and a damping of 1 is ω.

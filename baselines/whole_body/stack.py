@@ -1,0 +1,86 @@
+"""The stack of tasks of a reduced problem: what is asked of v̇ besides posture and momentum."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program, run
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import apart
+from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.state import RobotState
+
+from .tasks.task import BoundTask, RowArrays, Rows, TaskTick
+from .workspace import Workspace
+
+
+@dataclass(frozen=True, eq=False)
+class TaskStack(Block):
+    """k rows of ½ Σ weights (A v̇ − b)², task below task, for a problem of n unknowns."""
+
+    A: np.ndarray  # (k, nv)
+    b: np.ndarray  # (k,)
+    weights: np.ndarray  # (k,)
+    AV: np.ndarray  # (k, n) scratch
+    weighted: np.ndarray  # (k, n) scratch
+    fill: Program  # the kernels of the tasks, each with its rows
+
+
+def make_stack(
+    tasks: Iterable[BoundTask], state: StateArrays, workspace: Workspace, further: int = 0
+) -> TaskStack:
+    """The tasks one below the other, then `further` rows that no task fills."""
+    tasks = tuple(tasks)
+    k = sum(task.size for task, _ in tasks) + further
+    nv, n = len(state.qvel), len(workspace.g)
+    A, b, weights, calls, first = apart((k, nv)), apart(k), apart(k), [], 0
+    for task, block in tasks:
+        own = slice(first, first + task.size)
+        tick = TaskTick(state, block, RowArrays(A[own], b[own], weights[own]))
+        if task.kernel is not None:
+            calls.append((task.kernel, tick))
+        first = own.stop
+    return TaskStack(
+        A=A, b=b, weights=weights, AV=apart((k, n)), weighted=apart((k, n)), fill=Program.of(calls)
+    )
+
+
+def put_rows(stack: TaskStack, rows: Sequence[Rows], first: int = 0) -> None:
+    """Write rows into the stack, from its row `first` on."""
+    for each in rows:
+        own = slice(first, first + len(each.b))
+        stack.A[own], stack.b[own], stack.weights[own] = each.A, each.b, each.weights
+        first = own.stop
+
+
+def fill_from_python(stack: TaskStack, tasks: Iterable[BoundTask], state: RobotState) -> None:
+    """Write the rows of the tasks that have no kernel; they are the stack's first ones."""
+    first = 0
+    for bound in tasks:
+        if bound.task.kernel is None:
+            put_rows(stack, [bound.rows(state)], first)
+        first += bound.task.size
+
+
+@compiled
+def add_stack(stack: TaskStack, ws: Workspace):
+    """Add ½ Σ weights (A v̇ − b)², v̇ = v̇₀ + V x, to the objective; kernels fill their rows first."""
+    run(stack.fill)
+    A, AV = stack.A, stack.AV
+    np.dot(A, ws.V, AV)
+    for r in range(A.shape[0]):
+        offset = -stack.b[r]
+        for j in range(A.shape[1]):
+            offset += A[r, j] * ws.vdot0[j]
+        for i in range(AV.shape[1]):
+            stack.weighted[r, i] = stack.weights[r] * AV[r, i]
+            ws.g[i] += offset * stack.weighted[r, i]
+    n = AV.shape[1]
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for r in range(A.shape[0]):
+                total += AV[r, i] * stack.weighted[r, j]
+            ws.H[i, j] += total

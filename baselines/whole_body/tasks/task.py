@@ -1,0 +1,103 @@
+"""Tasks of the momentum QP: rows of ½ Σ weights (A v̇ − b)² from gains without units."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from poise.configs.errors import ConfigError
+from poise.configs.kinds import OfKind
+from poise.envs.compiled.block import Block
+from poise.envs.maths.pendulum import Units
+from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.state import RobotState
+from poise.envs.robots.robot import Robot
+
+
+class Rows(NamedTuple):
+    """A task: ½ Σ weights (A x − b)². A may stop short: the columns left out are zero."""
+
+    A: np.ndarray  # (k, ≤ n)
+    b: np.ndarray  # (k,)
+    weights: np.ndarray  # (k,)
+
+
+@dataclass(frozen=True, eq=False)
+class RowArrays(Block):
+    """The part of the stack that a task writes its k rows to."""
+
+    A: np.ndarray  # (k, nv); zero before the first tick
+    b: np.ndarray  # (k,)
+    weights: np.ndarray  # (k,)
+
+
+@dataclass(frozen=True, eq=False)
+class TaskTick(Block):
+    """All that a task's kernel works on."""
+
+    state: StateArrays
+    task: Any  # the task's own block, made by `bind`
+    rows: RowArrays
+
+
+@dataclass(frozen=True)
+class Task(OfKind):
+    """Base of tasks. A subclass is a frozen dataclass of gains, with a `kind` to be named by.
+
+    Gains have no units (see `gains.py`). `bind` makes the block that the task works on: gains in
+    SI units, and a reference that may be written to at any time. `rows` is the specification.
+    `kernel`, a compiled function of a `TaskTick`, fills the same rows; without one the controller
+    calls `rows`, and runs from Python.
+    """
+
+    room: ClassVar[str] = str(__package__)
+    size: ClassVar[int]  #: rows
+    kernel: ClassVar[Any] = None  #: as `staticmethod(compiled function)`
+
+    def bind(self, robot: Robot) -> Any:
+        """The block of this task for a robot."""
+        raise NotImplementedError
+
+    def rows(self, state: RobotState, block: Any) -> Rows:
+        """`size` rows in v̇, in NumPy."""
+        raise NotImplementedError
+
+
+class BoundTask(NamedTuple):
+    """A task, and the block that it works on for one robot."""
+
+    task: Task
+    block: Any
+
+    def rows(self, state: RobotState) -> Rows:
+        """The rows of a state."""
+        return self.task.rows(state, self.block)
+
+
+def bind_tasks(tasks: Mapping[str, Task], robot: Robot) -> dict[str, BoundTask]:
+    """The tasks of a configuration for one robot.
+
+    Raises ConfigError naming the task for a body or a point that the robot does not have.
+    """
+    bound = {}
+    for name, task in tasks.items():
+        try:
+            bound[name] = BoundTask(task, task.bind(robot))
+        except ConfigError as error:
+            field = ".".join(part for part in ("tasks", name, error.field) if part)
+            raise ConfigError(error.message, field=field, choices=error.choices) from None
+    return bound
+
+
+class Spring(NamedTuple):
+    """Stiffness k [1/s²] and damping d = 2 ζ √k [1/s] of a task."""
+
+    k: float
+    d: float
+
+
+def spring(units: Units, stiffness: float, damping_ratio: float) -> Spring:
+    """From a stiffness in ω² and a damping ratio ζ."""
+    k = stiffness * units.omega**2
+    return Spring(float(k), float(2.0 * damping_ratio * np.sqrt(k)))

@@ -1,0 +1,170 @@
+"""The memory of a reduced problem: which part of each array is what, said once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from poise.baselines.solvers.dual_active_set import iscratch_size, scratch_size
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.memory import apart
+from poise.envs.physics.arrays import RobotArrays
+
+from .null_space import NullSpace, allocate_null_space
+
+
+class Layout(NamedTuple):
+    """Sizes of a reduced problem, and where the parts of its arrays begin.
+
+    Unknowns x = (z, y, f, u): what is left of v̇, internal wrenches of the soles, forces of the
+    point contacts, a soft root's wrench. Affine in x are `rows` = (v̇, W, w, τ), see `Workspace`.
+    Constraints are the soles' cones, the points' cones, torque limits and joint limits.
+    """
+
+    nv: int
+    nj: int  # joints: nv − 6
+    k: int  # contact forces and moments: six a sole, three a point
+    n: int  # unknowns
+    first_internal: int
+    first_force: int
+    first_root: int
+    r: int  # rows
+    m: int  # constraints
+    first_point: int
+    first_torque: int
+    first_joint: int
+
+    @property
+    def parts(self) -> tuple[slice, slice, slice, slice]:
+        """The parts v̇, W, w and τ of `rows`."""
+        nv, k = self.nv, self.k
+        return slice(0, nv), slice(nv, nv + 6), slice(nv + 6, nv + 6 + k), slice(nv + 6 + k, self.r)
+
+
+def lay_out(
+    robot: RobotArrays, space: NullSpace, cone_rows: int, soft_root: bool, points: int, rows: int
+) -> Layout:
+    """The layout for a robot whose soles' cones have `cone_rows` rows each, and with so many
+    `points` in contact, whose cones have so many `rows` together."""
+    nj, nc = len(robot.q_standing), len(robot.sole_body)
+    nv, k = nj + 6, 6 * nc + 3 * points
+    first_internal = nv - len(space.beta)
+    first_force = first_internal + 6 * (nc - 1)
+    first_root = first_force + 3 * points
+    first_point = nc * cone_rows
+    first_torque = first_point + rows
+    return Layout(
+        nv=nv, nj=nj, k=k, n=first_root + (6 if soft_root else 0), first_internal=first_internal,
+        first_force=first_force, first_root=first_root, r=nv + 6 + k + nj,
+        m=first_torque + 2 * nj, first_point=first_point, first_torque=first_torque,
+        first_joint=first_torque + nj,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace(Block):
+    """Scratch of the reduced problem; `H`, `g`, `C`, `l`, `u` are the QP after `assemble`.
+
+    v̇, the total wrench W, the contact wrenches w and the joint torques τ are affine in x:
+    V x + v̇₀, B x + W₀, E x + w₀, T x + τ₀. They lie one below the other in `rows` and `offsets`.
+    """
+
+    first_internal: int  # see `Layout`
+    first_force: int
+    first_root: int
+    first_point: int
+    first_torque: int
+    first_joint: int
+    rows: np.ndarray  # (r, n)
+    offsets: np.ndarray  # (r,)
+    wanted: np.ndarray  # (r,) what each should be
+    weights: np.ndarray  # (r,) of the squared differences
+    weighted: np.ndarray  # (r, n) rows times weights
+    values: np.ndarray  # (r,) at the solution
+    V: np.ndarray  # (nv, n) a view of `rows`; columns span the null space of J, or are 0
+    B: np.ndarray  # (6, n) A V, a view
+    E: np.ndarray  # (k, n) a view
+    T: np.ndarray  # (nj, n) a view
+    vdot0: np.ndarray  # (nv,) a view of `offsets`
+    W0: np.ndarray  # (6,) A v̇₀ + A_bias, a view
+    w0: np.ndarray  # (k,) a view
+    tau0: np.ndarray  # (nj,) a view
+    accel_des: np.ndarray  # (nv,) a view of `wanted`
+    wrench_des: np.ndarray  # (6,) a view
+    force_des: np.ndarray  # (k,) a view
+    accel_weights: np.ndarray  # (nv,) a view of `weights`
+    momentum_weights: np.ndarray  # (6,) a view
+    force_weights: np.ndarray  # (k,) a view
+    torque_weights: np.ndarray  # (nj,) a view
+    space: NullSpace
+    contact_accel: np.ndarray  # (k,) that the contacts are to have: J v̇ + J̇ v less J̇ v
+    y: np.ndarray  # (6,)
+    cop_prev: np.ndarray  # (2,) last measured p
+    cop_vel: np.ndarray  # (2,) ṗ
+    momentum_rate: np.ndarray  # (6,) [Ṗ_des; L̇_des]
+    BBt: np.ndarray  # (6, 6)
+    JtE: np.ndarray  # (nv, n) Jᵀ E
+    local: np.ndarray  # (6, n) E of one sole, its own axes
+    local0: np.ndarray  # (6,) w₀ of one sole, its own axes
+    H: np.ndarray  # (n, n)
+    g: np.ndarray  # (n,)
+    C: np.ndarray  # (m, n)
+    l: np.ndarray  # noqa: E741  (m,)
+    u: np.ndarray  # (m,)
+    x: np.ndarray  # (n,)
+    lam: np.ndarray  # (m,)
+    scratch: np.ndarray
+    iscratch: np.ndarray
+    status: np.ndarray  # (1,) int: how the solution ended, see `solvers/scaled_rows.py`; 0: solved
+    vdot: np.ndarray  # (nv,) solution, a view of `values` like the next two
+    wrenches: np.ndarray  # (k,) solution
+    tau_asked: np.ndarray  # (nj,) solution, to rounding within the limits
+    tau: np.ndarray  # (nj,) solution, within the limits
+    root_wrench: np.ndarray  # (6,) solution, about the CoM; zero with a hard root
+
+    @property
+    def N(self) -> np.ndarray:
+        """(nz, nv) rows span the null space of J: the first columns of V."""
+        held, steps = self.space.held, len(self.space.beta)
+        return self.V[:, : len(held) - steps + len(self.space.free)].T
+
+
+def allocate_workspace(
+    robot: RobotArrays,
+    cone_rows: int,
+    soft_root: bool,
+    point_chains: Sequence[np.ndarray] = (),
+    point_rows: int = 0,
+) -> Workspace:
+    """Zeroed scratch for one robot, whose wrench cones have `cone_rows` rows each.
+
+    Args:
+        point_chains: for each point contact the degrees of freedom that move its body.
+        point_rows: how many rows the cones of these have together.
+    """
+    space = allocate_null_space(robot, point_chains)
+    lay = lay_out(robot, space, cone_rows, soft_root, len(point_chains), point_rows)
+    n, m, r, k, nj, z = lay.n, lay.m, lay.r, lay.k, lay.nj, apart
+    rows, offsets, wanted, weights, values = z((r, n)), z(r), z(r), z(r), z(r)
+    V, B, E, T = lay.parts
+    for i in range(3 * len(point_chains)):  # the forces of points are unknowns themselves
+        rows[E][i - 3 * len(point_chains), lay.first_force + i] = 1.0
+    ws = Workspace(
+        first_internal=lay.first_internal, first_force=lay.first_force, first_root=lay.first_root,
+        first_point=lay.first_point, first_torque=lay.first_torque, first_joint=lay.first_joint,
+        rows=rows, offsets=offsets, wanted=wanted, weights=weights,
+        weighted=z((r, n)), values=values, V=rows[V], B=rows[B], E=rows[E], T=rows[T],
+        vdot0=offsets[V], W0=offsets[B], w0=offsets[E], tau0=offsets[T],
+        accel_des=wanted[V], wrench_des=wanted[B], force_des=wanted[E],
+        accel_weights=weights[V], momentum_weights=weights[B], force_weights=weights[E],
+        torque_weights=weights[T], space=space,
+        contact_accel=z(k), y=z(6), cop_prev=z(2), cop_vel=z(2), momentum_rate=z(6),
+        BBt=z((6, 6)), JtE=z((lay.nv, n)), local=z((6, n)), local0=z(6),
+        H=z((n, n)), g=z(n), C=z((m, n)), l=z(m), u=z(m), x=z(n), lam=z(m),
+        scratch=z(scratch_size(n, m)), iscratch=z(iscratch_size(n, m), dtype=np.int64),
+        status=z(1, dtype=np.int64), vdot=values[V], wrenches=values[E], tau_asked=values[T],
+        tau=z(nj), root_wrench=z(6),
+    )  # fmt: skip
+    ws.cop_prev[:] = np.nan
+    return ws

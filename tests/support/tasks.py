@@ -1,0 +1,33 @@
+"""Rows of tasks as their kernels fill them, and as NumPy has them."""
+
+import numpy as np
+
+from poise.baselines.stepping.swing import swing_gains, swing_task
+from poise.baselines.whole_body.tasks.task import RowArrays, Rows, TaskTick
+from poise.envs.compiled.memory import apart
+
+
+def filled(bound, state):
+    """The rows that a task's kernel fills for a state."""
+    k = bound.task.size
+    arrays = RowArrays(apart((k, len(state.qvel))), apart(k), apart(k))
+    bound.task.kernel(TaskTick(state.arrays, bound.block, arrays))
+    return Rows(arrays.A, arrays.b, arrays.weights)
+
+
+def swing_rows(state, sole, reference, axes, task):
+    """The rows of a sole's pose: `reference` (3, 3), sole `axes` (3, 3)."""
+    frames = np.array(reference, dtype=float), np.array(axes, dtype=float)
+    return filled(swing_task(sole, *frames, swing_gains(state.robot, task)), state)
+
+
+#: kind → a task of the humanoid whose rows have a part of everything
+EXAMPLES = {
+    "orientation": {"body": "left_upper_arm", "stiffness": 30.0, "damping_ratio": 0.7},
+    "position": {"body": "right_lower_arm", "point": [0.18, 0.18, 0.18], "damping_ratio": 0.6},
+}
+
+
+def described(*names, **changes):
+    """The `tasks` of a configuration: some examples, each under its kind."""
+    return {name: {"kind": name, **EXAMPLES[name], **changes} for name in names or EXAMPLES}
