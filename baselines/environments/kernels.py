@@ -14,7 +14,7 @@ from poise.envs.vector.threads import Helpers
 
 from .policy_step import residual_tick
 from .residual import ResidualBalanceEnv
-from .stepping import ResidualStepEnv, stepping_tick
+from .stepping import ResidualStepEnv
 
 
 def _standing() -> tuple[MomentumQP, RobotState, Targets]:
@@ -71,4 +71,4 @@ def planner() -> None:
     """When, where to and how a foot steps, and what a policy sees of it."""
     env, tick = _stepping()
     capture_tick.compile((tick.numba_type,))
-    stepping_tick.compile((env.bind_steps(env.bind(tick, 0), 0).numba_type,))
+    env.bind(tick, 0)

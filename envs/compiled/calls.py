@@ -2,9 +2,11 @@
 
 import importlib
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
@@ -59,18 +61,40 @@ def _address(module: str, name: str, kind: BlockType) -> Address:
 def _compiled(kernel: Any, kind: BlockType) -> Address:
     kernel.compile((kind,))
     result = kernel.overloads[kind,]
+    if result.signature.return_type not in (types.none, types.float64):
+        name, given = kernel.py_func.__qualname__, result.signature.return_type
+        raise TypeError(f"{name} returns {given}: nothing or a float can be called by its address")
     address = Address(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
     address.kernel, address.kind = kernel, kind
     return address
 
 
 def address_of(kernel: Any, block: Block) -> Address:
-    """The address of the compiled function `kernel(block)`, which returns nothing, for `call`.
+    """The address of the compiled function `kernel(block)`, for `call`, or `value_of` for a float.
 
     A function called by its address is compiled apart from its caller: neither waits for the
     other, and it is not optimised once more within all that it is called from.
     """
     return _compiled(kernel, block.numba_type)
+
+
+def _calling(returned: types.Type, address: Any, block: Any) -> Any:
+    """Signature and code of a call by address, whose exceptions go on."""
+    kind = block if isinstance(block, BlockType) else types.voidptr
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        convention = context.call_conv
+        function = convention.get_function_type(returned, (kind,))
+        kernel = builder.inttoptr(args[0], function.as_pointer())
+        pointer = args[1]
+        if kind is types.voidptr:
+            pointer = builder.inttoptr(pointer, context.get_value_type(kind))
+        status, value = convention.call_function(builder, kernel, returned, (kind,), [pointer])
+        with cgutils.if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
+        return context.get_dummy_value() if returned == types.none else value
+
+    return returned(address, block), generate
 
 
 @intrinsic
@@ -79,21 +103,46 @@ def call(typing: Any, address: Any, block: Any) -> Any:
 
     The block may also be given by its address.
     """
-    kind = block if isinstance(block, BlockType) else types.voidptr
+    return _calling(types.none, address, block)
 
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        convention = context.call_conv
-        function = convention.get_function_type(types.none, (kind,))
-        kernel = builder.inttoptr(args[0], function.as_pointer())
-        pointer = args[1]
-        if kind is types.voidptr:
-            pointer = builder.inttoptr(pointer, context.get_value_type(kind))
-        status, _ = convention.call_function(builder, kernel, types.none, (kind,), [pointer])
-        with cgutils.if_unlikely(builder, status.is_error):
-            convention.return_status_propagate(builder, status)
-        return context.get_dummy_value()
 
-    return types.void(address, block), generate
+@intrinsic
+def value_of(typing: Any, address: Any, block: Any) -> Any:
+    """The float that `kernel(block)` returns, otherwise as `call`."""
+    return _calling(types.float64, address, block)
+
+
+@dataclass(frozen=True, eq=False)
+class Program(Block):
+    """Kernels that are called one after the other, each with a block of its own, see `of`."""
+
+    rows: np.ndarray  # (n, 2) int: the addresses of a kernel and of its block; 0, 0: nothing
+
+    @classmethod
+    def of(cls, calls: Iterable[tuple[Any, Block] | None]) -> "Program":
+        """A program of (kernel, block) pairs; None leaves a row free."""
+        return cls._linked(tuple(each and (address_of(*each), each[1]) for each in calls))
+
+    @classmethod
+    def _linked(cls, calls: tuple[tuple[Address, Block] | None, ...]) -> "Program":
+        rows = [(int(call[0]), call[1].address) if call else (0, 0) for call in calls]
+        program = cls(np.array(rows, dtype=np.int64).reshape(-1, 2))
+        object.__setattr__(program, "_calls", calls)  # it keeps the blocks
+        return program
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self)._linked, (self._calls,)  # type: ignore[attr-defined]
+
+    def __copy__(self) -> "Program":
+        return self._linked(self._calls)  # type: ignore[attr-defined]
+
+
+@compiled
+def run(program: Program):
+    """Call all kernels of `program` in order."""
+    rows = program.rows
+    for i in range(rows.shape[0]):
+        call(rows[i, 0], rows[i, 1])
 
 
 class CompiledStep(NamedTuple):

@@ -94,7 +94,7 @@ def update_state(robot: RobotArrays, plant: Plant, s: StateArrays):
 
 
 @compiled
-def _dynamics(robot, plant, s):
+def _dynamics(robot: RobotArrays, plant: Plant, s: StateArrays):
     nv = s.M.shape[0]
     copy(plant.qpos, s.qpos)
     copy(plant.qvel, s.qvel)
@@ -111,7 +111,7 @@ def _dynamics(robot, plant, s):
 
 
 @compiled
-def _momentum(robot, plant, s):
+def _momentum(robot: RobotArrays, plant: Plant, s: StateArrays):
     """P, L, A and its bias: A v̇ + A_bias is the wrench of the ground about the CoM."""
     nv = s.M.shape[0]
     R = s.root_axes
@@ -147,7 +147,7 @@ def _momentum(robot, plant, s):
 
 
 @compiled
-def _soles(robot, plant, s):
+def _soles(robot: RobotArrays, plant: Plant, s: StateArrays):
     """Pose, Jacobian and velocity-product acceleration of every sole; the heading frame."""
     nc = s.sole_point.shape[0]
     s.origin[:] = 0.0
@@ -174,7 +174,7 @@ def _soles(robot, plant, s):
 
 
 @compiled
-def _sole_jacobian(robot, plant, s, i):
+def _sole_jacobian(robot: RobotArrays, plant: Plant, s: StateArrays, i: int):
     """Rows 6i..6i+6 of J, J v and J̇ v: linear velocity of the reference point, then angular.
 
     MuJoCo keeps dof axes and spatial velocities at the subtree CoM o; a point at r moves with
@@ -212,7 +212,7 @@ def _sole_jacobian(robot, plant, s, i):
 
 
 @compiled
-def _contact(robot, plant, s):
+def _contact(robot: RobotArrays, plant: Plant, s: StateArrays):
     """Total ground wrench, CoP and capture point; which feet touch the ground.
 
     The ground is the only thing outside the body, and joint limits and friction do not act on
@@ -282,7 +282,7 @@ def update_support(robot: RobotArrays, s: StateArrays):
 
 
 @compiled
-def support_distance(s: StateArrays, x, y):
+def support_distance(s: StateArrays, x: float, y: float) -> float:
     """Signed distance [m] from (x, y) to the support polygon's edge, > 0 inside."""
     distance = np.inf
     size = s.support_size[0]

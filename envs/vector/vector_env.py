@@ -12,7 +12,8 @@ from gymnasium.vector.utils import batch_space
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import option_mapping, seed_number, whole_number
-from poise.envs.balance.base import BalanceEnv, InfoColumns
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.info import InfoColumns
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.compiled.copies import Copyable
 

@@ -1,17 +1,18 @@
 """`ResidualStepEnv`: zero is the planner, every other action moves what it says."""
 
 import inspect
+import re
 
 import numpy as np
 import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.environments.sensed import sensed_env
 from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
 from poise.baselines.stepping import offsets
 from poise.baselines.stepping.guidance import copy_targets, guide
 from poise.configs.errors import ConfigError
-from poise.envs.balance.observation import observation_table
+from poise.envs.sensors.delayed import DelayedState
+from poise.envs.sensors.source import StateSource
 from poise.envs.vector.batch import EnvBatch, replicate
 from tests.support.shared import robot
 
@@ -220,14 +221,14 @@ def test_a_replica_acts_alike(env):
     np.testing.assert_array_equal(ends[0], ends[1])
 
 
-def test_sensors_keep_the_kind_of_environment(env):
+def test_perfect_sensors_change_no_step(env):
     """With perfect sensors of the same robot the trial is the same."""
-    sensed = sensed_env(env)
-    sensed.set_plant(robot(), 0.0)
     ends = []
-    for one in (env, sensed):
-        play(one, {"foothold_x": 0.5})
-        ends.append(one.episode.observation.copy())
+    for sensors in (StateSource, lambda simulation: DelayedState(simulation, robot(), 0.0)):
+        env.state_source = sensors(env.simulation)
+        play(env, {"foothold_x": 0.5})
+        ends.append(env.episode.observation.copy())
+    env.state_source = StateSource(env.simulation)
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-6)
 
 
@@ -238,11 +239,11 @@ def test_controllers_that_do_not_step_are_refused():
 
 
 def test_the_class_docstring_is_the_specification():
-    """Its tables are those that the code builds for the default robot."""
+    """Its tables tell of every term and, for the default scales, of every entry of an action."""
     text, env = inspect.getdoc(ResidualStepEnv), ResidualStepEnv(robot())
-    table = observation_table(env.terms).splitlines()
-    added = next(i for i, row in enumerate(table) if "| swing | left |" in row)
-    assert "\n".join([*table[:2], *table[added:]]) in text, "\n".join(table[added:])
+    for term in env.terms:
+        assert f"| {term.name} |" in text and f"| {term.unit} | {term.meaning} |" in text
+    assert not re.search(r"<\w+>", text)
     for i, (name, scale) in enumerate(zip(env.action_names, env._residual.scale, strict=True)):
         field, unit = name.split("_")[0], "s" if name == "time" else "m"
         assert f"| {i} | {name} | `residual.{field}`, {scale:g} {unit} |" in text
