@@ -214,7 +214,7 @@ def paired_biped(folder: Path, friction: float) -> Path:
 
 
 def test_fingerprint_follows_the_dynamics(tmp_path: Path) -> None:
-    """The same description gives the same fingerprint; mass, friction, posture and contact pairs change it."""
+    """The same description gives the same one; mass, friction, posture and contact pairs count."""
     names = ("same", "again", "mass", "friction", "posture", "pair", "other pair")
     folders = {name: tmp_path / name for name in names}
     for folder in folders.values():
