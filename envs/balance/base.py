@@ -220,7 +220,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
             q_ref=q_ref,
             v_ref=v_ref,
             action=self.episode.action,
-            torques=world.plant.ctrl,
+            plant=world.plant,
             clock=world.clock,
             pushes=world.pushes,
             out=out,
@@ -235,7 +235,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
             scales=self.scales,
             limits=self.limits,
             q_ref=self._references()[0],
-            torques=world.plant.ctrl,
+            plant=world.plant,
             action=e.action,
             last_action=e.last_action,
         )

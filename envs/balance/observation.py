@@ -10,7 +10,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
-from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.arrays import Plant, RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.mirror import SIDES, Mirror
 
@@ -59,7 +59,7 @@ class View(Block):
     q_ref: np.ndarray  # (nj,) joint positions of the reference [rad]
     v_ref: np.ndarray  # (nj,) its joint velocities [rad/s]
     action: np.ndarray  # (na,) of the policy step that has just ended
-    torques: np.ndarray  # (nu,) of its last control tick [N·m]
+    plant: Plant  # the true robot: what the policy sent it (`ctrl`), what a teacher may see
     clock: np.ndarray  # (1,) int: physics steps since the reset
     pushes: np.ndarray  # (k, 11) of the episode, see `pack`; rows of zeros are none
     out: np.ndarray  # (size,) the term's own entries

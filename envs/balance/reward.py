@@ -13,7 +13,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, value_of
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import along
-from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.arrays import Plant, RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
 from .observation import Scales
@@ -29,7 +29,7 @@ class RewardView(Block):
     scales: Scales
     limits: Limits
     q_ref: np.ndarray  # (nj,) joint positions of the reference [rad]
-    torques: np.ndarray  # (nu,) of the policy step's last control tick [N·m]
+    plant: Plant  # whose `ctrl` (nu,) are the torques of the last control tick [N·m]
     action: np.ndarray  # (na,)
     last_action: np.ndarray  # (na,) of the policy step before
 
@@ -81,9 +81,9 @@ def posture_near(v: RewardView) -> float:
 
 @compiled
 def torque_cost(v: RewardView) -> float:
-    total, n = 0.0, v.torques.shape[0]
-    for i in range(n):
-        total += (v.torques[i] / v.robot.torque_limit[i]) ** 2 / n
+    total, torques = 0.0, v.plant.ctrl
+    for i in range(torques.shape[0]):
+        total += (torques[i] / v.robot.torque_limit[i]) ** 2 / torques.shape[0]
     return -total
 
 

@@ -142,7 +142,8 @@ def run(program: Program):
     """Call all kernels of `program` in order."""
     rows = program.rows
     for i in range(rows.shape[0]):
-        call(rows[i, 0], rows[i, 1])
+        if rows[i, 0] != 0:
+            call(rows[i, 0], rows[i, 1])
 
 
 class CompiledStep(NamedTuple):

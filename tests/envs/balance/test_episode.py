@@ -32,6 +32,7 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         e = new_episode(actions, len(r.soles))
         begin_episode(simulation.state_arrays, e)
         e.action[:], e.last_action[:] = [0.5, -0.25, 0.0], [0.1, 0.1, -0.1]
+    simulation.plant.ctrl[:] = 0.0 if tau is None else tau
     simulation.clock[0] = round(time / simulation.arrays.timestep)
     bounds = episode_limits(limits or FallLimits(), r.height_com, 100)
     view = RewardView(
@@ -40,7 +41,7 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         scales=scales(simulation.arrays, Simulation(r).state.support_polygon),
         limits=bounds,
         q_ref=r.standing_qpos[7:].copy() if q_ref is None else q_ref,
-        torques=np.zeros(r.model.nu) if tau is None else tau,
+        plant=simulation.plant,
         action=e.action,
         last_action=e.last_action,
     )
