@@ -10,6 +10,7 @@ import numpy as np
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import along
 from poise.envs.physics.kinematics import StateArrays
+from poise.envs.pushes.table import DURATION, FORCE, HALF_SINE, KIND, PROFILE, PUSH, START
 
 from .observation import GROUND, SPACE, Terms, View
 
@@ -106,3 +107,18 @@ def contacts(v: View):
 def last_action(v: View):
     for a in range(v.out.shape[0]):
         v.out[a] = v.action[a]
+
+
+@TERMS.add(SPACE, "m g", "force that pushes now: a teacher's privilege", "vector", default=False)
+def push(v: View):
+    now = v.clock[0] * v.robot.timestep
+    v.out[:] = 0.0
+    for k in range(v.pushes.shape[0]):
+        row = v.pushes[k]
+        age, duration = now - row[START], row[DURATION]
+        if row[KIND] == PUSH and 0.0 <= age < duration:
+            share = np.sin(np.pi * age / duration) if row[PROFILE] == HALF_SINE else 1.0
+            for a in range(3):
+                v.out[a] += share * row[FORCE + a]
+    put_local(v.state, v.out[0], v.out[1], v.scales.weight, v.out)
+    v.out[2] /= v.scales.weight

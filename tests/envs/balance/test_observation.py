@@ -212,3 +212,21 @@ def test_a_term_is_one_function():
     run(observer([term], out, view))
     assert out.tolist() == [9.0, 10.0]  # clipped
     assert mirror_terms([term], {}).sign.tolist() == [1.0, 1.0]
+
+
+def test_the_push_that_acts_is_observed():
+    """Its force in the heading frame over the weight, while it acts; a half-sine's at its phase."""
+    env = TorqueBalanceEnv(robot(), pushes=None, observation={"terms": ["push"]})
+    still = np.zeros(env.action_space.shape)
+    pushes = [
+        {"force": 60.0, "direction": 90.0, "duration": 0.03, "start": 0.01},
+        {"force": 40.0, "duration": 0.04, "start": 0.07, "profile": "half-sine"},
+        {"delta_v": 0.1, "start": 0.2},
+    ]
+    observation, _ = env.reset(seed=0, options={"push": pushes})
+    seen = [observation, *(env.step(still)[0] for _ in range(5))]
+    left = np.array([0.0, 60.0, 0.0]) / (robot().mass * 9.81)
+    ahead = np.array([40.0 * np.sin(np.pi / 4), 0.0, 0.0]) / (robot().mass * 9.81)
+    for moment, force in zip(seen, (0.0, left, 0.0, 0.0, ahead, ahead), strict=True):
+        # 0.04 s is the end of the first push, 0.08 s and 0.1 s quarters of the second
+        np.testing.assert_allclose(moment, np.broadcast_to(force, 3), atol=0.01)
