@@ -104,6 +104,14 @@ def action_change_cost(v: RewardView) -> float:
 
 
 @compiled
+def momentum_small(v: RewardView) -> float:
+    total, unit = 0.0, v.scales.momentum
+    for a in range(3, 6):
+        total += (v.state.momentum[a] / unit) ** 2
+    return np.exp(-total)
+
+
+@compiled
 def fall_cost(v: RewardView) -> float:
     return -1.0
 
@@ -141,6 +149,9 @@ class RewardWeights:
         0.05, action_change_cost, "−mean (a − a_before)² / 4", "no divergence"
     )
     fall: float = _term(5.0, fall_cost, "−1 in the step of a fall", "fall")
+    angular_momentum: float = _term(
+        0.0, momentum_small, "exp(−(|L| / 0.1 m h² ω)²), L about the CoM", "no fall"
+    )
 
 
 REWARD_TERMS = tuple(RewardWeights.__dataclass_fields__)

@@ -96,6 +96,17 @@ def test_each_reward_term_is_its_formula():
     assert reward == pytest.approx(sum(terms.values()), rel=1e-12)
 
 
+def test_little_angular_momentum_is_rewarded():
+    """exp(−(|L| / 0.1 m h² ω)²), if it has a weight."""
+    simulation = generic_state()
+    r = robot()
+    unit = 0.1 * r.mass * r.height_com**2 * np.sqrt(9.81 / r.height_com)
+    simulation.state_arrays.momentum[3:] = 0.3 * unit, -0.5 * unit, 0.2 * unit
+    _, e = play(simulation, weights=RewardWeights(angular_momentum=2.0))
+    expected = 2.0 * np.exp(-(0.3**2) - 0.5**2 - 0.2**2)
+    assert e.reward_terms[REWARD_TERMS.index("angular_momentum")] == pytest.approx(expected)
+
+
 def test_a_fall_costs_its_weight_and_earns_nothing():
     """In the step of the fall the positive terms are zero."""
     simulation = generic_state()
