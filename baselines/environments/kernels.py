@@ -9,10 +9,10 @@ from poise.baselines.whole_body.momentum_qp import MomentumQP, Tick, accept, mom
 from poise.envs.physics.kinematics import allocate_state
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import load_robot
-from poise.envs.vector.scheduler import Turns
-from poise.envs.vector.threads import Helpers
+from poise.envs.vector.scheduler import StepSchedule
+from poise.envs.vector.threads import ThreadTeam
 
-from .policy_step import residual_tick
+from .policy_step import policy_tick
 from .residual import ResidualBalanceEnv
 from .stepping import ResidualStepEnv
 
@@ -47,11 +47,11 @@ def steps() -> None:
     qp = env.controller
     problem = qp.assembly(env.simulation.state, env.targets)
     tick = Tick(problem, qp.memory, 0, 0)
-    residual_tick.compile((env.bind(tick, 0).numba_type,))
+    policy_tick.compile((env.bind(tick, 0).numba_type,))
     momentum_tick.compile((tick.numba_type,))
     accept(problem.state, problem.parameters, problem.workspace, qp.memory)
-    helpers = Helpers()
-    Turns(np.zeros((2, 3), dtype=np.int64), 2).play_all(helpers)
+    helpers = ThreadTeam()
+    StepSchedule(np.zeros((2, 3), dtype=np.int64), 2).play_all(helpers)
     helpers.close()
 
 

@@ -42,17 +42,17 @@ def soft_root_force(s: StateArrays, wrench: np.ndarray, qfrc_applied: np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Residual(Block):
-    """How an action becomes offsets of the controller's targets."""
+    """The law by which an action becomes offsets of the controller's targets."""
 
     moved: np.ndarray  # (na,) int: the offset that each entry of the action moves
     scale: np.ndarray  # (na,) the offset that it moves by 1
-    share: float  # of the way that a policy step goes from the last action to the next
-    gate: float  # [m] see `openness`
+    blend: float  # of the way that a policy step goes from the last action to the next
+    gate: float  # [m] see `gate_opening`
     offsets: np.ndarray  # (9,), 13 with steps: see `update_targets`
 
 
 @compiled
-def openness(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> float:
+def gate_opening(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> float:
     """1 − exp(−(d/gate)²), d the capture point's distance from that of the reference [m]."""
     if r.gate == 0.0:
         return 1.0
@@ -68,16 +68,16 @@ def openness(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> 
 @compiled
 def set_offsets(r: Residual, s: StateArrays, motion: Motion, com_offset: float, e: EpisodeArrays):
     """Offsets from the episode's action, which is smoothed first."""
-    opened = openness(r, s, motion, com_offset)
+    opened = gate_opening(r, s, motion, com_offset)
     for a in range(r.moved.shape[0]):
-        if r.share < 1.0:
-            e.action[a] = e.last_action[a] + r.share * (e.action[a] - e.last_action[a])
+        if r.blend < 1.0:
+            e.action[a] = e.last_action[a] + r.blend * (e.action[a] - e.last_action[a])
         r.offsets[r.moved[a]] = opened * r.scale[a] * e.action[a]
 
 
 @dataclass(frozen=True, eq=False)
-class Aim(Block):
-    """What `aim` works on, by the believed state."""
+class TargetInputs(Block):
+    """The inputs of `set_targets`; the state is the believed one."""
 
     robot: RobotArrays
     state: StateArrays
@@ -89,7 +89,7 @@ class Aim(Block):
 
 
 @compiled
-def aim(a: Aim):
+def set_targets(a: TargetInputs):
     """Targets of this tick."""
     now = a.clock[0] * a.robot.timestep
     update_targets(
@@ -98,10 +98,10 @@ def aim(a: Aim):
 
 
 @dataclass(frozen=True, eq=False)
-class ResidualStep(Block):
+class PolicyStep(Block):
     """All that a policy step works on."""
 
-    aim: Aim
+    inputs: TargetInputs
     kernel: int  # the address of the controller's tick
     tick: Erased  # what it works on
     tau: np.ndarray  # (nj,) what it finds [N·m]
@@ -117,22 +117,22 @@ class ResidualStep(Block):
 
 
 @compiled
-def residual_tick(step: ResidualStep):
+def policy_tick(step: PolicyStep):
     """The controller, held for `substeps` physics steps; `ticks` calls are a policy step."""
-    a, world, e, w = step.aim, step.world, step.episode, step.root_wrench
-    robot, plant, s = world.robot, world.plant, world.state
+    a, world, e, w = step.inputs, step.world, step.episode, step.root_wrench
+    robot, views, s = world.robot, world.views, world.state
     if e.ticks[0] == 0:
         set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
-    aim(a)
+    set_targets(a)
     call(step.kernel, step.tick)
-    for i in range(plant.ctrl.shape[0]):
-        plant.ctrl[i] = step.tau[robot.motor_dofs[i] - 6]
+    for i in range(views.ctrl.shape[0]):
+        views.ctrl[i] = step.tau[robot.motor_dofs[i] - 6]
     if step.soft_root:
-        soft_root_force(s, w, plant.qfrc_applied)
+        soft_root_force(s, w, views.qfrc_applied)
         m = e.metrics
         m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
         m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
-    record_tick(robot, s, plant.ctrl, step.substeps * robot.timestep, e)
+    record_tick(robot, s, views.ctrl, step.substeps * robot.timestep, e)
     simulate(world, step.substeps)
     run(step.estimate)
     e.ticks[0] += 1
@@ -145,8 +145,8 @@ def residual_tick(step: ResidualStep):
 
 
 @dataclass(frozen=True, eq=False)
-class Record(Block):
-    """What `record` works on."""
+class TickAccount(Block):
+    """The block of `account_tick`: what it reads, and the record that it writes."""
 
     world: World
     period: float  # [s]
@@ -154,6 +154,6 @@ class Record(Block):
 
 
 @compiled
-def record(r: Record):
-    """Account for the torques in `plant.ctrl`."""
-    record_tick(r.world.robot, r.world.state, r.world.plant.ctrl, r.period, r.episode)
+def account_tick(r: TickAccount):
+    """Account for the torques in `views.ctrl`."""
+    record_tick(r.world.robot, r.world.state, r.world.views.ctrl, r.period, r.episode)

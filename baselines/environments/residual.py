@@ -28,21 +28,21 @@ from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
 from .policy_step import (
-    Aim,
-    Record,
+    PolicyStep,
     Residual,
-    ResidualStep,
-    aim,
-    record,
-    residual_tick,
+    TargetInputs,
+    TickAccount,
+    account_tick,
+    policy_tick,
     set_offsets,
+    set_targets,
     soft_root_force,
 )
 
 
 @dataclass(frozen=True)
 class ResidualScales:
-    """What an action of 1 adds to each target, heading frame; a scale of 0 takes it away."""
+    """The offsets that an action of 1 gives, heading frame; a scale of 0 takes an entry away."""
 
     com: float = field(default=0.2, metadata={"min": 0.0})  # Δc_ref x, y [m]
     cop: float = field(default=0.15, metadata={"min": 0.0})  # Δp_ref x, y [m]
@@ -67,14 +67,14 @@ class ResidualScales:
 
 @dataclass(frozen=True)
 class _Lag:
-    """How the targets follow the action."""
+    """The lag and the gate between the action and the targets."""
 
     smoothing: float = field(metadata={"min": 0.0})  # τ [s]
     gate: float = field(metadata={"min": 0.0})  # d₀ [m]
 
 
 def _action_term(name: str) -> Term:
-    """What the action `name` is to a mirror."""
+    """The term that tells a mirror what the action `name` is."""
     if name[-2:] not in ("_x", "_y", "_z"):
         return Term(name, (name,), "1", "", "number")
     turns = name.startswith(("lean", "momentum"))
@@ -146,9 +146,9 @@ class ResidualBalanceEnv(BalanceEnv):
         super().__init__(robot, config, render_mode=render_mode, **overrides)
         lag = build(_Lag, to_dict({"smoothing": smoothing, "gate": gate}), "environment")
         self.smoothing, self.gate = lag.smoothing, lag.gate
-        # share of the way that the residual goes to the action in one policy step
+        # fraction of the way that the residual goes to the action in one policy step
         period = self.config.policy_period
-        share = 1.0 if lag.smoothing == 0.0 else -np.expm1(-period / lag.smoothing)
+        blend = 1.0 if lag.smoothing == 0.0 else -np.expm1(-period / lag.smoothing)
         names = list(self.residual.entries())
         carried = [names.index("momentum_x"), names.index("momentum_y")]
         scale[carried] *= 10.0 * self.scales.momentum  # m h² ω
@@ -156,7 +156,7 @@ class ResidualBalanceEnv(BalanceEnv):
         self._residual = Residual(
             moved=self._moved,
             scale=scale[self._moved],
-            share=float(share),
+            blend=float(blend),
             gate=self.gate,
             offsets=self._offsets,
         )
@@ -203,11 +203,11 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _unbind(self) -> None:
         super()._unbind()
-        self._bound: tuple[ResidualStep, Any]  # what `_step` works on, the gains when it was made
-        self._aimed: Aim | None = None
+        self._bound: tuple[PolicyStep, Any]  # what `_step` works on, the gains when it was made
+        self._inputs: TargetInputs | None = None
 
     def arguments(self) -> dict[str, Any]:
-        """What makes another environment like this one; robot and motion are shared.
+        """The arguments that make another environment like this one; robot and motion are shared.
 
         Raises ConfigError for a controller that cannot be made anew: its memory cannot be shared.
         """
@@ -233,13 +233,13 @@ class ResidualBalanceEnv(BalanceEnv):
     def _begin(self) -> None:
         self.controller.reset(self.state_source.state)
         self._offsets[:] = 0.0
-        aim(self._aim())
+        set_targets(self._target_inputs())
 
-    def _aim(self) -> Aim:
-        """What `aim` works on; the same object until something is replaced."""
-        if self._aimed is None:
+    def _target_inputs(self) -> TargetInputs:
+        """The block for `set_targets`; the same object until something is replaced."""
+        if self._inputs is None:
             source = self.state_source
-            self._aimed = Aim(
+            self._inputs = TargetInputs(
                 robot=source.arrays,
                 state=source.state_arrays,
                 clock=self.simulation.clock,
@@ -248,10 +248,10 @@ class ResidualBalanceEnv(BalanceEnv):
                 residual=self._residual,
                 targets=self._targets,
             )
-        return self._aimed
+        return self._inputs
 
     def compiled_step(self) -> CompiledStep | None:
-        """See `BalanceEnv`: controllers with a compiled tick and solver."""
+        """The compiled policy step, for a controller with a compiled tick and solver; else None."""
         if not self._compiled:
             return None
         known, gains, world = self._step, self.controller.gains(), self.simulation.world()
@@ -262,14 +262,14 @@ class ResidualBalanceEnv(BalanceEnv):
         address, tick = self.controller.compiled_tick(self.state_source.state, self.targets)
         bound = self.bind(tick, address)
         self._bound = bound, gains
-        self._step = CompiledStep(address_of(residual_tick, bound), bound, bound.ticks)
+        self._step = CompiledStep(address_of(policy_tick, bound), bound, bound.ticks)
         return self._step
 
-    def bind(self, tick: Block, kernel: int) -> ResidualStep:
+    def bind(self, tick: Block, kernel: int) -> PolicyStep:
         """All that a step works on, with the controller's tick and the address of its kernel."""
         found = self.controller.outputs()
-        return ResidualStep(
-            aim=self._aim(),
+        return PolicyStep(
+            inputs=self._target_inputs(),
             kernel=kernel,
             tick=Erased(tick),
             tau=found.tau,
@@ -285,7 +285,7 @@ class ResidualBalanceEnv(BalanceEnv):
         )
 
     def _end_of_tick(self, tick: Any) -> StepEnd:
-        """What ends a policy step of the controller whose compiled tick works on `tick`."""
+        """The end of a policy step of the controller whose compiled tick works on `tick`."""
         return self.step_end()
 
     def advance(self) -> None:
@@ -296,17 +296,17 @@ class ResidualBalanceEnv(BalanceEnv):
             self._advance_in_python()
 
     def _advance_in_python(self) -> None:
-        """What `residual_tick` does, for any controller."""
-        sim, e, a = self.simulation, self.episode, self._aim()
-        ctrl, wrench = sim.plant.ctrl, e.root_wrench
+        """Take the policy step of `policy_tick` with any controller, tick by tick."""
+        sim, e, a = self.simulation, self.episode, self._target_inputs()
+        ctrl, wrench = sim.views.ctrl, e.root_wrench
         set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
-        accounts = Record(sim.world(), self.controller.period, e)
+        accounts = TickAccount(sim.world(), self.controller.period, e)
         for _ in range(self.ticks):
-            aim(a)
+            set_targets(a)
             ctrl[:] = self.controller.torques(self.state_source.state, self.targets)
             wrench[:] = self._told.root_wrench
             self._push_root(wrench)
-            record(accounts)
+            account_tick(accounts)
             sim.step(ctrl, self.control_substeps)
             self.state_source.update()
         e.metrics[FAILURES] = self._told.failures
@@ -315,7 +315,7 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _push_root(self, wrench: np.ndarray) -> None:
         """Apply a soft root's wrench, and take away the last one."""
-        qfrc_applied = self.simulation.plant.qfrc_applied
+        qfrc_applied = self.simulation.views.qfrc_applied
         if not (wrench.any() or qfrc_applied[:6].any()):
             return
         soft_root_force(self.simulation.state_arrays, wrench, qfrc_applied)

@@ -14,39 +14,36 @@ from poise.envs.compiled.jit import compiled
 
 # entries of what a controller tells of its steps, see `Stepping.told`
 STEPS, FOOT, FOOTHOLD, PHASE, REMAINING, SINCE = 0, 1, 2, 4, 5, 6
-TOLD = 7
+REPORTED = 7
 
 
 @dataclass(frozen=True, eq=False)
 class StepView(Block):
-    """What the kernel of a term about steps reads, and the place that it fills."""
+    """The block of a term about steps: what it reads, and the place that it fills."""
 
     seen: View
-    told: np.ndarray  # (7,) see `Stepping.told`
+    report: np.ndarray  # (7,) see `Stepping.told`
 
 
 @dataclass(frozen=True, eq=False)
-class Teller(Block):
-    """What a compiled controller's steps are told from, and to."""
+class StepReporter(Block):
+    """The memory of a compiled controller's steps, and the report that is made of it."""
 
     memory: StepMemory
     swing: SwingArrays
-    told: np.ndarray  # (7,)
+    report: np.ndarray  # (7,)
 
 
 @compiled
-def tell_steps(t: Teller):
-    """Fill `told` as `Stepping.told` does."""
-    m, w, told = t.memory, t.swing, t.told
-    told[STEPS], told[FOOT] = m.steps[0], -1.0
-    told[PHASE], told[REMAINING], told[SINCE] = 0.0, 0.0, m.clock[0]
+def report_steps(t: StepReporter):
+    """Fill `report` as `Stepping.told` does."""
+    m, w, report = t.memory, t.swing, t.report
+    report[STEPS], report[FOOT], report[SINCE] = m.steps[0], -1.0, m.clock[0]
+    report[PHASE], report[REMAINING] = 0.0, 0.0
     if m.swinging[0]:
-        told[FOOT], told[FOOTHOLD], told[FOOTHOLD + 1] = m.foot[0], w.foothold[0], w.foothold[1]
-        told[PHASE], told[REMAINING], told[SINCE] = (
-            w.time[0] / w.duration[0],
-            remaining_time(w),
-            0.0,
-        )
+        report[FOOT], report[SINCE] = m.foot[0], 0.0
+        report[FOOTHOLD], report[FOOTHOLD + 1] = w.foothold[0], w.foothold[1]
+        report[PHASE], report[REMAINING] = w.time[0] / w.duration[0], remaining_time(w)
 
 
 STEP_TERMS = Terms(TERMS, StepView)  #: by name; those of every environment come first
@@ -55,7 +52,7 @@ STEP_TERMS = Terms(TERMS, StepView)  #: by name; those of every environment come
 @compiled
 def put_from_stance(t: StepView, x: float, y: float):
     """The point (x, y) of the ground from the stance sole, heading frame [0.5 h]; 0 without one."""
-    v, foot = t.seen, int(t.told[FOOT])
+    v, foot = t.seen, int(t.report[FOOT])
     v.out[:] = 0.0
     if foot >= 0:
         stance, half = v.state.sole_point[1 - foot], 0.5 * v.scales.height
@@ -65,27 +62,27 @@ def put_from_stance(t: StepView, x: float, y: float):
 @STEP_TERMS.add("feet", "1", "1 where the foot swings, else 0", "feet")
 def swing(t: StepView):
     for i in range(t.seen.out.shape[0]):
-        t.seen.out[i] = 1.0 if int(t.told[FOOT]) == i else 0.0
+        t.seen.out[i] = 1.0 if int(t.report[FOOT]) == i else 0.0
 
 
 @STEP_TERMS.add(("share",), "1", "share of the swing that is over", "number")
 def phase(t: StepView):
-    t.seen.out[0] = t.told[PHASE]
+    t.seen.out[0] = t.report[PHASE]
 
 
 @STEP_TERMS.add(("t",), "1/ω", "until touchdown is planned", "number")
 def time_left(t: StepView):
-    t.seen.out[0] = t.seen.scales.omega * t.told[REMAINING]
+    t.seen.out[0] = t.seen.scales.omega * t.report[REMAINING]
 
 
 @STEP_TERMS.add(("t",), "1/ω", "since the last touchdown", "number")
 def since(t: StepView):
-    t.seen.out[0] = t.seen.scales.omega * t.told[SINCE]
+    t.seen.out[0] = t.seen.scales.omega * t.report[SINCE]
 
 
 @STEP_TERMS.add(("count",), "1", "steps begun", "number")
 def steps(t: StepView):
-    t.seen.out[0] = t.told[STEPS]
+    t.seen.out[0] = t.report[STEPS]
 
 
 @STEP_TERMS.add(GROUND, "0.5 h", "first sole from the second", "between feet")
@@ -97,7 +94,7 @@ def feet(t: StepView):
 
 @STEP_TERMS.add(SPACE, "0.5 h", "swinging sole from the stance sole, 0 if both are down", "vector")
 def swing_foot(t: StepView):
-    v, foot = t.seen, int(t.told[FOOT])
+    v, foot = t.seen, int(t.report[FOOT])
     moving = v.state.sole_point[max(foot, 0)]
     put_from_stance(t, moving[0], moving[1])
     if foot >= 0:
@@ -106,7 +103,7 @@ def swing_foot(t: StepView):
 
 @STEP_TERMS.add(GROUND, "0.5 h", "foothold from the stance sole, 0 if both are down", "vector")
 def foothold(t: StepView):
-    put_from_stance(t, t.told[FOOTHOLD], t.told[FOOTHOLD + 1])
+    put_from_stance(t, t.report[FOOTHOLD], t.report[FOOTHOLD + 1])
 
 
 @STEP_TERMS.add(GROUND, "0.5 h", "ξ from the stance sole, 0 if both are down", "vector")

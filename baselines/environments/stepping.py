@@ -21,12 +21,12 @@ from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
 from .residual import ResidualBalanceEnv, ResidualScales
-from .step_terms import STEP_TERMS, TOLD, StepView, Teller, tell_steps
+from .step_terms import REPORTED, STEP_TERMS, StepReporter, StepView, report_steps
 
 
 @dataclass(frozen=True)
 class StepScales(ResidualScales):
-    """What an action of 1 adds, heading frame; a scale of 0 takes it away."""
+    """The offsets that an action of 1 gives, heading frame; a scale of 0 takes an entry away."""
 
     com: float = field(default=0.1, metadata={"min": 0.0})  # Δc_ref x, y [m]
     cop: float = field(default=0.05, metadata={"min": 0.0})  # Δp_ref x, y [m]
@@ -89,12 +89,15 @@ class ResidualStepEnv(ResidualBalanceEnv):
         controller: Any = "capture-step",
         **arguments: Any,
     ):
-        self._told_steps = apart(TOLD)
+        self._step_report = apart(REPORTED)
         super().__init__(robot, config, controller=controller, **arguments)
 
     @ResidualBalanceEnv.controller.setter  # type: ignore[attr-defined]
     def controller(self, controller: Any) -> None:
-        """As of `ResidualBalanceEnv`; raises ConfigError for one that does not step."""
+        """The controller whose targets and steps the action moves.
+
+        Raises ConfigError as `ResidualBalanceEnv` does, and for one that does not step.
+        """
         stepper = told_by(controller, self.robot).unwrapped
         if not isinstance(stepper, SteppingController):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
@@ -105,18 +108,18 @@ class ResidualStepEnv(ResidualBalanceEnv):
 
     def _view(self, kind: type[Block], out: np.ndarray) -> Block:
         view: Any = super()._view(View, out)
-        return StepView(view, self._told_steps) if kind is StepView else view
+        return StepView(view, self._step_report) if kind is StepView else view
 
     def _observe(self) -> None:
-        self._told_steps[:] = self.stepper.stepping().told()
+        self._step_report[:] = self.stepper.stepping().told()
         super()._observe()
 
     def _end_of_tick(self, tick: Any) -> StepEnd:
-        teller = Teller(tick.memory, tick.swing, self._told_steps)
-        return replace(self.step_end(), report=Program.of([(tell_steps, teller)]))
+        reporter = StepReporter(tick.memory, tick.swing, self._step_report)
+        return replace(self.step_end(), report=Program.of([(report_steps, reporter)]))
 
     def info(self) -> dict[str, Any]:
-        """As of `ResidualBalanceEnv`, and the number of steps."""
+        """The entries of `ResidualBalanceEnv`, and the number of steps."""
         return {**super().info(), "steps": self.stepper.stepping().steps}
 
 

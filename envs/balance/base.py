@@ -137,7 +137,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
 
     @property
     def state_source(self) -> StateSource:
-        """What targets, controller and observation go by; may be replaced between episodes.
+        """The source of what is believed of the state; may be replaced between episodes.
 
         The simulation's own state is what is judged. Raises ConfigError for a source of another
         simulation.
@@ -179,7 +179,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return self.simulation.data
 
     def arguments(self) -> dict[str, Any]:
-        """What makes another environment like this one; the robot is shared."""
+        """The arguments that make another environment like this one; the robot is shared."""
         names = ("robot", "config", "render_mode", "width", "height", "camera")
         return {name: vars(self)[name] for name in names}
 
@@ -195,7 +195,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return count
 
     def _action_names(self) -> tuple[str, ...]:
-        """One name for each entry of the action."""
+        """The names of the action's entries."""
         raise NotImplementedError
 
     def _observation_terms(self) -> list[Term]:
@@ -220,14 +220,14 @@ class BalanceEnv(Copyable, gymnasium.Env):
             q_ref=q_ref,
             v_ref=v_ref,
             action=self.episode.action,
-            plant=world.plant,
+            views=world.views,
             clock=world.clock,
             pushes=world.pushes,
             out=out,
         )
 
     def _judge(self) -> Judge:
-        """What judges the policy steps of this environment."""
+        """The block that judges the policy steps of this environment."""
         world, e = self.simulation.world(), self.episode
         view = RewardView(
             robot=world.robot,
@@ -235,13 +235,13 @@ class BalanceEnv(Copyable, gymnasium.Env):
             scales=self.scales,
             limits=self.limits,
             q_ref=self._references()[0],
-            plant=world.plant,
+            views=world.views,
             action=e.action,
             last_action=e.last_action,
         )
         return Judge(
             robot=world.robot,
-            plant=world.plant,
+            views=world.views,
             state=world.state,
             clock=world.clock,
             limits=self.limits,
@@ -250,7 +250,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
         )
 
     def step_end(self) -> StepEnd:
-        """What ends a policy step, for compiled code; a new one when `simulation.world()` is."""
+        """The block that ends a policy step; a new one when `simulation.world()` is."""
         world = self.simulation.world()
         if self._end is None or self._end_of is not world:
             observe = observer(self.terms, self.episode.observation, self._view)
@@ -278,13 +278,11 @@ class BalanceEnv(Copyable, gymnasium.Env):
         """Prepare the subclass for a new episode; the simulation has just been reset."""
 
     def advance(self) -> None:
-        """One policy step with `episode.action`: reward, metrics and observation of the record."""
+        """Take the policy step of `episode.action`; the outcome is in `episode`."""
         raise NotImplementedError
 
     def compiled_step(self) -> CompiledStep | None:
-        """What does what `advance` does, if it can be compiled; the same object while it can be
-        used again.
-        """
+        """The compiled form of `advance`, if there is one; the same object while it can be used."""
         return None
 
     def reset(
@@ -370,23 +368,26 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return vector
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """One policy step; a fall is `terminated`, the end of time is `truncated`.
+        """Take a policy step; a fall is `terminated`, the end of time is `truncated`.
 
         Raises ConfigError for an action that is not valid, PoiseError after the episode's end.
         """
-        reward, terminated, truncated = self.step_in_place(action)
+        reward, terminated, truncated = self.step_without_info(action)
         if self.render_mode == "human":
             self.render()
         observation = self.episode.observation.astype(np.float32)
         return observation, reward, terminated, truncated, self.info()
 
-    def step_in_place(self, action: np.ndarray) -> tuple[float, bool, bool]:
-        """What `step` does, without `info`: the observation is in `episode.observation`."""
+    def step_without_info(self, action: np.ndarray) -> tuple[float, bool, bool]:
+        """Take a step without making `info`: reward, terminated, truncated.
+
+        The observation is in `episode.observation`. Raises as `step` does.
+        """
         self.set_action(action)
         return self.apply_action()
 
     def apply_action(self) -> tuple[float, bool, bool]:
-        """What `step_in_place` does with an action that has been set."""
+        """Take the step of an action that has been set: reward, terminated, truncated."""
         self.expect_running()
         self.advance()
         terminated = self.fallen
@@ -404,7 +405,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
 
     @property
     def fallen(self) -> bool:
-        """Whether the robot has fallen."""
+        """True after a fall."""
         return bool(self.episode.metrics[FALLEN])
 
     @property
@@ -417,7 +418,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return step_info(self)
 
     def push_infos(self) -> list[dict[str, Any]]:
-        """What `info` says of the episode's pushes, see `push_info`."""
+        """The descriptions of the episode's pushes for `info`, see `push_info`."""
         pushes, (known, infos) = self.simulation.pushes, self._described
         if known is not pushes:
             infos = [push_info(push, self.robot) for push in pushes]

@@ -32,7 +32,7 @@ class ObservationConfig:
 
 @dataclass(frozen=True)
 class SensorConfig:
-    """What controller and policy know of the robot's state."""
+    """The sensors through which controller and policy know the robot's state."""
 
     delay: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0})  # whole physics steps [s]
 

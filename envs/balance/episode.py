@@ -8,7 +8,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
-from poise.envs.physics.arrays import Plant, RobotArrays
+from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, support_distance, update_support
 
 from .reward import Rewards, sum_rewards
@@ -35,7 +35,7 @@ METRICS = 14
 
 @dataclass(frozen=True, eq=False)
 class EpisodeArrays(Block):
-    """What compiled steps write about the running episode."""
+    """The record that compiled steps write of the running episode."""
 
     action: np.ndarray  # (na,)
     last_action: np.ndarray  # (na,)
@@ -104,7 +104,7 @@ class Judge(Block):
     """All that the end of a policy step is judged by; the state is the true one."""
 
     robot: RobotArrays
-    plant: Plant
+    views: SimViews
     state: StateArrays
     clock: np.ndarray  # (1,) int: physics steps since the reset
     limits: Limits
@@ -117,7 +117,7 @@ def judge_step(j: Judge):
     """Metrics and reward of the policy step that ends now, and whether it was the last."""
     s, e, m = j.state, j.episode, j.episode.metrics
     update_support(j.robot, s)
-    diverged = has_diverged(j.plant)
+    diverged = has_diverged(j.views)
     fallen = diverged or has_fallen(j.robot, s, j.limits)
     m[FALLEN] = 1.0 if fallen else 0.0
     record_quiet(j, fallen)
@@ -157,7 +157,7 @@ def record_excursions(s: StateArrays, e: EpisodeArrays):
 
 @dataclass(frozen=True, eq=False)
 class StepEnd(Block):
-    """What follows the last physics step of a policy step."""
+    """The block of all that follows the last physics step of a policy step."""
 
     judge: Judge
     report: Program  # what a controller tells of itself to the terms that observe it

@@ -30,7 +30,7 @@ def step_info(env: BalanceEnv) -> dict[str, Any]:
 
 
 class InfoColumns(Copyable):
-    """What `step_info` says of each of `envs`, one array for each key.
+    """The entries of `step_info` of many `envs`, one array for each key.
 
     `record` holds their rows. The lists of pushes are the same ones until the next episode.
     """

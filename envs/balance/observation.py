@@ -10,7 +10,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
-from poise.envs.physics.arrays import Plant, RobotArrays
+from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.mirror import SIDES, Mirror
 
@@ -19,7 +19,7 @@ CLIP = 10.0  # of every entry of an observation
 
 @dataclass(frozen=True, eq=False)
 class Scales(Block):
-    """What the observation and the reward are measured in."""
+    """The units of the observation and the reward."""
 
     support_x: float  #: half length of the standing support polygon [m]
     support_y: float  #: half width [m]
@@ -51,7 +51,7 @@ def scales(robot: RobotArrays, support: np.ndarray) -> Scales:
 
 @dataclass(frozen=True, eq=False)
 class View(Block):
-    """What the kernel of a term reads, and the place in the observation that it fills."""
+    """The block of a term: what its kernel reads, and the part of the observation that it fills."""
 
     robot: RobotArrays  # the robot that is believed in
     state: StateArrays  # the believed state
@@ -59,7 +59,7 @@ class View(Block):
     q_ref: np.ndarray  # (nj,) joint positions of the reference [rad]
     v_ref: np.ndarray  # (nj,) its joint velocities [rad/s]
     action: np.ndarray  # (na,) of the policy step that has just ended
-    plant: Plant  # the true robot: what the policy sent it (`ctrl`), what a teacher may see
+    views: SimViews  # the true robot: what the policy sent it (`ctrl`), what a teacher may see
     clock: np.ndarray  # (1,) int: physics steps since the reset
     pushes: np.ndarray  # (k, 11) of the episode, see `pack`; rows of zeros are none
     out: np.ndarray  # (size,) the term's own entries
@@ -77,7 +77,7 @@ Entries = tuple[str, ...] | Literal["joints", "motors", "feet", "actions"]
 
 @dataclass(frozen=True)
 class Term:
-    """One named part of the observation vector of an environment.
+    """A named part of the observation vector of an environment.
 
     `image` is what it is to a mirror that exchanges left and right. Entries of a vector or a turn
     (an axial vector) end in x, y or z; those along the root's axes have all three.
@@ -218,7 +218,7 @@ def observer(
 
 
 def mirror_terms(terms: Iterable[Term], parts: Mapping[str, Mirror]) -> Mirror:
-    """How values of these `terms` look in the mirror; `parts` by what their `image` names."""
+    """The mirror image of values of these `terms`; `parts` by what their `image` names."""
     order, sign, first = [], [], 0
     for term in terms:
         part = parts[term.image] if term.image in parts else _plain(term)

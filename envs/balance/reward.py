@@ -13,7 +13,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, value_of
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import along
-from poise.envs.physics.arrays import Plant, RobotArrays
+from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays
 
 from .observation import Scales
@@ -22,14 +22,14 @@ from .termination import Limits, uprightness
 
 @dataclass(frozen=True, eq=False)
 class RewardView(Block):
-    """What the kernel of a reward term reads; the state is the true one."""
+    """The block that the kernel of a reward term reads; the state is the true one."""
 
     robot: RobotArrays
     state: StateArrays
     scales: Scales
     limits: Limits
     q_ref: np.ndarray  # (nj,) joint positions of the reference [rad]
-    plant: Plant  # whose `ctrl` (nu,) are the torques of the last control tick [N·m]
+    views: SimViews  # whose `ctrl` (nu,) are the torques of the last control tick [N·m]
     action: np.ndarray  # (na,)
     last_action: np.ndarray  # (na,) of the policy step before
 
@@ -81,7 +81,7 @@ def posture_near(v: RewardView) -> float:
 
 @compiled
 def torque_cost(v: RewardView) -> float:
-    total, torques = 0.0, v.plant.ctrl
+    total, torques = 0.0, v.views.ctrl
     for i in range(torques.shape[0]):
         total += (torques[i] / v.robot.torque_limit[i]) ** 2 / torques.shape[0]
     return -total

@@ -9,7 +9,7 @@ from poise.envs.physics.simulation import Simulation
 
 @dataclass(frozen=True)
 class StartNoise:
-    """How far a reset departs from the standing posture; uniform in ±."""
+    """The range in which a reset departs from the standing posture; uniform in ±."""
 
     joints: float = field(default=0.02, metadata={"min": 0.0, "max": 0.5})  # [rad]
     joint_speeds: float = field(default=0.05, metadata={"min": 0.0})  # [rad/s]

@@ -7,13 +7,13 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.physics.arrays import Plant, RobotArrays
+from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays
 
 
 @dataclass(frozen=True)
 class FallLimits:
-    """When a robot has fallen, and when it is upright and quiet again."""
+    """The limits beyond which a robot has fallen, and within which it is quiet again."""
 
     height: float = field(default=0.6, metadata={"above": 0.0, "max": 1.0})  # of the standing h
     # root [deg]: a deep bow, the hip strategy at its end, is not yet a fall
@@ -73,9 +73,9 @@ BAD_STATE = tuple(
 
 
 @compiled
-def has_diverged(plant: Plant) -> bool:
-    """Whether numbers became too large since the reset; MuJoCo then starts anew by itself."""
+def has_diverged(views: SimViews) -> bool:
+    """True if numbers became too large since the reset; MuJoCo then starts anew by itself."""
     for i in BAD_STATE:
-        if plant.warnings[i] > 0:
+        if views.warnings[i] > 0:
             return True
     return False

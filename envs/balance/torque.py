@@ -32,8 +32,8 @@ class TorqueStep(Block):
 
 @compiled
 def torque_step(step: TorqueStep):
-    """One policy step: torques are held for `substeps` physics steps."""
-    world, e, ctrl = step.world, step.episode, step.world.plant.ctrl
+    """Take a policy step: torques are held for `substeps` physics steps."""
+    world, e, ctrl = step.world, step.episode, step.world.views.ctrl
     for i in range(ctrl.shape[0]):
         ctrl[i] = e.action[i] * step.torque_limit[i]
     record_tick(world.robot, world.state, ctrl, step.substeps * world.robot.timestep, e)
@@ -87,7 +87,7 @@ class TorqueBalanceEnv(BalanceEnv):
         self._bound().play()
 
     def compiled_step(self) -> CompiledStep | None:
-        """See `BalanceEnv`."""
+        """The compiled policy step; the same object while it can be used again."""
         return self._bound()
 
     def _bound(self) -> CompiledStep:

@@ -18,7 +18,7 @@ from poise.envs.maths.polygons import convex_hull
 from poise.envs.maths.vectors import copy
 from poise.envs.robots.soles import MAX_VERTICES
 
-from .arrays import Plant, RobotArrays
+from .arrays import RobotArrays, SimViews
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,41 +85,41 @@ def allocate_state(nv: int, nc: int) -> StateArrays:
 
 
 @compiled
-def update_state(robot: RobotArrays, plant: Plant, s: StateArrays):
-    """Fill `s` from the plant, whose position and velocity stages are current."""
-    _dynamics(robot, plant, s)
-    _momentum(robot, plant, s)
-    _soles(robot, plant, s)
-    _contact(robot, plant, s)
+def update_state(robot: RobotArrays, views: SimViews, s: StateArrays):
+    """Fill `s` from the simulation, whose position and velocity stages are current."""
+    _dynamics(robot, views, s)
+    _momentum(robot, views, s)
+    _soles(robot, views, s)
+    _contact(robot, views, s)
 
 
 @compiled
-def _dynamics(robot: RobotArrays, plant: Plant, s: StateArrays):
+def _dynamics(robot: RobotArrays, views: SimViews, s: StateArrays):
     nv = s.M.shape[0]
-    copy(plant.qpos, s.qpos)
-    copy(plant.qvel, s.qvel)
+    copy(views.qpos, s.qpos)
+    copy(views.qvel, s.qvel)
     for i in range(nv):
         start = robot.M_rowadr[i]
         for k in range(robot.M_rownnz[i]):
             j = robot.M_colind[start + k]
-            s.M[i, j] = plant.M[start + k]
-            s.M[j, i] = plant.M[start + k]
-        s.h[i] = plant.qfrc_bias[i] - plant.qfrc_passive[i]
+            s.M[i, j] = views.M[start + k]
+            s.M[j, i] = views.M[start + k]
+        s.h[i] = views.qfrc_bias[i] - views.qfrc_passive[i]
     for i in range(3):
         for j in range(3):
-            s.root_axes[i, j] = plant.xmat[robot.root_body, 3 * i + j]
+            s.root_axes[i, j] = views.xmat[robot.root_body, 3 * i + j]
 
 
 @compiled
-def _momentum(robot: RobotArrays, plant: Plant, s: StateArrays):
+def _momentum(robot: RobotArrays, views: SimViews, s: StateArrays):
     """P, L, A and its bias: A v̇ + A_bias is the wrench of the ground about the CoM."""
     nv = s.M.shape[0]
     R = s.root_axes
     for i in range(3):
-        s.com[i] = plant.subtree_com[robot.root_body, i]
-    ox = s.com[0] - plant.qpos[0]
-    oy = s.com[1] - plant.qpos[1]
-    oz = s.com[2] - plant.qpos[2]
+        s.com[i] = views.subtree_com[robot.root_body, i]
+    ox = s.com[0] - views.qpos[0]
+    oy = s.com[1] - views.qpos[1]
+    oz = s.com[2] - views.qpos[2]
     for j in range(nv):
         fx, fy, fz = s.M[0, j], s.M[1, j], s.M[2, j]
         s.A[0, j], s.A[1, j], s.A[2, j] = fx, fy, fz
@@ -140,14 +140,14 @@ def _momentum(robot: RobotArrays, plant: Plant, s: StateArrays):
     for i in range(6):
         total = 0.0
         for j in range(nv):
-            total += s.A[i, j] * plant.qvel[j]
+            total += s.A[i, j] * views.qvel[j]
         s.momentum[i] = total
     for i in range(3):
         s.com_vel[i] = s.momentum[i] / robot.mass
 
 
 @compiled
-def _soles(robot: RobotArrays, plant: Plant, s: StateArrays):
+def _soles(robot: RobotArrays, views: SimViews, s: StateArrays):
     """Pose, Jacobian and velocity-product acceleration of every sole; the heading frame."""
     nc = s.sole_point.shape[0]
     s.origin[:] = 0.0
@@ -158,49 +158,49 @@ def _soles(robot: RobotArrays, plant: Plant, s: StateArrays):
         for a in range(3):
             offset = 0.0
             for b in range(3):
-                offset += plant.xmat[body, 3 * a + b] * robot.sole_position[i, b]
+                offset += views.xmat[body, 3 * a + b] * robot.sole_position[i, b]
                 total = 0.0
                 for c in range(3):
-                    total += plant.xmat[body, 3 * a + c] * robot.sole_rotation[i, c, b]
+                    total += views.xmat[body, 3 * a + c] * robot.sole_rotation[i, c, b]
                 axes[a, b] = total
-            point[a] = plant.xpos[body, a] + offset
+            point[a] = views.xpos[body, a] + offset
             s.origin[a] += point[a] / nc
         forward_x += axes[0, 0]
         forward_y += axes[1, 0]
-        _sole_jacobian(robot, plant, s, i)
+        _sole_jacobian(robot, views, s, i)
     norm = np.sqrt(forward_x * forward_x + forward_y * forward_y)
     s.heading[0] = forward_x / norm if norm > 1e-9 else 1.0
     s.heading[1] = forward_y / norm if norm > 1e-9 else 0.0
 
 
 @compiled
-def _sole_jacobian(robot: RobotArrays, plant: Plant, s: StateArrays, i: int):
+def _sole_jacobian(robot: RobotArrays, views: SimViews, s: StateArrays, i: int):
     """Rows 6i..6i+6 of J, J v and J̇ v: linear velocity of the reference point, then angular.
 
     MuJoCo keeps dof axes and spatial velocities at the subtree CoM o; a point at r moves with
     ṙ = lin + ang × (r − o), and its acceleration has the additional ω × ṙ.
     """
     point, row = s.sole_point[i], 6 * i
-    rx = point[0] - plant.subtree_com[robot.tree_body, 0]
-    ry = point[1] - plant.subtree_com[robot.tree_body, 1]
-    rz = point[2] - plant.subtree_com[robot.tree_body, 2]
+    rx = point[0] - views.subtree_com[robot.tree_body, 0]
+    ry = point[1] - views.subtree_com[robot.tree_body, 1]
+    rz = point[2] - views.subtree_com[robot.tree_body, 2]
     for a in range(6):
         s.J_v[row + a] = 0.0
         s.Jdot_v[row + a] = 0.0
     for k in range(robot.chain_length[i]):
         d = robot.chain[i, k]
-        speed = plant.qvel[d]
-        wx, wy, wz = plant.cdof[d, 0], plant.cdof[d, 1], plant.cdof[d, 2]
-        s.J[row, d] = plant.cdof[d, 3] + wy * rz - wz * ry
-        s.J[row + 1, d] = plant.cdof[d, 4] + wz * rx - wx * rz
-        s.J[row + 2, d] = plant.cdof[d, 5] + wx * ry - wy * rx
+        speed = views.qvel[d]
+        wx, wy, wz = views.cdof[d, 0], views.cdof[d, 1], views.cdof[d, 2]
+        s.J[row, d] = views.cdof[d, 3] + wy * rz - wz * ry
+        s.J[row + 1, d] = views.cdof[d, 4] + wz * rx - wx * rz
+        s.J[row + 2, d] = views.cdof[d, 5] + wx * ry - wy * rx
         s.J[row + 3, d], s.J[row + 4, d], s.J[row + 5, d] = wx, wy, wz
         for a in range(6):
             s.J_v[row + a] += s.J[row + a, d] * speed
-        wx, wy, wz = plant.cdof_dot[d, 0], plant.cdof_dot[d, 1], plant.cdof_dot[d, 2]
-        s.Jdot_v[row] += speed * (plant.cdof_dot[d, 3] + wy * rz - wz * ry)
-        s.Jdot_v[row + 1] += speed * (plant.cdof_dot[d, 4] + wz * rx - wx * rz)
-        s.Jdot_v[row + 2] += speed * (plant.cdof_dot[d, 5] + wx * ry - wy * rx)
+        wx, wy, wz = views.cdof_dot[d, 0], views.cdof_dot[d, 1], views.cdof_dot[d, 2]
+        s.Jdot_v[row] += speed * (views.cdof_dot[d, 3] + wy * rz - wz * ry)
+        s.Jdot_v[row + 1] += speed * (views.cdof_dot[d, 4] + wz * rx - wx * rz)
+        s.Jdot_v[row + 2] += speed * (views.cdof_dot[d, 5] + wx * ry - wy * rx)
         s.Jdot_v[row + 3] += speed * wx
         s.Jdot_v[row + 4] += speed * wy
         s.Jdot_v[row + 5] += speed * wz
@@ -212,7 +212,7 @@ def _sole_jacobian(robot: RobotArrays, plant: Plant, s: StateArrays, i: int):
 
 
 @compiled
-def _contact(robot: RobotArrays, plant: Plant, s: StateArrays):
+def _contact(robot: RobotArrays, views: SimViews, s: StateArrays):
     """Total ground wrench, CoP and capture point; which feet touch the ground.
 
     The ground is the only thing outside the body, and joint limits and friction do not act on
@@ -220,7 +220,7 @@ def _contact(robot: RobotArrays, plant: Plant, s: StateArrays):
     root's pose before the last step, from which v has led to the present one.
     """
     R = s.root_axes
-    dt, f, v = robot.timestep, plant.qfrc_constraint, plant.qvel
+    dt, f, v = robot.timestep, views.qfrc_constraint, views.qvel
     fx, fy, fz = f[0], f[1], f[2]
     mx = f[3] - dt * (v[4] * f[5] - v[5] * f[4])
     my = f[4] - dt * (v[5] * f[3] - v[3] * f[5])
@@ -228,9 +228,9 @@ def _contact(robot: RobotArrays, plant: Plant, s: StateArrays):
     nx = R[0, 0] * mx + R[0, 1] * my + R[0, 2] * mz
     ny = R[1, 0] * mx + R[1, 1] * my + R[1, 2] * mz
     nz = R[2, 0] * mx + R[2, 1] * my + R[2, 2] * mz
-    x = plant.qpos[0] - dt * v[0]
-    y = plant.qpos[1] - dt * v[1]
-    z = plant.qpos[2] - dt * v[2]
+    x = views.qpos[0] - dt * v[0]
+    y = views.qpos[1] - dt * v[1]
+    z = views.qpos[2] - dt * v[2]
     s.contact_wrench[0], s.contact_wrench[1], s.contact_wrench[2] = fx, fy, fz
     s.contact_wrench[3] = nx + y * fz - z * fy
     s.contact_wrench[4] = ny + z * fx - x * fz
@@ -246,10 +246,10 @@ def _contact(robot: RobotArrays, plant: Plant, s: StateArrays):
         s.capture_point[a] = s.com[a] + s.com_vel[a] / s.omega[0]
     feet = 0.0
     for i in range(s.contacts.shape[0]):
-        found = plant.sensordata[robot.sole_sensor[i]]
+        found = views.sensordata[robot.sole_sensor[i]]
         s.contacts[i] = 1.0 if found > 0.0 else 0.0
         feet += found
-    s.other_contacts[0] = plant.sensordata[robot.ground_sensor] - feet
+    s.other_contacts[0] = views.sensordata[robot.ground_sensor] - feet
 
 
 AIRBORNE = 0.02  # [h]: a sole without contact that is this far above the lowest one is in the air

@@ -16,7 +16,7 @@ from poise.envs.pushes.push import Kick, Push
 from poise.envs.pushes.table import TABLE_COLUMNS, apply_kicks, apply_pushes, pack
 from poise.envs.robots.robot import Robot
 
-from .arrays import Plant, RobotArrays, plant_views, robot_arrays
+from .arrays import RobotArrays, SimViews, robot_arrays, sim_views
 from .kinematics import StateArrays, allocate_state, update_state
 from .state import RobotState
 
@@ -24,20 +24,20 @@ SOME_PUSHES = 4  # rows of a table that may grow
 
 
 @compiled
-def advance(robot: RobotArrays, plant: Plant, pushes: np.ndarray, clock: np.ndarray):
-    """One physics step with the controls in `plant.ctrl`.
+def advance(robot: RobotArrays, views: SimViews, pushes: np.ndarray, clock: np.ndarray):
+    """Take one physics step with the controls in `views.ctrl`.
 
     Enters and leaves with the position and velocity stages current, so whoever reads the state
     needs no second pass. `clock` (1,) counts steps since the reset.
     """
     dt = robot.timestep
     t = clock[0] * dt
-    plant.xfrc_applied[:, :] = 0.0
-    apply_pushes(pushes, t, dt, plant.xfrc_applied, plant.xmat)
-    mj_step2(plant.model_address, plant.data_address)
-    apply_kicks(pushes, t, dt, plant.qvel)
+    views.xfrc_applied[:, :] = 0.0
+    apply_pushes(pushes, t, dt, views.xfrc_applied, views.xmat)
+    mj_step2(views.model_address, views.data_address)
+    apply_kicks(pushes, t, dt, views.qvel)
     clock[0] += 1
-    mj_step1(plant.model_address, plant.data_address)
+    mj_step1(views.model_address, views.data_address)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class World(Block):
     """A simulated robot and all that moves it, for compiled code."""
 
     robot: RobotArrays
-    plant: Plant
+    views: SimViews
     state: StateArrays
     clock: np.ndarray  # (1,) int: physics steps since the reset
     pushes: np.ndarray  # see `apply_pushes`
@@ -55,11 +55,11 @@ class World(Block):
 
 @compiled
 def simulate(world: World, count: int):
-    """`count` physics steps with the controls in `plant.ctrl`, then the state."""
+    """`count` physics steps with the controls in `views.ctrl`, then the state."""
     for _ in range(count):
-        advance(world.robot, world.plant, world.pushes, world.clock)
+        advance(world.robot, world.views, world.pushes, world.clock)
         run(world.sensors)
-    update_state(world.robot, world.plant, world.state)
+    update_state(world.robot, world.views, world.state)
 
 
 @compiled
@@ -76,7 +76,7 @@ class Simulation(Copyable):
         self.model = robot.model
         self.data = mujoco.MjData(robot.model)
         self.arrays = robot_arrays(robot)
-        self.plant = plant_views(robot.model, self.data)
+        self.views = sim_views(robot.model, self.data)
         self.state_arrays = allocate_state(robot.model.nv, len(robot.soles))
         self.clock = apart(1, dtype=np.int64)
         self._count = apart(1, dtype=np.int64)
@@ -96,11 +96,11 @@ class Simulation(Copyable):
         self._sensors, self._world = sensors, None
 
     def world(self) -> World:
-        """What compiled code works on; the same object until `sensors` or `push_table` changes."""
+        """The block of this simulation; the same object until `sensors` or `push_table` changes."""
         if self._world is None or self._world.pushes is not self.push_table:
             self._world = World(
                 robot=self.arrays,
-                plant=self.plant,
+                views=self.views,
                 state=self.state_arrays,
                 clock=self.clock,
                 pushes=self.push_table,
@@ -136,7 +136,7 @@ class Simulation(Copyable):
         mujoco.mj_normalizeQuat(self.model, self.data.qpos)
         mujoco.mj_forward(self.model, self.data)
         self.clock[0] = 0
-        update_state(self.arrays, self.plant, self.state_arrays)
+        update_state(self.arrays, self.views, self.state_arrays)
         self.set_pushes(pushes)
         return self.state
 
@@ -151,7 +151,7 @@ class Simulation(Copyable):
 
     def step(self, torques: np.ndarray, count: int = 1) -> RobotState:
         """Apply joint torques (nu,) [N·m] for `count` physics steps."""
-        self.plant.ctrl[:] = torques
+        self.views.ctrl[:] = torques
         self._count[0] = count
         advance_world(self.world())
         return self.state

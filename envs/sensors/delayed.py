@@ -13,7 +13,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
 from poise.envs.compiled.mujoco_calls import mj_step1
 from poise.envs.maths.vectors import copy
-from poise.envs.physics.arrays import Plant, RobotArrays
+from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, update_state
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot
@@ -23,16 +23,16 @@ from .source import StateSource
 
 @dataclass(frozen=True, eq=False)
 class Delay(Block):
-    """What the sensors have measured in the last n − 1 physics steps and now, and what is believed.
+    """The measurements of the last n − 1 physics steps and now, and the state that is believed.
 
     The measurements lie in rings of n rows, the oldest one where the next one will be written.
     """
 
     robot: RobotArrays  # the true one
-    plant: Plant
+    views: SimViews
     state: StateArrays
     known_robot: RobotArrays  # the one that is believed in
-    known_plant: Plant
+    known_views: SimViews
     known_state: StateArrays
     next: np.ndarray  # (1,) int: the row of the next measurement
     qpos: np.ndarray  # (n, nq)
@@ -48,10 +48,10 @@ def allocate_delay(true: Simulation, known: Simulation, rows: int) -> Delay:
     s = true.state_arrays
     return Delay(
         robot=true.arrays,
-        plant=true.plant,
+        views=true.views,
         state=s,
         known_robot=known.arrays,
-        known_plant=known.plant,
+        known_views=known.views,
         known_state=known.state_arrays,
         next=apart(1, dtype=np.int64),
         qpos=apart((rows, len(s.qpos))),
@@ -67,7 +67,7 @@ def allocate_delay(true: Simulation, known: Simulation, rows: int) -> Delay:
 def measure(d: Delay):
     """Write the true positions, velocities and ground contacts over the oldest measurement."""
     s, k = d.state, d.next[0]
-    update_state(d.robot, d.plant, s)
+    update_state(d.robot, d.views, s)
     copy(s.qpos, d.qpos[k])
     copy(s.qvel, d.qvel[k])
     copy(s.contact_wrench, d.contact_wrench[k])
@@ -81,10 +81,10 @@ def measure(d: Delay):
 def believe_oldest(d: Delay):
     """The state that the known robot would have with the oldest measurement."""
     s, k = d.known_state, d.next[0]
-    copy(d.qpos[k], d.known_plant.qpos)
-    copy(d.qvel[k], d.known_plant.qvel)
-    mj_step1(d.known_plant.model_address, d.known_plant.data_address)
-    update_state(d.known_robot, d.known_plant, s)
+    copy(d.qpos[k], d.known_views.qpos)
+    copy(d.qvel[k], d.known_views.qvel)
+    mj_step1(d.known_views.model_address, d.known_views.data_address)
+    update_state(d.known_robot, d.known_views, s)
     copy(d.contact_wrench[k], s.contact_wrench)
     copy(d.cop[k], s.cop)
     copy(d.contacts[k], s.contacts)

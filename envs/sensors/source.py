@@ -11,7 +11,7 @@ from poise.envs.physics.state import RobotState
 
 
 class StateSource(Copyable):
-    """What is believed of the state of a simulation; of this class, the truth itself.
+    """The source of what is believed of a simulation's state; of this class, the truth itself.
 
     An environment judges the simulation's own state. Its targets, its controller and its
     observation go by this one. A subclass has a state of its own and two programs of compiled

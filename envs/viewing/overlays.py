@@ -67,7 +67,7 @@ def push_arrows(simulation: Simulation) -> list[Mark]:
     """An arrow for every push that acts, or has ended less than `FADE` seconds ago."""
     weight = simulation.robot.mass * simulation.arrays.gravity
     size = simulation.robot.height_com
-    plant, found = simulation.plant, []
+    views, found = simulation.views, []
     for row in simulation.push_table:
         if row[KIND] == NOTHING:
             continue
@@ -78,7 +78,7 @@ def push_arrows(simulation: Simulation) -> list[Mark]:
         force = float(np.linalg.norm(vector))
         if age < -1e-9 or opacity <= 0.0 or force == 0.0:
             continue
-        tip = plant.xipos[body] + plant.xmat[body].reshape(3, 3) @ row[POINT : POINT + 3]
+        tip = views.xipos[body] + views.xmat[body].reshape(3, 3) @ row[POINT : POINT + 3]
         share = (simulation.robot.mass / KICK_TIME if is_kick else 1.0) * force / weight
         length = size * float(np.clip(ARROW_GAIN * share, *ARROW_LENGTHS))
         tail = tip - length * vector / force

@@ -9,7 +9,7 @@ import numpy as np
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.simulation import Simulation
-from poise.envs.robots.variants import altered_robot
+from poise.envs.robots.variants import perturbed_robot
 from poise.envs.sensors.delayed import DelayedState
 from poise.training.statistics.eurobench import body_sway, recovery_time, sway_angle
 from poise.training.trials.players import Player
@@ -81,7 +81,7 @@ class BenchmarkPlayer:
             env.simulation = self.standard
         else:
             env.simulation = Simulation(
-                altered_robot(env.robot, friction=case.friction, mass_error=case.mass_error)
+                perturbed_robot(env.robot, friction=case.friction, mass_error=case.mass_error)
             )
         if not known or case.delay > 0.0:
             env.state_source = DelayedState(env.simulation, env.robot, case.delay)

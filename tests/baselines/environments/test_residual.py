@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.controller import Targets
-from poise.baselines.environments.policy_step import openness
+from poise.baselines.environments.policy_step import gate_opening
 from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.targets import Motion, update_targets
@@ -287,7 +287,7 @@ def test_the_gate_opens_with_the_capture_point():
     reference = s.origin[:2] + env._com_offset * s.heading
     for distance, share in ((0.0, 0.0), (0.04, 1.0 - np.exp(-1.0)), (0.4, 1.0)):
         s.capture_point[:] = reference + distance * np.array([0.6, -0.8])
-        opened = openness(env._residual, s, env._motion, env._com_offset)
+        opened = gate_opening(env._residual, s, env._motion, env._com_offset)
         assert opened == pytest.approx(share, abs=1e-9)
 
 

@@ -33,7 +33,7 @@ def play(env, action=(), seed=2, until=None):
     env.reset(seed=seed, options={"push": PUSH})
     done = False
     while not done and not (until and until(env)):
-        _, fallen, over = env.step_in_place(vector)
+        _, fallen, over = env.step_without_info(vector)
         done = fallen or over
 
 
@@ -98,7 +98,7 @@ def test_threads_do_not_share_anything():
     for k, end in enumerate(ends):
         alone.reset(seed=k, options=options[k])
         for _ in range(29):
-            alone.step_in_place(actions[k])
+            alone.step_without_info(actions[k])
         np.testing.assert_array_equal(alone.simulation.data.qpos, end)
 
 
@@ -138,7 +138,7 @@ def test_the_time_of_a_step_moves_by_what_is_added_once(env, sign):
         play(env, {"time": 0.5 * value}, until=swinging)
         duration = env.controller.swing.duration
         for _ in range(3):
-            env.step_in_place(env.episode.action.copy())
+            env.step_without_info(env.episode.action.copy())
         ends.append((duration, env.controller.swing.duration))
     first, later = np.diff(ends, axis=0)[0]
     assert first == pytest.approx(sign * 0.5 * ALL.time, abs=1e-9)
@@ -165,7 +165,7 @@ def test_targets_of_a_step_are_moved(env, name, index, part):
         play(env, until=swinging)
         vector = np.zeros(len(env.action_names))
         vector[env.action_names.index(name)] = value
-        env.step_in_place(vector)
+        env.step_without_info(vector)
         seen.append(np.array(getattr(env.controller._guided, part))[..., index].copy())
     assert np.abs(seen[1] - seen[0]).max() > 5e-3
 

@@ -32,7 +32,7 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         e = new_episode(actions, len(r.soles))
         begin_episode(simulation.state_arrays, e)
         e.action[:], e.last_action[:] = [0.5, -0.25, 0.0], [0.1, 0.1, -0.1]
-    simulation.plant.ctrl[:] = 0.0 if tau is None else tau
+    simulation.views.ctrl[:] = 0.0 if tau is None else tau
     simulation.clock[0] = round(time / simulation.arrays.timestep)
     bounds = episode_limits(limits or FallLimits(), r.height_com, 100)
     view = RewardView(
@@ -41,14 +41,14 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         scales=scales(simulation.arrays, Simulation(r).state.support_polygon),
         limits=bounds,
         q_ref=r.standing_qpos[7:].copy() if q_ref is None else q_ref,
-        plant=simulation.plant,
+        views=simulation.views,
         action=e.action,
         last_action=e.last_action,
     )
     judge_step(
         Judge(
             robot=simulation.arrays,
-            plant=simulation.plant,
+            views=simulation.views,
             state=simulation.state_arrays,
             clock=simulation.clock,
             limits=bounds,
@@ -131,7 +131,7 @@ def test_a_diverged_simulation_costs_the_fall_alone():
     """What numbers that are none would give is not computed."""
     simulation = Simulation(robot())
     simulation.state_arrays.com[:] = np.nan
-    simulation.plant.warnings[2 * int(mujoco.mjtWarning.mjWARN_BADQACC)] = 1
+    simulation.views.warnings[2 * int(mujoco.mjtWarning.mjWARN_BADQACC)] = 1
     reward, e = play(simulation)
     assert reward == -RewardWeights().fall and np.count_nonzero(e.reward_terms) == 1
 

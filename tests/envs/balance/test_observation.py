@@ -45,7 +45,7 @@ def observed(simulation, q_ref, v_ref, action, names=None):
             q_ref=q_ref,
             v_ref=v_ref,
             action=action,
-            plant=world.plant,
+            views=world.views,
             clock=world.clock,
             pushes=world.pushes,
             out=out,
@@ -206,7 +206,7 @@ def test_a_term_is_one_function():
         action = np.array([3.0, 4.0])
         return View(
             simulation.arrays, simulation.state_arrays, scale, blank, blank, action,
-            world.plant, world.clock, world.pushes, out,
+            world.views, world.clock, world.pushes, out,
         )  # fmt: skip
 
     run(observer([term], out, view))

@@ -54,7 +54,7 @@ def observed(env, actions, **options):
     env.reset(options=options)
     rows = []
     for action in actions:
-        env.step_in_place(action)
+        env.step_without_info(action)
         rows.append(env.episode.observation.copy())
     return np.array(rows)
 

@@ -12,7 +12,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot
-from poise.envs.robots.variants import altered_robot
+from poise.envs.robots.variants import perturbed_robot
 from poise.envs.sensors.delayed import DelayedState
 from poise.envs.sensors.source import StateSource
 from tests.support.shared import robot
@@ -70,7 +70,7 @@ def test_sensors_are_late_by_the_delay() -> None:
 
 def test_the_known_robot_is_believed() -> None:
     """Masses are those the controller knows; the forces are those of the true robot."""
-    source = late(altered_robot(robot(), mass_error=0.1))
+    source = late(perturbed_robot(robot(), mass_error=0.1))
     for _ in range(50):
         source.simulation.step(np.zeros(robot().model.nu))
     source.update()
@@ -128,7 +128,7 @@ def test_a_late_controller_acts_on_what_it_sees() -> None:
     env = ResidualBalanceEnv(robot(), controller="pd", duration=1.0, pushes=None)
     end = play(env)[1]
     assert not np.allclose(end, play(believing(env, robot(), 0.02))[1], atol=1e-6)
-    heavy = altered_robot(robot(), mass_error=0.1)
+    heavy = perturbed_robot(robot(), mass_error=0.1)
     assert not np.allclose(end, play(believing(env, heavy, 0.0))[1], atol=1e-6)
 
 
@@ -161,6 +161,6 @@ def test_the_fall_is_judged_by_the_truth() -> None:
         env = TorqueBalanceEnv(robot(), pushes=None, sensors={"delay": delay})
         env.reset(seed=0, options={"noise": 0.0})
         while env.episode.running[0]:
-            env.step_in_place(np.zeros(env.action_space.shape))
+            env.step_without_info(np.zeros(env.action_space.shape))
         falls.append(env.steps)
     assert env.fallen and falls[0] == falls[1]
