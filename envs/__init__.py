@@ -11,6 +11,7 @@ __all__ = [
     "BalanceEnv",
     "BalanceVectorEnv",
     "Camera",
+    "DelayedState",
     "EnvBatch",
     "EnvConfig",
     "FallLimits",
@@ -22,6 +23,7 @@ __all__ = [
     "RobotState",
     "SceneRenderer",
     "Simulation",
+    "StateSource",
     "TorqueBalanceEnv",
     "choose_gl_backend",
     "load_robot",
@@ -33,8 +35,9 @@ __all__ = [
 if TYPE_CHECKING:
     from poise.envs.balance.base import BalanceEnv
     from poise.envs.balance.config import EnvConfig
-    from poise.envs.balance.episode import FallLimits, RewardWeights
     from poise.envs.balance.observation import observation_table
+    from poise.envs.balance.reward import RewardWeights
+    from poise.envs.balance.termination import FallLimits
     from poise.envs.balance.torque import TorqueBalanceEnv
     from poise.envs.physics.simulation import Simulation
     from poise.envs.physics.state import RobotState
@@ -42,6 +45,8 @@ if TYPE_CHECKING:
     from poise.envs.pushes.push import Kick, Push
     from poise.envs.pushes.sampler import PushSampler
     from poise.envs.robots.robot import Robot, load_robot
+    from poise.envs.sensors.delayed import DelayedState
+    from poise.envs.sensors.source import StateSource
     from poise.envs.vector.batch import EnvBatch, replicate
     from poise.envs.vector.vector_env import BalanceVectorEnv
     from poise.envs.viewing.camera import Camera
@@ -53,8 +58,9 @@ else:
         {
             "balance.base": ("BalanceEnv",),
             "balance.config": ("EnvConfig",),
-            "balance.episode": ("FallLimits", "RewardWeights"),
             "balance.observation": ("observation_table",),
+            "balance.reward": ("RewardWeights",),
+            "balance.termination": ("FallLimits",),
             "balance.torque": ("TorqueBalanceEnv",),
             "physics.simulation": ("Simulation",),
             "physics.state": ("RobotState",),
@@ -62,6 +68,8 @@ else:
             "pushes.push": ("Kick", "Push"),
             "pushes.sampler": ("PushSampler",),
             "robots.robot": ("Robot", "load_robot"),
+            "sensors.delayed": ("DelayedState",),
+            "sensors.source": ("StateSource",),
             "vector.batch": ("EnvBatch", "replicate"),
             "vector.vector_env": ("BalanceVectorEnv",),
             "viewing.camera": ("Camera",),

@@ -9,12 +9,12 @@ from poise.baselines.whole_body.momentum_qp import MomentumQP, Tick, accept, mom
 from poise.envs.physics.kinematics import allocate_state
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import load_robot
-from poise.envs.vector.scheduler import Turns
-from poise.envs.vector.threads import Helpers
+from poise.envs.vector.scheduler import StepSchedule
+from poise.envs.vector.threads import ThreadTeam
 
-from .policy_step import residual_tick
+from .policy_step import policy_tick
 from .residual import ResidualBalanceEnv
-from .stepping import ResidualStepEnv, stepping_tick
+from .stepping import ResidualStepEnv
 
 
 def _standing() -> tuple[MomentumQP, RobotState, Targets]:
@@ -48,11 +48,11 @@ def steps() -> None:
     qp = env.controller
     problem = qp.assembly(env.simulation.state, env.targets)
     tick = Tick(problem, qp.memory, 0, 0)
-    residual_tick.compile((env.bind(tick, 0).numba_type,))
+    policy_tick.compile((env.bind(tick, 0).numba_type,))
     momentum_tick.compile((tick.numba_type,))
     accept(problem.state, problem.parameters, problem.workspace, qp.memory)
-    helpers = Helpers()
-    Turns(np.zeros((2, 3), dtype=np.int64), 2).play_all(helpers)
+    helpers = ThreadTeam()
+    StepSchedule(np.zeros((2, 3), dtype=np.int64), 2).play_all(helpers)
     helpers.close()
 
 
@@ -72,4 +72,4 @@ def planner() -> None:
     """When, where to and how a foot steps, and what a policy sees of it."""
     env, tick = _stepping()
     capture_tick.compile((tick.numba_type,))
-    stepping_tick.compile((env.bind_steps(env.bind(tick, 0), 0).numba_type,))
+    env.bind(tick, 0)

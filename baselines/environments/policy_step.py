@@ -11,18 +11,17 @@ from poise.envs.balance.episode import (
     ROOT_FORCE,
     ROOT_MOMENT,
     EpisodeArrays,
-    Judge,
-    judge_step,
+    StepEnd,
+    end_step,
     record_tick,
 )
-from poise.envs.balance.observation import Scales, observe
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import Erased, call
+from poise.envs.compiled.calls import Erased, Program, call, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import copy
-from poise.envs.physics.arrays import Plant, RobotArrays
-from poise.envs.physics.kinematics import StateArrays, update_state
-from poise.envs.physics.simulation import advance
+from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.simulation import World, simulate
 
 
 @compiled
@@ -43,17 +42,17 @@ def soft_root_force(s: StateArrays, wrench: np.ndarray, qfrc_applied: np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Residual(Block):
-    """How an action becomes offsets of the controller's targets."""
+    """The law by which an action becomes offsets of the controller's targets."""
 
     moved: np.ndarray  # (na,) int: the offset that each entry of the action moves
     scale: np.ndarray  # (na,) the offset that it moves by 1
-    share: float  # of the way that a policy step goes from the last action to the next
-    gate: float  # [m] see `openness`
+    blend: float  # of the way that a policy step goes from the last action to the next
+    gate: float  # [m] see `gate_opening`
     offsets: np.ndarray  # (9,), 13 with steps: see `update_targets`
 
 
 @compiled
-def openness(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> float:
+def gate_opening(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> float:
     """1 − exp(−(d/gate)²), d the capture point's distance from that of the reference [m]."""
     if r.gate == 0.0:
         return 1.0
@@ -69,107 +68,92 @@ def openness(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> 
 @compiled
 def set_offsets(r: Residual, s: StateArrays, motion: Motion, com_offset: float, e: EpisodeArrays):
     """Offsets from the episode's action, which is smoothed first."""
-    opened = openness(r, s, motion, com_offset)
+    opened = gate_opening(r, s, motion, com_offset)
     for a in range(r.moved.shape[0]):
-        if r.share < 1.0:
-            e.action[a] = e.last_action[a] + r.share * (e.action[a] - e.last_action[a])
+        if r.blend < 1.0:
+            e.action[a] = e.last_action[a] + r.blend * (e.action[a] - e.last_action[a])
         r.offsets[r.moved[a]] = opened * r.scale[a] * e.action[a]
 
 
 @dataclass(frozen=True, eq=False)
-class ResidualStep(Block):
-    """All that a policy step works on."""
+class TargetInputs(Block):
+    """The inputs of `set_targets`; the state is the believed one."""
 
     robot: RobotArrays
-    plant: Plant
     state: StateArrays
     clock: np.ndarray  # (1,) int
+    motion: Motion
+    com_offset: float  # [m]
+    residual: Residual
+    targets: TargetArrays
+
+
+@compiled
+def set_targets(a: TargetInputs):
+    """Targets of this tick."""
+    now = a.clock[0] * a.robot.timestep
+    update_targets(
+        a.robot, a.state, a.motion, now, a.com_offset, a.residual.offsets, a.targets
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class PolicyStep(Block):
+    """All that a policy step works on."""
+
+    inputs: TargetInputs
     kernel: int  # the address of the controller's tick
     tick: Erased  # what it works on
     tau: np.ndarray  # (nj,) what it finds [N·m]
     root_wrench: np.ndarray  # (6,) of a soft root
     failures: np.ndarray  # (1,) int: ticks that it could not solve
     soft_root: bool
-    targets: TargetArrays
-    motion: Motion
-    com_offset: float  # [m]
-    residual: Residual
-    pushes: np.ndarray  # see `apply_pushes`
-    scales: Scales
-    judge: Judge
+    world: World
+    estimate: Program  # of the state source
     ticks: int
     substeps: int  # physics steps of each
     episode: EpisodeArrays
+    end: StepEnd
 
 
 @compiled
-def residual_tick(step: ResidualStep):
+def policy_tick(step: PolicyStep):
     """The controller, held for `substeps` physics steps; `ticks` calls are a policy step."""
-    robot, plant, s, clock, motion = step.robot, step.plant, step.state, step.clock, step.motion
-    t, e, tau, w = step.targets, step.episode, step.tau, step.root_wrench
-    period = step.substeps * robot.timestep
+    a, world, e, w = step.inputs, step.world, step.episode, step.root_wrench
+    robot, views, s = world.robot, world.views, world.state
     if e.ticks[0] == 0:
-        set_offsets(step.residual, s, motion, step.com_offset, e)
-    update_targets(
-        robot, s, motion, clock[0] * robot.timestep, step.com_offset, step.residual.offsets, t
-    )
+        set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
+    set_targets(a)
     call(step.kernel, step.tick)
-    for i in range(plant.ctrl.shape[0]):
-        plant.ctrl[i] = tau[robot.motor_dofs[i] - 6]
+    for i in range(views.ctrl.shape[0]):
+        views.ctrl[i] = step.tau[robot.motor_dofs[i] - 6]
     if step.soft_root:
-        soft_root_force(s, w, plant.qfrc_applied)
+        soft_root_force(s, w, views.qfrc_applied)
         m = e.metrics
         m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
         m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
-    record_tick(robot, s, plant.ctrl, period, e)
-    for _ in range(step.substeps):
-        advance(robot, plant, step.pushes, clock)
-    update_state(robot, plant, s)
+    record_tick(robot, s, views.ctrl, step.substeps * robot.timestep, e)
+    simulate(world, step.substeps)
+    run(step.estimate)
     e.ticks[0] += 1
     if e.ticks[0] < step.ticks:
         return
     e.ticks[0] = 0
     copy(w, e.root_wrench)
     e.metrics[FAILURES] = step.failures[0]
-    now = clock[0] * robot.timestep
-    judge_step(robot, plant, s, step.scales, step.judge, t.q_ref, plant.ctrl, now, e)
-    observe(robot, s, step.scales, t.q_ref, t.v_ref, e.action, e.observation)
+    end_step(step.end)
 
 
 @dataclass(frozen=True, eq=False)
-class Aim(Block):
-    """What `update_targets` works on."""
+class TickAccount(Block):
+    """The block of `account_tick`: what it reads, and the record that it writes."""
 
-    robot: RobotArrays
-    state: StateArrays
-    clock: np.ndarray  # (1,) int
-    motion: Motion
-    com_offset: float  # [m]
-    residual: np.ndarray  # (≥ 9,)
-    targets: TargetArrays
-
-
-@compiled
-def aim(block: Aim):
-    """Targets of this tick."""
-    update_targets(
-        block.robot, block.state, block.motion, block.clock[0] * block.robot.timestep,
-        block.com_offset, block.residual, block.targets,
-    )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Record(Block):
-    """What `record_tick` works on."""
-
-    robot: RobotArrays
-    state: StateArrays
-    plant: Plant
+    world: World
     period: float  # [s]
     episode: EpisodeArrays
 
 
 @compiled
-def record(block: Record):
-    """Account for the torques in `plant.ctrl`."""
-    record_tick(block.robot, block.state, block.plant.ctrl, block.period, block.episode)
+def account_tick(r: TickAccount):
+    """Account for the torques in `views.ctrl`."""
+    record_tick(r.world.robot, r.world.state, r.world.views.ctrl, r.period, r.episode)

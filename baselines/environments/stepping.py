@@ -10,67 +10,23 @@ import numpy as np
 
 from poise.baselines.controller import told_by
 from poise.baselines.stepping.controller import SteppingController
-from poise.baselines.stepping.swing import SwingArrays, time_left
-from poise.baselines.stepping.tick import StepMemory
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
-from poise.envs.balance.observation import Term
+from poise.envs.balance.episode import StepEnd
+from poise.envs.balance.observation import View
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import CompiledStep, Erased, address_of, call
-from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.calls import Program
 from poise.envs.compiled.memory import apart
-from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
-from .policy_step import ResidualStep
 from .residual import ResidualBalanceEnv, ResidualScales
-
-
-@dataclass(frozen=True, eq=False)
-class StepSight(Block):
-    """What a policy sees of the steps."""
-
-    state: StateArrays
-    told: np.ndarray  # (7,) `Stepping.told`
-    height: float  # h [m]
-    omega: float  # [1/s]
-    observation: np.ndarray  # (≥ 15,) of which the last are filled
-
-
-@compiled
-def _put_local(sight: StepSight, first: int, x: float, y: float):
-    """(x, y) in the heading frame, in 0.5 h."""
-    cos, sin, half = sight.state.heading[0], sight.state.heading[1], 0.5 * sight.height
-    sight.observation[first] = (cos * x + sin * y) / half
-    sight.observation[first + 1] = (cos * y - sin * x) / half
-
-
-@compiled
-def observe_step(sight: StepSight):
-    """The terms `swing` to `stance_capture_point` of `ResidualStepEnv`, clipped to ±10."""
-    s, told, out = sight.state, sight.told, sight.observation
-    first, foot, feet = out.shape[0] - 15, int(told[1]), s.sole_point
-    for i in range(2):
-        out[first + i] = 1.0 if foot == i else 0.0
-    out[first + 2], out[first + 5] = told[4], told[0]
-    out[first + 3], out[first + 4] = sight.omega * told[5], sight.omega * told[6]
-    _put_local(sight, first + 6, feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1])
-    for i in range(first + 8, first + 15):
-        out[i] = 0.0
-    if foot >= 0:
-        stance, moving, xi = feet[1 - foot], feet[foot], s.capture_point
-        _put_local(sight, first + 8, moving[0] - stance[0], moving[1] - stance[1])
-        out[first + 10] = (moving[2] - stance[2]) / (0.5 * sight.height)
-        _put_local(sight, first + 11, told[2] - stance[0], told[3] - stance[1])
-        _put_local(sight, first + 13, xi[0] - stance[0], xi[1] - stance[1])
-    for i in range(first, first + 15):
-        out[i] = min(max(out[i], -10.0), 10.0)
+from .step_terms import REPORTED, STEP_TERMS, StepReporter, StepView, report_steps
 
 
 @dataclass(frozen=True)
 class StepScales(ResidualScales):
-    """What an action of 1 adds, heading frame; a scale of 0 takes it away."""
+    """The offsets that an action of 1 gives, heading frame; a scale of 0 takes an entry away."""
 
     com: float = field(default=0.1, metadata={"min": 0.0})  # Δc_ref x, y [m]
     cop: float = field(default=0.05, metadata={"min": 0.0})  # Δp_ref x, y [m]
@@ -87,33 +43,6 @@ class StepScales(ResidualScales):
             "time": self.time,
             "trigger": self.trigger,
         }
-
-
-@dataclass(frozen=True, eq=False)
-class SteppingStep(Block):
-    """A policy step of a compiled controller that steps."""
-
-    residual: Erased  # a `ResidualStep`
-    ticks: np.ndarray  # (1,) int: of the running policy step
-    kernel: int  # address of `residual_tick`
-    memory: StepMemory
-    swing: SwingArrays
-    sight: StepSight
-
-
-@compiled
-def stepping_tick(step: SteppingStep):
-    """`residual_tick`, after the last one what the policy sees of the steps."""
-    call(step.kernel, step.residual)
-    if step.ticks[0] > 0:
-        return
-    m, w, told = step.memory, step.swing, step.sight.told
-    told[0], told[1] = m.steps[0], -1.0
-    told[4], told[5], told[6] = 0.0, 0.0, m.clock[0]
-    if m.swinging[0]:
-        told[1], told[2], told[3] = m.foot[0], w.foothold[0], w.foothold[1]
-        told[4], told[5], told[6] = w.time[0] / w.duration[0], time_left(w), 0.0
-    observe_step(step.sight)
 
 
 class ResidualStepEnv(ResidualBalanceEnv):
@@ -137,25 +66,9 @@ class ResidualStepEnv(ResidualBalanceEnv):
     A scale `residual.trigger` [m] above 0 appends `trigger`: how much further ξ may leave the reach
     of the feet before a step is taken. `height`, `lean` and `momentum` come before `foothold_x`.
 
-    Observation: that of `ResidualBalanceEnv` with these actions (0 to 70), then
+    Observation: <observation>
 
-    | index | term | entry | unit | meaning |
-    | --- | --- | --- | --- | --- |
-    | 71 | swing | left | 1 | 1 where the foot swings, else 0 |
-    | 72 | swing | right | 1 | 1 where the foot swings, else 0 |
-    | 73 | phase | share | 1 | share of the swing that is over |
-    | 74 | time_left | t | 1/ω | until touchdown is planned |
-    | 75 | since | t | 1/ω | since the last touchdown |
-    | 76 | steps | count | 1 | steps begun |
-    | 77 | feet | x | 0.5 h | first sole from the second |
-    | 78 | feet | y | 0.5 h | first sole from the second |
-    | 79 | swing_foot | x | 0.5 h | swinging sole from the stance sole, 0 if both are down |
-    | 80 | swing_foot | y | 0.5 h | swinging sole from the stance sole, 0 if both are down |
-    | 81 | swing_foot | z | 0.5 h | swinging sole from the stance sole, 0 if both are down |
-    | 82 | foothold | x | 0.5 h | foothold from the stance sole, 0 if both are down |
-    | 83 | foothold | y | 0.5 h | foothold from the stance sole, 0 if both are down |
-    | 84 | stance_capture_point | x | 0.5 h | ξ from the stance sole, 0 if both are down |
-    | 85 | stance_capture_point | y | 0.5 h | ξ from the stance sole, 0 if both are down |
+    It does not know the push. The reference is that of `motion`.
 
     Info: besides those of `ResidualBalanceEnv`, "steps", begun in this episode.
 
@@ -166,6 +79,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
     """
 
     scales_class = StepScales
+    known_terms = STEP_TERMS
 
     def __init__(
         self,
@@ -175,11 +89,15 @@ class ResidualStepEnv(ResidualBalanceEnv):
         controller: Any = "capture-step",
         **arguments: Any,
     ):
+        self._step_report = apart(REPORTED)
         super().__init__(robot, config, controller=controller, **arguments)
 
     @ResidualBalanceEnv.controller.setter  # type: ignore[attr-defined]
     def controller(self, controller: Any) -> None:
-        """As of `ResidualBalanceEnv`; raises ConfigError for one that does not step."""
+        """The controller whose targets and steps the action moves.
+
+        Raises ConfigError as `ResidualBalanceEnv` does, and for one that does not step.
+        """
         stepper = told_by(controller, self.robot).unwrapped
         if not isinstance(stepper, SteppingController):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
@@ -188,47 +106,20 @@ class ResidualStepEnv(ResidualBalanceEnv):
         self._offsets = stepper.shift.values  # one array is both
         self._residual = replace(self._residual, offsets=self._offsets)
 
-    def _observation_terms(self, soles: list[str]) -> list[Term]:
-        ground, stance = ("x", "y"), "the stance sole, 0 if both are down"
-        return [
-            *super()._observation_terms(soles),
-            Term("swing", tuple(soles), "1", "1 where the foot swings, else 0", "feet"),
-            Term("phase", ("share",), "1", "share of the swing that is over", "number"),
-            Term("time_left", ("t",), "1/ω", "until touchdown is planned", "number"),
-            Term("since", ("t",), "1/ω", "since the last touchdown", "number"),
-            Term("steps", ("count",), "1", "steps begun", "number"),
-            Term("feet", ground, "0.5 h", "first sole from the second", "between feet"),
-            Term("swing_foot", (*ground, "z"), "0.5 h", f"swinging sole from {stance}", "vector"),
-            Term("foothold", ground, "0.5 h", f"foothold from {stance}", "vector"),
-            Term("stance_capture_point", ground, "0.5 h", f"ξ from {stance}", "vector"),
-        ]
+    def _view(self, kind: type[Block], out: np.ndarray) -> Block:
+        view: Any = super()._view(View, out)
+        return StepView(view, self._step_report) if kind is StepView else view
 
     def _observe(self) -> None:
+        self._step_report[:] = self.stepper.stepping().told()
         super()._observe()
-        told, sight = np.array(self.stepper.stepping().told()), self.scales
-        observe_step(
-            StepSight(
-                self.simulation.state_arrays, told, sight.height, sight.omega,
-                self.episode.observation,
-            )
-        )  # fmt: skip
 
-    def _whole_step(self, bound: ResidualStep) -> CompiledStep:
-        alone = super()._whole_step(bound)
-        block = self.bind_steps(bound, alone.kernel)
-        return CompiledStep(address_of(stepping_tick, block), block, alone.ticks)
-
-    def bind_steps(self, residual: ResidualStep, kernel: int) -> SteppingStep:
-        """All that a step works on, with what `bind` made and the address of `residual_tick`."""
-        tick: Any = residual.tick.inner
-        scales, observation = self.scales, self.episode.observation
-        sight = StepSight(residual.state, apart(7), scales.height, scales.omega, observation)
-        return SteppingStep(
-            Erased(residual), self.episode.ticks, kernel, tick.memory, tick.swing, sight
-        )
+    def _end_of_tick(self, tick: Any) -> StepEnd:
+        reporter = StepReporter(tick.memory, tick.swing, self._step_report)
+        return replace(self.step_end(), report=Program.of([(report_steps, reporter)]))
 
     def info(self) -> dict[str, Any]:
-        """As of `ResidualBalanceEnv`, and the number of steps."""
+        """The entries of `ResidualBalanceEnv`, and the number of steps."""
         return {**super().info(), "steps": self.stepper.stepping().steps}
 
 

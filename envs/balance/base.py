@@ -1,8 +1,8 @@
 """What all environments share: a pushed robot, its observation, reward, fall and record."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import mujoco
@@ -17,31 +17,37 @@ from poise.configs.numbers import (
     seed_number,
     whole_number,
 )
-from poise.envs.compiled.calls import CompiledStep
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import CompiledStep, Program, run
 from poise.envs.compiled.copies import Copyable
 from poise.envs.physics.arrays import RobotArrays
-from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.simulation import Simulation, World
 from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import push_info
 from poise.envs.robots.mirror import Mirror, mirror_robot
 from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.sensors.delayed import DelayedState
+from poise.envs.sensors.source import StateSource
 from poise.envs.viewing.camera import Camera, find_camera
 
 from .config import EnvConfig as EnvConfig
 from .config import env_config
+from .docstrings import filled
 from .episode import (
-    FAILURES,
     FALLEN,
     QUIET_STEPS,
-    REWARD_TERMS,
-    SATURATED,
-    TICKS,
     EpisodeArrays,
+    Judge,
+    StepEnd,
     allocate_episode,
     begin_episode,
-    judge,
 )
-from .observation import Term, mirror_terms, observation_terms, observe, scales
+from .info import step_info
+from .observation import Term, Terms, View, mirror_terms, observer, scales
+from .reward import REWARD_TERMS, RewardView, rewards
+from .start import disturbed_start
+from .termination import episode_limits
+from .terms import TERMS
 
 if TYPE_CHECKING:
     from poise.envs.viewing.renderer import SceneRenderer
@@ -55,6 +61,11 @@ class BalanceEnv(Copyable, gymnasium.Env):
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
     observation_space: spaces.Box
     action_space: spaces.Box
+    known_terms: ClassVar[Terms] = TERMS  #: of which `observation` chooses
+
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        super().__init_subclass__(**arguments)
+        cls.__doc__ = filled(cls.__doc__, cls.known_terms)
 
     def __init__(
         self,
@@ -82,21 +93,20 @@ class BalanceEnv(Copyable, gymnasium.Env):
         self.camera = find_camera(camera, self.robot.model)
         self.push_sampler = self.config.pushes  #: may be replaced between episodes
         self.simulation = Simulation(self.robot)
-        self.arrays: RobotArrays = self.simulation.arrays
+        self.arrays: RobotArrays = self.simulation.arrays  #: of `robot`
         period = self.config.policy_period
         self.substeps = self._whole(period, self.arrays.timestep, "policy_period")
         self.max_steps = round(self.config.duration / period)
         self.quiet_steps = int(np.ceil(self.config.fall.quiet_time / period - 1e-9))
         state = self.simulation.state
         self.scales = scales(self.arrays, state.support_polygon)
-        self.judge = judge(
-            self.config.fall, self.config.reward, self.robot.height_com, self.max_steps
-        )
+        self.limits = episode_limits(self.config.fall, self.robot.height_com, self.max_steps)
         self.action_names = self._action_names()
-        soles = [sole.name for sole in self.robot.soles]
-        self.terms = self._observation_terms(soles)
+        self.terms = self._observation_terms()  #: of which the observation is made
         size = sum(term.size for term in self.terms)
-        self.episode = allocate_episode(len(self.action_names), size, len(soles))
+        self.episode = allocate_episode(
+            len(self.action_names), size, len(REWARD_TERMS), len(self.robot.soles)
+        )
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
         self._described: tuple[Any, list[dict[str, Any]]] = None, []  # pushes, their infos
@@ -114,13 +124,49 @@ class BalanceEnv(Copyable, gymnasium.Env):
 
     @property
     def simulation(self) -> Simulation:
-        """The robot and its world; may be replaced between episodes."""
+        """The robot and its world; may be replaced between episodes, and `state_source` with it."""
         return self._simulation
 
     @simulation.setter
     def simulation(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._step: Any = None  # what compiled code is bound to, with the simulation of before
+        delay = self.config.sensors.delay
+        self.state_source = (
+            DelayedState(simulation, self.robot, delay) if delay else StateSource(simulation)
+        )
+
+    @property
+    def state_source(self) -> StateSource:
+        """The source of what is believed of the state; may be replaced between episodes.
+
+        The simulation's own state is what is judged. Raises ConfigError for a source of another
+        simulation.
+        """
+        return self._state_source
+
+    @state_source.setter
+    def state_source(self, source: StateSource) -> None:
+        if source.simulation is not self.simulation:
+            raise ConfigError("is about another simulation", field="state_source")
+        self._state_source = source
+        self.simulation.sensors = source.sense
+        self._unbind()
+
+    @property
+    def episode(self) -> EpisodeArrays:
+        """The record of the running episode; other arrays may take its place."""
+        return self._episode
+
+    @episode.setter
+    def episode(self, episode: EpisodeArrays) -> None:
+        self._episode = episode
+        self._unbind()
+
+    def _unbind(self) -> None:
+        """Forget the blocks that compiled code works on: what they are made of has changed."""
+        self._step: Any = None  # of a policy step
+        self._end: StepEnd | None = None
+        self._end_of: World | None = None
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -133,7 +179,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return self.simulation.data
 
     def arguments(self) -> dict[str, Any]:
-        """What makes another environment like this one; the robot is shared."""
+        """The arguments that make another environment like this one; the robot is shared."""
         names = ("robot", "config", "render_mode", "width", "height", "camera")
         return {name: vars(self)[name] for name in names}
 
@@ -149,12 +195,68 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return count
 
     def _action_names(self) -> tuple[str, ...]:
-        """One name for each entry of the action."""
+        """The names of the action's entries."""
         raise NotImplementedError
 
-    def _observation_terms(self, soles: list[str]) -> list[Term]:
-        """Parts of the observation: those that `observe` fills, then a subclass's own."""
-        return observation_terms(self.robot.joint_names, soles, self.action_names)
+    def _observation_terms(self) -> list[Term]:
+        """The terms that `config.observation` chooses of `known_terms`, for this robot."""
+        chosen = self.config.observation
+        names = {
+            "joints": self.robot.joint_names,
+            "motors": tuple(self.robot.model.actuator(i).name for i in range(self.robot.model.nu)),
+            "feet": tuple(sole.name for sole in self.robot.soles),
+            "actions": self.action_names,
+        }
+        return [kind.of(names) for kind in self.known_terms.choose(chosen.terms, chosen.extra)]
+
+    def _view(self, kind: type[Block], out: np.ndarray) -> Block:
+        """The block of a term that fills `out`, of the `kind` that its kernel works on."""
+        source, world = self.state_source, self.simulation.world()
+        q_ref, v_ref = self._references()
+        return View(
+            robot=source.arrays,
+            state=source.state_arrays,
+            scales=self.scales,
+            q_ref=q_ref,
+            v_ref=v_ref,
+            action=self.episode.action,
+            views=world.views,
+            clock=world.clock,
+            pushes=world.pushes,
+            out=out,
+        )
+
+    def _judge(self) -> Judge:
+        """The block that judges the policy steps of this environment."""
+        world, e = self.simulation.world(), self.episode
+        view = RewardView(
+            robot=world.robot,
+            state=world.state,
+            scales=self.scales,
+            limits=self.limits,
+            q_ref=self._references()[0],
+            views=world.views,
+            action=e.action,
+            last_action=e.last_action,
+        )
+        return Judge(
+            robot=world.robot,
+            views=world.views,
+            state=world.state,
+            clock=world.clock,
+            limits=self.limits,
+            rewards=rewards(self.config.reward, view),
+            episode=e,
+        )
+
+    def step_end(self) -> StepEnd:
+        """The block that ends a policy step; a new one when `simulation.world()` is."""
+        world = self.simulation.world()
+        if self._end is None or self._end_of is not world:
+            observe = observer(self.terms, self.episode.observation, self._view)
+            self._end = StepEnd(self._judge(), Program.of(()), observe)
+            self._end_of = world
+        return self._end
 
     def mirrors(self) -> tuple[Mirror, Mirror]:
         """Left and right exchanged, in an observation and in an action.
@@ -176,13 +278,11 @@ class BalanceEnv(Copyable, gymnasium.Env):
         """Prepare the subclass for a new episode; the simulation has just been reset."""
 
     def advance(self) -> None:
-        """One policy step with `episode.action`: reward, metrics and observation of the record."""
+        """Take the policy step of `episode.action`; the outcome is in `episode`."""
         raise NotImplementedError
 
     def compiled_step(self) -> CompiledStep | None:
-        """What does what `advance` does, if it can be compiled; the same object while it can be
-        used again.
-        """
+        """The compiled form of `advance`, if there is one; the same object while it can be used."""
         return None
 
     def reset(
@@ -205,7 +305,8 @@ class BalanceEnv(Copyable, gymnasium.Env):
                     "unknown option", source="reset", field=str(name), choices=RESET_OPTIONS
                 )
         push, qpos, qvel = (options.get(name) for name in ("push", "qpos", "qvel"))
-        start, speed = self._start(float(self._numbers(options.get("noise", 1.0), (), "noise")))
+        noise = float(self._numbers(options.get("noise", 1.0), (), "noise"))
+        start, speed = disturbed_start(self.simulation, self.config.noise, noise, self.np_random)
         qpos = start if qpos is None else self._numbers(qpos, start.shape, "qpos")
         qvel = speed if qvel is None else self._numbers(qvel, speed.shape, "qvel")
         state = self.simulation.reset(qpos, qvel)
@@ -217,30 +318,12 @@ class BalanceEnv(Copyable, gymnasium.Env):
             pushes = self.push_sampler.sample(self.np_random, self.robot, state.support_margin)
         self.simulation.set_pushes(pushes)
         begin_episode(self.simulation.state_arrays, self.episode)
+        self.state_source.reset()
         self._begin()
         self._observe()
         if self.render_mode == "human":
             self.render()
         return self.episode.observation.astype(np.float32), self.info()
-
-    def _start(self, scale: float) -> tuple[np.ndarray, np.ndarray]:
-        """A disturbed standing posture with its lowest sole on the ground."""
-        noise, rng, robot = self.config.noise, self.np_random, self.robot
-        qpos, qvel = robot.standing_qpos.copy(), np.zeros(robot.model.nv)
-        nj = len(robot.joint_names)
-        qpos[7:] += scale * rng.uniform(-noise.joints, noise.joints, nj)
-        qpos[7:] = np.clip(qpos[7:], robot.joint_range[:, 0], robot.joint_range[:, 1])
-        qvel[6:] = scale * rng.uniform(-noise.joint_speeds, noise.joint_speeds, nj)
-        qvel[:2] = scale * rng.uniform(-noise.speed, noise.speed, 2)
-        state = self.simulation.reset(qpos)
-        lowest = min(
-            float((point + polygon @ axes[:, :2].T)[:, 2].min())
-            for point, axes, polygon in zip(
-                state.sole_points, state.sole_axes, (s.polygon for s in robot.soles), strict=True
-            )
-        )
-        qpos[2] -= lowest
-        return qpos, qvel
 
     @staticmethod
     def _numbers(value: Any, shape: tuple[int, ...], name: str) -> np.ndarray:
@@ -285,23 +368,26 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return vector
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """One policy step; a fall is `terminated`, the end of time is `truncated`.
+        """Take a policy step; a fall is `terminated`, the end of time is `truncated`.
 
         Raises ConfigError for an action that is not valid, PoiseError after the episode's end.
         """
-        reward, terminated, truncated = self.step_in_place(action)
+        reward, terminated, truncated = self.step_without_info(action)
         if self.render_mode == "human":
             self.render()
         observation = self.episode.observation.astype(np.float32)
         return observation, reward, terminated, truncated, self.info()
 
-    def step_in_place(self, action: np.ndarray) -> tuple[float, bool, bool]:
-        """What `step` does, without `info`: the observation is in `episode.observation`."""
+    def step_without_info(self, action: np.ndarray) -> tuple[float, bool, bool]:
+        """Take a step without making `info`: reward, terminated, truncated.
+
+        The observation is in `episode.observation`. Raises as `step` does.
+        """
         self.set_action(action)
         return self.apply_action()
 
     def apply_action(self) -> tuple[float, bool, bool]:
-        """What `step_in_place` does with an action that has been set."""
+        """Take the step of an action that has been set: reward, terminated, truncated."""
         self.expect_running()
         self.advance()
         terminated = self.fallen
@@ -314,20 +400,12 @@ class BalanceEnv(Copyable, gymnasium.Env):
             raise PoiseError("step() after the episode's end: call reset() first")
 
     def _observe(self) -> None:
-        q_ref, v_ref = self._references()
-        observe(
-            self.arrays,
-            self.simulation.state_arrays,
-            self.scales,
-            q_ref,
-            v_ref,
-            self.episode.action,
-            self.episode.observation,
-        )
+        """Fill `episode.observation`."""
+        run(self.step_end().observe)
 
     @property
     def fallen(self) -> bool:
-        """Whether the robot has fallen."""
+        """True after a fall."""
         return bool(self.episode.metrics[FALLEN])
 
     @property
@@ -336,19 +414,11 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return bool(self.episode.metrics[QUIET_STEPS] >= self.quiet_steps)
 
     def info(self) -> dict[str, Any]:
-        """Reward terms, push and record of the episode so far; see also `InfoColumns`."""
-        metrics, terms = self.episode.metrics, self.episode.reward_terms.tolist()
-        return {
-            "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
-            "push": self.push_infos(),
-            "is_success": self.recovered,
-            "solver_failures": int(metrics[FAILURES]),
-            "torque_saturation": float(metrics[SATURATED] / max(metrics[TICKS], 1.0)),
-            "root_wrench": self.episode.root_wrench.copy(),
-        }
+        """Reward terms, push and record of the episode so far."""
+        return step_info(self)
 
     def push_infos(self) -> list[dict[str, Any]]:
-        """What `info` says of the episode's pushes, see `push_info`."""
+        """The descriptions of the episode's pushes for `info`, see `push_info`."""
         pushes, (known, infos) = self.simulation.pushes, self._described
         if known is not pushes:
             infos = [push_info(push, self.robot) for push in pushes]
@@ -372,32 +442,3 @@ class BalanceEnv(Copyable, gymnasium.Env):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
-
-
-class InfoColumns(Copyable):
-    """What `BalanceEnv.info` says of each of `envs`, one array for each key.
-
-    `record` holds their rows. The lists of pushes are the same ones until the next episode.
-    """
-
-    def __init__(self, envs: Sequence[BalanceEnv], record: EpisodeArrays):
-        self.envs, self.record = envs, record
-        self._quiet_steps = np.array([env.quiet_steps for env in envs])
-        self._pushes: list[Any] = [None] * len(envs)  # those described
-        self._descriptions = np.empty(len(envs), dtype=object)
-
-    def read(self) -> dict[str, Any]:
-        """The columns of the last step."""
-        record, metrics = self.record, self.record.metrics
-        for i, env in enumerate(self.envs):
-            pushes = env.simulation.pushes
-            if pushes is not self._pushes[i]:
-                self._pushes[i], self._descriptions[i] = pushes, env.push_infos()
-        return {
-            "reward_terms": dict(zip(REWARD_TERMS, record.reward_terms.T.copy(), strict=True)),
-            "push": self._descriptions.copy(),
-            "is_success": metrics[:, QUIET_STEPS] >= self._quiet_steps,
-            "solver_failures": metrics[:, FAILURES].astype(int),
-            "torque_saturation": metrics[:, SATURATED] / np.maximum(metrics[:, TICKS], 1.0),
-            "root_wrench": record.root_wrench.copy(),
-        }

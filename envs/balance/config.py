@@ -10,7 +10,9 @@ from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml, to_dict
 from poise.envs.pushes.sampler import PushSampler
 
-from .episode import FallLimits, RewardWeights
+from .reward import RewardWeights
+from .start import StartNoise as StartNoise
+from .termination import FallLimits
 
 
 class UnknownArgument(ConfigError, TypeError):
@@ -21,12 +23,18 @@ class UnknownArgument(ConfigError, TypeError):
 
 
 @dataclass(frozen=True)
-class StartNoise:
-    """How far a reset departs from the standing posture; uniform in ±."""
+class ObservationConfig:
+    """Which terms an observation is made of, by name and in this order."""
 
-    joints: float = field(default=0.02, metadata={"min": 0.0, "max": 0.5})  # [rad]
-    joint_speeds: float = field(default=0.05, metadata={"min": 0.0})  # [rad/s]
-    speed: float = field(default=0.02, metadata={"min": 0.0})  # root, horizontal [m/s]
+    terms: tuple[str, ...] | None = None  # None: those that the environment has by default
+    extra: tuple[str, ...] = ()  # after them
+
+
+@dataclass(frozen=True)
+class SensorConfig:
+    """The sensors through which controller and policy know the robot's state."""
+
+    delay: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0})  # whole physics steps [s]
 
 
 @dataclass(frozen=True)
@@ -41,6 +49,8 @@ class EnvConfig:
     noise: StartNoise = field(default_factory=StartNoise)
     fall: FallLimits = field(default_factory=FallLimits)
     reward: RewardWeights = field(default_factory=RewardWeights)
+    observation: ObservationConfig = field(default_factory=ObservationConfig)
+    sensors: SensorConfig = field(default_factory=SensorConfig)
 
 
 def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: Any) -> EnvConfig:

@@ -1,50 +1,18 @@
 """What is recorded during an episode: fall, quiet time, effort, excursions; and the reward."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
-from poise.envs.maths.vectors import along
-from poise.envs.physics.arrays import Plant, RobotArrays
+from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, support_distance, update_support
 
-from .observation import Scales
-
-
-@dataclass(frozen=True)
-class FallLimits:
-    """When a robot has fallen, and when it is upright and quiet again."""
-
-    height: float = field(default=0.6, metadata={"above": 0.0, "max": 1.0})  # of the standing h
-    # root [deg]: a deep bow, the hip strategy at its end, is not yet a fall
-    tilt: float = field(default=90.0, metadata={"above": 0.0, "max": 180.0})
-    ground_contact: bool = True  # anything but the feet on the ground is a fall
-    quiet_speed: float = field(default=0.1, metadata={"above": 0.0})  # CoM [m/s]
-    quiet_tilt: float = field(default=30.0, metadata={"above": 0.0, "max": 90.0})  # root [deg]
-    quiet_time: float = field(default=1.0, metadata={"above": 0.0})  # [s]
-
-
-@dataclass(frozen=True)
-class RewardWeights:
-    """Weights of the reward terms; each term is smooth and lies in [0, 1] or [−1, 0]."""
-
-    alive: float = 0.5
-    com: float = 0.2
-    capture: float = 0.2
-    upright: float = 0.1
-    quiet: float = 0.1
-    posture: float = 0.1
-    effort: float = 0.02
-    action: float = 0.1
-    action_rate: float = 0.05
-    fall: float = 5.0
-
-
-REWARD_TERMS = tuple(RewardWeights.__dataclass_fields__)
+from .reward import Rewards, sum_rewards
+from .termination import Limits, has_diverged, has_fallen, uprightness
 
 (
     QUIET_STEPS,  # policy steps in a row that were quiet
@@ -67,7 +35,7 @@ METRICS = 14
 
 @dataclass(frozen=True, eq=False)
 class EpisodeArrays(Block):
-    """What compiled steps write about the running episode."""
+    """The record that compiled steps write of the running episode."""
 
     action: np.ndarray  # (na,)
     last_action: np.ndarray  # (na,)
@@ -82,40 +50,14 @@ class EpisodeArrays(Block):
     ticks: np.ndarray  # (1,) int: control ticks of the running policy step
 
 
-@dataclass(frozen=True, eq=False)
-class Judge(Block):
-    """Limits and weights as compiled code reads them."""
-
-    height: float  # [m]
-    cos_tilt: float
-    ground_contact: bool
-    quiet_speed: float
-    quiet_cos_tilt: float
-    max_steps: int  # of an episode
-    weights: np.ndarray  # (terms,)
-
-
-def judge(limits: FallLimits, weights: RewardWeights, height_com: float, max_steps: int) -> Judge:
-    """Numbers for compiled code."""
-    return Judge(
-        height=limits.height * height_com,
-        cos_tilt=float(np.cos(np.radians(limits.tilt))),
-        ground_contact=limits.ground_contact,
-        quiet_speed=limits.quiet_speed,
-        quiet_cos_tilt=float(np.cos(np.radians(limits.quiet_tilt))),
-        max_steps=max_steps,
-        weights=np.array([getattr(weights, name) for name in REWARD_TERMS], dtype=float),
-    )
-
-
-def allocate_episode(actions: int, observations: int, nc: int) -> EpisodeArrays:
-    """Zeroed storage."""
+def allocate_episode(actions: int, observations: int, terms: int, nc: int) -> EpisodeArrays:
+    """Zeroed storage: as many entries of each as named, and `nc` soles."""
     return EpisodeArrays(
         action=apart(actions),
         last_action=apart(actions),
         observation=apart(observations),
         reward=apart(1),
-        reward_terms=apart(len(REWARD_TERMS)),
+        reward_terms=apart(terms),
         metrics=apart(METRICS),
         root_wrench=apart(6),
         sole_start=apart((nc, 2)),
@@ -157,66 +99,53 @@ def record_tick(
     m[TICKS] += 1.0
 
 
-@compiled
-def uprightness(robot: RobotArrays, s: StateArrays) -> float:
-    """Cosine of the root's tilt from standing: between its vertical axes, whatever the yaw."""
-    upright = 0.0
-    for a in range(3):
-        upright += s.root_axes[2, a] * robot.root_standing[2, a]
-    return upright
+@dataclass(frozen=True, eq=False)
+class Judge(Block):
+    """All that the end of a policy step is judged by; the state is the true one."""
+
+    robot: RobotArrays
+    views: SimViews
+    state: StateArrays
+    clock: np.ndarray  # (1,) int: physics steps since the reset
+    limits: Limits
+    rewards: Rewards
+    episode: EpisodeArrays
 
 
 @compiled
-def has_fallen(robot: RobotArrays, s: StateArrays, j: Judge) -> bool:
-    """CoM too low, root tilted too far, or more than the feet on the ground."""
-    low = s.com[2] - s.origin[2] < j.height
-    touching = j.ground_contact and s.other_contacts[0] > 0.5
-    # not np.isfinite(x + y): x + y − (x + y), reordered, is 0 for NaN too
-    finite = abs(s.com[2]) < np.inf and abs(s.com_vel[2]) < np.inf
-    return low or uprightness(robot, s) < j.cos_tilt or touching or not finite
-
-
-BAD_STATE = tuple(
-    2 * int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{name}")) for name in ("QPOS", "QVEL", "QACC")
-)
-
-
-@compiled
-def has_diverged(plant: Plant) -> bool:
-    """Whether numbers became too large since the reset; MuJoCo then starts anew by itself."""
-    for i in BAD_STATE:
-        if plant.warnings[i] > 0:
-            return True
-    return False
-
-
-@compiled
-def judge_step(
-    robot: RobotArrays,
-    plant: Plant,
-    s: StateArrays,
-    scale: Scales,
-    j: Judge,
-    q_ref: np.ndarray,
-    tau: np.ndarray,
-    time: float,
-    e: EpisodeArrays,
-):
-    """Metrics and reward of one policy step that ended at `time`, and whether it was the last."""
-    m = e.metrics
-    update_support(robot, s)
-    diverged = has_diverged(plant)
-    fallen = diverged or has_fallen(robot, s, j)
+def judge_step(j: Judge):
+    """Metrics and reward of the policy step that ends now, and whether it was the last."""
+    s, e, m = j.state, j.episode, j.episode.metrics
+    update_support(j.robot, s)
+    diverged = has_diverged(j.views)
+    fallen = diverged or has_fallen(j.robot, s, j.limits)
     m[FALLEN] = 1.0 if fallen else 0.0
-    com_x, com_y = s.com[0] - s.origin[0], s.com[1] - s.origin[1]
-    xi_x, xi_y = s.capture_point[0] - s.origin[0], s.capture_point[1] - s.origin[1]
+    record_quiet(j, fallen)
+    record_excursions(s, e)
+    e.reward[0] = sum_rewards(j.rewards, fallen, diverged, e.reward_terms)
+    e.steps[0] += 1
+    e.running[0] = not fallen and e.steps[0] < j.limits.max_steps
+
+
+@compiled
+def record_quiet(j: Judge, fallen: bool):
+    """Count a step that was quiet: upright, slow, the CoM over the soles; or note its time."""
+    s, m = j.state, j.episode.metrics
     speed = np.sqrt(s.com_vel[0] ** 2 + s.com_vel[1] ** 2 + s.com_vel[2] ** 2)
-    upright = uprightness(robot, s)
-    quiet = not fallen and speed < j.quiet_speed and upright > j.quiet_cos_tilt
+    quiet = not fallen and speed < j.limits.quiet_speed
+    quiet = quiet and uprightness(j.robot, s) > j.limits.quiet_cos_tilt
     quiet = quiet and support_distance(s, s.com[0], s.com[1]) > 0.0
     m[QUIET_STEPS] = m[QUIET_STEPS] + 1.0 if quiet else 0.0
     if not quiet:
-        m[LAST_MOVING] = time
+        m[LAST_MOVING] = j.clock[0] * j.robot.timestep
+
+
+@compiled
+def record_excursions(s: StateArrays, e: EpisodeArrays):
+    """Keep the largest distances of CoM, capture point and soles, and the CoP's least margin."""
+    m = e.metrics
+    com_x, com_y = s.com[0] - s.origin[0], s.com[1] - s.origin[1]
+    xi_x, xi_y = s.capture_point[0] - s.origin[0], s.capture_point[1] - s.origin[1]
     m[MAX_COM] = max(m[MAX_COM], np.sqrt(com_x * com_x + com_y * com_y))
     m[MAX_CAPTURE] = max(m[MAX_CAPTURE], np.sqrt(xi_x * xi_x + xi_y * xi_y))
     m[MIN_COP_MARGIN] = min(m[MIN_COP_MARGIN], support_distance(s, s.cop[0], s.cop[1]))
@@ -225,40 +154,19 @@ def judge_step(
         dy = s.sole_point[i, 1] - e.sole_start[i, 1]
         m[MAX_SLIDE] = max(m[MAX_SLIDE], np.sqrt(dx * dx + dy * dy))
 
-    cos, sin = s.heading[0], s.heading[1]
-    posture = 0.0
-    for a in range(q_ref.shape[0]):
-        posture += (s.qpos[7 + a] - q_ref[a]) ** 2
-    effort, action, action_rate = 0.0, 0.0, 0.0
-    for i in range(tau.shape[0]):
-        effort += (tau[i] / robot.torque_limit[i]) ** 2 / tau.shape[0]
-    for a in range(e.action.shape[0]):
-        action += e.action[a] ** 2 / e.action.shape[0]
-        action_rate += (e.action[a] - e.last_action[a]) ** 2 / e.action.shape[0]
-    x, y = along(cos, sin, com_x, com_y)
-    x, y = x / scale.support_x, y / scale.support_y
-    com_error = x * x + y * y
-    x, y = along(cos, sin, xi_x, xi_y)
-    x, y = x / scale.support_x, y / scale.support_y
-    capture_error = x * x + y * y
-    terms = e.reward_terms
-    terms[0] = 1.0
-    terms[1] = np.exp(-4.0 * com_error)
-    terms[2] = np.exp(-2.0 * capture_error)
-    terms[3] = max(upright, 0.0) ** 4
-    terms[4] = np.exp(-((speed / j.quiet_speed) ** 2) / 4.0)
-    terms[5] = np.exp(-posture)
-    terms[6] = -effort
-    terms[7] = -action
-    terms[8] = -0.25 * action_rate
-    terms[9] = -1.0 if fallen else 0.0
-    if fallen:
-        for i in range(9 if diverged else 6):
-            terms[i] = 0.0
-    total = 0.0
-    for i in range(terms.shape[0]):
-        terms[i] *= j.weights[i]
-        total += terms[i]
-    e.reward[0] = total
-    e.steps[0] += 1
-    e.running[0] = not fallen and e.steps[0] < j.max_steps
+
+@dataclass(frozen=True, eq=False)
+class StepEnd(Block):
+    """The block of all that follows the last physics step of a policy step."""
+
+    judge: Judge
+    report: Program  # what a controller tells of itself to the terms that observe it
+    observe: Program  # see `observer`
+
+
+@compiled
+def end_step(end: StepEnd):
+    """Judge the step by the true state, and observe the believed one."""
+    judge_step(end.judge)
+    run(end.report)
+    run(end.observe)

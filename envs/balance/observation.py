@@ -1,24 +1,30 @@
-"""The observation: what balance is about, in the heading frame, divided by known scales."""
+"""What an observation is made of: terms, their scales, their table and their mirror image."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from poise.configs.errors import ConfigError, shown
 from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
-from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.mirror import SIDES, Mirror
+
+CLIP = 10.0  # of every entry of an observation
 
 
 @dataclass(frozen=True, eq=False)
 class Scales(Block):
-    """What the observation and the reward are measured in."""
+    """The units of the observation and the reward."""
 
     support_x: float  #: half length of the standing support polygon [m]
     support_y: float  #: half width [m]
+    per_support_x: float  #: 1 over the half length [1/m]: a product rounds alike in every kernel
+    per_support_y: float  #: [1/m]
     height: float  #: CoM height of the standing posture [m]
     velocity: float  #: 0.2 ω h [m/s]
     momentum: float  #: 0.1 m h² ω [N·m·s]
@@ -33,6 +39,8 @@ def scales(robot: RobotArrays, support: np.ndarray) -> Scales:
     return Scales(
         support_x=float(half[0]),
         support_y=float(half[1]),
+        per_support_x=float(1.0 / half[0]),
+        per_support_y=float(1.0 / half[1]),
         height=robot.height_com,
         velocity=0.2 * omega * robot.height_com,
         momentum=0.1 * robot.mass * robot.height_com**2 * omega,
@@ -41,17 +49,35 @@ def scales(robot: RobotArrays, support: np.ndarray) -> Scales:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class View(Block):
+    """The block of a term: what its kernel reads, and the part of the observation that it fills."""
+
+    robot: RobotArrays  # the robot that is believed in
+    state: StateArrays  # the believed state
+    scales: Scales
+    q_ref: np.ndarray  # (nj,) joint positions of the reference [rad]
+    v_ref: np.ndarray  # (nj,) its joint velocities [rad/s]
+    action: np.ndarray  # (na,) of the policy step that has just ended
+    views: SimViews  # the true robot: what the policy sent it (`ctrl`), what a teacher may see
+    clock: np.ndarray  # (1,) int: physics steps since the reset
+    pushes: np.ndarray  # (k, 11) of the episode, see `pack`; rows of zeros are none
+    out: np.ndarray  # (size,) the term's own entries
+
+
 # fmt: off
 Image = Literal[
-    "vector", "turn", "root vector", "root turn", "number", "joints", "feet", "between feet",
-    "actions",
+    "vector", "turn", "root vector", "root turn", "number", "joints", "motors", "feet",
+    "between feet", "actions",
 ]
 # fmt: on
+GROUND, SPACE = ("x", "y"), ("x", "y", "z")
+Entries = tuple[str, ...] | Literal["joints", "motors", "feet", "actions"]
 
 
 @dataclass(frozen=True)
 class Term:
-    """One named part of the observation vector.
+    """A named part of the observation vector of an environment.
 
     `image` is what it is to a mirror that exchanges left and right. Entries of a vector or a turn
     (an axial vector) end in x, y or z; those along the root's axes have all three.
@@ -62,38 +88,91 @@ class Term:
     unit: str
     meaning: str
     image: Image
+    kernel: Any = None  # the compiled function that fills it; None: no observation, but an action
+    view: type[Block] = View  # the block that the kernel works on
 
     @property
     def size(self) -> int:
-        """How many numbers."""
+        """The number of its entries."""
         return len(self.entries)
 
 
-def observation_terms(
-    joints: Sequence[str], soles: Sequence[str], actions: Sequence[str]
-) -> list[Term]:
-    """The parts of the observation, in order; `observe` fills them."""
-    ground, space = ("x", "y"), ("x", "y", "z")
-    joints, soles, actions = tuple(joints), tuple(soles), tuple(actions)
-    return [
-        Term("com", ground, "half support", "CoM from the middle of the soles", "vector"),
-        Term("com_height", ("z",), "0.1 h", "CoM height minus its standing value", "vector"),
-        Term("capture_point", ground, "half support", "ξ from the middle of the soles", "vector"),
-        Term("cop", ground, "half support", "CoP from the middle of the soles", "vector"),
-        Term("com_vel", space, "0.2 ω h", "CoM velocity", "vector"),
-        Term("angular_momentum", space, "0.1 m h² ω", "angular momentum about the CoM", "turn"),
-        Term("gravity", space, "1", "direction of gravity, root axes", "root vector"),
-        Term("root_rate", space, "ω", "angular velocity of the root, root axes", "root turn"),
-        Term("load", ("z",), "m g", "vertical force of the ground minus the weight", "vector"),
-        Term("joint_pos", joints, "rad", "joint position minus the reference", "joints"),
-        Term("joint_vel", joints, "3 ω", "joint velocity minus the reference's", "joints"),
-        Term("contacts", soles, "1", "1 where the foot touches the ground, else 0", "feet"),
-        Term("last_action", actions, "1", "action of the step before", "actions"),
-    ]
+@dataclass(frozen=True)
+class TermKind:
+    """A term of any robot: its entries may be one for each joint, motor, foot or action."""
+
+    name: str
+    entries: Entries
+    unit: str
+    meaning: str
+    image: Image
+    default: bool
+    kernel: Any
+    view: type[Block]
+
+    def of(self, names: Mapping[str, tuple[str, ...]]) -> Term:
+        """The term of a robot whose joints, motors, feet and actions have these `names`."""
+        entries = names[self.entries] if isinstance(self.entries, str) else self.entries
+        return Term(self.name, entries, self.unit, self.meaning, self.image, self.kernel, self.view)
 
 
-def observation_table(terms: Sequence[Term]) -> str:
-    """The terms as a table for a docstring, one row per index."""
+class Terms(dict[str, TermKind]):
+    """Terms by name, in the order in which an observation has them by default.
+
+    `add` makes one of a function that fills `out` of a `view`.
+    """
+
+    def __init__(self, known: Mapping[str, TermKind] | None = None, view: type[Block] = View):
+        super().__init__(known or {})
+        self.view = view
+
+    def add(
+        self,
+        entries: Entries,
+        unit: str,
+        meaning: str,
+        image: Image,
+        default: bool = True,
+    ) -> Callable[[Callable], Any]:
+        """A decorator: the function, compiled, is the term of its name.
+
+        Args:
+            entries: names of its numbers, or of what each of them belongs to.
+            unit: what the numbers are measured in.
+            meaning: what they are.
+            image: what they are to a mirror, see `Term`.
+            default: whether observations have the term if no list is given.
+        """
+
+        def decorate(function: Callable) -> Any:
+            kernel, name = compiled(function), function.__name__
+            self[name] = TermKind(name, entries, unit, meaning, image, default, kernel, self.view)
+            return kernel
+
+        return decorate
+
+    def choose(self, names: Sequence[str] | None, extra: Sequence[str] = ()) -> list[TermKind]:
+        """The terms of these `names`, by default all that are on by default; then the `extra` ones.
+
+        Raises ConfigError for a name that is unknown, or comes twice.
+        """
+        if names is None:
+            names = [name for name, kind in self.items() if kind.default]
+        for field, given in (("observation.terms", names), ("observation.extra", extra)):
+            for name in given:
+                if name not in self:
+                    raise ConfigError(f"unknown term {shown(name)}", field=field, choices=self)
+        chosen = [*names, *extra]
+        for name in chosen:
+            if chosen.count(name) > 1:
+                raise ConfigError(f"{shown(name)} comes twice", field="observation")
+        if not chosen:
+            raise ConfigError("needs at least one term", field="observation.terms", choices=self)
+        return [self[name] for name in chosen]
+
+
+def observation_table(terms: Iterable[Term]) -> str:
+    """The terms of an environment (`env.unwrapped.terms`) as a Markdown table, a row per index."""
     rows = ["| index | term | entry | unit | meaning |", "| --- | --- | --- | --- | --- |"]
     for term in terms:
         for entry in term.entries:
@@ -102,62 +181,44 @@ def observation_table(terms: Sequence[Term]) -> str:
     return "\n".join(rows)
 
 
+def term_table(kinds: Iterable[TermKind]) -> str:
+    """The terms of any robot as a Markdown table, a row per term."""
+    rows = ["| term | entries | unit | meaning |", "| --- | --- | --- | --- |"]
+    for kind in kinds:
+        each = kind.entries if isinstance(kind.entries, str) else ", ".join(kind.entries)
+        rows.append(f"| {kind.name} | {each} | {kind.unit} | {kind.meaning} |")
+    return "\n".join(rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Whole(Block):
+    """A whole observation."""
+
+    out: np.ndarray  # (no,)
+
+
 @compiled
-def observe(
-    robot: RobotArrays,
-    s: StateArrays,
-    scale: Scales,
-    q_ref: np.ndarray,
-    v_ref: np.ndarray,
-    last_action: np.ndarray,
-    out: np.ndarray,
-):
-    """Fill `out` with the terms of `observation_terms`, in that order, clipped to ±10."""
-    cos, sin = s.heading[0], s.heading[1]
-    ox, oy = s.origin[0], s.origin[1]
-    k = 0
-    for which in range(4):
-        if which == 0:
-            x, y = s.com[0] - ox, s.com[1] - oy
-        elif which == 1:
-            out[k] = (s.com[2] - s.origin[2] - scale.height) / (0.1 * scale.height)
-            k += 1
-            continue
-        elif which == 2:
-            x, y = s.capture_point[0] - ox, s.capture_point[1] - oy
-        else:
-            x, y = s.cop[0] - ox, s.cop[1] - oy
-        out[k] = (cos * x + sin * y) / scale.support_x
-        out[k + 1] = (cos * y - sin * x) / scale.support_y
-        k += 2
-    out[k] = (cos * s.com_vel[0] + sin * s.com_vel[1]) / scale.velocity
-    out[k + 1] = (cos * s.com_vel[1] - sin * s.com_vel[0]) / scale.velocity
-    out[k + 2] = s.com_vel[2] / scale.velocity
-    out[k + 3] = (cos * s.momentum[3] + sin * s.momentum[4]) / scale.momentum
-    out[k + 4] = (cos * s.momentum[4] - sin * s.momentum[3]) / scale.momentum
-    out[k + 5] = s.momentum[5] / scale.momentum
-    k += 6
-    for a in range(3):
-        out[k + a] = -s.root_axes[2, a]
-        out[k + 3 + a] = s.qvel[3 + a] / scale.omega
-    out[k + 6] = s.contact_wrench[2] / scale.weight - 1.0
-    k += 7
-    nj = q_ref.shape[0]
-    for j in range(nj):
-        out[k + j] = s.qpos[7 + j] - q_ref[j]
-        out[k + nj + j] = (s.qvel[6 + j] - v_ref[j]) / (3.0 * scale.omega)
-    k += 2 * nj
-    for i in range(s.contacts.shape[0]):
-        out[k + i] = s.contacts[i]
-    k += s.contacts.shape[0]
-    for a in range(last_action.shape[0]):
-        out[k + a] = last_action[a]
+def clip(whole: Whole):
+    """Every entry into [−10, 10]."""
+    out = whole.out
     for i in range(out.shape[0]):
-        out[i] = min(max(out[i], -10.0), 10.0)
+        out[i] = min(max(out[i], -CLIP), CLIP)
 
 
-def mirror_terms(terms: Sequence[Term], parts: Mapping[str, Mirror]) -> Mirror:
-    """How values of these `terms` look in the mirror; `parts` by what their `image` names."""
+def observer(
+    terms: Iterable[Term], out: np.ndarray, view: Callable[[type[Block], np.ndarray], Block]
+) -> Program:
+    """The program that fills `out` (no,) with `terms`; `view(kind, out)` makes their blocks."""
+    calls: list[tuple[Any, Block]] = []
+    first = 0
+    for term in terms:
+        calls.append((term.kernel, view(term.view, out[first : first + term.size])))
+        first += term.size
+    return Program.of([*calls, (clip, Whole(out))])
+
+
+def mirror_terms(terms: Iterable[Term], parts: Mapping[str, Mirror]) -> Mirror:
+    """The mirror image of values of these `terms`; `parts` by what their `image` names."""
     order, sign, first = [], [], 0
     for term in terms:
         part = parts[term.image] if term.image in parts else _plain(term)
@@ -168,7 +229,7 @@ def mirror_terms(terms: Sequence[Term], parts: Mapping[str, Mirror]) -> Mirror:
 
 
 def _plain(term: Term) -> Mirror:
-    """Of numbers and vectors, which keep their places, and of feet, which change them."""
+    """The image of numbers and vectors, which keep their places, and of feet, which change them."""
     places = np.arange(term.size)
     if term.image == "feet":
         return Mirror(places[::-1].copy(), np.ones(term.size))

@@ -6,14 +6,14 @@ from poise.envs.compiled.jit import compiled
 
 
 @compiled
-def copy(source, out):
+def copy(source: np.ndarray, out: np.ndarray):
     """`out[:] = source` of two vectors; NumPy's form compiles checks and their messages too."""
     for i in range(out.shape[0]):
         out[i] = source[i]
 
 
 @compiled
-def cross(a, b, out):
+def cross(a: np.ndarray, b: np.ndarray, out: np.ndarray):
     """out = a × b for arrays of three."""
     x = a[1] * b[2] - a[2] * b[1]
     y = a[2] * b[0] - a[0] * b[2]

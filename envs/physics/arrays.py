@@ -1,6 +1,6 @@
 """What compiled code sees of a robot and of one simulation: blocks of arrays.
 
-`RobotArrays` is constant and shared; `Plant` holds views into one `MjData`, which it keeps alive,
+`RobotArrays` is constant and shared. `SimViews` holds views into one `MjData` and keeps it alive,
 so a kernel reads and writes the simulation itself.
 """
 
@@ -49,12 +49,12 @@ class RobotArrays(Block):
 
     @property
     def units(self) -> Units:
-        """As of `Robot`."""
+        """The units of the robot, see `Robot`."""
         return Units(self.mass, self.gravity, self.height_com)
 
 
 @dataclass(frozen=True, eq=False)
-class Plant(Block):
+class SimViews(Block):
     """Views into one `MjData`; two addresses for the C functions."""
 
     model_address: int
@@ -81,9 +81,9 @@ class Plant(Block):
 
     def __reduce__(self) -> tuple[Any, ...]:
         data = self.data  # type: ignore[attr-defined]
-        return plant_views, (portable(data.model), portable(data))
+        return sim_views, (portable(data.model), portable(data))
 
-    def __copy__(self) -> "Plant":
+    def __copy__(self) -> "SimViews":
         return self  # views can be of this data only
 
 
@@ -127,14 +127,14 @@ def robot_arrays(robot: Robot) -> RobotArrays:
     )
 
 
-def plant_views(model: mujoco.MjModel, data: mujoco.MjData) -> Plant:
+def sim_views(model: mujoco.MjModel, data: mujoco.MjData) -> SimViews:
     """Views into `data` under their MuJoCo names."""
-    views = {field.name: getattr(data, field.name) for field in fields(Plant)[2:-1]}
+    named = {field.name: getattr(data, field.name) for field in fields(SimViews)[2:-1]}
     counts = data.warning.number  # with something else between any two
     every = as_strided(counts, (2 * len(counts) - 1,), (counts.strides[0] // 2,))
-    plant = Plant(model._address, data._address, **views, warnings=every)
-    object.__setattr__(plant, "data", data)
-    return plant
+    views = SimViews(model._address, data._address, **named, warnings=every)
+    object.__setattr__(views, "data", data)
+    return views
 
 
 def dof_chain(model: mujoco.MjModel, body: int) -> list[int]:

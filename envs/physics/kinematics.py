@@ -18,7 +18,7 @@ from poise.envs.maths.polygons import convex_hull
 from poise.envs.maths.vectors import copy
 from poise.envs.robots.soles import MAX_VERTICES
 
-from .arrays import Plant, RobotArrays
+from .arrays import RobotArrays, SimViews
 from .jacobian import point_jacobian
 
 
@@ -96,42 +96,42 @@ def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
 
 
 @compiled
-def update_state(robot: RobotArrays, plant: Plant, s: StateArrays):
-    """Fill `s` from the plant, whose position and velocity stages are current."""
-    _dynamics(robot, plant, s)
-    _momentum(robot, plant, s)
-    _soles(robot, plant, s)
-    _contact(robot, plant, s)
-    _bodies(robot, plant, s)
+def update_state(robot: RobotArrays, views: SimViews, s: StateArrays):
+    """Fill `s` from the simulation, whose position and velocity stages are current."""
+    _dynamics(robot, views, s)
+    _momentum(robot, views, s)
+    _soles(robot, views, s)
+    _contact(robot, views, s)
+    _bodies(robot, views, s)
 
 
 @compiled
-def _dynamics(robot, plant, s):
+def _dynamics(robot: RobotArrays, views: SimViews, s: StateArrays):
     nv = s.M.shape[0]
-    copy(plant.qpos, s.qpos)
-    copy(plant.qvel, s.qvel)
+    copy(views.qpos, s.qpos)
+    copy(views.qvel, s.qvel)
     for i in range(nv):
         start = robot.M_rowadr[i]
         for k in range(robot.M_rownnz[i]):
             j = robot.M_colind[start + k]
-            s.M[i, j] = plant.M[start + k]
-            s.M[j, i] = plant.M[start + k]
-        s.h[i] = plant.qfrc_bias[i] - plant.qfrc_passive[i]
+            s.M[i, j] = views.M[start + k]
+            s.M[j, i] = views.M[start + k]
+        s.h[i] = views.qfrc_bias[i] - views.qfrc_passive[i]
     for i in range(3):
         for j in range(3):
-            s.root_axes[i, j] = plant.xmat[robot.root_body, 3 * i + j]
+            s.root_axes[i, j] = views.xmat[robot.root_body, 3 * i + j]
 
 
 @compiled
-def _momentum(robot, plant, s):
+def _momentum(robot: RobotArrays, views: SimViews, s: StateArrays):
     """P, L, A and its bias: A v̇ + A_bias is the wrench of the ground about the CoM."""
     nv = s.M.shape[0]
     R = s.root_axes
     for i in range(3):
-        s.com[i] = plant.subtree_com[robot.root_body, i]
-    ox = s.com[0] - plant.qpos[0]
-    oy = s.com[1] - plant.qpos[1]
-    oz = s.com[2] - plant.qpos[2]
+        s.com[i] = views.subtree_com[robot.root_body, i]
+    ox = s.com[0] - views.qpos[0]
+    oy = s.com[1] - views.qpos[1]
+    oz = s.com[2] - views.qpos[2]
     for j in range(nv):
         fx, fy, fz = s.M[0, j], s.M[1, j], s.M[2, j]
         s.A[0, j], s.A[1, j], s.A[2, j] = fx, fy, fz
@@ -152,14 +152,14 @@ def _momentum(robot, plant, s):
     for i in range(6):
         total = 0.0
         for j in range(nv):
-            total += s.A[i, j] * plant.qvel[j]
+            total += s.A[i, j] * views.qvel[j]
         s.momentum[i] = total
     for i in range(3):
         s.com_vel[i] = s.momentum[i] / robot.mass
 
 
 @compiled
-def _soles(robot, plant, s):
+def _soles(robot: RobotArrays, views: SimViews, s: StateArrays):
     """Pose, Jacobian and velocity-product acceleration of every sole; the heading frame."""
     nc = s.sole_point.shape[0]
     s.origin[:] = 0.0
@@ -170,34 +170,34 @@ def _soles(robot, plant, s):
         for a in range(3):
             offset = 0.0
             for b in range(3):
-                offset += plant.xmat[body, 3 * a + b] * robot.sole_position[i, b]
+                offset += views.xmat[body, 3 * a + b] * robot.sole_position[i, b]
                 total = 0.0
                 for c in range(3):
-                    total += plant.xmat[body, 3 * a + c] * robot.sole_rotation[i, c, b]
+                    total += views.xmat[body, 3 * a + c] * robot.sole_rotation[i, c, b]
                 axes[a, b] = total
-            point[a] = plant.xpos[body, a] + offset
+            point[a] = views.xpos[body, a] + offset
             s.origin[a] += point[a] / nc
         forward_x += axes[0, 0]
         forward_y += axes[1, 0]
-        _sole_jacobian(robot, plant, s, i)
+        _sole_jacobian(robot, views, s, i)
     norm = np.sqrt(forward_x * forward_x + forward_y * forward_y)
     s.heading[0] = forward_x / norm if norm > 1e-9 else 1.0
     s.heading[1] = forward_y / norm if norm > 1e-9 else 0.0
 
 
 @compiled
-def _sole_jacobian(robot, plant, s, i):
+def _sole_jacobian(robot: RobotArrays, views: SimViews, s: StateArrays, i: int):
     """Rows 6i..6i+6 of J, J v and J̇ v, see `point_jacobian`."""
-    point, tree, rows = s.sole_point[i], plant.subtree_com[robot.tree_body], slice(6 * i, 6 * i + 6)
+    point, tree, rows = s.sole_point[i], views.subtree_com[robot.tree_body], slice(6 * i, 6 * i + 6)
     point_jacobian(
-        plant.cdof, plant.cdof_dot, plant.qvel, robot.chain[i], robot.chain_length[i],
+        views.cdof, views.cdof_dot, views.qvel, robot.chain[i], robot.chain_length[i],
         point[0] - tree[0], point[1] - tree[1], point[2] - tree[2],
         s.J[rows], s.J_v[rows], s.Jdot_v[rows],
     )  # fmt: skip
 
 
 @compiled
-def _contact(robot, plant, s):
+def _contact(robot: RobotArrays, views: SimViews, s: StateArrays):
     """Total ground wrench, CoP and capture point; which feet touch the ground.
 
     The ground is the only thing outside the body, and joint limits and friction do not act on
@@ -205,7 +205,7 @@ def _contact(robot, plant, s):
     root's pose before the last step, from which v has led to the present one.
     """
     R = s.root_axes
-    dt, f, v = robot.timestep, plant.qfrc_constraint, plant.qvel
+    dt, f, v = robot.timestep, views.qfrc_constraint, views.qvel
     fx, fy, fz = f[0], f[1], f[2]
     mx = f[3] - dt * (v[4] * f[5] - v[5] * f[4])
     my = f[4] - dt * (v[5] * f[3] - v[3] * f[5])
@@ -213,9 +213,9 @@ def _contact(robot, plant, s):
     nx = R[0, 0] * mx + R[0, 1] * my + R[0, 2] * mz
     ny = R[1, 0] * mx + R[1, 1] * my + R[1, 2] * mz
     nz = R[2, 0] * mx + R[2, 1] * my + R[2, 2] * mz
-    x = plant.qpos[0] - dt * v[0]
-    y = plant.qpos[1] - dt * v[1]
-    z = plant.qpos[2] - dt * v[2]
+    x = views.qpos[0] - dt * v[0]
+    y = views.qpos[1] - dt * v[1]
+    z = views.qpos[2] - dt * v[2]
     s.contact_wrench[0], s.contact_wrench[1], s.contact_wrench[2] = fx, fy, fz
     s.contact_wrench[3] = nx + y * fz - z * fy
     s.contact_wrench[4] = ny + z * fx - x * fz
@@ -231,25 +231,25 @@ def _contact(robot, plant, s):
         s.capture_point[a] = s.com[a] + s.com_vel[a] / s.omega[0]
     feet = 0.0
     for i in range(s.contacts.shape[0]):
-        found = plant.sensordata[robot.sole_sensor[i]]
+        found = views.sensordata[robot.sole_sensor[i]]
         s.contacts[i] = 1.0 if found > 0.0 else 0.0
         feet += found
-    s.other_contacts[0] = plant.sensordata[robot.ground_sensor] - feet
+    s.other_contacts[0] = views.sensordata[robot.ground_sensor] - feet
 
 
 @compiled
-def _bodies(robot, plant, s):
+def _bodies(robot: RobotArrays, views: SimViews, s: StateArrays):
     """Where the bodies are, and the axes of the degrees of freedom: what any point's J needs."""
     for i in range(s.body_position.shape[0]):
         for a in range(3):
-            s.body_position[i, a] = plant.xpos[i, a]
+            s.body_position[i, a] = views.xpos[i, a]
             for b in range(3):
-                s.body_axes[i, a, b] = plant.xmat[i, 3 * a + b]
+                s.body_axes[i, a, b] = views.xmat[i, 3 * a + b]
     for d in range(s.dof_axes.shape[0]):
         for a in range(6):
-            s.dof_axes[d, a] = plant.cdof[d, a]
-            s.dof_axes_dot[d, a] = plant.cdof_dot[d, a]
-    copy(plant.subtree_com[robot.tree_body], s.tree_com)
+            s.dof_axes[d, a] = views.cdof[d, a]
+            s.dof_axes_dot[d, a] = views.cdof_dot[d, a]
+    copy(views.subtree_com[robot.tree_body], s.tree_com)
 
 
 AIRBORNE = 0.02  # [h]: a sole without contact that is this far above the lowest one is in the air
@@ -282,7 +282,7 @@ def update_support(robot: RobotArrays, s: StateArrays):
 
 
 @compiled
-def support_distance(s: StateArrays, x, y):
+def support_distance(s: StateArrays, x: float, y: float) -> float:
     """Signed distance [m] from (x, y) to the support polygon's edge, > 0 inside."""
     distance = np.inf
     size = s.support_size[0]

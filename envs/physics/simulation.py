@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
@@ -15,46 +16,56 @@ from poise.envs.pushes.push import Kick, Push
 from poise.envs.pushes.table import TABLE_COLUMNS, apply_kicks, apply_pushes, pack
 from poise.envs.robots.robot import Robot
 
-from .arrays import Plant, RobotArrays, plant_views, robot_arrays
+from .arrays import RobotArrays, SimViews, robot_arrays, sim_views
 from .kinematics import StateArrays, allocate_state, update_state
 from .state import RobotState
 
+SOME_PUSHES = 4  # rows of a table that may grow
+
 
 @compiled
-def advance(robot: RobotArrays, plant: Plant, pushes: np.ndarray, clock: np.ndarray):
-    """One physics step with the controls in `plant.ctrl`.
+def advance(robot: RobotArrays, views: SimViews, pushes: np.ndarray, clock: np.ndarray):
+    """Take one physics step with the controls in `views.ctrl`.
 
     Enters and leaves with the position and velocity stages current, so whoever reads the state
     needs no second pass. `clock` (1,) counts steps since the reset.
     """
     dt = robot.timestep
     t = clock[0] * dt
-    plant.xfrc_applied[:, :] = 0.0
-    apply_pushes(pushes, t, dt, plant.xfrc_applied, plant.xmat)
-    mj_step2(plant.model_address, plant.data_address)
-    apply_kicks(pushes, t, dt, plant.qvel)
+    views.xfrc_applied[:, :] = 0.0
+    apply_pushes(pushes, t, dt, views.xfrc_applied, views.xmat)
+    mj_step2(views.model_address, views.data_address)
+    apply_kicks(pushes, t, dt, views.qvel)
     clock[0] += 1
-    mj_step1(plant.model_address, plant.data_address)
+    mj_step1(views.model_address, views.data_address)
 
 
 @dataclass(frozen=True, eq=False)
 class World(Block):
-    """What `Simulation.step` works on."""
+    """A simulated robot and all that moves it, for compiled code."""
 
     robot: RobotArrays
-    plant: Plant
+    views: SimViews
     state: StateArrays
-    clock: np.ndarray  # (1,) int
-    pushes: np.ndarray
-    count: np.ndarray  # (1,) int: physics steps
+    clock: np.ndarray  # (1,) int: physics steps since the reset
+    pushes: np.ndarray  # see `apply_pushes`
+    sensors: Program  # what measures, after each physics step
+    count: np.ndarray  # (1,) int: physics steps of `advance_world`
+
+
+@compiled
+def simulate(world: World, count: int):
+    """`count` physics steps with the controls in `views.ctrl`, then the state."""
+    for _ in range(count):
+        advance(world.robot, world.views, world.pushes, world.clock)
+        run(world.sensors)
+    update_state(world.robot, world.views, world.state)
 
 
 @compiled
 def advance_world(world: World):
-    """`count` physics steps, then the state."""
-    for _ in range(world.count[0]):
-        advance(world.robot, world.plant, world.pushes, world.clock)
-    update_state(world.robot, world.plant, world.state)
+    """`simulate` for a caller in Python."""
+    simulate(world, world.count[0])
 
 
 class Simulation(Copyable):
@@ -65,15 +76,38 @@ class Simulation(Copyable):
         self.model = robot.model
         self.data = mujoco.MjData(robot.model)
         self.arrays = robot_arrays(robot)
-        self.plant = plant_views(robot.model, self.data)
+        self.views = sim_views(robot.model, self.data)
         self.state_arrays = allocate_state(robot.model.nv, len(robot.soles), robot.model.nbody)
         self.clock = apart(1, dtype=np.int64)
         self._count = apart(1, dtype=np.int64)
         self.pushes: tuple[Push | Kick, ...] = ()
-        self.push_table = apart((0, TABLE_COLUMNS))
-        self._tables = {0: self.push_table}  # by number of pushes: compiled code is bound to them
+        self.push_table = apart((SOME_PUSHES, TABLE_COLUMNS))
         self._world: World | None = None
+        self.sensors = Program.of(())
         self.reset()
+
+    @property
+    def sensors(self) -> Program:
+        """The kernels that compiled code calls after every physics step; none by default."""
+        return self._sensors
+
+    @sensors.setter
+    def sensors(self, sensors: Program) -> None:
+        self._sensors, self._world = sensors, None
+
+    def world(self) -> World:
+        """The block of this simulation; the same object until `sensors` or `push_table` changes."""
+        if self._world is None or self._world.pushes is not self.push_table:
+            self._world = World(
+                robot=self.arrays,
+                views=self.views,
+                state=self.state_arrays,
+                clock=self.clock,
+                pushes=self.push_table,
+                sensors=self.sensors,
+                count=self._count,
+            )
+        return self._world
 
     @property
     def time(self) -> float:
@@ -102,7 +136,7 @@ class Simulation(Copyable):
         mujoco.mj_normalizeQuat(self.model, self.data.qpos)
         mujoco.mj_forward(self.model, self.data)
         self.clock[0] = 0
-        update_state(self.arrays, self.plant, self.state_arrays)
+        update_state(self.arrays, self.views, self.state_arrays)
         self.set_pushes(pushes)
         return self.state
 
@@ -110,18 +144,14 @@ class Simulation(Copyable):
         """Replace the schedule; starts are seconds since the reset."""
         self.pushes = tuple(pushes)
         table = pack(self.pushes, self.robot, self.state.heading_yaw)
-        if len(table) not in self._tables:
-            self._tables[len(table)] = apart(table.shape)
-        self.push_table = self._tables[len(table)]
-        self.push_table[:] = table
+        if len(table) > len(self.push_table):  # seldom: compiled code is bound to the table
+            self.push_table = apart((2 * len(table), TABLE_COLUMNS))
+        self.push_table[:] = 0.0
+        self.push_table[: len(table)] = table
 
     def step(self, torques: np.ndarray, count: int = 1) -> RobotState:
         """Apply joint torques (nu,) [N·m] for `count` physics steps."""
-        if self._world is None or self._world.pushes is not self.push_table:
-            self._world = World(
-                self.arrays, self.plant, self.state_arrays, self.clock, self.push_table, self._count
-            )
-        self.plant.ctrl[:] = torques
+        self.views.ctrl[:] = torques
         self._count[0] = count
-        advance_world(self._world)
+        advance_world(self.world())
         return self.state

@@ -9,36 +9,42 @@ from poise.envs.robots.robot import Robot
 
 from .push import Kick, Push, unit_vector
 
-TABLE_COLUMNS = 12
+# columns; of a force and a point three each
+BODY, START, DURATION, FORCE, POINT, PROFILE, KIND = 0, 1, 2, 3, 6, 9, 10
+TABLE_COLUMNS = 11
+NOTHING, PUSH, KICK = 0.0, 1.0, 2.0  # kinds; a row of zeros is no push
+SQUARE, HALF_SINE = 0.0, 1.0  # profiles
 
 
 def pack(pushes: Sequence[Push | Kick], robot: Robot, heading_yaw: float) -> np.ndarray:
-    """Table (k, 12) for the compiled kernels, one row per push.
+    """Table (k, 11) for the compiled kernels, one row per push.
 
-    Columns: body id, start, duration, peak world force x y z [N] (of a kick: world Δv [m/s]),
-    point x y z in the body frame [m], profile (0 square, 1 half-sine), kind (0 force, 1 kick),
-    spare. `heading_yaw` [rad] is the yaw of the heading frame at the reset.
+    Columns: body id, start [s], duration [s], peak world force x y z [N] (of a kick: world Δv
+    [m/s]), point x y z in the body frame [m], profile, kind. `heading_yaw` [rad] is the yaw of the
+    heading frame at the reset.
     """
     table = np.zeros((len(pushes), TABLE_COLUMNS))
     cos, sin = np.cos(heading_yaw), np.sin(heading_yaw)
     to_world = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     for row, push in zip(table, pushes, strict=True):
-        row[1] = push.start
+        row[START] = push.start
         if isinstance(push, Kick):
-            row[0] = robot.root_body_id
-            row[3:6] = push.delta_v * to_world @ unit_vector(push.direction)
-            row[10] = 1.0
+            row[BODY], row[KIND] = robot.root_body_id, KICK
+            row[FORCE : FORCE + 3] = push.delta_v * to_world @ unit_vector(push.direction)
         else:
-            row[0] = robot.model.body(push.body).id
-            row[2] = push.duration
-            row[3:6] = push.peak_force * to_world @ unit_vector(push.direction, push.elevation)
-            row[6:9] = push.point
-            row[9] = float(push.profile == "half-sine")
+            row[BODY], row[KIND] = robot.model.body(push.body).id, PUSH
+            row[DURATION] = push.duration
+            direction = unit_vector(push.direction, push.elevation)
+            row[FORCE : FORCE + 3] = push.peak_force * to_world @ direction
+            row[POINT : POINT + 3] = push.point
+            row[PROFILE] = HALF_SINE if push.profile == "half-sine" else SQUARE
     return table
 
 
 @compiled
-def apply_pushes(table, t, dt, xfrc_applied, xmat):
+def apply_pushes(
+    table: np.ndarray, t: float, dt: float, xfrc_applied: np.ndarray, xmat: np.ndarray
+):
     """Add the forces active during the step [t, t + dt) to `xfrc_applied` (nbody, 6).
 
     The force written is the mean over the step, so Σ F dt = J for any start and duration.
@@ -46,21 +52,22 @@ def apply_pushes(table, t, dt, xfrc_applied, xmat):
     torque = (R point) × force; `xmat` (nbody, 9) holds R row by row. Clear `xfrc_applied` before.
     """
     for k in range(table.shape[0]):
-        if table[k, 10] != 0.0:
+        push = table[k]
+        if push[KIND] != PUSH:
             continue
-        start, duration = table[k, 1], table[k, 2]
+        start, duration = push[START], push[DURATION]
         begin = max(t, start) - start
         end = min(t + dt, start + duration) - start
         if end <= begin:
             continue
-        if table[k, 9] == 0.0:
+        if push[PROFILE] == SQUARE:
             share = (end - begin) / dt
         else:
             rate = np.pi / duration
             share = (np.cos(rate * begin) - np.cos(rate * end)) / (rate * dt)
-        body = int(table[k, 0])
-        fx, fy, fz = share * table[k, 3], share * table[k, 4], share * table[k, 5]
-        px, py, pz = table[k, 6], table[k, 7], table[k, 8]
+        body = int(push[BODY])
+        fx, fy, fz = share * push[FORCE], share * push[FORCE + 1], share * push[FORCE + 2]
+        px, py, pz = push[POINT], push[POINT + 1], push[POINT + 2]
         R = xmat[body]
         rx = R[0] * px + R[1] * py + R[2] * pz
         ry = R[3] * px + R[4] * py + R[5] * pz
@@ -75,7 +82,7 @@ def apply_pushes(table, t, dt, xfrc_applied, xmat):
 
 
 @compiled
-def apply_kicks(table, t, dt, qvel):
+def apply_kicks(table: np.ndarray, t: float, dt: float, qvel: np.ndarray):
     """Add each kick whose start lies in the step [t, t + dt) to the root's velocity `qvel[:3]`.
 
     Call once per step; `qvel` (nv,) starts with the root's free joint (world frame). Steps are
@@ -83,7 +90,6 @@ def apply_kicks(table, t, dt, qvel):
     """
     step = np.rint(t / dt)
     for k in range(table.shape[0]):
-        if table[k, 10] == 1.0 and np.floor(table[k, 1] / dt + 1e-6) == step:
-            qvel[0] += table[k, 3]
-            qvel[1] += table[k, 4]
-            qvel[2] += table[k, 5]
+        if table[k, KIND] == KICK and np.floor(table[k, START] / dt + 1e-6) == step:
+            for a in range(3):
+                qvel[a] += table[k, FORCE + a]

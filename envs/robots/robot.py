@@ -40,6 +40,10 @@ DYNAMICS = (  # arrays of the model that its motion depends on
     *("geom_quat", "geom_size", "geom_friction", "geom_margin", "geom_solref", "geom_solimp"),
     *("geom_priority", "body_gravcomp", "actuator_trnid", "actuator_ctrlrange"),
 )
+CONTACTS = (  # the same of contacts that a model lists one by one, or rules out
+    *("pair_geom1", "pair_geom2", "pair_dim", "pair_friction", "pair_margin", "pair_gap"),
+    *("pair_solref", "pair_solreffriction", "pair_solimp", "exclude_signature"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +172,8 @@ def fingerprint(model: mujoco.MjModel, standing_qpos: np.ndarray) -> str:
     Looks, names and the versions of libraries do not enter.
     """
     digest = hashlib.sha256()
-    for array in [*(getattr(model, name) for name in DYNAMICS), standing_qpos]:
+    names = DYNAMICS + CONTACTS if model.npair or model.nexclude else DYNAMICS
+    for array in [*(getattr(model, name) for name in names), standing_qpos]:
         rounded = np.round(np.asarray(array, dtype=float), 6) + 0.0  # + 0.0: no negative zeros
         digest.update(repr(rounded.tolist()).encode())
     for name in ("timestep", "integrator", "solver", "cone", "gravity", "disableflags"):
@@ -190,7 +195,7 @@ def _prepare(
         joint.name = joint.name or f"joint{i}"
     ground = install_ground(spec, description.ground, source)
     model = _compile(spec, source)
-    check_numbers(model, DYNAMICS, source)
+    check_numbers(model, DYNAMICS + CONTACTS, source)
     _check_bodies(model, description, source)
     keyframes = {model.key(i).name: model.key_qpos[i].copy() for i in range(model.nkey)}
     for element in [*spec.keys, *spec.sensors]:  # they need not fit the new actuators

@@ -10,7 +10,9 @@ import mujoco
 from .robot import Robot, fingerprint
 
 
-def altered_robot(robot: Robot, *, friction: float | None = None, mass_error: float = 0.0) -> Robot:
+def perturbed_robot(
+    robot: Robot, *, friction: float | None = None, mass_error: float = 0.0
+) -> Robot:
     """A copy of `robot` with another sliding friction, and masses scaled by 1 + `mass_error`.
 
     Inertias scale with the masses. Postures, sizes and motors stay, so that a controller made for

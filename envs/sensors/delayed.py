@@ -1,85 +1,129 @@
-"""A simulation seen through sensors that are late, by a controller that knows other masses."""
+"""A state that is known late, and by the model of a robot that may have other masses."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Sequence
+from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError
-from poise.envs.physics.kinematics import update_state
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import apart
+from poise.envs.compiled.mujoco_calls import mj_step1
+from poise.envs.maths.vectors import copy
+from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.kinematics import StateArrays, update_state
 from poise.envs.physics.simulation import Simulation
-from poise.envs.physics.state import RobotState
-from poise.envs.pushes.push import Kick, Push
 from poise.envs.robots.robot import Robot
 
-MEASURED = ("contact_wrench", "cop", "contacts", "other_contacts")  # not from the model's own
+from .source import StateSource
 
 
-class SensedSimulation(Simulation):
-    """The true robot; `known` is what a controller believes of it.
+@dataclass(frozen=True, eq=False)
+class Delay(Block):
+    """The measurements of the last n − 1 physics steps and now, and the state that is believed.
+
+    The measurements lie in rings of n rows, the oldest one where the next one will be written.
+    """
+
+    robot: RobotArrays  # the true one
+    views: SimViews
+    state: StateArrays
+    known_robot: RobotArrays  # the one that is believed in
+    known_views: SimViews
+    known_state: StateArrays
+    next: np.ndarray  # (1,) int: the row of the next measurement
+    qpos: np.ndarray  # (n, nq)
+    qvel: np.ndarray  # (n, nv)
+    contact_wrench: np.ndarray  # (n, 6)
+    cop: np.ndarray  # (n, 2)
+    contacts: np.ndarray  # (n, nc)
+    other_contacts: np.ndarray  # (n, 1)
+
+
+def allocate_delay(true: Simulation, known: Simulation, rows: int) -> Delay:
+    """Zeroed rings of `rows` measurements."""
+    s = true.state_arrays
+    return Delay(
+        robot=true.arrays,
+        views=true.views,
+        state=s,
+        known_robot=known.arrays,
+        known_views=known.views,
+        known_state=known.state_arrays,
+        next=apart(1, dtype=np.int64),
+        qpos=apart((rows, len(s.qpos))),
+        qvel=apart((rows, len(s.qvel))),
+        contact_wrench=apart((rows, 6)),
+        cop=apart((rows, 2)),
+        contacts=apart((rows, len(s.contacts))),
+        other_contacts=apart((rows, 1)),
+    )
+
+
+@compiled
+def measure(d: Delay):
+    """Write the true positions, velocities and ground contacts over the oldest measurement."""
+    s, k = d.state, d.next[0]
+    update_state(d.robot, d.views, s)
+    copy(s.qpos, d.qpos[k])
+    copy(s.qvel, d.qvel[k])
+    copy(s.contact_wrench, d.contact_wrench[k])
+    copy(s.cop, d.cop[k])
+    copy(s.contacts, d.contacts[k])
+    copy(s.other_contacts, d.other_contacts[k])
+    d.next[0] = (k + 1) % d.qpos.shape[0]
+
+
+@compiled
+def believe_oldest(d: Delay):
+    """The state that the known robot would have with the oldest measurement."""
+    s, k = d.known_state, d.next[0]
+    copy(d.qpos[k], d.known_views.qpos)
+    copy(d.qvel[k], d.known_views.qvel)
+    mj_step1(d.known_views.model_address, d.known_views.data_address)
+    update_state(d.known_robot, d.known_views, s)
+    copy(d.contact_wrench[k], s.contact_wrench)
+    copy(d.cop[k], s.cop)
+    copy(d.contacts[k], s.contacts)
+    copy(d.other_contacts[k], s.other_contacts)
+
+
+class DelayedState(StateSource):
+    """The state of `delay` seconds ago, of a robot whose masses are thought to be others.
 
     The sensors give positions, velocities and contact forces of `delay` seconds ago (of the start,
     before that). Everything else of the believed state (masses, CoM, momentum, capture point) comes
-    from the model of the robot that the controller knows.
+    from the model of the robot that is known.
 
     Args:
-        actual: who is simulated.
-        robot: who the controller knows; the same joints and feet as `actual`.
+        simulation: the true robot in its world.
+        robot: the robot that is known; the same joints and feet as the true one.
         delay: a whole number of physics steps [s].
 
     Raises ConfigError for another delay.
     """
 
-    def __init__(self, actual: Robot, robot: Robot, delay: float = 0.0):
-        step = actual.model.opt.timestep
-        self.late = round(delay / step)
-        if self.late < 0 or abs(self.late * step - delay) > 1e-9:
-            raise ConfigError(f"{delay} s is not a whole number of steps of {step} s",
-                              field="delay")  # fmt: skip
+    def __init__(self, simulation: Simulation, robot: Robot, delay: float = 0.0):
+        super().__init__(simulation)
+        step = simulation.model.opt.timestep
+        late = round(delay / step)
+        if late < 0 or abs(late * step - delay) > 1e-9:
+            raise ConfigError(
+                f"{delay} s is not a whole number of steps of {step} s", field="sensors.delay"
+            )
+        self.delay = delay
         self.known = Simulation(robot)
-        self._history: deque[tuple[np.ndarray, ...]] = deque(maxlen=self.late + 1)
-        self._believed_at = -1  # clock
-        super().__init__(actual)
+        self.arrays, self.state_arrays = self.known.arrays, self.known.state_arrays
+        self._delay = allocate_delay(simulation, self.known, late + 1)
+        self.sense = Program.of([(measure, self._delay)])
+        self.estimate = Program.of([(believe_oldest, self._delay)])
+        self.reset()
 
-    def reset(
-        self,
-        qpos: np.ndarray | None = None,
-        qvel: np.ndarray | None = None,
-        pushes: Sequence[Push | Kick] = (),
-    ) -> RobotState:
-        """As `Simulation.reset`; the sensors show the start until the delay has passed."""
-        state = super().reset(qpos, qvel, pushes)
-        self._history.clear()
-        self._believed_at = -1
-        self._measure()
-        return state
-
-    def step(self, torques: np.ndarray, count: int = 1) -> RobotState:
-        """As `Simulation.step`, with a measurement after every physics step."""
-        state = self.state
-        for _ in range(count):
-            state = super().step(torques)
-            self._measure()
-        return state
-
-    def _measure(self) -> None:
-        s = self.state_arrays
-        arrays = (s.qpos, s.qvel, *(getattr(s, name) for name in MEASURED))
-        self._history.append(tuple(array.copy() for array in arrays))
-
-    def believe(self) -> Simulation:
-        """`known` with the state that the controller sees now; its clock is the true one."""
-        if self._believed_at == self.clock[0]:
-            return self.known
-        qpos, qvel, *measured = self._history[0]
-        known = self.known
-        known.data.qpos[:], known.data.qvel[:] = qpos, qvel
-        mujoco.mj_step1(known.model, known.data)
-        update_state(known.arrays, known.plant, known.state_arrays)
-        for name, value in zip(MEASURED, measured, strict=True):
-            getattr(known.state_arrays, name)[:] = value
-        known.clock[0] = self._believed_at = self.clock[0]
-        return known
+    def reset(self) -> None:
+        """The sensors show the simulation's present state until the delay has passed."""
+        for _ in range(len(self._delay.qpos)):
+            measure(self._delay)
+        self.update()

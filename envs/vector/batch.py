@@ -18,8 +18,8 @@ from poise.envs.compiled.calls import CompiledStep
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import apart
 
-from .scheduler import NOTHING, Turns
-from .threads import Helpers
+from .scheduler import NOTHING, StepSchedule
+from .threads import ThreadTeam
 
 
 def replicate(env: BalanceEnv, count: int) -> list[BalanceEnv]:
@@ -64,9 +64,9 @@ class EnvBatch(Copyable):
         self.rewards = np.zeros(n)
         self.terminated = np.zeros(n, dtype=bool)
         self.truncated = np.zeros(n, dtype=bool)
-        self._helpers = Helpers()
-        self._nothing = Turns(NOTHING, self.threads)
-        self._turns: tuple[list[CompiledStep], Turns] = [], self._nothing  # of those steps
+        self._helpers = ThreadTeam()
+        self._nothing = StepSchedule(NOTHING, self.threads)
+        self._turns: tuple[list[CompiledStep], StepSchedule] = [], self._nothing  # of those steps
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "_turns": ([], self._nothing)}  # they hold addresses
@@ -101,7 +101,7 @@ class EnvBatch(Copyable):
     def step(
         self, actions: np.ndarray, at_end: Callable[[int, BalanceEnv], None] | None = None
     ) -> None:
-        """One policy step of all; an episode that ends is followed by the next at once.
+        """Take a policy step of all; an episode that ends is followed by the next at once.
 
         Its outcome are `observations`, `rewards`, `terminated`, `truncated` and, where an episode
         ended, `final_observations`. `at_end(i, env)` sees a finished episode before its reset.
@@ -119,7 +119,7 @@ class EnvBatch(Copyable):
         self.observations = self.episodes.observation.astype(np.float32)
 
     def advance(self, actions: np.ndarray, restart: np.ndarray | None = None) -> None:
-        """One policy step of all but those of `restart` (n,), which start an episode instead.
+        """Take a policy step of all but those of `restart` (n,), which start an episode instead.
 
         The action of a restarted environment is not looked at; its reward is 0. Nothing else is
         reset. Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
@@ -146,15 +146,15 @@ class EnvBatch(Copyable):
         self._report()
 
     def _report(self) -> None:
-        """What the records say; those of a new episode are clear."""
+        """Copy what the records say; the record of a new episode is empty."""
         record = self.episodes
         self.observations = record.observation.astype(np.float32)
         self.rewards = record.reward[:, 0].copy()
         self.terminated = record.metrics[:, FALLEN] != 0.0
         self.truncated = (record.running[:, 0] == 0) & ~self.terminated
 
-    def _compiled_steps(self, played: Sequence[int]) -> Turns | None:
-        """Turns at the steps of `played`; None if Python has to take them."""
+    def _compiled_steps(self, played: Sequence[int]) -> StepSchedule | None:
+        """StepSchedule at the steps of `played`; None if Python has to take them."""
         steps = [self.envs[i].compiled_step() for i in played]
         known, turns = self._turns
         if steps == known:  # the same objects, as long as nobody was bound anew
@@ -163,11 +163,11 @@ class EnvBatch(Copyable):
         if len(found) < len(steps):
             return None
         rows = np.array([step.row() for step in found], dtype=np.int64).reshape(-1, 3)
-        self._turns = found, Turns(rows, self.threads)
+        self._turns = found, StepSchedule(rows, self.threads)
         return self._turns[1]
 
     def _set_actions(self, actions: np.ndarray, live: Any) -> None:
-        """What `BalanceEnv.set_action` does, for these rows at once."""
+        """Set the actions of these rows at once, as `BalanceEnv.set_action` does."""
         record = self.episodes
         vectors = real_array(actions)
         if vectors is None:
@@ -193,7 +193,7 @@ class EnvBatch(Copyable):
         self.envs[i].reset(seed=seed, options=options)
 
     def _share(
-        self, work: Callable[[int], None], indices: Iterable[int], turns: Turns | None = None
+        self, work: Callable[[int], None], indices: Iterable[int], turns: StepSchedule | None = None
     ) -> None:
         """Call `work` with every index and play all `turns`, in all threads.
 

@@ -10,7 +10,7 @@ from poise.envs.compiled.atomics import look_at, swap, take_turn
 from poise.envs.compiled.calls import call, play_one
 from poise.envs.compiled.jit import compiled
 
-from .threads import Helpers, tell_of_fork
+from .threads import ThreadTeam, tell_of_fork
 
 SPLIT = 1  # steps for each thread that are shared out tick by tick at the end
 MANY = 6  # steps for each thread from which on that is worth its while
@@ -24,8 +24,8 @@ LINE = 8  # integers that a cache line holds
 NOTHING = np.zeros((0, 3), dtype=np.int64)  #: no steps
 
 
-class Turns:
-    """Who takes which of `steps` (n, 3), rows of `CompiledStep`, in `threads` threads.
+class StepSchedule:
+    """A schedule of `steps` (n, 3), rows of `CompiledStep`, for `threads` threads.
 
     A thread plays those of its own queue, which stay in its cache from call to call, then helps the
     others; at last all of them play some steps tick by tick, so that none waits for a whole step
@@ -48,10 +48,10 @@ class Turns:
     def __reduce__(self) -> tuple[Any, ...]:
         if len(self.steps):
             raise PoiseError("turns hold addresses: copy the environments that they are of")
-        return Turns, (NOTHING, len(self.turns))
+        return StepSchedule, (NOTHING, len(self.turns))
 
     def forget_threads(self) -> None:
-        """Nobody plays or waits: those who did are threads of another process."""
+        """Mark that nobody plays or waits: the threads that did are another process's."""
         self.calls[:] = AWAY
         self.taken[:] = 0
 
@@ -64,7 +64,7 @@ class Turns:
         """A thread's part; returns when what is left is in the hands of others."""
         play(self.steps, self.ends, self.turns, self.done, self.taken, thread)
 
-    def play_all(self, helpers: Helpers) -> None:
+    def play_all(self, helpers: ThreadTeam) -> None:
         """Every step once, in this thread and as many `helpers` as there are threads."""
         self.begin()
         called = range(1, min(len(self.turns), len(self.steps)))
@@ -92,7 +92,7 @@ def play(
     steps: np.ndarray, ends: np.ndarray, turns: np.ndarray,
     done: np.ndarray, taken: np.ndarray, thread: int,
 ):  # fmt: skip
-    """See `Turns`."""
+    """Play a thread's part of a `StepSchedule`."""
     queues, split = turns.shape[0], done.shape[0]
     for i in range(queues):
         queue = (thread + i) % queues
@@ -126,7 +126,7 @@ def call_waiting(calls: np.ndarray, played: np.ndarray, thread: int):
 
 @compiled
 def has_played(played: np.ndarray, thread: int):
-    """Whether a helper has done its part; looks for a while."""
+    """True once a helper has done its part; looks for a while."""
     for _ in range(PATIENCE):
         if look_at(played, LINE * thread) == 1:
             return True

@@ -26,7 +26,7 @@ if hasattr(os, "register_at_fork"):  # not on Windows
     os.register_at_fork(after_in_child=_forget)
 
 
-class Helpers:
+class ThreadTeam:
     """Threads that share some work with the one that asks for it; they start when first asked.
 
     A copy, and what a forked process has of it, starts threads of its own.
@@ -39,10 +39,10 @@ class Helpers:
         tell_of_fork(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Helpers, ()
+        return ThreadTeam, ()
 
     def forget_threads(self) -> None:
-        """As if none had been asked: they are threads of another process."""
+        """Forget those who have been asked: they are threads of another process."""
         self._calls.clear()
         self._threads.clear()
 

@@ -12,7 +12,8 @@ from gymnasium.vector.utils import batch_space
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import option_mapping, seed_number, whole_number
-from poise.envs.balance.base import BalanceEnv, InfoColumns
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.info import InfoColumns
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.compiled.copies import Copyable
 
@@ -109,7 +110,7 @@ class BalanceVectorEnv(Copyable, VectorEnv):
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """One policy step of all with `actions` (n, na).
+        """Take a policy step of all with `actions` (n, na).
 
         Raises ConfigError for actions that are not valid (nothing has moved then), PoiseError
         before the first reset.
@@ -165,7 +166,7 @@ class BalanceVectorEnv(Copyable, VectorEnv):
         return tuple(env.np_random_seed for env in self.envs)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """What the method `name` of each environment returns, or its attribute `name`."""
+        """Call the method `name` of each environment, or get its attribute `name`."""
         found = [getattr(env, name) for env in self.envs]
         return tuple(each(*args, **kwargs) if callable(each) else each for each in found)
 
@@ -234,7 +235,7 @@ def make_vector_env(
     autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     **arguments: Any,
 ) -> BalanceVectorEnv:
-    """What `gymnasium.make_vec` calls: `num_envs` environments that share one robot.
+    """Make `num_envs` environments that share one robot, for `gymnasium.make_vec`.
 
     `threads` defaults to the processor's cores that this process may use; `arguments` are those
     of a single environment. Raises ConfigError naming what is wrong.

@@ -21,6 +21,7 @@ import mujoco
 import numpy as np
 
 from poise.envs.physics.simulation import Simulation
+from poise.envs.pushes.table import BODY, DURATION, FORCE, KICK, KIND, NOTHING, POINT, START
 
 AMBER = (0.902, 0.624, 0.0)
 BLACK = (0.05, 0.05, 0.05)
@@ -66,15 +67,18 @@ def push_arrows(simulation: Simulation) -> list[Mark]:
     """An arrow for every push that acts, or has ended less than `FADE` seconds ago."""
     weight = simulation.robot.mass * simulation.arrays.gravity
     size = simulation.robot.height_com
-    plant, found = simulation.plant, []
+    views, found = simulation.views, []
     for row in simulation.push_table:
-        body, start, duration, vector, is_kick = int(row[0]), row[1], row[2], row[3:6], row[10]
+        if row[KIND] == NOTHING:
+            continue
+        body, start, duration = int(row[BODY]), row[START], row[DURATION]
+        vector, is_kick = row[FORCE : FORCE + 3], row[KIND] == KICK
         age = simulation.time - start
         opacity = 1.0 - max(age - duration, 0.0) / FADE
         force = float(np.linalg.norm(vector))
         if age < -1e-9 or opacity <= 0.0 or force == 0.0:
             continue
-        tip = plant.xipos[body] + plant.xmat[body].reshape(3, 3) @ row[6:9]
+        tip = views.xipos[body] + views.xmat[body].reshape(3, 3) @ row[POINT : POINT + 3]
         share = (simulation.robot.mass / KICK_TIME if is_kick else 1.0) * force / weight
         length = size * float(np.clip(ARROW_GAIN * share, *ARROW_LENGTHS))
         tail = tip - length * vector / force

@@ -21,7 +21,7 @@ def follow(motion, direction=None):
     env.reset(seed=0, options={"push": pushes, "noise": 0.0})
     errors, references = [], []
     for _ in range(env.max_steps):
-        env.step_in_place(np.zeros(4))
+        env.step_without_info(np.zeros(4))
         assert not env.fallen
         state, targets = env.simulation.state, env.targets
         turn = 0.5 * (np.trace(state.root_axes.T @ targets.root_axes) - 1.0)

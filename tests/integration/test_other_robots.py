@@ -18,7 +18,7 @@ def trial(name, push, duration):
                 "start": 0.3, "body": body}  # fmt: skip
     env.reset(seed=0, options={"push": push})
     for _ in range(env.max_steps):
-        env.step_in_place(np.zeros(4))
+        env.step_without_info(np.zeros(4))
         if env.fallen:
             break
     return env

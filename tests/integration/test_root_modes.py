@@ -54,7 +54,7 @@ def test_a_soft_root_never_falls(robot, direction):
         env = ResidualBalanceEnv(robot, controller=config, pushes=None, duration=2.0)
         env.reset(seed=0, options={"push": push})
         for _ in range(env.max_steps):
-            env.step_in_place(np.zeros(4))
+            env.step_without_info(np.zeros(4))
             if env.fallen:
                 break
         fell[root] = env.fallen

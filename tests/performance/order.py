@@ -33,7 +33,7 @@ def play(name: str) -> tuple[Course, bool]:
         over = fell or ended
         s = env.simulation.state
         heel = float(s.support_polygon[:, 0].min()) if len(s.support_polygon) else np.nan
-        torque = np.abs(env.simulation.plant.ctrl) / env.robot.torque_limit
+        torque = np.abs(env.simulation.views.ctrl) / env.robot.torque_limit
         rows.append(
             (s.time, heel - s.capture_point[0], s.cop[0] - heel, s.angular_momentum[1],
              torque.max())

@@ -41,7 +41,7 @@ def record(seconds: float = 1.5, every: int = 10) -> tuple[ResidualBalanceEnv, l
             ticks: list[Tick] = []
             ended = False
             while not ended:
-                _, fallen, truncated = env.step_in_place(action)
+                _, fallen, truncated = env.step_without_info(action)
                 ended = fallen or truncated
                 if env.simulation.time > 0.1 and env.steps % every == 0 and not fallen:
                     state = env.simulation.state.copy()

@@ -56,7 +56,7 @@ class Rig:
 
     def __init__(self, robot: Robot, simulation: Simulation):
         self.controller = MomentumQP(robot)
-        self.plant = simulation.plant
+        self.views = simulation.views
         self.s = allocate_state(robot.model.nv, len(robot.soles), robot.model.nbody)
         self.state = RobotState(self.controller.arrays, self.s)
         self.update()
@@ -64,7 +64,7 @@ class Rig:
         self.times: dict[str, list[float]] = {"tick": [], "state": [], "active": []}
 
     def update(self) -> None:
-        update_state(self.controller.arrays, self.plant, self.s)
+        update_state(self.controller.arrays, self.views, self.s)
 
     def tick(self) -> np.ndarray:
         """Torques of every motor; what it took is remembered."""

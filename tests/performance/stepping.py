@@ -50,7 +50,7 @@ def play(env, push) -> list[float]:
     action, times, ended = np.zeros(env.action_space.shape), [], False
     while not ended:
         begun = time.thread_time()
-        _, fallen, over = env.step_in_place(action)
+        _, fallen, over = env.step_without_info(action)
         times.append(time.thread_time() - begun)
         ended = fallen or over
     return times

@@ -11,7 +11,7 @@ import numpy as np
 
 from poise.baselines.whole_body.momentum_qp import MomentumQP, momentum_tick
 from poise.envs.compiled.mujoco_calls import mj_step1
-from poise.envs.physics.arrays import plant_views
+from poise.envs.physics.arrays import sim_views
 from poise.envs.physics.kinematics import allocate_state, update_state
 from tests.performance.recoveries import Tick
 
@@ -40,11 +40,11 @@ def _now(buffer):
 
 
 @numba.njit(nogil=True)
-def _timed_tick(robot, plant, s, tick, buffer, times):
+def _timed_tick(robot, views, s, tick, buffer, times):
     start = _now(buffer)
-    mj_step1(plant.model_address, plant.data_address)
+    mj_step1(views.model_address, views.data_address)
     kinematics = _now(buffer)
-    update_state(robot, plant, s)
+    update_state(robot, views, s)
     state = _now(buffer)
     momentum_tick(tick)  # with the ground's forces, which are recorded
     times[0], times[1] = kinematics - start, state - kinematics
@@ -58,7 +58,7 @@ class TickClock:
         self.controller = controller
         self.model = controller.robot.model
         self.data = mujoco.MjData(self.model)
-        self.plant = plant_views(self.model, self.data)
+        self.views = sim_views(self.model, self.data)
         self.state = allocate_state(self.model.nv, len(controller.robot.soles), self.model.nbody)
         self._buffer = np.zeros(2, dtype=np.int64)
 
@@ -68,7 +68,7 @@ class TickClock:
         self.data.qpos[:] = tick.state.qpos
         self.data.qvel[:] = tick.state.qvel
         _timed_tick(
-            controller.arrays, self.plant, self.state,
+            controller.arrays, self.views, self.state,
             controller.tick(tick.state, tick.targets), self._buffer, times,
         )  # fmt: skip
         return TickTimes(*times.tolist())

@@ -14,7 +14,6 @@ import numpy as np
 
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.environments.sensed import sensed_env
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.registry import load_controller
 from poise.configs.files import packaged
@@ -22,7 +21,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
-from poise.envs.sensors.delayed import SensedSimulation
+from poise.envs.sensors.delayed import DelayedState
 from poise.envs.vector.batch import EnvBatch, replicate
 from poise.envs.vector.vector_env import BalanceVectorEnv
 from poise.training.learning.policy import load_policy
@@ -86,6 +85,13 @@ def play_simulation(simulation: Any) -> list[Any]:
     return [simulation.data.qpos.copy(), simulation.time, *play_state(simulation.state)]
 
 
+def play_source(source: Any) -> list[Any]:
+    """Torques for a while, and what is believed then."""
+    seen = play_simulation(source.simulation)
+    source.update()
+    return [*seen, *play_state(source.state)]
+
+
 def play_state(state: Any) -> list[Any]:
     """All that it says."""
     return [*(array.copy() for array in state.arrays.members()), state.support_polygon, state.time]
@@ -131,11 +137,9 @@ def env_of(kind: type[BalanceEnv], **arguments: Any) -> BalanceEnv:
     return kind(robot(), pushes=PUSHES, **arguments)
 
 
-def _sensed(env: BalanceEnv) -> BalanceEnv:
-    sensed = sensed_env(env)
-    sensed.push_sampler = env.push_sampler
-    sensed.set_plant(robot(), 0.01)
-    return _begin(sensed)
+def _late(env: BalanceEnv) -> BalanceEnv:
+    env.state_source = DelayedState(env.simulation, robot(), 0.01)
+    return _begin(env)
 
 
 def _several(kind: type[BalanceEnv], **arguments: Any) -> list[BalanceEnv]:
@@ -167,10 +171,12 @@ def _state() -> RobotState:
     return _begin(env_of(TorqueBalanceEnv)).simulation.state
 
 
-def _late() -> SensedSimulation:
-    simulation = SensedSimulation(robot(), robot(), 0.01)
-    play_simulation(simulation)
-    return simulation
+def _source() -> DelayedState:
+    simulation = Simulation(robot())
+    source = DelayedState(simulation, robot(), 0.01)
+    simulation.sensors = source.sense
+    play_source(source)
+    return source
 
 
 def _running() -> Simulation:
@@ -183,9 +189,9 @@ KINDS: dict[str, tuple[Callable[[], Any], Callable[[Any], list[Any]]]] = {
     "torque": (lambda: _begin(env_of(TorqueBalanceEnv)), play_env),
     "residual": (lambda: _begin(env_of(ResidualBalanceEnv, smoothing=0.1, gate=0.02)), play_env),
     "step": (lambda: _begin(env_of(ResidualStepEnv, smoothing=0.1)), play_env),
-    "sensed torque": (lambda: _sensed(env_of(TorqueBalanceEnv)), play_env),
-    "sensed residual": (lambda: _sensed(env_of(ResidualBalanceEnv)), play_env),
-    "sensed step": (lambda: _sensed(env_of(ResidualStepEnv)), play_env),
+    "late torque": (lambda: _late(env_of(TorqueBalanceEnv)), play_env),
+    "late residual": (lambda: _late(env_of(ResidualBalanceEnv)), play_env),
+    "late step": (lambda: _late(env_of(ResidualStepEnv)), play_env),
     "wrapped": (_wrapped, play_env),
     "one of many": (lambda: _vector(ResidualBalanceEnv).envs[2], play_env),
     "vector": (lambda: _vector(ResidualBalanceEnv), play_many),
@@ -193,7 +199,7 @@ KINDS: dict[str, tuple[Callable[[], Any], Callable[[Any], list[Any]]]] = {
     "SB3": (_threaded, play_many),
     "batch": (_batch, play_many),
     "simulation": (_running, play_simulation),
-    "late simulation": (_late, play_simulation),
+    "state source": (_source, play_source),
     "robot": (robot, play_robot),
     "state": (_state, play_state),
     "policy": (load_policy, play_policy),

@@ -39,7 +39,7 @@ def random_state(robot: Robot, rng: np.random.Generator) -> tuple[np.ndarray, np
 def forward(simulation: Simulation) -> RobotState:
     """The state with accelerations and contact forces of this very instant, not the last step."""
     mujoco.mj_forward(simulation.model, simulation.data)
-    update_state(simulation.arrays, simulation.plant, simulation.state_arrays)
+    update_state(simulation.arrays, simulation.views, simulation.state_arrays)
     return simulation.state
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from poise.envs.balance.base import EnvConfig
-from poise.envs.balance.episode import FallLimits
+from poise.envs.balance.termination import FallLimits
 from poise.envs.physics.simulation import Simulation
 from poise.envs.pushes.sampler import PushSampler
 from poise.envs.robots.robot import Robot, load_robot

@@ -60,7 +60,7 @@ class _Clock:
             push = {"specific_impulse": 0.2, "start": 0.05}
             observation, _ = env.reset(seed=seed, options={"push": push})
             for _ in range(round(SECONDS / env.config.policy_period)):
-                env.step_in_place(act(observation))
+                env.step_without_info(act(observation))
                 observation = env.episode.observation.astype(np.float32)
                 if env.fallen:
                     break

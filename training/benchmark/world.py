@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from poise.baselines.environments.sensed import SensedResidualEnv, SensedTorqueEnv, sensed_env
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.simulation import Simulation
-from poise.envs.robots.variants import altered_robot
+from poise.envs.robots.variants import perturbed_robot
+from poise.envs.sensors.delayed import DelayedState
 from poise.training.statistics.eurobench import body_sway, recovery_time, sway_angle
 from poise.training.trials.players import Player
 from poise.training.trials.stage import Stage
@@ -63,30 +63,29 @@ def play_case(player: BenchmarkPlayer, case: Case, watch: Any = None) -> Result:
 
 
 class BenchmarkPlayer:
-    """A player in the standard world, and in others: each has its environment, built when needed.
+    """A player in the standard world, and in others.
 
-    Without a delay and with the masses that the controller knows, the environment is the one of
-    `poise evaluate`, and its fast path.
+    The environment stays that of `poise evaluate`; its simulation and its state source are those of
+    the case.
     """
 
     def __init__(self, player: Player):
         self.player = player
         self.standard = player.env.simulation
-        self._sensed: SensedResidualEnv | SensedTorqueEnv | None = None
 
     def prepare(self, case: Case) -> Player:
         """The player with an environment whose world is that of the case."""
         env = self.player.env
-        if case.mass_error == 0.0 and case.delay == 0.0:
+        known = case.mass_error == 0.0  # the controller's masses are the true ones
+        if known and case.friction is None:
             env.simulation = self.standard
-            if case.friction is not None:
-                env.simulation = Simulation(altered_robot(env.robot, friction=case.friction))
-            return self.player
-        if self._sensed is None:
-            self._sensed = sensed_env(env)
-        actual = altered_robot(env.robot, friction=case.friction, mass_error=case.mass_error)
-        self._sensed.set_plant(actual, case.delay)
-        return replace(self.player, env=self._sensed)
+        else:
+            env.simulation = Simulation(
+                perturbed_robot(env.robot, friction=case.friction, mass_error=case.mass_error)
+            )
+        if not known or case.delay > 0.0:
+            env.state_source = DelayedState(env.simulation, env.robot, case.delay)
+        return self.player
 
 
 _players: dict[tuple[Stage, str], BenchmarkPlayer] = {}  # of this process

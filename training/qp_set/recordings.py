@@ -96,7 +96,7 @@ def recoveries(robot: Robot, controller: str, limits: PushLimits, seed: int) -> 
         env.reset(seed=start, options={"push": [push]})
         ended = False
         while not ended:
-            _, fallen, truncated = env.step_in_place(action)
+            _, fallen, truncated = env.step_without_info(action)
             ended = fallen or truncated
         end: End = "fell" if env.fallen else "recovered" if env.recovered else "not quiet"
         yield Recovery(push, start, end, recorder.ticks, recorder.met)

@@ -28,7 +28,7 @@ class Signals:
             cos, sin = state.heading
             self._origin, self._axes = state.origin[:2].copy(), np.array([[cos, -sin], [sin, cos]])
         support = self._local(state.support_polygon)
-        load = np.abs(env.simulation.plant.ctrl) / env.robot.torque_limit
+        load = np.abs(env.simulation.views.ctrl) / env.robot.torque_limit
         momentum = state.angular_momentum
         self._rows.append((
             env.simulation.time,

@@ -123,7 +123,7 @@ def run_trial(
         if watch is not None:
             watch(env)
         action = player.act(observation)
-        _, terminated, truncated = env.step_in_place(action)
+        _, terminated, truncated = env.step_without_info(action)
         observation = env.episode.observation.astype(np.float32)
         done = terminated or truncated
         touchdowns.update(state.contacts)

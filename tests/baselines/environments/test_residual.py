@@ -1,13 +1,14 @@
 """The residual environment: what the action moves, and what it leaves alone."""
 
 import inspect
+import re
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from poise.baselines.controller import Targets
-from poise.baselines.environments.policy_step import openness
+from poise.baselines.environments.policy_step import gate_opening
 from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.targets import Motion, update_targets
@@ -16,8 +17,7 @@ from poise.baselines.whole_body.gains import CoMTask
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import EnvConfig
-from poise.envs.balance.episode import RewardWeights
-from poise.envs.balance.observation import observation_table
+from poise.envs.balance.reward import RewardWeights
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.vector.batch import replicate
@@ -239,9 +239,11 @@ def test_failures_of_the_solver_are_counted_per_episode(env):
 
 
 def test_the_class_docstring_is_the_specification(env):
-    """Its tables are those that the code builds for the default robot."""
+    """Its tables tell of every term and, for the default scales, of every entry of an action."""
     text = inspect.getdoc(ResidualBalanceEnv)
-    assert observation_table(env.terms) in text, observation_table(env.terms)
+    for term in env.terms:
+        assert f"| {term.name} |" in text and f"| {term.unit} | {term.meaning} |" in text
+    assert not re.search(r"<\w+>", text)
     for i, (name, scale) in enumerate(zip(env.action_names, env._residual.scale, strict=True)):
         field = name.split("_")[0]
         assert f"| {i} | {name} | `residual.{field}`, {scale:g} m |" in text
@@ -285,7 +287,7 @@ def test_the_gate_opens_with_the_capture_point():
     reference = s.origin[:2] + env._com_offset * s.heading
     for distance, share in ((0.0, 0.0), (0.04, 1.0 - np.exp(-1.0)), (0.4, 1.0)):
         s.capture_point[:] = reference + distance * np.array([0.6, -0.8])
-        opened = openness(env._residual, s, env._motion, env._com_offset)
+        opened = gate_opening(env._residual, s, env._motion, env._com_offset)
         assert opened == pytest.approx(share, abs=1e-9)
 
 

@@ -1,17 +1,18 @@
 """`ResidualStepEnv`: zero is the planner, every other action moves what it says."""
 
 import inspect
+import re
 
 import numpy as np
 import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.environments.sensed import sensed_env
 from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
 from poise.baselines.stepping import offsets
 from poise.baselines.stepping.guidance import copy_targets, guide
 from poise.configs.errors import ConfigError
-from poise.envs.balance.observation import observation_table
+from poise.envs.sensors.delayed import DelayedState
+from poise.envs.sensors.source import StateSource
 from poise.envs.vector.batch import EnvBatch, replicate
 from tests.support.shared import robot
 
@@ -32,7 +33,7 @@ def play(env, action=(), seed=2, until=None):
     env.reset(seed=seed, options={"push": PUSH})
     done = False
     while not done and not (until and until(env)):
-        _, fallen, over = env.step_in_place(vector)
+        _, fallen, over = env.step_without_info(vector)
         done = fallen or over
 
 
@@ -97,7 +98,7 @@ def test_threads_do_not_share_anything():
     for k, end in enumerate(ends):
         alone.reset(seed=k, options=options[k])
         for _ in range(29):
-            alone.step_in_place(actions[k])
+            alone.step_without_info(actions[k])
         np.testing.assert_array_equal(alone.simulation.data.qpos, end)
 
 
@@ -137,7 +138,7 @@ def test_the_time_of_a_step_moves_by_what_is_added_once(env, sign):
         play(env, {"time": 0.5 * value}, until=swinging)
         duration = env.controller.swing.duration
         for _ in range(3):
-            env.step_in_place(env.episode.action.copy())
+            env.step_without_info(env.episode.action.copy())
         ends.append((duration, env.controller.swing.duration))
     first, later = np.diff(ends, axis=0)[0]
     assert first == pytest.approx(sign * 0.5 * ALL.time, abs=1e-9)
@@ -164,7 +165,7 @@ def test_targets_of_a_step_are_moved(env, name, index, part):
         play(env, until=swinging)
         vector = np.zeros(len(env.action_names))
         vector[env.action_names.index(name)] = value
-        env.step_in_place(vector)
+        env.step_without_info(vector)
         seen.append(np.array(getattr(env.controller._guided, part))[..., index].copy())
     assert np.abs(seen[1] - seen[0]).max() > 5e-3
 
@@ -220,14 +221,14 @@ def test_a_replica_acts_alike(env):
     np.testing.assert_array_equal(ends[0], ends[1])
 
 
-def test_sensors_keep_the_kind_of_environment(env):
+def test_perfect_sensors_change_no_step(env):
     """With perfect sensors of the same robot the trial is the same."""
-    sensed = sensed_env(env)
-    sensed.set_plant(robot(), 0.0)
     ends = []
-    for one in (env, sensed):
-        play(one, {"foothold_x": 0.5})
-        ends.append(one.episode.observation.copy())
+    for sensors in (StateSource, lambda simulation: DelayedState(simulation, robot(), 0.0)):
+        env.state_source = sensors(env.simulation)
+        play(env, {"foothold_x": 0.5})
+        ends.append(env.episode.observation.copy())
+    env.state_source = StateSource(env.simulation)
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-6)
 
 
@@ -238,11 +239,11 @@ def test_controllers_that_do_not_step_are_refused():
 
 
 def test_the_class_docstring_is_the_specification():
-    """Its tables are those that the code builds for the default robot."""
+    """Its tables tell of every term and, for the default scales, of every entry of an action."""
     text, env = inspect.getdoc(ResidualStepEnv), ResidualStepEnv(robot())
-    table = observation_table(env.terms).splitlines()
-    added = next(i for i, row in enumerate(table) if "| swing | left |" in row)
-    assert "\n".join([*table[:2], *table[added:]]) in text, "\n".join(table[added:])
+    for term in env.terms:
+        assert f"| {term.name} |" in text and f"| {term.unit} | {term.meaning} |" in text
+    assert not re.search(r"<\w+>", text)
     for i, (name, scale) in enumerate(zip(env.action_names, env._residual.scale, strict=True)):
         field, unit = name.split("_")[0], "s" if name == "time" else "m"
         assert f"| {i} | {name} | `residual.{field}`, {scale:g} {unit} |" in text

@@ -80,7 +80,7 @@ def test_every_packaged_controller_takes_a_light_push(name):
     push = {"impulse": 4.0, "direction": 90.0, "duration": 0.1, "start": 0.3, "body": "torso"}
     env.reset(seed=0, options={"push": push})
     for _ in range(env.max_steps):
-        _, terminated, _ = env.step_in_place(np.zeros(4))
+        _, terminated, _ = env.step_without_info(np.zeros(4))
         assert not terminated
     assert getattr(env.controller, "failures", 0) == 0
 
@@ -91,7 +91,7 @@ def test_every_packaged_controller_suits_another_robot(name):
     env = ResidualBalanceEnv(robot("tall"), controller=name, pushes=None, duration=0.5)
     env.reset(seed=0)
     for _ in range(env.max_steps):
-        _, terminated, _ = env.step_in_place(np.zeros(4))
+        _, terminated, _ = env.step_without_info(np.zeros(4))
         assert not terminated
 
 

@@ -23,7 +23,7 @@ def stands(controller, seconds=2.0):
     env.reset(seed=3)
     done = False
     while not done:
-        _, terminated, truncated = env.step_in_place(np.zeros(4))
+        _, terminated, truncated = env.step_without_info(np.zeros(4))
         done = terminated or truncated
     return env.recovered
 

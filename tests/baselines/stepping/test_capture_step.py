@@ -28,7 +28,7 @@ def trial(controller, impulse, direction, seed=0, duration=4.0, watch=None, late
     env.reset(seed=seed, options={"push": [push, *later]})
     done, action = False, np.zeros(4)
     while not done:
-        _, fallen, over = env.step_in_place(action)
+        _, fallen, over = env.step_without_info(action)
         done = fallen or over
         if watch is not None:
             watch(env)
@@ -220,7 +220,7 @@ def test_a_step_at_the_first_tick_does_not_know_the_trial_before():
         qvel[0] = 1.3
         env.reset(options={"push": [], "qpos": robot().standing_qpos, "qvel": qvel})
         for _ in range(10):
-            env.step_in_place(np.zeros(4))
+            env.step_without_info(np.zeros(4))
         assert controller.steps >= 1
         ends.append(env.simulation.data.qpos.copy())
     np.testing.assert_array_equal(*ends)

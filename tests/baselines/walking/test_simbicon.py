@@ -114,7 +114,7 @@ def test_it_marks_time():
     heights = np.zeros(2)
     start = state.com[:2].copy()
     for _ in range(env.max_steps):
-        _, fallen, _ = env.step_in_place(np.zeros(4))
+        _, fallen, _ = env.step_without_info(np.zeros(4))
         assert not fallen
         heights = np.maximum(heights, state.sole_points[:, 2])
     assert 6 <= env.controller.steps <= 15

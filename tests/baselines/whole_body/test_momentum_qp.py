@@ -172,7 +172,7 @@ def test_accelerations_are_those_of_the_simulator(robot):
     env = ResidualBalanceEnv(robot, controller="momentum-qp", motion="arm_swing", pushes=None)
     env.reset(seed=0, options={"noise": 0.0})
     for _ in range(40):
-        env.step_in_place(np.zeros(4))
+        env.step_without_info(np.zeros(4))
     qp, simulation = env.controller, env.simulation
     errors, sizes = [], []
     for _ in range(20):

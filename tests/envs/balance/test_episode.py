@@ -1,40 +1,61 @@
 """Falls, quiet time, effort and the reward of one policy step."""
 
+import mujoco
 import numpy as np
 import pytest
 
 from poise.envs.balance import episode
 from poise.envs.balance.episode import (
     METRICS,
-    REWARD_TERMS,
-    FallLimits,
-    RewardWeights,
+    Judge,
     allocate_episode,
     begin_episode,
-    has_fallen,
-    judge,
     judge_step,
     record_tick,
 )
 from poise.envs.balance.observation import scales
+from poise.envs.balance.reward import REWARD_TERMS, RewardView, RewardWeights, rewards
+from poise.envs.balance.termination import FallLimits, episode_limits, has_fallen
 from poise.envs.physics.simulation import Simulation
 from tests.support.shared import generic_state, robot
+
+
+def new_episode(actions, nc=2):
+    """An empty record."""
+    return allocate_episode(actions, 1, len(REWARD_TERMS), nc)
 
 
 def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, actions=3, e=None):
     """One judged step; returns reward and episode."""
     r = simulation.robot
     if e is None:
-        e = allocate_episode(actions, 1, len(r.soles))
+        e = new_episode(actions, len(r.soles))
         begin_episode(simulation.state_arrays, e)
         e.action[:], e.last_action[:] = [0.5, -0.25, 0.0], [0.1, 0.1, -0.1]
+    simulation.views.ctrl[:] = 0.0 if tau is None else tau
+    simulation.clock[0] = round(time / simulation.arrays.timestep)
+    bounds = episode_limits(limits or FallLimits(), r.height_com, 100)
+    view = RewardView(
+        robot=simulation.arrays,
+        state=simulation.state_arrays,
+        scales=scales(simulation.arrays, Simulation(r).state.support_polygon),
+        limits=bounds,
+        q_ref=r.standing_qpos[7:].copy() if q_ref is None else q_ref,
+        views=simulation.views,
+        action=e.action,
+        last_action=e.last_action,
+    )
     judge_step(
-        simulation.arrays, simulation.plant, simulation.state_arrays,
-        scales(simulation.arrays, Simulation(r).state.support_polygon),
-        judge(limits or FallLimits(), weights or RewardWeights(), r.height_com, 100),
-        r.standing_qpos[7:].copy() if q_ref is None else q_ref,
-        np.zeros(r.model.nu) if tau is None else tau, time, e,
-    )  # fmt: skip
+        Judge(
+            robot=simulation.arrays,
+            views=simulation.views,
+            state=simulation.state_arrays,
+            clock=simulation.clock,
+            limits=bounds,
+            rewards=rewards(weights or RewardWeights(), view),
+            episode=e,
+        )
+    )
     return float(e.reward[0]), e
 
 
@@ -75,6 +96,17 @@ def test_each_reward_term_is_its_formula():
     assert reward == pytest.approx(sum(terms.values()), rel=1e-12)
 
 
+def test_little_angular_momentum_is_rewarded():
+    """exp(−(|L| / 0.1 m h² ω)²), if it has a weight."""
+    simulation = generic_state()
+    r = robot()
+    unit = 0.1 * r.mass * r.height_com**2 * np.sqrt(9.81 / r.height_com)
+    simulation.state_arrays.momentum[3:] = 0.3 * unit, -0.5 * unit, 0.2 * unit
+    _, e = play(simulation, weights=RewardWeights(angular_momentum=2.0))
+    expected = 2.0 * np.exp(-(0.3**2) - 0.5**2 - 0.2**2)
+    assert e.reward_terms[REWARD_TERMS.index("angular_momentum")] == pytest.approx(expected)
+
+
 def test_a_fall_costs_its_weight_and_earns_nothing():
     """In the step of the fall the positive terms are zero."""
     simulation = generic_state()
@@ -95,10 +127,27 @@ def test_weights_scale_the_terms():
     assert e.reward_terms[REWARD_TERMS.index("action")] == pytest.approx(-7.0 * 0.3125 / 3)
 
 
+def test_a_diverged_simulation_costs_the_fall_alone():
+    """What numbers that are none would give is not computed."""
+    simulation = Simulation(robot())
+    simulation.state_arrays.com[:] = np.nan
+    simulation.views.warnings[2 * int(mujoco.mjtWarning.mjWARN_BADQACC)] = 1
+    reward, e = play(simulation)
+    assert reward == -RewardWeights().fall and np.count_nonzero(e.reward_terms) == 1
+
+
+def test_terms_without_weight_give_nothing():
+    """All of them off: the reward is 0."""
+    simulation = generic_state()
+    off = dict.fromkeys(REWARD_TERMS, 0.0)
+    reward, e = play(simulation, weights=RewardWeights(**off))
+    assert reward == 0.0 and not e.reward_terms.any()
+
+
 def fallen(simulation, **limits):
     return has_fallen(
         simulation.arrays, simulation.state_arrays,
-        judge(FallLimits(**limits), RewardWeights(), simulation.robot.height_com, 100),
+        episode_limits(FallLimits(**limits), simulation.robot.height_com, 100),
     )  # fmt: skip
 
 
@@ -191,7 +240,7 @@ def test_ticks_account_for_power_and_saturation():
     """Energy is Σ|τ q̇| dt, saturation the share of motors at their limit."""
     simulation = generic_state()
     r = robot()
-    e = allocate_episode(1, 1, 2)
+    e = new_episode(1)
     tau = 0.5 * r.torque_limit
     tau[:3] = -r.torque_limit[:3]
     record_tick(simulation.arrays, simulation.state_arrays, tau, 0.004, e)
@@ -205,7 +254,7 @@ def test_ticks_account_for_power_and_saturation():
 def test_a_new_episode_forgets_the_last():
     """Everything recorded is cleared, and the feet are where they should stay."""
     simulation = generic_state()
-    e = allocate_episode(2, 1, 2)
+    e = new_episode(2)
     e.action[:], e.last_action[:], e.reward_terms[:], e.metrics[:] = 1.0, 1.0, 1.0, 1.0
     begin_episode(simulation.state_arrays, e)
     assert not e.action.any() and not e.last_action.any() and not e.reward_terms.any()

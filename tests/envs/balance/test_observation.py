@@ -3,22 +3,57 @@
 import numpy as np
 import pytest
 
-from poise.envs.balance.observation import observation_table, observation_terms, observe, scales
+from poise.configs.errors import ConfigError
+from poise.envs.balance.observation import (
+    Terms,
+    View,
+    mirror_terms,
+    observation_table,
+    observer,
+    scales,
+    term_table,
+)
+from poise.envs.balance.terms import TERMS
+from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.compiled.calls import run
 from tests.support.shared import generic_state, robot
 
 
-def observed(simulation, q_ref, v_ref, action):
+def terms_of(r, actions, names=None):
+    """The terms of a robot, by default those that are on."""
+    sizes = {
+        "joints": r.joint_names,
+        "motors": tuple(r.model.actuator(i).name for i in range(r.model.nu)),
+        "feet": tuple(sole.name for sole in r.soles),
+        "actions": actions,
+    }
+    return [kind.of(sizes) for kind in TERMS.choose(names)]
+
+
+def observed(simulation, q_ref, v_ref, action, names=None):
     """The observation as a mapping from term to its numbers."""
-    r = simulation.robot
-    terms = observation_terms(r.joint_names, [s.name for s in r.soles], range(len(action)))
-    out = np.full(sum(term.size for term in terms), np.nan)
-    standing = type(simulation)(r).state.support_polygon
-    observe(
-        simulation.arrays, simulation.state_arrays, scales(simulation.arrays, standing),
-        q_ref, v_ref, action, out,
-    )  # fmt: skip
+    terms = terms_of(simulation.robot, tuple(f"a{i}" for i in range(len(action))), names)
+    whole = np.full(sum(term.size for term in terms), np.nan)
+    standing = type(simulation)(simulation.robot).state.support_polygon
+    world = simulation.world()
+
+    def view(kind, out):
+        return View(
+            robot=simulation.arrays,
+            state=simulation.state_arrays,
+            scales=scales(simulation.arrays, standing),
+            q_ref=q_ref,
+            v_ref=v_ref,
+            action=action,
+            views=world.views,
+            clock=world.clock,
+            pushes=world.pushes,
+            out=out,
+        )
+
+    run(observer(terms, whole, view))
     ends = np.cumsum([term.size for term in terms])
-    return dict(zip([term.name for term in terms], np.split(out, ends[:-1]), strict=True))
+    return dict(zip([term.name for term in terms], np.split(whole, ends[:-1]), strict=True))
 
 
 @pytest.mark.parametrize("name", ["humanoid", "tall", "compact"])
@@ -108,8 +143,90 @@ def test_scales_of_the_standing_robot():
 
 def test_the_table_has_one_row_per_index():
     """Rows count from 0 and name the entries of each term."""
-    terms = observation_terms(["hip", "knee"], ["left", "right"], ["push"])
+    terms = terms_of(robot(), ("push",))
     rows = observation_table(terms).splitlines()[2:]
     assert [int(row.split("|")[1]) for row in rows] == list(range(sum(t.size for t in terms)))
-    assert rows[20].startswith("| 20 | joint_pos | hip | rad |")
-    assert rows[-1].startswith("| 26 | last_action | push |")
+    assert rows[20].startswith(f"| 20 | joint_pos | {robot().joint_names[0]} | rad |")
+    assert rows[-1] == "| 64 | last_action | push | 1 | action of the step before |"
+
+
+def test_the_docstring_has_the_terms():
+    """A row for each term that there is, on by default or not."""
+    for kind in TERMS.values():
+        assert term_table([kind]).splitlines()[2] in TorqueBalanceEnv.__doc__, kind.name
+
+
+def test_the_configuration_chooses_the_terms():
+    """In the order of the list; extra ones come last; the mirror and the space follow."""
+    chosen = {"terms": ["last_action", "com"], "extra": ["gravity"]}
+    env = TorqueBalanceEnv(robot(), pushes=None, observation=chosen)
+    assert [term.name for term in env.terms] == ["last_action", "com", "gravity"]
+    nu = robot().model.nu
+    assert env.observation_space.shape == (nu + 2 + 3,)
+    observation, _ = env.reset(seed=0)
+    whole, _ = TorqueBalanceEnv(robot(), pushes=None).reset(seed=0)
+    np.testing.assert_array_equal(observation[nu:], [*whole[:2], *whole[13:16]])
+    observation = env.step(np.full(nu, 0.1))[0]
+    np.testing.assert_array_equal(observation[:nu], np.float32(0.1))
+    assert env.mirrors()[0].order.shape == env.observation_space.shape
+
+
+@pytest.mark.parametrize(
+    ("chosen", "error"),
+    [
+        ({"terms": ["com", "comm"]}, r"observation.terms: unknown term 'comm'.*com_height"),
+        ({"extra": ["push me"]}, r"observation.extra: unknown term 'push me'"),
+        ({"extra": ["com"]}, r"observation: 'com' comes twice"),
+        ({"terms": []}, r"observation.terms: needs at least one term"),
+        ({"terms": "com"}, r"observation.terms: must be a list"),
+    ],
+)
+def test_wrong_terms_are_refused(chosen, error):
+    """Unknown, twice or none; the line names the choices."""
+    with pytest.raises(ConfigError, match=error):
+        TorqueBalanceEnv(robot(), observation=chosen)
+
+
+def test_a_term_is_one_function():
+    """Whatever fills `out` can be a term: its entries, unit, meaning and image are told once."""
+    terms = Terms()
+
+    @terms.add(("n", "m"), "1", "squared", "number")
+    def square(v: View):
+        v.out[0], v.out[1] = v.action[0] ** 2, v.action[1] ** 2
+
+    (term,) = [kind.of({}) for kind in terms.choose(None)]
+    assert (term.name, term.size, term.unit) == ("square", 2, "1")
+    out, simulation = np.zeros(2), generic_state()
+    blank = np.zeros(1)
+
+    def view(kind, out):
+        scale = scales(simulation.arrays, simulation.state.support_polygon)
+        world = simulation.world()
+        action = np.array([3.0, 4.0])
+        return View(
+            simulation.arrays, simulation.state_arrays, scale, blank, blank, action,
+            world.views, world.clock, world.pushes, out,
+        )  # fmt: skip
+
+    run(observer([term], out, view))
+    assert out.tolist() == [9.0, 10.0]  # clipped
+    assert mirror_terms([term], {}).sign.tolist() == [1.0, 1.0]
+
+
+def test_the_push_that_acts_is_observed():
+    """Its force in the heading frame over the weight, while it acts; a half-sine's at its phase."""
+    env = TorqueBalanceEnv(robot(), pushes=None, observation={"terms": ["push"]})
+    still = np.zeros(env.action_space.shape)
+    pushes = [
+        {"force": 60.0, "direction": 90.0, "duration": 0.03, "start": 0.01},
+        {"force": 40.0, "duration": 0.04, "start": 0.07, "profile": "half-sine"},
+        {"delta_v": 0.1, "start": 0.2},
+    ]
+    observation, _ = env.reset(seed=0, options={"push": pushes})
+    seen = [observation, *(env.step(still)[0] for _ in range(5))]
+    left = np.array([0.0, 60.0, 0.0]) / (robot().mass * 9.81)
+    ahead = np.array([40.0 * np.sin(np.pi / 4), 0.0, 0.0]) / (robot().mass * 9.81)
+    for moment, force in zip(seen, (0.0, left, 0.0, 0.0, ahead, ahead), strict=True):
+        # 0.04 s is the end of the first push, 0.08 s and 0.1 s quarters of the second
+        np.testing.assert_allclose(moment, np.broadcast_to(force, 3), atol=0.01)

@@ -25,7 +25,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, address_of
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.simulation import Simulation
-from poise.envs.vector.scheduler import Turns
+from poise.envs.vector.scheduler import StepSchedule
 from tests.support.copied import BEFORE, KEEPS_TO_ITSELF, KINDS, digest, env_of, outcome, play_env
 from tests.support.shared import robot
 
@@ -301,7 +301,7 @@ def test_turns_are_not_copied():
     env.reset(seed=1)
     step = env.compiled_step()
     assert isinstance(step, CompiledStep)
-    turns = Turns(np.array([step.row()]), 1)
+    turns = StepSchedule(np.array([step.row()]), 1)
     for make in WAYS.values():
         with pytest.raises(PoiseError, match="addresses"):
             make(turns)

@@ -9,6 +9,7 @@ import pytest
 from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
 from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
 from poise.configs.errors import ConfigError
+from poise.envs.balance.terms import TERMS
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.robots.mirror import SIDES, mirror_robot
 from poise.envs.robots.robot import load_robot
@@ -53,7 +54,7 @@ def observed(env, actions, **options):
     env.reset(options=options)
     rows = []
     for action in actions:
-        env.step_in_place(action)
+        env.step_without_info(action)
         rows.append(env.episode.observation.copy())
     return np.array(rows)
 
@@ -72,6 +73,18 @@ def test_a_mirrored_trial(kind, even):
     np.testing.assert_allclose(seen(one), other, atol=1e-4)
     assert np.mean(abs(one - other).max(axis=0) > 0.02) > 0.6  # not the same trial again
     assert env.info().get("steps", 1) == 1
+
+
+def test_every_term_has_its_image(even):
+    """Those that are off by default, too."""
+    env = TorqueBalanceEnv(even, pushes=None, observation={"terms": list(TERMS)})
+    push = {"force": 30.0, "direction": 50.0, "duration": 1.0, "profile": "half-sine"}
+    actions = np.random.default_rng(3).uniform(-0.3, 0.3, (5, *env.action_space.shape))
+    seen, done = env.mirrors()
+    start = {"qpos": even.standing_qpos, "qvel": np.zeros(27)}
+    one = observed(env, actions, push=push, **start)
+    other = observed(env, done(actions), push={**push, "direction": 310.0}, **start)
+    np.testing.assert_allclose(seen(one), other, atol=1e-4)
 
 
 @pytest.mark.parametrize("name", ["compact", "tall", "toddler"])

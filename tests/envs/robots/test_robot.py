@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.robots.robot import Robot, load_robot
-from tests.support.small_biped import BOX_FOOT, LEG, write_biped
+from tests.support.small_biped import BOX_FOOT, LEG, motors, write_biped
 
 ROBOTS = ("compact", "humanoid", "tall", "toddler")
 
@@ -207,9 +207,15 @@ def test_arrays_are_read_only(robot: Robot) -> None:
             array[0] = 0
 
 
+def paired_biped(folder: Path, friction: float) -> Path:
+    """A biped whose soles collide with this friction, as an explicit contact pair."""
+    pair = f'<pair geom1="left_sole" geom2="right_sole" friction="{friction} {friction} 0 0 0"/>'
+    return write_biped(folder, extra=motors(ctrlrange="-9 9") + f"<contact>{pair}</contact>")
+
+
 def test_fingerprint_follows_the_dynamics(tmp_path: Path) -> None:
-    """The same description gives the same fingerprint; mass, friction and posture change it."""
-    names = ("same", "again", "mass", "friction", "posture")
+    """The same description gives the same one; mass, friction, posture and contact pairs count."""
+    names = ("same", "again", "mass", "friction", "posture", "pair", "other pair")
     folders = {name: tmp_path / name for name in names}
     for folder in folders.values():
         folder.mkdir()
@@ -220,10 +226,12 @@ def test_fingerprint_follows_the_dynamics(tmp_path: Path) -> None:
         "mass": write_biped(folders["mass"], trunk='<geom size="0.01" mass="0.1"/>'),
         "friction": write_biped(folders["friction"], options={"friction": 0.5}),
         "posture": write_biped(folders["posture"], posture=posture),
+        "pair": paired_biped(folders["pair"], 0.5),
+        "other pair": paired_biped(folders["other pair"], 0.4),
     }
     prints = {name: load_robot(path).fingerprint for name, path in paths.items()}
     assert prints["same"] == prints["again"]
-    assert len(set(prints.values())) == 4
+    assert len(set(prints.values())) == 6
 
 
 def test_options_replace_the_models(tmp_path: Path) -> None:

@@ -10,14 +10,14 @@ import pytest
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.ground import contact_friction
 from poise.envs.robots.robot import Robot, load_robot
-from poise.envs.robots.variants import altered_robot
+from poise.envs.robots.variants import perturbed_robot
 from tests.support.shared import robot
 from tests.support.small_biped import BOX_FOOT, motors, write_biped
 
 
 def test_masses_and_what_follows_from_them_are_scaled() -> None:
     """Mass, inertia matrix and bias forces of the same state all grow by a tenth."""
-    heavy = altered_robot(robot(), mass_error=0.1)
+    heavy = perturbed_robot(robot(), mass_error=0.1)
     assert heavy.mass == pytest.approx(1.1 * robot().mass)
     one, other = Simulation(robot()).state, Simulation(heavy).state
     armature = np.diag(robot().model.dof_armature)
@@ -29,11 +29,11 @@ def test_masses_and_what_follows_from_them_are_scaled() -> None:
 def test_the_given_robot_stays_as_it_was() -> None:
     """The altered robot has its own model, and another fingerprint."""
     before = robot().model.geom_friction.copy(), robot().model.body_mass.copy()
-    other = altered_robot(robot(), friction=0.4, mass_error=-0.1)
+    other = perturbed_robot(robot(), friction=0.4, mass_error=-0.1)
     assert np.array_equal(robot().model.geom_friction, before[0])
     assert np.array_equal(robot().model.body_mass, before[1])
     assert other.fingerprint != robot().fingerprint
-    assert altered_robot(robot()).fingerprint == robot().fingerprint
+    assert perturbed_robot(robot()).fingerprint == robot().fingerprint
 
 
 def friction(robot: Robot) -> float:
@@ -44,7 +44,7 @@ def friction(robot: Robot) -> float:
 def test_friction_is_what_the_soles_meet() -> None:
     """A robot pushed sideways at its root slides where the floor does not hold it."""
     assert friction(robot()) == pytest.approx(0.8)
-    smooth = altered_robot(robot(), friction=0.05)
+    smooth = perturbed_robot(robot(), friction=0.05)
     assert friction(smooth) == pytest.approx(0.05)
     moved = []
     for one in (robot(), smooth):
@@ -69,7 +69,7 @@ def test_contact_pairs_take_the_friction(tmp_path: Path) -> None:
         world='<geom name="floor" type="plane" size="1 1 1"/>',
         options={"friction": 0.6},
     )
-    smooth = altered_robot(load_robot(path), friction=0.05)
+    smooth = perturbed_robot(load_robot(path), friction=0.05)
     assert friction(load_robot(path)) == 0.6 and friction(smooth) == 0.05
     simulation = Simulation(smooth)
     simulation.step(np.zeros(smooth.model.nu), 5)
@@ -81,4 +81,4 @@ def test_contact_pairs_take_the_friction(tmp_path: Path) -> None:
 def test_what_cannot_be_is_refused(change: dict[str, float]) -> None:
     """No friction at all, or no mass."""
     with pytest.raises(ValueError, match=next(iter(change))):
-        altered_robot(robot(), **change)
+        perturbed_robot(robot(), **change)

@@ -11,8 +11,8 @@ from poise.configs.errors import PoiseError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, address_of
 from poise.envs.compiled.jit import compiled
-from poise.envs.vector.scheduler import MANY, Turns
-from poise.envs.vector.threads import Helpers
+from poise.envs.vector.scheduler import MANY, StepSchedule
+from poise.envs.vector.threads import ThreadTeam
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ def test_one_step():
 def test_every_step_is_played_whole(threads, per_thread):
     """With as few steps as threads and with many; the last ones are shared out tick by tick."""
     steps = [counted(1 + k % 5) for k in range(per_thread * threads)]
-    turns = Turns(np.array([step.row() for step in steps]), threads)
+    turns = StepSchedule(np.array([step.row() for step in steps]), threads)
     split = len(turns.done)
     assert (split > 0) == (threads > 1 and per_thread >= MANY)
     rounds = 30
@@ -77,7 +77,7 @@ def test_a_tick_is_one_threads():
     """Also where threads reach for the same steps all the time."""
     threads, rounds, ticks = 4, 10, 20_000
     steps = [counted(ticks, effort=3) for _ in range(MANY * threads)]
-    turns = Turns(np.array([step.row() for step in steps]), threads)
+    turns = StepSchedule(np.array([step.row() for step in steps]), threads)
     turns.ends[:] = 0  # all but those that are split have been played
     start, end = Barrier(threads), Barrier(threads)
 
@@ -103,7 +103,7 @@ def test_a_tick_is_one_threads():
 def test_a_thread_alone_plays_all():
     """The queues of threads that never come are emptied, and all ticks taken."""
     steps = [counted(2) for _ in range(3 * MANY)]
-    turns = Turns(np.array([step.row() for step in steps]), 3)
+    turns = StepSchedule(np.array([step.row() for step in steps]), 3)
     turns.begin()
     turns.play(1)
     assert [step.block.ticks[0] for step in steps] == [2] * len(steps)
@@ -117,7 +117,7 @@ ENOUGH = 10_000  # rounds within which a helper finds a core even where other jo
 def test_helpers_stay_for_the_next_call(threads, pause, monkeypatch):
     """Called again at once they are still there; after a pause they are woken. All is played."""
     steps = [counted(2) for _ in range(2 * MANY * threads)]
-    turns, helpers = Turns(np.array([step.row() for step in steps]), threads), Helpers()
+    turns, helpers = StepSchedule(np.array([step.row() for step in steps]), threads), ThreadTeam()
     woken, ask = [], helpers.ask
     monkeypatch.setattr(helpers, "ask", lambda work, k: (woken.append(k), ask(work, k)))
     rounds = 0
@@ -138,10 +138,10 @@ def test_helpers_stay_for_the_next_call(threads, pause, monkeypatch):
 
 def test_other_steps_than_those_that_a_helper_waits_for():
     """It comes once it has waited long enough; each of two kinds of turns is played in full."""
-    helpers, kinds = Helpers(), []
+    helpers, kinds = ThreadTeam(), []
     for count in (4, 9):
         steps = [counted(3) for _ in range(count)]
-        kinds.append((steps, Turns(np.array([step.row() for step in steps]), 2)))
+        kinds.append((steps, StepSchedule(np.array([step.row() for step in steps]), 2)))
     for _ in range(10):
         for _, turns in kinds:
             turns.play_all(helpers)
@@ -153,7 +153,7 @@ def test_other_steps_than_those_that_a_helper_waits_for():
 def test_an_interrupt_leaves_no_helper_at_work(monkeypatch):
     """What the caller did not play its helper has, before the interrupt goes on."""
     steps = [counted(2) for _ in range(4)]
-    turns, helpers = Turns(np.array([step.row() for step in steps]), 2), Helpers()
+    turns, helpers = StepSchedule(np.array([step.row() for step in steps]), 2), ThreadTeam()
 
     def interrupt(thread):
         raise KeyboardInterrupt
@@ -168,9 +168,9 @@ def test_an_interrupt_leaves_no_helper_at_work(monkeypatch):
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_helper_that_died_is_not_waited_for():
     """As in the copy of a process: an error instead."""
-    helpers = Helpers()
+    helpers = ThreadTeam()
     helpers.ask(lambda number: 1 // 0, 1)
     step = counted(1)
-    turns = Turns(np.array([step.row()] * 2), 2)
+    turns = StepSchedule(np.array([step.row()] * 2), 2)
     with pytest.raises(PoiseError, match="a thread has ended"):
         turns.play_all(helpers)

@@ -6,12 +6,12 @@ import time
 import pytest
 
 from poise.configs.errors import PoiseError
-from poise.envs.vector.threads import Helpers
+from poise.envs.vector.threads import ThreadTeam
 
 
 def test_the_work_is_shared():
     """Each number once, 0 in the thread that asks, the others at the same time as it."""
-    helpers, seen, meeting = Helpers(), {}, threading.Barrier(3, timeout=10.0)
+    helpers, seen, meeting = ThreadTeam(), {}, threading.Barrier(3, timeout=10.0)
 
     def work(number):
         meeting.wait()
@@ -26,7 +26,7 @@ def test_the_work_is_shared():
 @pytest.mark.parametrize("where", [0, 1])
 def test_an_error_reaches_the_one_that_asked(where):
     """After all have ended; and the threads can be asked again."""
-    helpers, done = Helpers(), []
+    helpers, done = ThreadTeam(), []
 
     def work(number):
         if number == where:
@@ -46,7 +46,7 @@ def test_an_error_reaches_the_one_that_asked(where):
 def test_threads_end(how):
     """When they are closed, and when nobody holds the helpers any more."""
     before = set(threading.enumerate())
-    helpers = Helpers()
+    helpers = ThreadTeam()
     assert set(threading.enumerate()) == before  # a copy of this process would have none of them
     helpers.share(lambda number: None, 2)
     ours = set(threading.enumerate()) - before
@@ -67,7 +67,7 @@ def test_threads_end(how):
 def test_the_dead_are_not_waited_for():
     """An error instead."""
     before = set(threading.enumerate())
-    helpers = Helpers()
+    helpers = ThreadTeam()
     helpers.ask(lambda number: 1 // 0, 1)
     for thread in set(threading.enumerate()) - before:
         thread.join(10.0)

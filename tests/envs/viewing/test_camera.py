@@ -91,7 +91,7 @@ def test_the_model_and_the_data_are_those_of_mujoco() -> None:
     env.step(env.action_space.sample())
     assert base.data.time == pytest.approx(base.config.policy_period)
     assert not np.array_equal(base.data.qpos, before)
-    assert np.array_equal(base.data.qpos, base.simulation.plant.qpos)
+    assert np.array_equal(base.data.qpos, base.simulation.views.qpos)
 
 
 def test_a_time_limit_of_gymnasium_s_own_comes_on_top() -> None:

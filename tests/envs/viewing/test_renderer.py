@@ -56,7 +56,7 @@ def trajectory(robot, render):
     frame, history = None, []
     data = base.simulation.data
     arrays = [
-        *base.simulation.plant.members()[2:],
+        *base.simulation.views.members()[2:],
         *base.simulation.state_arrays.members(),
         data.qacc,
     ]

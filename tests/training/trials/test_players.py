@@ -40,7 +40,7 @@ def test_zero_gives_no_torque(robot: Robot) -> None:
     assert isinstance(player.env, TorqueBalanceEnv)
     player.env.reset(seed=0)
     player.env.step(player.act(np.zeros(player.env.observation_space.shape)))
-    assert not player.env.simulation.plant.ctrl.any()
+    assert not player.env.simulation.views.ctrl.any()
 
 
 def test_a_controllers_file_is_played_and_told_apart(robot: Robot, tmp_path: Path) -> None:

@@ -1,0 +1,204 @@
+"""The reward: a sum of terms, each of which stands here with its weight, formula and kernel.
+
+A new term is one more function and its field of `RewardWeights`; with a weight of 0 it is off, and
+not computed. All that a term may read are the fields of `RewardView`.
+"""
+
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
+
+import numpy as np
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program, value_of
+from poise.envs.compiled.jit import compiled
+from poise.envs.maths.vectors import along
+from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.kinematics import StateArrays
+
+from .observation import Scales
+from .termination import Limits, uprightness
+
+
+@dataclass(frozen=True, eq=False)
+class RewardView(Block):
+    """The block that the kernel of a reward term reads; the state is the true one."""
+
+    robot: RobotArrays
+    state: StateArrays
+    scales: Scales
+    limits: Limits
+    q_ref: np.ndarray  # (nj,) joint positions of the reference [rad]
+    views: SimViews  # whose `ctrl` (nu,) are the torques of the last control tick [N·m]
+    action: np.ndarray  # (na,)
+    last_action: np.ndarray  # (na,) of the policy step before
+
+
+@compiled
+def squared_distance(v: RewardView, point: np.ndarray) -> float:
+    """e² of a point of the ground from the middle of the soles [half support]."""
+    s = v.state
+    x, y = point[0] - s.origin[0], point[1] - s.origin[1]
+    x, y = along(s.heading[0], s.heading[1], x, y)
+    x, y = x * v.scales.per_support_x, y * v.scales.per_support_y
+    return x * x + y * y
+
+
+@compiled
+def constant(v: RewardView) -> float:
+    return 1.0
+
+
+@compiled
+def com_near(v: RewardView) -> float:
+    return np.exp(-4.0 * squared_distance(v, v.state.com))
+
+
+@compiled
+def capture_near(v: RewardView) -> float:
+    return np.exp(-2.0 * squared_distance(v, v.state.capture_point))
+
+
+@compiled
+def root_upright(v: RewardView) -> float:
+    return max(uprightness(v.robot, v.state), 0.0) ** 4
+
+
+@compiled
+def com_slow(v: RewardView) -> float:
+    velocity = v.state.com_vel
+    speed = np.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+    return np.exp(-((speed / v.limits.quiet_speed) ** 2) / 4.0)
+
+
+@compiled
+def posture_near(v: RewardView) -> float:
+    total = 0.0
+    for a in range(v.q_ref.shape[0]):
+        total += (v.state.qpos[7 + a] - v.q_ref[a]) ** 2
+    return np.exp(-total)
+
+
+@compiled
+def torque_cost(v: RewardView) -> float:
+    total, torques = 0.0, v.views.ctrl
+    for i in range(torques.shape[0]):
+        total += (torques[i] / v.robot.torque_limit[i]) ** 2 / torques.shape[0]
+    return -total
+
+
+@compiled
+def action_cost(v: RewardView) -> float:
+    total, n = 0.0, v.action.shape[0]
+    for a in range(n):
+        total += v.action[a] ** 2 / n
+    return -total
+
+
+@compiled
+def action_change_cost(v: RewardView) -> float:
+    total, n = 0.0, v.action.shape[0]
+    for a in range(n):
+        total += (v.action[a] - v.last_action[a]) ** 2 / n
+    return -0.25 * total
+
+
+@compiled
+def momentum_small(v: RewardView) -> float:
+    total, unit = 0.0, v.scales.momentum
+    for a in range(3, 6):
+        total += (v.state.momentum[a] / unit) ** 2
+    return np.exp(-total)
+
+
+@compiled
+def fall_cost(v: RewardView) -> float:
+    return -1.0
+
+
+#: of a term: it is not earned in the step of a fall; it is paid then too, unless the simulation
+#: diverged; it is paid then only
+When = Literal["no fall", "no divergence", "fall"]
+
+
+def _term(weight: float, kernel: Any, formula: str, when: When) -> Any:
+    """A field of `RewardWeights`."""
+    return field(default=weight, metadata={"kernel": kernel, "formula": formula, "when": when})
+
+
+@dataclass(frozen=True)
+class RewardWeights:
+    """Weights of the reward terms; each term is smooth and lies in [0, 1] or [−1, 0]."""
+
+    alive: float = _term(0.5, constant, "1", "no fall")
+    com: float = _term(
+        0.2, com_near,
+        "exp(−4 e²), e the CoM's distance from the middle of the soles [half support]", "no fall",
+    )  # fmt: skip
+    capture: float = _term(
+        0.2, capture_near, "exp(−2 e²), e the capture point's [half support]", "no fall"
+    )
+    upright: float = _term(
+        0.1, root_upright, "max(cos φ, 0)⁴, φ the tilt of the root from standing", "no fall"
+    )
+    quiet: float = _term(0.1, com_slow, "exp(−(|ċ| / quiet_speed)² / 4)", "no fall")
+    posture: float = _term(0.1, posture_near, "exp(−Σ (q − q_ref)²)", "no fall")
+    effort: float = _term(0.02, torque_cost, "−mean (τ / τ_max)²", "no divergence")
+    action: float = _term(0.1, action_cost, "−mean a²", "no divergence")
+    action_rate: float = _term(
+        0.05, action_change_cost, "−mean (a − a_before)² / 4", "no divergence"
+    )
+    fall: float = _term(5.0, fall_cost, "−1 in the step of a fall", "fall")
+    angular_momentum: float = _term(
+        0.0, momentum_small, "exp(−(|L| / 0.1 m h² ω)²), L about the CoM", "no fall"
+    )
+
+
+REWARD_TERMS = tuple(RewardWeights.__dataclass_fields__)
+NO_FALL, NO_DIVERGENCE, FALL = range(3)  # `When`, for compiled code
+_CODES = {"no fall": NO_FALL, "no divergence": NO_DIVERGENCE, "fall": FALL}
+
+
+def reward_table() -> str:
+    """The terms as a Markdown table with their default weights."""
+    rows = ["| term | weight | value |", "| --- | --- | --- |"]
+    for each in fields(RewardWeights):
+        rows.append(f"| {each.name} | {each.default} | {each.metadata['formula']} |")
+    return "\n".join(rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Rewards(Block):
+    """The reward terms as compiled code reads them."""
+
+    kernels: Program  # a row for each term, free where the weight is 0
+    weights: np.ndarray  # (terms,)
+    when: np.ndarray  # (terms,) int: `NO_FALL`, `NO_DIVERGENCE` or `FALL`
+
+
+def rewards(weights: RewardWeights, view: RewardView) -> Rewards:
+    """The terms with these `weights`, of what is seen in `view`."""
+    terms = fields(weights)
+    numbers = np.array([getattr(weights, term.name) for term in terms], dtype=float)
+    calls = [
+        (term.metadata["kernel"], view) if weight != 0.0 else None
+        for term, weight in zip(terms, numbers, strict=True)
+    ]
+    when = np.array([_CODES[term.metadata["when"]] for term in terms], dtype=np.int64)
+    return Rewards(kernels=Program.of(calls), weights=numbers, when=when)
+
+
+@compiled
+def sum_rewards(r: Rewards, fallen: bool, diverged: bool, terms: np.ndarray) -> float:
+    """The reward of a policy step, and its weighted `terms` (terms,)."""
+    rows = r.kernels.rows
+    for i in range(terms.shape[0]):
+        counts = not fallen if r.when[i] == NO_FALL else fallen
+        if r.when[i] == NO_DIVERGENCE:
+            counts = not diverged
+        terms[i] = value_of(rows[i, 0], rows[i, 1]) if counts and r.weights[i] != 0.0 else 0.0
+    total = 0.0
+    for i in range(terms.shape[0]):
+        terms[i] *= r.weights[i]
+        total += terms[i]
+    return total

@@ -1,0 +1,81 @@
+"""When an episode ends by a fall, and when the robot is quiet again."""
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.kinematics import StateArrays
+
+
+@dataclass(frozen=True)
+class FallLimits:
+    """The limits beyond which a robot has fallen, and within which it is quiet again."""
+
+    height: float = field(default=0.6, metadata={"above": 0.0, "max": 1.0})  # of the standing h
+    # root [deg]: a deep bow, the hip strategy at its end, is not yet a fall
+    tilt: float = field(default=90.0, metadata={"above": 0.0, "max": 180.0})
+    ground_contact: bool = True  # anything but the feet on the ground is a fall
+    quiet_speed: float = field(default=0.1, metadata={"above": 0.0})  # CoM [m/s]
+    quiet_tilt: float = field(default=30.0, metadata={"above": 0.0, "max": 90.0})  # root [deg]
+    quiet_time: float = field(default=1.0, metadata={"above": 0.0})  # [s]
+
+
+@dataclass(frozen=True, eq=False)
+class Limits(Block):
+    """The limits of an episode as compiled code reads them."""
+
+    height: float  # [m]
+    cos_tilt: float
+    ground_contact: bool
+    quiet_speed: float  # [m/s]
+    quiet_cos_tilt: float
+    max_steps: int  # of an episode
+
+
+def episode_limits(limits: FallLimits, height_com: float, max_steps: int) -> Limits:
+    """Numbers for compiled code; `height_com` [m] is that of the standing robot."""
+    return Limits(
+        height=limits.height * height_com,
+        cos_tilt=float(np.cos(np.radians(limits.tilt))),
+        ground_contact=limits.ground_contact,
+        quiet_speed=limits.quiet_speed,
+        quiet_cos_tilt=float(np.cos(np.radians(limits.quiet_tilt))),
+        max_steps=max_steps,
+    )
+
+
+@compiled
+def uprightness(robot: RobotArrays, s: StateArrays) -> float:
+    """Cosine of the root's tilt from standing: between its vertical axes, whatever the yaw."""
+    upright = 0.0
+    for a in range(3):
+        upright += s.root_axes[2, a] * robot.root_standing[2, a]
+    return upright
+
+
+@compiled
+def has_fallen(robot: RobotArrays, s: StateArrays, limits: Limits) -> bool:
+    """CoM too low, root tilted too far, or more than the feet on the ground."""
+    low = s.com[2] - s.origin[2] < limits.height
+    touching = limits.ground_contact and s.other_contacts[0] > 0.5
+    # not np.isfinite(x + y): x + y − (x + y), reordered, is 0 for NaN too
+    finite = abs(s.com[2]) < np.inf and abs(s.com_vel[2]) < np.inf
+    return low or uprightness(robot, s) < limits.cos_tilt or touching or not finite
+
+
+BAD_STATE = tuple(
+    2 * int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{name}")) for name in ("QPOS", "QVEL", "QACC")
+)
+
+
+@compiled
+def has_diverged(views: SimViews) -> bool:
+    """True if numbers became too large since the reset; MuJoCo then starts anew by itself."""
+    for i in BAD_STATE:
+        if views.warnings[i] > 0:
+            return True
+    return False

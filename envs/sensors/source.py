@@ -1,0 +1,47 @@
+"""Where a controller and a policy know the state from: by default it is the truth."""
+
+from __future__ import annotations
+
+from poise.envs.compiled.calls import Program, run
+from poise.envs.compiled.copies import Copyable
+from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.state import RobotState
+
+
+class StateSource(Copyable):
+    """The source of what is believed of a simulation's state; of this class, the truth itself.
+
+    An environment judges the simulation's own state. Its targets, its controller and its
+    observation go by this one. A subclass has a state of its own and two programs of compiled
+    kernels: `sense` measures after every physics step, `estimate` makes a state of what was
+    measured, before every control tick and every observation. Neither may allocate or raise.
+
+    Attributes:
+        simulation: whose state it is about.
+        arrays: the constants of the robot that is believed in.
+        state_arrays: the believed state; the same arrays for as long as the source exists.
+        sense: the program after every physics step.
+        estimate: the program before the state is read.
+    """
+
+    arrays: RobotArrays
+    state_arrays: StateArrays
+
+    def __init__(self, simulation: Simulation):
+        self.simulation = simulation
+        self.arrays, self.state_arrays = simulation.arrays, simulation.state_arrays
+        self.sense, self.estimate = Program.of(()), Program.of(())
+
+    @property
+    def state(self) -> RobotState:
+        """The believed state, as of the last `update`; its clock is the simulation's."""
+        return RobotState(self.arrays, self.state_arrays, self.simulation.time)
+
+    def reset(self) -> None:
+        """Forget all measurements; the simulation has just been reset."""
+
+    def update(self) -> None:
+        """Estimate the state from what has been measured, for a caller in Python."""
+        run(self.estimate)
