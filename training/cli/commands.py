@@ -161,7 +161,7 @@ def evaluate(
         overwrite: replace an evaluation that the folder holds.
         allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
-    from poise.training.evaluation.evaluate import evaluate, measured_limits
+    from poise.training.evaluation.run import evaluate, measured_limits
 
     folder = Path("out") / Path(suite).stem if out is None else out
     summary = evaluate(
@@ -211,7 +211,7 @@ def benchmark(
 
     choose_gl_backend()
     from poise.baselines.allowance import named
-    from poise.training.benchmark.run import benchmark, errors
+    from poise.training.evaluation.run import benchmark, errors
 
     summary = benchmark(
         controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
@@ -402,7 +402,6 @@ def list_names() -> None:
         "controllers",
         "policies",
         "suites",
-        "benchmarks",
         "training",
         "motions",
         "tuning",

@@ -116,7 +116,7 @@ def _train(
     summary = {
         "runs": entries,
         "recovered": recovered,
-        **circumstances(started, crew.workers, backend=crew.backend),
+        **circumstances(started, crew.workers, crew.backend),
     }
     write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
     print_seeds(summary, console)

@@ -18,7 +18,7 @@ from poise.envs.physics.state import RobotState
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
-from poise.training.suites.base import generator, start_seed
+from poise.training.suites.draw import generator, start_seed
 from poise.training.trials.push_limits import PushLimits
 
 End = Literal["recovered", "fell", "not quiet"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import cast
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from poise.baselines.stepping.planner import StepLimits
 from poise.baselines.stepping.reach import Reach
 from poise.envs.maths.pendulum import capture_distance, duration_factor
 from poise.envs.maths.polygons import ray_to_edge
+from poise.training.running.summary import Direction, Envelope, StepCurves
 
 from .players import Player
 from .push_limits import PushLimits
@@ -64,20 +65,20 @@ class NStepLimit:
         d = capture_distance(count, r, length, omega, self.time)
         return mass * omega * d * duration_factor(omega, duration)
 
-    def add_to(self, figures: dict[str, Any], duration: float) -> None:
+    def add_to(self, figures: Envelope, duration: float) -> None:
         """Complete the figures of an envelope: in each of its `directions` r, l and T_s, the limits
         of `COUNTS` and the share of each that J50 is; over all directions the shares' means."""
         for entry in figures["directions"]:
             angle = entry["direction"]
             entry["step_reach"], entry["step_length"] = self.reach(angle), self.length(angle)
             entry["step_time"] = self.time
-            for name, count in COUNTS.items():
-                limit = self(angle, duration, count)
-                entry[f"step_limit_{name}"] = limit
-                entry[f"step_share_{name}"] = entry["j50"] / limit
-        for name in COUNTS:
-            shares = [entry[f"step_share_{name}"] for entry in figures["directions"]]
-            figures[f"step_share_{name}_mean"] = float(np.mean(shares))
+            limits = {f"step_limit_{n}": self(angle, duration, c) for n, c in COUNTS.items()}
+            found = {f"step_share_{n}": entry["j50"] / limits[f"step_limit_{n}"] for n in COUNTS}
+            entry.update(cast(Direction, limits | found))
+        entries = cast(list[dict[str, float]], figures["directions"])
+        shares = {name: [entry[f"step_share_{name}"] for entry in entries] for name in COUNTS}
+        means = {f"step_share_{name}_mean": float(np.mean(shares[name])) for name in COUNTS}
+        figures.update(cast(Envelope, means))
 
 
 def stepping_limits(
@@ -94,7 +95,7 @@ def stepping_limits(
     planned, others = {}, {}
     for player in players:
         own = _own_limits(player)
-        stepped = [o.stepped and o.steps > 0 for o in outcomes[player.name] if o.recovered]
+        stepped = [o.foot_displaced and o.steps > 0 for o in outcomes[player.name] if o.recovered]
         if own is not None:
             planned[player.name] = NStepLimit(limits, own)
         elif stepped and np.mean(stepped) > STEPPING:
@@ -118,7 +119,7 @@ def groups(steps: Mapping[str, NStepLimit]) -> dict[StepLimits, list[str]]:
     return found
 
 
-def curves(steps: Mapping[str, NStepLimit], duration: float) -> list[dict[str, Any]]:
+def curves(steps: Mapping[str, NStepLimit], duration: float) -> list[StepCurves]:
     """For summary.json: limits around the robot [N·s], one entry for each of the `groups`."""
     fine = [float(angle) for angle in range(0, 360, 5)]
     return [
