@@ -246,7 +246,7 @@ class Run:
         for name, entry in entries.items():
             entry["tick_us"], entry["fingerprint"] = ticks[name], settings.controllers[name]
         first = next(iter(played))
-        reference = self.reference if self.reference in played else first
+        reference = self.reference if self.reference and self.reference in played else first
         against = [(reference, name) for name in played if name != reference]
         pairs = combinations(played, 2) if self.reference is None else against
         whole: Summary = {

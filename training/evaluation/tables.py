@@ -13,6 +13,7 @@ from poise.training.running.summary import Entry, Interval, Summary
 from .seed_groups import seed_lines
 
 NONE = "–"
+IN_PAIRS = ("lost, won", "McNemar p")  # headings whose figures the table of pairs has
 BOUNDS = {None: "", "lower": "≥ ", "upper": "≤ "}
 
 
@@ -29,8 +30,11 @@ def print_summary(summary: Summary, console: Console) -> None:
     """Tables of the controllers and of the pairs, errors, a line per group of training seeds."""
     robot = summary["robot"]["name"]
     title = escape(f"{summary['suite']} · {robot} · seed {summary['seed']}")
-    columns = [column for column in table_columns(summary)
-               if any(column[1](name) != NONE for name in summary["ranking"])]  # fmt: skip
+    columns = [
+        (heading, text)
+        for heading, text in table_columns(summary)
+        if heading not in IN_PAIRS and not {text(name) for name in summary["ranking"]} <= {NONE, "0"}
+    ]
     table = Table(title=title, title_justify="left")
     table.add_column("controller", overflow="fold", min_width=_room(summary["ranking"], 16))
     for heading, _ in columns:
