@@ -38,10 +38,9 @@ from poise.configs.schema import build
 from poise.configs.yaml_loader import DEPTH, DIGITS, NODES
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmark.suite import load_benchmark
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
-from poise.training.suites.registry import load_suite
+from poise.training.suites.suite import load_suite
 from poise.training.trials.players import load_player
 from poise.training.trials.push_limits import load_limits
 from poise.training.tuning.search import tune_config
@@ -53,7 +52,6 @@ LOADERS: dict[str, Callable[[Any], Any]] = {
     "controllers": controller_config,
     "motions": lambda path: load_motion(path, robot()),
     "suites": load_suite,
-    "benchmarks": load_benchmark,
     "training": train_config,
     "tuning": tune_config,
     "limits": lambda path: load_limits(robot(), path),

@@ -12,9 +12,9 @@ import pytest
 import stable_baselines3
 from hypothesis import strategies as st
 
-from poise.training.benchmark import run
+from poise.training.evaluation import run
 from poise.training.cli import commands
-from poise.training.evaluation import evaluate
+from poise.training.evaluation import run
 from poise.training.figures import video
 from poise.training.learning import train_seeds
 from poise.training.qp_set import export

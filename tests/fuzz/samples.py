@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.benchmark import run
-from poise.training.evaluation import evaluate as evaluation
-from poise.training.evaluation.evaluate import evaluate
+from poise.training.evaluation import run
+from poise.training.evaluation import run as evaluation
+from poise.training.evaluation.run import evaluate
 from tests.support.benchmarks_small import InProcessCrew, write_small
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 

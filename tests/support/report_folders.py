@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.benchmark import run
-from poise.training.evaluation import evaluate as evaluation
-from poise.training.evaluation.evaluate import evaluate
+from poise.training.evaluation import run
+from poise.training.evaluation import run as evaluation
+from poise.training.evaluation.run import evaluate
 from tests.support.benchmarks_small import InProcessCrew, write_small
-from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, write_suite
+from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, random_suite, write_suite
 
 SOFT = 'a "soft" <b>&.yaml'  # a name that must be escaped wherever it is written
 _folders: list[tempfile.TemporaryDirectory] = []  # removed at the end of the process
@@ -39,7 +39,7 @@ def finished(kind: str) -> Path:
             InProcessCrew.stop_after = None
             run.benchmark(names, write_small(path), out=path / "out", seed=2)
         return path / "out"
-    fields = {"random": {**RANDOM, "trials": 8}, "envelope": ENVELOPE}[kind]
+    fields = {"random": random_suite(8), "envelope": ENVELOPE}[kind]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evaluation, "Crew", InProcess)
         InProcess.stop_after = None

@@ -18,7 +18,7 @@ from poise.training.cli import commands
 from poise.training.cli import train as train_command
 from poise.training.cli.commands import main
 from poise.training.cli.train import parse
-from poise.training.evaluation import evaluate
+from poise.training.evaluation import run
 from poise.training.learning.config import TrainConfig, train_config
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 

@@ -17,10 +17,10 @@ from rich.console import Console
 
 from poise.configs.errors import ConfigError
 from poise.training.cli import demo
-from poise.training.evaluation import evaluate as evaluation
-from poise.training.evaluation.evaluate import evaluate, measured_limits
+from poise.training.evaluation import run as evaluation
+from poise.training.evaluation.run import evaluate, measured_limits
 from poise.training.running.crew import Crew
-from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, write_suite
+from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, random_suite, write_suite
 
 BOTH = ("momentum-qp", "zero")
 
@@ -139,7 +139,7 @@ def test_measured_limits_are_what_the_random_suite_pushes_by(
     table = yaml.safe_load(limits.read_text())["table"]
     j50 = [d["j50"] for d in summary["controllers"]["momentum-qp"]["directions"]]
     assert table["impulses"] == pytest.approx(j50, abs=1e-3)
-    suite = write_suite(tmp_path, {**RANDOM, "trials": 2})
+    suite = write_suite(tmp_path, random_suite(2))
     found = evaluate(["momentum-qp"], suite, out=tmp_path / "random", limits=limits)
     assert found["controllers"]["momentum-qp"]["fraction_of"] == "baseline J50"
     with pytest.raises(ConfigError, match="does not measure J50"):
@@ -174,7 +174,7 @@ def test_a_dead_worker_costs_nothing_that_is_finished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A process killed from outside is one line; the trials are those of an undisturbed run."""
-    suite = write_suite(tmp_path, {**RANDOM, "trials": 12})
+    suite = write_suite(tmp_path, random_suite(12))
     appended, killed = evaluation.EvaluationFolder.append, []
 
     def append_and_kill(folder: Any, number: int, outcomes: Any) -> None:

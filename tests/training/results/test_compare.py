@@ -17,7 +17,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.schema import to_yaml
 from poise.training.benchmark.case import Case, Result, failed
 from poise.training.benchmark.figures import controller_figures, pair_figures, paired
-from poise.training.benchmark.tick_times import tick_times
+from poise.training.evaluation.tick_times import tick_times
 from poise.training.cli.commands import main
 from poise.training.results.benchmark import read_summary
 from poise.training.results.compare import compare, print_comparison

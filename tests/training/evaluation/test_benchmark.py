@@ -17,15 +17,15 @@ import poise
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.balance.config import StartNoise
-from poise.training.benchmark import run
+from poise.training.evaluation import run
 from poise.training.benchmark.case import Case
-from poise.training.benchmark.run import benchmark, default_controllers
+from poise.training.evaluation.run import benchmark, default_controllers
 from poise.training.benchmark.world import BenchmarkPlayer, Job, play, play_case
 from poise.training.cli.commands import main
 from poise.training.results.benchmark import load_benchmark_data, read_case, replay_case
 from poise.training.results.replay import replay
 from poise.training.trials.players import load_player
-from poise.training.trials.stage import Stage
+from poise.training.trials.jobs import Stage
 from poise.training.trials.trial import Trial, run_trial
 from tests.support.benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small
 from tests.support.shared import robot

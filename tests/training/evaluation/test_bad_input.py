@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.benchmark.run import benchmark
+from poise.training.evaluation.run import benchmark
 from poise.training.cli.commands import main
 from poise.training.running import log as trial_log
 from tests.support.benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small
@@ -22,7 +22,7 @@ BOTH = ("momentum-qp", "zero")
 KILLED = """
 import os, signal
 from poise.training.benchmark.folder import BenchmarkFolder
-from poise.training.benchmark.run import benchmark
+from poise.training.evaluation.run import benchmark
 append = BenchmarkFolder.append
 def and_die(folder, *rest):
     append(folder, *rest)
