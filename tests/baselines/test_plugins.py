@@ -18,8 +18,8 @@ from poise.baselines.registry import controller_config, load_controller
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
-from poise.training.trials.players import load_player
 from poise.training.trials.play import run_trial
+from poise.training.trials.players import load_player
 from poise.training.trials.trial import Trial
 from tests.support.shared import robot
 

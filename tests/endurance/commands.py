@@ -22,7 +22,7 @@ import yaml
 from poise.configs.schema import to_yaml
 from poise.training.learning.checkpoints import STATE, find_checkpoint, read_state
 from tests.support.benchmarks_small import SMALL
-from tests.support.evaluations import RANDOM, random_suite
+from tests.support.evaluations import random_suite
 from tests.support.shared import tiny_config
 
 RUN = ("command", "versions", "machine", "workers", "backend", "commit", "seconds", "tick_us")

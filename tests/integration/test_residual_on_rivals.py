@@ -10,15 +10,14 @@ import pytest
 from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.files import packaged
 from poise.training.evaluation import run
-from poise.training.evaluation.run import benchmark
 from poise.training.evaluation import run as evaluation
-from poise.training.evaluation.run import evaluate
+from poise.training.evaluation.run import benchmark, evaluate
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train
 from poise.training.results.replay import replay
 from tests.support.benchmarks_small import InProcessCrew, write_small
-from tests.support.evaluations import RANDOM, InProcess, random_suite, write_suite
+from tests.support.evaluations import InProcess, random_suite, write_suite
 from tests.support.shared import tiny_config
 
 

@@ -28,10 +28,8 @@ from poise.baselines.plugins import find_outside
 from poise.baselines.registry import controller_config, load_controller, momentum_qp_config
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled import warmup
-from poise.training.evaluation.run import benchmark
-from poise.training.trials.jobs import Job, Stage, play
 from poise.training.cli.commands import main
-from poise.training.evaluation.run import evaluate
+from poise.training.evaluation.run import benchmark, evaluate
 from poise.training.evaluation.seed_groups import seed_groups
 from poise.training.learning.checkpoints import check_controller, controller_fingerprint
 from poise.training.learning.config import train_config
@@ -46,6 +44,7 @@ from poise.training.results.leaderboard import write_leaderboard
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.running.crew import Crew
+from poise.training.trials.jobs import Job, Stage, play
 from poise.training.trials.players import load_player
 from poise.training.tuning.candidates import Candidate
 from poise.training.tuning.candidates import play as play_candidate

@@ -13,7 +13,7 @@ from poise.training.evaluation import run
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.run import evaluate
 from tests.support.benchmarks_small import InProcessCrew, write_small
-from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, random_suite, write_suite
+from tests.support.evaluations import ENVELOPE, InProcess, random_suite, write_suite
 
 SOFT = 'a "soft" <b>&.yaml'  # a name that must be escaped wherever it is written
 _folders: list[tempfile.TemporaryDirectory] = []  # removed at the end of the process

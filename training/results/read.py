@@ -121,9 +121,8 @@ def load_results(folder: str | Path) -> Results:
         raise ConfigError("no such folder", source=folder)
     missing = [name for name in (SETTINGS, SUMMARY, TRIALS) if not is_file(folder / name)]
     if missing:
-        why = "it was stopped: the command that began it goes on" if is_file(folder / LOG) else (
-            f"holds no finished result: {', '.join(missing)} missing"
-        )  # fmt: skip
+        why = f"holds no finished result: {', '.join(missing)} missing"
+        why += "; the command that began it goes on" if is_file(folder / LOG) else ""
         raise ConfigError(why, source=folder)
     settings, summary = read_settings(folder), read_summary(folder / SUMMARY)
     records = _records(folder / TRIALS)

@@ -18,7 +18,6 @@ from poise.training.cli import commands
 from poise.training.cli import train as train_command
 from poise.training.cli.commands import main
 from poise.training.cli.train import parse
-from poise.training.evaluation import run
 from poise.training.learning.config import TrainConfig, train_config
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
@@ -170,7 +169,7 @@ def test_evaluate_and_replay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One command plays, the other plays one of its trials again and says that it is the same."""
-    monkeypatch.setattr(evaluate, "Crew", InProcess)
+    monkeypatch.setattr(run, "Crew", InProcess)
     InProcess.played, InProcess.stop_after = 0, None
     suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
     args = ["evaluate", "zero", "--suite", suite, "--out", out, "--trials", "2", "--seed", "3"]
@@ -189,7 +188,7 @@ def test_ctrl_c_says_how_to_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 130, no traceback; the same command finishes the evaluation."""
-    monkeypatch.setattr(evaluate, "Crew", InProcess)
+    monkeypatch.setattr(run, "Crew", InProcess)
     InProcess.played, InProcess.stop_after = 0, 1
     suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
     args = ["evaluate", "zero", "--suite", suite, "--out", out]

@@ -97,9 +97,7 @@ def test_controllers_are_added_and_kept(tmp_path: Path) -> None:
         ({"closed": True, "controllers": {"abe07": "2"}}, r"other controllers \(pd, abe07\)"),
     ],
 )
-def test_other_settings_do_not_mix(
-    tmp_path: Path, changes: dict[str, Any], message: str
-) -> None:
+def test_other_settings_do_not_mix(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
     """The text says what differs and what to do; the folder stays as it was. Where trials depend
     on who takes part, nobody can be added."""
     folder = start(tmp_path)

@@ -28,7 +28,7 @@ from poise.training.learning.config import PPOConfig
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import SeedRun, train_seeds
 from tests.support.benchmarks_small import InProcessCrew
-from tests.support.evaluations import RANDOM, random_suite, write_suite
+from tests.support.evaluations import random_suite, write_suite
 from tests.support.shared import finished_run, tiny_config
 from tests.training.learning.test_train import ROOT, weights
 
@@ -224,7 +224,7 @@ def test_an_evaluation_of_a_folder_of_seeds(
 ) -> None:
     """Its runs play, and their IQM and the worst seed are in the summary and on the terminal."""
     from poise.training.evaluation import run as evaluation
-    from tests.support.evaluations import InProcess, random_suite
+    from tests.support.evaluations import InProcess
 
     monkeypatch.setattr(evaluation, "Crew", InProcess)
     InProcess.played, InProcess.stop_after = 0, None

@@ -17,7 +17,7 @@ from poise.training.cli import commands
 from poise.training.cli.commands import main
 from poise.training.running.stopping import Stopped, stop_code, stoppable, uninterrupted
 from tests.endurance.processes import Running, heed_interrupts, kill
-from tests.support.evaluations import RANDOM, random_suite, write_suite
+from tests.support.evaluations import random_suite, write_suite
 
 # A native call of minutes that no signal interrupts, as a compilation is. It speaks from within the
 # call: a signal before it would be heard.

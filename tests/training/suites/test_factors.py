@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.configs.files import packaged
 from poise.configs.schema import build
 from poise.training.suites.plan import Plan
 from poise.training.suites.suite import Suite, load_suite
@@ -142,7 +141,10 @@ def test_the_mix_stays_in_its_ranges_and_uses_all_of_them() -> None:
     mix = {"trials": 60, "delay": [0.0, 0.02], "friction": [0.5, 0.6], "repeated": 0.5}
     cases = part(small(mix=mix), "mix")
     assert all(0.5 <= c.world.friction <= 0.6 and -0.1 <= c.world.mass_error <= 0.1 for c in cases)
-    assert {c.world.delay for c in cases} == {0.0, 0.02} and {len(c.pushes) for c in cases} == {1, 2}
+    assert {c.world.delay for c in cases} == {0.0, 0.02} and {len(c.pushes) for c in cases} == {
+        1,
+        2,
+    }
     assert all(0.05 <= case.push.duration <= 0.5 for case in cases)
     assert {case.push.body for case in cases} == set(robot().description.push_bodies)
     sectors = np.histogram([case.push.direction for case in cases], bins=6, range=(0, 360))[0]

@@ -42,7 +42,7 @@ def player():
 
 def trial(impulse):
     """A push forward."""
-    return Trial(0, 5, Push("torso", 0.5, 0.1, impulse, 0.0))
+    return Trial(0, 5, (Push("torso", 0.5, 0.1, impulse, 0.0),))
 
 
 def test_a_fall_is_worth_less_than_standing(player, monkeypatch):
