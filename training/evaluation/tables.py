@@ -33,7 +33,8 @@ def print_summary(summary: Summary, console: Console) -> None:
     columns = [
         (heading, text)
         for heading, text in table_columns(summary)
-        if heading not in IN_PAIRS and not {text(name) for name in summary["ranking"]} <= {NONE, "0"}
+        if heading not in IN_PAIRS
+        and not {text(name) for name in summary["ranking"]} <= {NONE, "0"}
     ]
     table = Table(title=title, title_justify="left")
     table.add_column("controller", overflow="fold", min_width=_room(summary["ranking"], 16))

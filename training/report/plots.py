@@ -64,10 +64,10 @@ def step_lines(results: Results) -> dict[str, tuple[list[float], list[float]]]:
     """
     found = results.summary["step_limits"]
     whose = [entry["controllers"] for entry in found]
-    return {
-        line_name(name, whose): (found[0]["curves"]["directions"], found[0]["curves"][name])
-        for name in (DRAWN if found else ())
-    }
+    if not found:
+        return {}
+    curves = cast(dict[str, list[float]], found[0]["curves"])
+    return {line_name(name, whose): (curves["directions"], curves[name]) for name in DRAWN}
 
 
 def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:

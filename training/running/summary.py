@@ -5,6 +5,7 @@ Impulses are N·s, lengths m, rates and gains shares; an `Interval` is [low, hig
 """
 
 # without `from __future__ import annotations`: TypedDict must see which keys are required
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, TypedDict
 
@@ -168,11 +169,16 @@ class Fractions(TypedDict, total=False):
     sectors: list[Sector]
 
 
-class Entry(Counts, Envelope, Fractions, total=False):
-    """A controller. The counts are of the part that is rated, else of all trials."""
+class Played(Rate):
+    """How many trials were played, and in how many the controller raised."""
 
     played: int
     errors: int
+
+
+class Entry(Played, Counts, Envelope, Fractions, total=False):
+    """A controller. The counts are of the part that is rated, else of all trials."""
+
     tick_us: Number
     fingerprint: str
     factors: list[Factor]
@@ -231,12 +237,19 @@ class SeedGroup(SeedNames, total=False):
     recovered: SeedFigures
 
 
+Curves = TypedDict(
+    "Curves",
+    {"directions": list[float], "1": list[float], "2": list[float], "inf": list[float]},
+)
+
+
 class StepCurves(TypedDict):
-    """What steps can stop around the robot, of controllers with the same limits of a step."""
+    """What 1, 2 and any number of steps can stop around the robot, of controllers with the same
+    limits of a step."""
 
     controllers: list[str]
     steps: dict[str, float]
-    curves: dict[str, list[float]]
+    curves: Curves
 
 
 class RobotFigures(TypedDict):
@@ -267,11 +280,12 @@ class Summary(Circumstances):
     seeds: list[SeedGroup]
 
 
-#: keys of an entry that are there together or not at all
+#: keys of an entry or a pair that are there together or not at all
 TOGETHER = (
     ("directions", "j50_mean", "j50_mean_ci95", "j50_mean_per_mass", "j50_min", "j50_bounded",
      "eta_mean", "eta_mean_ci95", "eta_min"),
     ("sectors", "fraction_of", "fraction50"),
+    ("both", "only_a", "only_b", "neither", "p_mcnemar"),
 )  # fmt: skip
 
 
@@ -293,16 +307,15 @@ def read_summary(path: str | Path) -> Summary:
             raise ConfigError(f"no such controller: {shown(name)}", source=path, choices=entries)
     for name, entry in entries.items():
         _check_rate(entry, path, f"controllers.{name}")
-        for keys in TOGETHER:
-            lacking = [key for key in keys if key not in entry]
-            if 0 < len(lacking) < len(keys):
-                raise ConfigError("is missing", source=path,
-                                  field=f"controllers.{name}.{lacking[0]}")  # fmt: skip
+        _check_together(entry, path, f"controllers.{name}")
         for factor in entry.get("factors", ()):
             for level in factor["levels"]:
                 _check_rate(level, path, f"controllers.{name}.factors")
-    for k, curves in enumerate(summary["step_limits"]):
-        if len({len(values) for values in curves["curves"].values()} - {0}) != 1:
+    for k, pair in enumerate(summary["pairs"]):
+        _check_together(pair, path, f"pairs[{k}]")
+    for k, steps in enumerate(summary["step_limits"]):
+        curves = steps["curves"]
+        if len({len(curves[key]) for key in ("directions", "1", "2", "inf")}) != 1:
             raise ConfigError("must have as many values as directions", source=path,
                               field=f"step_limits[{k}].curves")  # fmt: skip
     return summary
@@ -319,6 +332,13 @@ def check_format(found: object, path: Path) -> None:
         source=path,
         field="format",
     )
+
+
+def _check_together(entry: Mapping[str, object], path: Path, field: str) -> None:
+    for keys in TOGETHER:
+        lacking = [key for key in keys if key not in entry]
+        if 0 < len(lacking) < len(keys):
+            raise ConfigError("is missing", source=path, field=f"{field}.{lacking[0]}")
 
 
 def _check_rate(rate: Rate, path: Path, field: str) -> None:

@@ -15,7 +15,7 @@ from poise.baselines.stepping.planner import StepLimits
 from poise.baselines.stepping.reach import Reach
 from poise.envs.maths.pendulum import capture_distance, duration_factor
 from poise.envs.maths.polygons import ray_to_edge
-from poise.training.running.summary import Direction, Envelope, StepCurves
+from poise.training.running.summary import Curves, Direction, Envelope, StepCurves
 
 from .players import Player
 from .push_limits import PushLimits
@@ -126,13 +126,14 @@ def curves(steps: Mapping[str, NStepLimit], duration: float) -> list[StepCurves]
         {
             "controllers": names,
             "steps": asdict(own),
-            "curves": {
-                "directions": fine,
-                **{
+            "curves": cast(
+                Curves,
+                {"directions": fine}
+                | {
                     name: [steps[names[0]](angle, duration, count) for angle in fine]
                     for name, count in COUNTS.items()
                 },
-            },
+            ),
         }
         for own, names in groups(steps).items()
     ]

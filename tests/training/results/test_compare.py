@@ -8,7 +8,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import pytest
 from rich.console import Console
@@ -50,8 +50,14 @@ def rate(won: int, trials: int) -> Rate:
             "recovered_ci95": (share - 0.1, share + 0.1)}  # fmt: skip
 
 
+class Compared(TypedDict):
+    lost: int
+    won: int
+    p_mcnemar: float
+
+
 def entry(outcomes: list[bool], j50: float) -> Entry:
-    compared: Any = {"lost": 0, "won": 0, "p_mcnemar": 1.0}
+    compared: Compared = {"lost": 0, "won": 0, "p_mcnemar": 1.0}
     return {
         **rate(sum(outcomes), len(outcomes)),
         "played": 4, "errors": 0, "root_force_max": 3.0, "tick_us": 80.0, "fingerprint": "0",

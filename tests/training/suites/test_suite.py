@@ -132,7 +132,7 @@ def test_parts_are_played_one_after_the_other(limits: PushLimits) -> None:
     trials = first(both, limits, 1)
     assert trials[:3] == first(suite, limits, 1)
     assert [trial.part for trial in trials] == ["random"] * 3 + ["quiet"] * 2
-    assert both.resized(1).parts == {"random": replace(suite.random, trials=1), "quiet": Quiet(1)}
+    assert both.resized(1).parts == {"random": suite.resized(1).random, "quiet": Quiet(1)}
     assert suite.resized(10**4).random.trials == 10**4 and both.resized(10**4) == both
 
 

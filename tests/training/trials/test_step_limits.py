@@ -175,7 +175,7 @@ def test_the_envelope_of_one_that_steps_is_measured_by_the_step_limits() -> None
     for d, before in zip(entry["directions"], plain["directions"], strict=True):
         assert d["step_limit_1"] == own(d["direction"], plan.suite.push_duration, 1)
         assert d["step_share_1"] == d["j50"] / d["step_limit_1"]
-        assert {key: d[key] for key in before} == before and len(d) == len(before) + 9
+        assert d | before == d and len(d) == len(before) + 9
     assert "step_share_1_mean" in entry and not any("step_share" in key for key in plain)
 
 
