@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from poise.training.evaluation.run import benchmark, evaluate
+    from poise.training.evaluation.evaluate import benchmark, evaluate
     from poise.training.figures.video import frame_strip, record
     from poise.training.learning.config import TrainConfig
     from poise.training.learning.policy import Policy, load_policy
@@ -42,7 +42,7 @@ else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
-            "evaluation.run": ("benchmark", "evaluate"),
+            "evaluation.evaluate": ("benchmark", "evaluate"),
             "figures.video": ("frame_strip", "record"),
             "learning.config": ("TrainConfig",),
             "learning.policy": ("Policy", "load_policy"),

@@ -98,7 +98,7 @@ def play(case: Json, folder: Path) -> None:
     """Run it here: code 2 with one line, or usage, or a result; raises AssertionError otherwise."""
     for name in ("evaluation", "benchmark"):
         copy_sample(name, folder)
-    (folder / "bad.yaml").write_text("kind: random\ntrials: many\n")
+    (folder / "bad.yaml").write_text("random: {trials: many}\n")
     (folder / "latin.yaml").write_bytes(b"kind: \xe9\xff\n")
     (folder / "file").write_text("text\n")
     out, err = io.BytesIO(), io.BytesIO()

@@ -12,7 +12,7 @@ import pytest
 
 from poise.training.evaluation import run
 from poise.training.evaluation import run as evaluation
-from poise.training.evaluation.run import evaluate
+from poise.training.evaluation.evaluate import benchmark, evaluate
 from tests.support.benchmarks_small import InProcessCrew, write_small
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
@@ -40,7 +40,7 @@ def make_samples(path: Path) -> None:
         patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
         suite = write_suite(path, RANDOM)
         evaluate(CONTROLLERS, suite, out=path / "evaluation", seed=4)
-        run.benchmark(CONTROLLERS, write_small(path), out=path / "benchmark", seed=2)
+        benchmark(CONTROLLERS, write_small(path), out=path / "benchmark", seed=2)
 
 
 def copy_sample(name: str, to: Path) -> Path:

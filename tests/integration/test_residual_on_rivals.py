@@ -11,7 +11,7 @@ from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.files import packaged
 from poise.training.evaluation import run
 from poise.training.evaluation import run as evaluation
-from poise.training.evaluation.run import benchmark, evaluate
+from poise.training.evaluation.evaluate import benchmark, evaluate
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train

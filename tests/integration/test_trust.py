@@ -29,7 +29,7 @@ from poise.baselines.registry import controller_config, load_controller, momentu
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled import warmup
 from poise.training.cli.commands import main
-from poise.training.evaluation.run import benchmark, evaluate
+from poise.training.evaluation.evaluate import benchmark, evaluate
 from poise.training.evaluation.seed_groups import seed_groups
 from poise.training.learning.checkpoints import check_controller, controller_fingerprint
 from poise.training.learning.config import train_config

@@ -11,7 +11,7 @@ import pytest
 
 from poise.training.evaluation import run
 from poise.training.evaluation import run as evaluation
-from poise.training.evaluation.run import evaluate
+from poise.training.evaluation.evaluate import benchmark, evaluate
 from tests.support.benchmarks_small import InProcessCrew, write_small
 from tests.support.evaluations import ENVELOPE, InProcess, random_suite, write_suite
 
@@ -37,7 +37,7 @@ def finished(kind: str) -> Path:
             patch.setattr(run, "Crew", InProcessCrew)
             patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
             InProcessCrew.stop_after = None
-            run.benchmark(names, write_small(path), out=path / "out", seed=2)
+            benchmark(names, write_small(path), out=path / "out", seed=2)
         return path / "out"
     fields = {"random": random_suite(8), "envelope": ENVELOPE}[kind]
     with pytest.MonkeyPatch.context() as patch:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from poise.training.evaluation.run import evaluate
+from poise.training.evaluation.evaluate import evaluate
 from poise.training.running.files import PLOTS
 from poise.training.running.stopping import ANEW, keeps
 from poise.training.running.summary import Summary

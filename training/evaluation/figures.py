@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -11,37 +11,32 @@ from poise.training.running.summary import (
     Direction,
     Entry,
     Envelope,
-    Eurobench,
-    Factor,
     Fractions,
-    Level,
-    Margin,
-    Rate,
     RobotFigures,
     Sector,
 )
-from poise.training.statistics.bootstrap import EnvelopeFit, mean_over_directions
-from poise.training.statistics.eurobench import (
-    HUMAN_COM_HEIGHT,
-    Size,
-    energy_factor,
-    force_factor,
-    human_reach,
-    mean_or_none,
-    stability_margin,
-)
+from poise.training.statistics.bootstrap import mean_over_directions
+from poise.training.statistics.eurobench import HUMAN_COM_HEIGHT
 from poise.training.statistics.fits import fit_logistic
-from poise.training.statistics.rates import eta, mcnemar, wilson_interval
-from poise.training.suites.factors import STANDARD
+from poise.training.statistics.rates import eta, wilson_interval
 from poise.training.suites.plan import Plan
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import NStepLimit
-from poise.training.trials.trial import Outcome, Trial
+from poise.training.trials.trial import Outcome
 
-Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers
-RATED = "mix"  # the part that the counts are of, where a suite has it
-DIRECTIONAL = ("envelope", "grid")  # parts that J50 of each direction is fitted to
-SECTOR = 45.0  # [deg] in which random directions are counted together
+from .factors import eurobench_figures, factor_figures
+from .played import (
+    DIRECTIONAL,
+    Played,
+    ankle_limits,
+    fractions,
+    part,
+    pushes,
+    rate,
+    rated,
+    sectors,
+    won,
+)
 
 
 def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None) -> Entry:
@@ -56,56 +51,11 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
         entry.update(envelope(directional, plan.limits, steps))
     if random := part(played, "random"):
         entry.update(_fractions(random, plan.limits))
-    if factors := _factors(part(played, "factors"), plan.standard):
+    if factors := factor_figures(part(played, "factors"), plan.standard):
         entry["factors"] = factors
     if part(played, "envelope", "margin"):
-        entry["eurobench"] = _eurobench(played, plan.limits)
+        entry["eurobench"] = eurobench_figures(played, plan.limits)
     return entry
-
-
-def part(played: Played, *names: str) -> Played:
-    """The trials of some parts."""
-    return [(trial, outcome) for trial, outcome in played if trial.part in names]
-
-
-def rated(played: Played) -> Played:
-    """The trials that a controller is rated by: those of the mix, else all."""
-    return part(played, RATED) or played
-
-
-def pushes(played: Played) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Direction [deg], impulse [N·s] and duration [s] of every trial's push."""
-    found = [(t.push.direction, t.push.impulse, t.push.duration) for t, _ in played if t.push]
-    direction, impulse, duration = np.array(found).reshape(-1, 3).T
-    return direction, impulse, duration
-
-
-def won(played: Played) -> np.ndarray:
-    """Whether each trial was recovered."""
-    return np.array([outcome.recovered for _, outcome in played], dtype=bool)
-
-
-def fractions(played: Played) -> np.ndarray:
-    """Impulse over the limit of every trial."""
-    return np.array([trial.limit_fraction for trial, _ in played], dtype=float)
-
-
-def sectors(played: Played) -> EnvelopeFit:
-    """Fits of the share of the limit in sectors of 45°, named by their middle."""
-    direction, _, _ = pushes(played)
-    middle = SECTOR * (np.rint(direction / SECTOR) % (360.0 / SECTOR))
-    return mean_over_directions(middle, fractions(played), won(played))
-
-
-def rate(recovered: Sequence[bool]) -> Rate:
-    """How many were recovered."""
-    trials, count = len(recovered), int(sum(recovered))
-    return {
-        "trials": trials,
-        "recovered": count,
-        "recovered_rate": count / trials,
-        "recovered_ci95": wilson_interval(count, trials),
-    }
 
 
 def counts(outcomes: Sequence[Outcome]) -> Counts:
@@ -189,12 +139,6 @@ def envelope(played: Played, limits: PushLimits, steps: NStepLimit | None = None
     return figures
 
 
-def ankle_limits(played: Played, limits: PushLimits) -> np.ndarray:
-    """The ankle limit [N·s] for the push of every trial."""
-    direction, _, duration = pushes(played)
-    return np.array([limits.ankle(d, t) for d, t in zip(direction, duration, strict=True)])
-
-
 def _fractions(played: Played, limits: PushLimits) -> Fractions:
     fit, by_sector = fit_logistic(fractions(played), won(played)), sectors(played)
     found: list[Sector] = [
@@ -214,74 +158,6 @@ def _fractions(played: Played, limits: PushLimits) -> Fractions:
         "fraction50_bound": fit.bound,
         "sectors": found,
     }
-
-
-def _factors(played: Played, standard: Mapping[str, str]) -> list[Factor]:
-    """Recovered rate of every level, and what it lost and won against the standard case."""
-    cells: dict[tuple[str, str], list[bool]] = {}
-    for trial, outcome in played:
-        cells.setdefault((str(trial.factor), str(trial.level)), []).append(outcome.recovered)
-    base = cells.pop((STANDARD, STANDARD), [])
-    found: dict[str, list[Level]] = {}
-    for (factor, level), recovered in cells.items():
-        found.setdefault(factor, []).append(_level(level, recovered, base))
-    for factor, levels in found.items():
-        levels.append({**_level(standard[factor], base, base), "standard": True})
-        if factor != "body":
-            levels.sort(key=lambda entry: float(entry["level"]))
-    return [{"factor": factor, "standard": standard[factor], "levels": levels}
-            for factor, levels in found.items()]  # fmt: skip
-
-
-def _level(level: str, recovered: Sequence[bool], base: Sequence[bool]) -> Level:
-    lost = sum(b and not r for r, b in zip(recovered, base, strict=True))
-    gained = sum(r and not b for r, b in zip(recovered, base, strict=True))
-    return {
-        "level": level,
-        "standard": False,
-        **rate(recovered),
-        "lost": lost,
-        "won": gained,
-        "p_mcnemar": mcnemar(lost, gained).p_value,
-    }
-
-
-def _eurobench(played: Played, limits: PushLimits) -> Eurobench:
-    """Sway and recovery time over recovered standard pushes; stability margins."""
-    plain = [outcome for _, outcome in part(played, "envelope") if outcome.recovered]
-    return {
-        "body_sway_mean": mean_or_none([outcome.sway for outcome in plain]),
-        "recovery_time_mean": mean_or_none([outcome.sway_recovery for outcome in plain]),
-        "recovery_time_trials": sum(outcome.sway_recovery is not None for outcome in plain),
-        "trials": len(plain),
-        "margins": _margins(part(played, "margin"), limits),
-    }
-
-
-def _margins(played: Played, limits: PushLimits) -> list[Margin]:
-    """Stability margin per direction: force [N], energy [J], and both on a human's scale."""
-    if not played:
-        return []
-    direction, impulse, duration = pushes(played)
-    fallen = ~won(played)  # not recovered counts as a fall: the protocol knows no third end
-    robot, found = limits.robot, []
-    for angle in dict.fromkeys(direction.tolist()):
-        here = direction == angle
-        largest = stability_margin(impulse[here], fallen[here])
-        margin: Margin = {"direction": angle, "impulse": largest}
-        if largest is not None:
-            size = Size(robot.mass, robot.height_com, limits.margin(angle))
-            reach = human_reach(angle)
-            force, energy = largest / float(duration[here][0]), largest**2 / (2.0 * robot.mass)
-            margin |= {
-                "force": force,
-                "force_normalised": force / force_factor(size, reach),
-                "energy": energy,
-                "energy_normalised": energy / energy_factor(size, reach),
-                "largest_tried": largest == float(impulse[here].max()),
-            }
-        found.append(margin)
-    return found
 
 
 def robot_figures(limits: PushLimits) -> RobotFigures:

@@ -10,7 +10,7 @@ from poise.training.statistics.differences import paired_rates, relative_gain
 from poise.training.statistics.rates import mcnemar
 from poise.training.trials.trial import Outcome, Trial
 
-from .figures import DIRECTIONAL, Played, part, pushes, rated, won
+from .played import DIRECTIONAL, Played, part, pushes, rated, won
 
 
 def pair_figures(

@@ -12,7 +12,7 @@ from poise.training.statistics.fits import fit_logistic
 from poise.training.suites.plan import Plan
 from poise.training.trials.step_limits import COUNTS, DRAWN, NStepLimit, groups, line_name
 
-from .figures import DIRECTIONAL, Played, ankle_limits, fractions, part, pushes, sectors, won
+from .played import DIRECTIONAL, Played, ankle_limits, fractions, part, pushes, sectors, won
 
 
 def draw_plots(

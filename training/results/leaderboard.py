@@ -12,7 +12,9 @@ from poise.configs.reading import is_folder
 from poise.training.evaluation.seed_groups import seed_lines
 from poise.training.evaluation.tables import ranked, table_columns
 from poise.training.running.files import SUMMARY
-from poise.training.running.summary import Entry, Summary, read_summary
+from poise.training.running.summary import Entry, Summary
+
+from .summary import read_summary
 
 HEAD = """# Leaderboard
 

@@ -11,9 +11,11 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import is_file, is_folder, read_table
 from poise.training.evaluation.folder import Settings, read_settings
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS
-from poise.training.running.summary import Summary, read_summary
+from poise.training.running.summary import Summary
 from poise.training.trials.table import CASE_COLUMNS, COLUMNS, read_trial
 from poise.training.trials.trial import Trial
+
+from .summary import read_summary
 
 FLAGS = {"True": True, "False": False}
 

@@ -5,13 +5,10 @@ Impulses are N·s, lengths m, rates and gains shares; an `Interval` is [low, hig
 """
 
 # without `from __future__ import annotations`: TypedDict must see which keys are required
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, TypedDict
 
 from poise.configs.errors import ConfigError, shown
-from poise.configs.reading import is_file, read_json
-from poise.configs.schema import checked
 from poise.training.statistics.seeds import SeedFigures
 
 from .provenance import Circumstances
@@ -280,47 +277,6 @@ class Summary(Circumstances):
     seeds: list[SeedGroup]
 
 
-#: keys of an entry or a pair that are there together or not at all
-TOGETHER = (
-    ("directions", "j50_mean", "j50_mean_ci95", "j50_mean_per_mass", "j50_min", "j50_bounded",
-     "eta_mean", "eta_mean_ci95", "eta_min"),
-    ("sectors", "fraction_of", "fraction50"),
-    ("both", "only_a", "only_b", "neither", "p_mcnemar"),
-)  # fmt: skip
-
-
-def read_summary(path: str | Path) -> Summary:
-    """A summary.json; raises ConfigError, naming the file and the field, where it is not one."""
-    path = Path(path)
-    if not is_file(path):
-        raise ConfigError("cannot be read (no such file): not a finished result", source=path)
-    data = read_json(path)
-    check_format(data.get("format"), path)
-    summary = checked(Summary, data, path)
-    entries = summary["controllers"]
-    if not entries or sorted(summary["ranking"]) != sorted(entries):
-        raise ConfigError("must name all controllers", source=path, field="ranking")
-    named = [[summary["reference"]], *([pair["a"], pair["b"]] for pair in summary["pairs"]),
-             *(curves["controllers"] or [""] for curves in summary["step_limits"])]  # fmt: skip
-    for name in (name for names in named for name in names):
-        if name not in entries:
-            raise ConfigError(f"no such controller: {shown(name)}", source=path, choices=entries)
-    for name, entry in entries.items():
-        _check_rate(entry, path, f"controllers.{name}")
-        _check_together(entry, path, f"controllers.{name}")
-        for factor in entry.get("factors", ()):
-            for level in factor["levels"]:
-                _check_rate(level, path, f"controllers.{name}.factors")
-    for k, pair in enumerate(summary["pairs"]):
-        _check_together(pair, path, f"pairs[{k}]")
-    for k, steps in enumerate(summary["step_limits"]):
-        curves = steps["curves"]
-        if len({len(curves[key]) for key in ("directions", "1", "2", "inf")}) != 1:
-            raise ConfigError("must have as many values as directions", source=path,
-                              field=f"step_limits[{k}].curves")  # fmt: skip
-    return summary
-
-
 def check_format(found: object, path: Path) -> None:
     """Raise ConfigError for a file of another format than `FORMAT`."""
     if found == FORMAT:
@@ -332,21 +288,6 @@ def check_format(found: object, path: Path) -> None:
         source=path,
         field="format",
     )
-
-
-def _check_together(entry: Mapping[str, object], path: Path, field: str) -> None:
-    for keys in TOGETHER:
-        lacking = [key for key in keys if key not in entry]
-        if 0 < len(lacking) < len(keys):
-            raise ConfigError("is missing", source=path, field=f"{field}.{lacking[0]}")
-
-
-def _check_rate(rate: Rate, path: Path, field: str) -> None:
-    if rate["trials"] < 1:
-        raise ConfigError("must be at least 1", source=path, field=f"{field}.trials")
-    if not 0 <= rate["recovered"] <= rate["trials"]:
-        raise ConfigError(f"must be a whole number from 0 to trials, not {rate['recovered']}",
-                          source=path, field=f"{field}.recovered")  # fmt: skip
 
 
 def both_ends(interval: Interval | None) -> tuple[float, float] | None:

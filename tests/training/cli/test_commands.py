@@ -98,7 +98,10 @@ def test_a_broken_pipe_of_another_kind_is_raised(
         (["evaluate", "zero", "--suite", "rndom"], "no such name: 'rndom'"),
         (["evaluate", "zero", "--robot", "robby"], "no such name: 'robby'"),
         (["evaluate", "zero", "--workers", "0"], "workers: must be at least 1"),
-        (["evaluate", "zero", "--suite", "bad.yaml"], "bad.yaml: random.trials: must be a whole number"),
+        (
+            ["evaluate", "zero", "--suite", "bad.yaml"],
+            "bad.yaml: random.trials: must be a whole",
+        ),
         (["evaluate", "zero", "--suite", "text.yaml"], "text.yaml: not valid YAML"),
         (["evaluate", "zero", "--robot", "robot.yaml"], "robot.yaml: feet: a biped has two feet"),
         (["evaluate", "run"], "a policy folder holds"),

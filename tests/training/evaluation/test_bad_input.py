@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from poise.training.cli.commands import main
-from poise.training.evaluation.run import benchmark
+from poise.training.evaluation.evaluate import benchmark
 from poise.training.running import log as trial_log
 from tests.support.benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small
 
@@ -22,7 +22,7 @@ BOTH = ("momentum-qp", "zero")
 KILLED = """
 import os, signal
 from poise.training.evaluation.folder import ResultFolder
-from poise.training.evaluation.run import benchmark
+from poise.training.evaluation.evaluate import benchmark
 append = ResultFolder.append
 def and_die(folder, *rest):
     append(folder, *rest)

@@ -19,7 +19,7 @@ from poise.envs.balance.config import StartNoise
 from poise.envs.pushes.push import Push
 from poise.training.cli.commands import main
 from poise.training.evaluation import run
-from poise.training.evaluation.run import benchmark, default_controllers
+from poise.training.evaluation.evaluate import benchmark, default_controllers
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.trials.jobs import Job, Stage, play

@@ -18,7 +18,7 @@ from rich.console import Console
 from poise.configs.errors import ConfigError
 from poise.training.cli import demo
 from poise.training.evaluation import run as evaluation
-from poise.training.evaluation.run import evaluate, measured_limits
+from poise.training.evaluation.evaluate import evaluate, measured_limits
 from poise.training.running.crew import Crew
 from poise.training.running.provenance import Circumstances
 from poise.training.running.summary import Summary

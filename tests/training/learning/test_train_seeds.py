@@ -21,7 +21,7 @@ from rich.console import Console
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.schema import read_yaml, to_yaml
 from poise.training.cli.train import run as train_command
-from poise.training.evaluation.run import evaluate
+from poise.training.evaluation.evaluate import evaluate
 from poise.training.learning import train_seeds as module
 from poise.training.learning.checkpoints import find_checkpoint
 from poise.training.learning.config import PPOConfig

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.training.evaluation import run
+from poise.training.evaluation.evaluate import benchmark
 from poise.training.report import factors as factor_tables
 from poise.training.report.cells import Table
 from poise.training.report.tables import ranking
@@ -159,7 +159,7 @@ def test_without_a_mix_all_trials_count(tmp_path: Path, monkeypatch: pytest.Monk
     """The rate is then that of everything that was played."""
     play_in_process(monkeypatch)
     suite = write_small(tmp_path, mix=None, factors=None)
-    run.benchmark(["momentum-qp", "zero"], suite, out=tmp_path / "out")
+    benchmark(["momentum-qp", "zero"], suite, out=tmp_path / "out")
     results = load_results(tmp_path / "out")
     assert results.summary["rated"] is None
     for name, entry in results.summary["controllers"].items():

@@ -22,9 +22,10 @@ from poise.training.evaluation.pairs import alike, pair_figures, paired
 from poise.training.evaluation.tick_times import tick_times
 from poise.training.results.compare import compare, print_comparison
 from poise.training.results.leaderboard import leaderboard, write_leaderboard
+from poise.training.results.summary import read_summary
 from poise.training.running.files import csv_text
 from poise.training.running.provenance import Circumstances
-from poise.training.running.summary import Entry, Rate, Summary, read_summary
+from poise.training.running.summary import Entry, Rate, Summary
 from poise.training.suites.plan import Plan
 from poise.training.trials.players import Player, load_player
 from poise.training.trials.table import COLUMNS, trial_row

@@ -12,7 +12,8 @@ import pytest
 
 from poise.configs.errors import ConfigError
 from poise.training.results.read import load_results
-from poise.training.running.summary import both_ends, read_summary
+from poise.training.results.summary import read_summary
+from poise.training.running.summary import both_ends
 from tests.support.report_folders import copied, finished
 
 

@@ -9,7 +9,7 @@ import yaml
 
 from poise.configs.errors import ConfigError
 from poise.training.evaluation import run as evaluation
-from poise.training.evaluation.run import evaluate
+from poise.training.evaluation.evaluate import evaluate
 from poise.training.results.replay import replay
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 

@@ -18,7 +18,7 @@ from poise.training.report.plots import step_lines
 from poise.training.results.compare import compare, print_comparison
 from poise.training.results.leaderboard import write_leaderboard
 from poise.training.results.read import load_results
-from poise.training.running.summary import read_summary
+from poise.training.results.summary import read_summary
 from tests.training.results.test_compare import NO, YES, write_result
 
 WRONG = (None, True, "x", [], -1, 10**300, [1, None], {"x": 1})

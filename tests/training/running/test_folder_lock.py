@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from poise.configs.errors import PoiseError
-from poise.training.evaluation.run import evaluate
+from poise.training.evaluation.evaluate import evaluate
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import train_seeds
 from poise.training.running.folder_lock import HOLDER, FolderLock

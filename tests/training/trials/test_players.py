@@ -14,7 +14,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.evaluation.run import default_controllers
+from poise.training.evaluation.evaluate import default_controllers
 from poise.training.learning import policy
 from poise.training.learning.policy import load_policy
 from poise.training.trials.players import load_player

@@ -18,9 +18,9 @@ from poise.baselines.stepping.planner import StepLimits
 from poise.envs.maths.pendulum import drifted, duration_factor
 from poise.training.evaluation import plots
 from poise.training.evaluation import run as evaluation
+from poise.training.evaluation.evaluate import evaluate
 from poise.training.evaluation.figures import controller_entry
 from poise.training.evaluation.plots import _step_lines
-from poise.training.evaluation.run import evaluate
 from poise.training.trials.players import Player, load_player
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import (
