@@ -82,7 +82,7 @@ def command() -> None:
 
 
 def _unread(stream: TextIO | None) -> bool:
-    """Whether this is a pipe that nobody reads any more."""
+    """True for a pipe that nobody reads any more."""
     try:
         poll = select.poll()
         poll.register(stream.fileno(), 0)  # type: ignore[union-attr]

@@ -1,4 +1,4 @@
-"""What a controller reached: its entry of summary.json."""
+"""A controller's entry of summary.json is computed here."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
 
 
 def counts(outcomes: Sequence[Outcome]) -> Counts:
-    """How many were recovered, how, and medians of what was recorded."""
+    """Counts of how trials ended, and medians of what was recorded."""
     standing = [outcome for outcome in outcomes if outcome.recovered]
     trials, fallen = len(outcomes), sum(outcome.fallen for outcome in outcomes)
 
@@ -161,7 +161,7 @@ def _fractions(played: Played, limits: PushLimits) -> Fractions:
 
 
 def robot_figures(limits: PushLimits) -> RobotFigures:
-    """What a report needs of the robot."""
+    """The robot's figures that a report needs."""
     robot = limits.robot
     return {
         "name": robot.name,

@@ -164,7 +164,7 @@ def read_settings(folder: Path) -> Settings:
 
 
 def _difference(name: str, old: Any, new: Any) -> str:
-    """What differs, in words."""
+    """The difference in words."""
     if isinstance(old, dict) and isinstance(new, dict):
         keys = [k for k in {**old, **new} if old.get(k) != new.get(k)]
         what = ", ".join(f"{k} {old.get(k)}, not {new.get(k)}" for k in keys)

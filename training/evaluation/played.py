@@ -1,4 +1,4 @@
-"""What one controller has played: its trials with their outcomes, as arrays and in parts."""
+"""Trials of one controller with their outcomes, as arrays and in parts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def pushes(played: Played) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def won(played: Played) -> np.ndarray:
-    """Whether each trial was recovered."""
+    """An array (n,), true where a trial was recovered."""
     return np.array([outcome.recovered for _, outcome in played], dtype=bool)
 
 
@@ -53,7 +53,7 @@ def sectors(played: Played) -> EnvelopeFit:
 
 
 def rate(recovered: Sequence[bool]) -> Rate:
-    """How many were recovered."""
+    """The count of recovered trials and their rate, with its interval."""
     trials, count = len(recovered), int(sum(recovered))
     return {
         "trials": trials,

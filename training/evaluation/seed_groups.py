@@ -55,7 +55,7 @@ def seed_lines(groups: Sequence[SeedGroup]) -> list[str]:
 
 
 def _configuration(folder: str) -> tuple[str, int]:
-    """What a run was trained with but for its seed, and the seed."""
+    """The configuration of a run but for its seed, and the seed."""
     from poise.training.learning.policy import load_policy
 
     try:

@@ -1,4 +1,4 @@
-"""How long a control tick takes, all controllers measured in turn in one process."""
+"""The time of a control tick is measured here, of all controllers in turn in one process."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ SPAN, TRIAL_DURATION = 2.0, 5.0  # [s]
 
 
 class Tick(NamedTuple):
-    """What the controller met, and its answer."""
+    """A control tick: what the controller met, and its answer."""
 
     time: float
     state: RobotState

@@ -47,7 +47,7 @@ class Cell(NamedTuple):
 
     @property
     def sort_key(self) -> str:
-        """What the page sorts by; nothing sorts last."""
+        """The text that the page sorts by; nothing sorts last."""
         return "" if self.value is None else str(self.value)
 
 

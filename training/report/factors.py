@@ -1,4 +1,4 @@
-"""What only some suites have: sensitivity to factors, indicators, training seeds, errors."""
+"""Tables that only some suites have: sensitivity to factors, indicators, seeds, errors."""
 
 from __future__ import annotations
 

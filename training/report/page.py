@@ -218,7 +218,7 @@ def _ending(record: Record) -> str:
 
 
 def _facts(results: Results) -> list[tuple[str, str]]:
-    """Where the result comes from, as far as the summary says."""
+    """The origin of the result."""
     summary, settings = results.summary, results.settings
     machine, versions = summary["machine"], summary["versions"]
     rows = [

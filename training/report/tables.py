@@ -20,7 +20,7 @@ STEP_LIMITS = {"1": "1-step limit", "2": "2-step limit", "inf": "∞-step limit"
 
 
 def assisted(results: Results, name: str) -> bool:
-    """Whether a controller took force from nowhere, at a soft root."""
+    """True if a controller took force from nowhere, at a soft root."""
     return (results.summary["controllers"][name].get("root_force_max") or 0.0) > ROOT_FORCE
 
 

@@ -1,4 +1,4 @@
-"""What a report says in words."""
+"""Sentences of a report."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .tables import assisted
 
 
 def lead(results: Results) -> list[str]:
-    """What the result says, in a sentence or three."""
+    """The result in a sentence or three."""
     summary = results.summary
     fair = [name for name in summary["ranking"] if not assisted(results, name)]
     first = (fair or summary["ranking"])[0]

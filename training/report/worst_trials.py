@@ -1,4 +1,4 @@
-"""Which trials a report shows, and how they are played again: frames and signals."""
+"""The trials that a report shows are chosen and played again: frames and signals."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def choose_exhibits(results: Results, baseline: str, order: Sequence[str]) -> li
 
 
 def smallest_lost(results: Results, name: str) -> list[Record]:
-    """What a controller did not recover, the smallest push first, without its errors."""
+    """The trials that a controller did not recover, the smallest push first, without its errors."""
     lost = [r for r in results.of(name) if not r.recovered and not r.error]
     return sorted(lost, key=_size)
 

@@ -1,4 +1,4 @@
-"""What changed between two results, with intervals."""
+"""Two results are compared here, with intervals."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Change:
 
     @property
     def certain(self) -> bool:
-        """Whether the interval leaves zero out."""
+        """True if the interval leaves zero out."""
         return self.low > 0.0 or self.high < 0.0
 
 
@@ -112,7 +112,7 @@ Key = tuple[str, ...]
 
 
 def _outcomes(results: Results, name: str) -> dict[Key, bool]:
-    """What a trial must share to be a pair → whether the controller recovered."""
+    """A mapping from what a trial must share to be a pair, to whether the controller recovered."""
     return {record.met: record.recovered for record in results.of(name)}
 
 

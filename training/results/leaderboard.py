@@ -88,7 +88,7 @@ def _same(summary: Summary) -> tuple[object, ...]:
 
 
 def _shape(entry: Entry) -> tuple[int, list[int]]:
-    """How many directions, and how many levels of each factor, a controller has."""
+    """The number of a controller's directions, and of levels of each factor."""
     return len(entry["directions"]), [len(f["levels"]) for f in entry.get("factors", ())]
 
 

@@ -22,7 +22,7 @@ FLAGS = {"True": True, "False": False}
 
 @dataclass(frozen=True)
 class Record:
-    """How one controller fared in one trial.
+    """A controller in a trial: a line of trials.csv.
 
     Attributes:
         trial, controller: which.
@@ -51,7 +51,7 @@ class Record:
 
     @property
     def error(self) -> str:
-        """What the controller raised, if it did."""
+        """The error that the controller raised, or nothing."""
         return self.line["error"]
 
     @cached_property
@@ -62,7 +62,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Results:
-    """What a folder holds.
+    """The content of a result's folder.
 
     Attributes:
         folder: where it was read.
@@ -96,7 +96,7 @@ class Results:
         return [record for record in self.records if record.controller == controller]
 
     def record(self, controller: str, trial: int) -> Record:
-        """How a controller fared in a trial; raises ConfigError where there is none."""
+        """The line of a controller in a trial; raises ConfigError where there is none."""
         if controller not in self.controllers:
             raise ConfigError(f"{shown(controller)} took no part", source=self.folder,
                               field="controller", choices=self.controllers)  # fmt: skip
@@ -107,7 +107,7 @@ class Results:
         return numbers[trial]
 
     def trial(self, record: Record) -> Trial:
-        """What a controller met, exactly; raises ConfigError where its line does not parse."""
+        """The trial of a record, exactly; raises ConfigError where its line does not parse."""
         return read_trial(record.line, self.folder / TRIALS)
 
 

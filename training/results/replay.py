@@ -67,11 +67,12 @@ def replay(
             robot that is no longer the one that took part, or may not run.
         PoiseError: nothing can be drawn here, or a file cannot be written.
     """
-    results = folder if isinstance(folder, Results) else load_results(folder)
-    name = results.controllers[-1] if controller is None else controller
-    record = results.record(name, trial)
-    again = results.trial(record)
-    with allowing(allow, source=results.folder / SETTINGS):
+    path = folder.folder if isinstance(folder, Results) else Path(folder)
+    with allowing(allow, source=path / SETTINGS):
+        results = folder if isinstance(folder, Results) else load_results(path)
+        name = results.controllers[-1] if controller is None else controller
+        record = results.record(name, trial)
+        again = results.trial(record)
         player = Worlds(_player(results, name)).enter(again.world)
     signals = Signals() if plot is not None else None
     watches = [each for each in (signals, watch) if each is not None]

@@ -1,4 +1,4 @@
-"""Where a result comes from: command, versions, machine, commit and time."""
+"""The origin of a result: command, versions, machine, commit and time."""
 
 import importlib.metadata
 import os
@@ -24,7 +24,7 @@ class Machine(TypedDict):
 
 
 class Circumstances(TypedDict):
-    """How a result was made; `seconds` counts the last call alone."""
+    """The origin of a result; `seconds` counts the last call alone."""
 
     command: str
     versions: dict[str, str]
@@ -36,7 +36,7 @@ class Circumstances(TypedDict):
 
 
 def circumstances(started: float, workers: int, backend: str) -> Circumstances:
-    """What a result says of how it was made; `started` is of `time.perf_counter`."""
+    """The origin of a result that this process makes; `started` is of `time.perf_counter`."""
     return {
         "command": shlex.join(sys.argv),
         "versions": versions(),

@@ -20,7 +20,7 @@ Bound = Literal["lower", "upper"] | None  # where a fit is only a bound
 
 
 class Rate(TypedDict):
-    """How many trials were recovered."""
+    """The number of recovered trials, and their rate."""
 
     trials: int
     recovered: int
@@ -29,7 +29,7 @@ class Rate(TypedDict):
 
 
 class Counts(Rate, total=False):
-    """How trials ended, and medians of what was recorded."""
+    """Counts of how trials ended, and medians of what was recorded."""
 
     fallen: int
     never_fell_rate: float
@@ -167,7 +167,7 @@ class Fractions(TypedDict, total=False):
 
 
 class Played(Rate):
-    """How many trials were played, and in how many the controller raised."""
+    """The number of trials played, and of those in which the controller raised."""
 
     played: int
     errors: int
@@ -241,7 +241,7 @@ Curves = TypedDict(
 
 
 class StepCurves(TypedDict):
-    """What 1, 2 and any number of steps can stop around the robot, of controllers with the same
+    """The impulses that 1, 2 and any number of steps can stop, of controllers with the same
     limits of a step."""
 
     controllers: list[str]
@@ -250,7 +250,7 @@ class StepCurves(TypedDict):
 
 
 class RobotFigures(TypedDict):
-    """What a report needs of the robot; its ankle limit is [direction, N·s] of a 0.1 s push."""
+    """The robot's figures; its ankle limit is [direction, N·s] of a 0.1 s push."""
 
     name: str
     mass: float

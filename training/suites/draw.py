@@ -1,4 +1,4 @@
-"""What the parts of a suite draw from: every draw depends on the seed and the trial's number."""
+"""Trials are drawn here: every draw depends on the seed and the trial's number alone."""
 
 from __future__ import annotations
 
@@ -98,11 +98,11 @@ class Draw:
         ]
 
     def height(self, body: str) -> float:
-        """Of the body's centre of mass, standing, over that of the robot."""
+        """The height of the body's centre of mass, standing, over that of the robot's."""
         return float(self._data.xipos[self.robot.model.body(body).id, 2] / self.robot.height_com)
 
     def point(self, body: str, height: float) -> tuple[float, float, float]:
-        """Above the body's centre of mass at a height [of the CoM's], in the body's frame [m]."""
+        """The point above the body's CoM at a height [of the robot's CoM], in its frame [m]."""
         axes = self._data.xmat[self.robot.model.body(body).id].reshape(3, 3)
         up = (height - self.height(body)) * self.robot.height_com
         x, y, z = (float(u) for u in axes.T @ [0.0, 0.0, up])
@@ -128,7 +128,7 @@ class Part:
         raise NotImplementedError
 
     def second_count(self, controllers: int) -> int:
-        """How many trials each controller meets in the second stage."""
+        """The number of trials that each controller meets in the second stage."""
         return 0
 
     def second(

@@ -15,7 +15,7 @@ Finished = Mapping[tuple[str, int], Outcome]  # controller, number of the trial 
 
 
 class Plan:
-    """Which trials each controller plays. Numbers leave room for the second stage of a part.
+    """Lists the trials of each controller; numbers leave room for the second stage of a part.
 
     Attributes:
         suite: whose trials they are.

@@ -40,7 +40,7 @@ class Suite(Standard):
 
     @property
     def paired(self) -> bool:
-        """Whether trials depend on who takes part."""
+        """True if trials depend on who takes part."""
         return self.envelope is not None and self.envelope.paired
 
     def resized(self, trials: int) -> Suite:

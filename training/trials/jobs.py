@@ -1,4 +1,4 @@
-"""What a process is told to play, and how it plays it."""
+"""Jobs tell a process what to play, and `play` plays it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .worlds import Worlds
 
 @dataclass(frozen=True)
 class Stage:
-    """Where all trials of a suite are played.
+    """The robot, duration and noise that all trials of a suite share.
 
     Attributes:
         robot: name or path.

@@ -50,7 +50,7 @@ def run_trial(player: Player, trial: Trial, watch: Watch | None = None) -> Outco
 
 
 def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -> Outcome:
-    """What the environment has recorded about the episode."""
+    """The outcome that the environment has recorded."""
     m = env.episode.metrics
     recovered = env.recovered and not env.fallen
     pushed = max((push.start for push in trial.pushes), default=0.0)

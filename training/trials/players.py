@@ -1,4 +1,4 @@
-"""Who is evaluated: a controller by its name, ready to act in an environment of its own."""
+"""Agents are evaluated: a controller by its name, ready to act in its own environment."""
 
 import hashlib
 from collections.abc import Callable
@@ -115,7 +115,7 @@ ENVIRONMENTS = {
 
 
 def _is_controller(name: str, robot: Robot) -> bool:
-    """Whether a class, or what a function makes, gives torques."""
+    """True if a class, or what a function makes, gives torques."""
     found = find_outside(name)
     return hasattr(found if isinstance(found, type) else make_outside(name, robot), "torques")
 

@@ -1,4 +1,4 @@
-"""What a trial looks like over time: CoM, CoP, capture point, angular momentum, torque, sway."""
+"""Signals of a trial over time: CoM, CoP, capture point, angular momentum, torque, sway."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What steps could recover at best: the N-step limit of a linear inverted pendulum."""
+"""The N-step limit of a linear inverted pendulum: an upper bound of what steps recover."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _own_limits(player: Player) -> StepLimits | None:
 
 
 def groups(steps: Mapping[str, NStepLimit]) -> dict[StepLimits, list[str]]:
-    """Which controllers have the same limits of a step."""
+    """The controllers that have the same limits of a step."""
     found: dict[StepLimits, list[str]] = {}
     for name, limit in steps.items():
         found.setdefault(limit.steps, []).append(name)
@@ -140,12 +140,12 @@ def curves(steps: Mapping[str, NStepLimit], duration: float) -> list[StepCurves]
 
 
 def line_name(name: str, whose: Sequence[Sequence[str]]) -> str:
-    """Of a line of a plot; it says whose it is where not all controllers that step are alike."""
+    """The name of a line of a plot; it says whose it is where not all that step are alike."""
     return DRAWN[name] + (f" of {whose[0][0]}" if len(whose) > 1 else "")
 
 
 def shown_out_to(top: float, limits: Iterable[float]) -> float:
-    """How far out a plot goes that shows values up to `top`, and limits as far as there is room."""
+    """The reach of a plot that shows values up to `top`, and limits as far as there is room."""
     return max(top, min(max(limits, default=0.0), ROOM * top))
 
 

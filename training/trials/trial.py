@@ -9,7 +9,7 @@ from poise.envs.pushes.push import Push
 
 @dataclass(frozen=True)
 class World:
-    """In what a trial differs from the robot as its controller knows it.
+    """The difference of a trial's robot from the one that its controller knows.
 
     Attributes:
         friction: of floor and soles; None: the robot's own.
@@ -27,7 +27,7 @@ OWN_WORLD = World()  # the robot as its controller knows it
 
 @dataclass(frozen=True)
 class Trial:
-    """What every controller meets alike.
+    """A trial that controllers meet alike.
 
     Attributes:
         number: of the trial within its suite.
@@ -65,7 +65,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a trial. Distances [m], times [s]; None where there is no such value, or
+    """The outcome of a trial. Distances [m], times [s]; None where there is no such value, or
     where a simulation has blown up.
 
     Attributes:

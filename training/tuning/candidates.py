@@ -1,4 +1,4 @@
-"""What a candidate of `poise tune` is worth: how pushes around the limit end."""
+"""A candidate of `poise tune` is judged here, by how pushes around the limit end."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

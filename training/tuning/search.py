@@ -117,7 +117,7 @@ def tune(
 
 
 def _known(config: TuneConfig, out: Path, resume: bool) -> list[dict[str, Any]]:
-    """What an earlier call has tried."""
+    """The generations that an earlier call has tried."""
     if not is_file(out / CONFIG):
         if resume:
             raise ConfigError("holds no search to resume", source=out, field="resume")
@@ -212,7 +212,7 @@ class _Search:
         self._take(units, values)
 
     def _are_worths(self, values: Any) -> bool:
-        """Whether these are values of all candidates and pushes, or of no pushes."""
+        """True if these are values of all candidates and pushes, or of no pushes."""
         found, pushes = np.asarray(values, float), self.config.pushes
         trials = len(pushes.directions) * len(pushes.levels)
         sizes = [(self.config.population, count) for count in (0, trials)]
