@@ -37,7 +37,7 @@ def make_samples(path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evaluation, "Crew", InProcess)
         patch.setattr(run, "Crew", InProcessCrew)
-        patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+        patch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
         suite = write_suite(path, RANDOM)
         evaluate(CONTROLLERS, suite, out=path / "evaluation", seed=4)
         benchmark(CONTROLLERS, write_small(path), out=path / "benchmark", seed=2)

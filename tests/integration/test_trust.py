@@ -44,8 +44,8 @@ from poise.training.results.leaderboard import write_leaderboard
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.running.crew import Crew
+from poise.training.trials.agents import load_agent
 from poise.training.trials.jobs import Job, Stage, play
-from poise.training.trials.players import load_player
 from poise.training.tuning.candidates import Candidate
 from poise.training.tuning.candidates import play as play_candidate
 from poise.training.tuning.gains import Gains
@@ -120,8 +120,8 @@ LOADERS: dict[str, Callable[[Ground, str], Any]] = {
     "controller_config, mapping": lambda g, n: controller_config({"kind": "outside", "name": n}),
     "load_controller": lambda g, n: load_controller(n, robot()),
     "find_outside": lambda g, n: find_outside(n),
-    "load_player": lambda g, n: load_player(n, robot()),
-    "load_player, a policy's folder": lambda g, n: load_player(str(policy(g, n)), robot()),
+    "load_agent": lambda g, n: load_agent(n, robot()),
+    "load_agent, a policy's folder": lambda g, n: load_agent(str(policy(g, n)), robot()),
     "load_policy, best checkpoint": lambda g, n: load_policy(
         _once(lambda g, n: g.policy(n, "run/best"), "run")(g, n)
     ),
@@ -263,7 +263,7 @@ ELSEWHERE: dict[str, Callable[[Ground, str], Any]] = {
     "a policy's start": lambda g, n: train(
         tiny_config(start_from=str(g.here / "none")), g.here / "out"
     ),
-    "a robot's file": lambda g, n: load_player(
+    "a robot's file": lambda g, n: load_agent(
         "momentum-qp",
         poise.envs.robots.robot.load_robot(g.yaml("robot.yaml", model=n, root=n, feet=[])),
     ),
@@ -525,7 +525,7 @@ DANGEROUS = {
         "src/poise/lazy.py",
     },
     "exec_module": {"baselines/plugins.py"},
-    "find_outside": {"baselines/plugins.py", "training/trials/players.py"},
+    "find_outside": {"baselines/plugins.py", "training/trials/agents.py"},
     "OutsideConfig": {"baselines/plugins.py", "baselines/registry.py"},
     # MuJoCo's data within a copy; what the main process and its workers say to each other
     "pickle.loads": {"envs/compiled/copies.py", "training/running/processes.py"},

@@ -36,7 +36,7 @@ def write_small(folder: Path, **changes: Any) -> Path:
 def play_in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
     """Trials are played in this process, and ticks are not timed."""
     monkeypatch.setattr(run, "Crew", InProcessCrew)
-    monkeypatch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+    monkeypatch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
     InProcessCrew.played, InProcessCrew.stop_after = 0, None
     return InProcessCrew
 

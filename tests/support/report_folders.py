@@ -35,7 +35,7 @@ def finished(kind: str) -> Path:
     if kind == "benchmark":
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(run, "Crew", InProcessCrew)
-            patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+            patch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
             InProcessCrew.stop_after = None
             benchmark(names, write_small(path), out=path / "out", seed=2)
         return path / "out"

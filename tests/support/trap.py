@@ -135,7 +135,7 @@ def allowed_there(name: str) -> bool:
 
 
 def loaded_there(name: str) -> str:
-    """The name of a player that the process that is asked has loaded."""
+    """The name of an agent that the process that is asked has loaded."""
     return Stage("humanoid", 6.0, StartNoise()).load(name).name
 
 

@@ -9,7 +9,7 @@ from poise.training.running.files import PLOTS
 from poise.training.running.stopping import ANEW, keeps
 from poise.training.running.summary import Summary
 from poise.training.running.terminal import print_paths
-from poise.training.trials.players import SHIPPED
+from poise.training.trials.agents import SHIPPED
 
 CONTROLLERS = ("momentum-qp", SHIPPED, "capture-step", "residual-step", "feedback-step")
 SUITES = ("demo-envelope", "demo-random")

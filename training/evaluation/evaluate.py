@@ -45,7 +45,7 @@ def evaluate(
     `backend`.
 
     Args:
-        controllers: names as `load_player` takes them, or folders of several training seeds; all
+        controllers: names as `load_agent` takes them, or folders of several training seeds; all
             different. The first is the reference of the others.
         suite: a packaged suite or a path to a ``.yaml`` of one.
         out: the folder to write to.

@@ -26,8 +26,8 @@ from poise.training.running.terminal import print_paths, progress_bar
 from poise.training.suites.draw import MOST_TRIALS
 from poise.training.suites.plan import Plan
 from poise.training.suites.suite import load_suite
+from poise.training.trials.agents import Agent
 from poise.training.trials.jobs import Job, Stage, play
-from poise.training.trials.players import Player
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import NStepLimit, curves, stepping_limits
 from poise.training.trials.table import trial_row
@@ -70,7 +70,7 @@ class Run:
         Plan(self.suite, self.limits, seed, names)  # refuses what does not fit the robot
         prepare()
         self.stage = Stage(robot, self.suite.duration, self.suite.noise)
-        self.players = {name: self.stage.load(name, self.robot) for name in names}
+        self.agents = {name: self.stage.load(name, self.robot) for name in names}
         self.settings = Settings(
             format=FORMAT,
             suite_name=str(suite),
@@ -80,7 +80,7 @@ class Run:
             seed=seed,
             limits=self.limits.table,
             versions=versions(("mujoco", "numpy", "numba")),
-            controllers={name: player.fingerprint for name, player in self.players.items()},
+            controllers={name: agent.fingerprint for name, agent in self.agents.items()},
         )
 
     def play(self, plots: bool = False, timed: bool = False) -> Summary:
@@ -91,18 +91,18 @@ class Run:
         with closing(folder):
             self._announce(folder)
             names = tuple(folder.settings.controllers)
-            players = {name: self.players.get(name) or self._load_again(name, folder)
+            agents = {name: self.agents.get(name) or self._load_again(name, folder)
                        for name in names}  # fmt: skip
             plan = Plan(self.suite, self.limits, self.settings.seed, names)
-            _warm_up(players.values())
+            _warm_up(agents.values())
             self._play(folder, plan)
             played: dict[str, Played] = {
                 name: [(trial, folder.finished[name, trial.number]) for trial in trials]
                 for name, trials in plan.trials(folder.finished).items()
             }
             outcomes = {name: [o for _, o in played[name]] for name in names}
-            steps = stepping_limits(players.values(), outcomes, self.limits)
-            ticks = tick_times(players) if timed else dict.fromkeys(names)
+            steps = stepping_limits(agents.values(), outcomes, self.limits)
+            ticks = tick_times(agents) if timed else dict.fromkeys(names)
             summary = self._summary(folder, plan, played, steps, ticks)
             drawn = draw_plots(self.out, plan, played, steps) if plots else []
             rows = [(trial, name, outcome) for name in names for trial, outcome in played[name]]
@@ -153,16 +153,16 @@ class Run:
         if folder.finished:
             self.console.print(f"going on after {len(folder.finished)} finished trials")
 
-    def _load_again(self, name: str, folder: ResultFolder) -> Player:
+    def _load_again(self, name: str, folder: ResultFolder) -> Agent:
         """A controller that the folder has besides; raises ConfigError if it has changed."""
         with allowing(source=self.out / SETTINGS):
-            player = self.stage.load(name, self.robot)
-        if player.fingerprint != folder.settings.controllers[name]:
+            agent = self.stage.load(name, self.robot)
+        if agent.fingerprint != folder.settings.controllers[name]:
             raise ConfigError(
                 f"holds trials of {shown(name)}, which has changed since: choose another folder",
                 source=self.out, field="controllers",
             )  # fmt: skip
-        return player
+        return agent
 
     def _play(self, folder: ResultFolder, plan: Plan) -> None:
         """Play what is missing: the first stage, then what follows from it."""
@@ -220,9 +220,9 @@ def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | N
         raise ConfigError(f"must be at most {MOST_TRIALS}", field="trials")
 
 
-def _warm_up(players: Iterable[Player]) -> None:
+def _warm_up(agents: Iterable[Agent]) -> None:
     """Compile what is not yet compiled, once, before many processes would do it each."""
-    for player in players:
+    for agent in agents:
         with contextlib.suppress(Exception):  # a controller from outside: its trials say what
-            observation, _ = player.env.reset(seed=0, options={"push": []})
-            player.env.step(player.act(observation))
+            observation, _ = agent.env.reset(seed=0, options={"push": []})
+            agent.env.step(agent.act(observation))

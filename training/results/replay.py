@@ -13,9 +13,9 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import load_robot
 from poise.training.running.files import SETTINGS
 from poise.training.suites.suite import Suite
+from poise.training.trials.agents import Agent
 from poise.training.trials.jobs import Stage
 from poise.training.trials.play import run_trial
-from poise.training.trials.players import Player
 from poise.training.trials.signals import Signals
 from poise.training.trials.table import outcome_cells
 from poise.training.trials.trial import Outcome, Trial
@@ -73,10 +73,10 @@ def replay(
         name = results.controllers[-1] if controller is None else controller
         record = results.record(name, trial)
         again = results.trial(record)
-        player = Worlds(_player(results, name)).enter(again.world)
+        agent = Worlds(_agent(results, name)).enter(again.world)
     signals = Signals() if plot is not None else None
     watches = [each for each in (signals, watch) if each is not None]
-    outcome = run_trial(player, again, lambda env: [each(env) for each in watches])
+    outcome = run_trial(agent, again, lambda env: [each(env) for each in watches])
     differences = {
         key: (record.line[key], text)
         for key, value in outcome_cells(outcome).items()
@@ -87,11 +87,11 @@ def replay(
     if video is not None:
         from poise.training.figures.video import record as film
 
-        film(player.env, player.act, video, {"seed": again.seed, "options": again.options})
+        film(agent.env, agent.act, video, {"seed": again.seed, "options": again.options})
     return Replay(again, name, outcome, differences)
 
 
-def _player(results: Results, name: str) -> Player:
+def _agent(results: Results, name: str) -> Agent:
     """The controller as it took part; raises ConfigError if it or the robot has changed since."""
     settings, folder = results.settings, results.folder
     robot = load_robot(settings.robot)
@@ -99,11 +99,11 @@ def _player(results: Results, name: str) -> Player:
         raise ConfigError(f"the robot {shown(settings.robot)} has changed since", source=folder,
                           field="robot_fingerprint")  # fmt: skip
     suite = build(Suite, settings.suite, str(folder / SETTINGS))
-    player = Stage(settings.robot, suite.duration, suite.noise).load(name, robot)
-    if player.fingerprint != settings.controllers[name]:
+    agent = Stage(settings.robot, suite.duration, suite.noise).load(name, robot)
+    if agent.fingerprint != settings.controllers[name]:
         raise ConfigError(f"the controller {shown(name)} has changed since", source=folder,
                           field="controllers")  # fmt: skip
-    return player
+    return agent
 
 
 def _draw(signals: Signals, path: Path, trial: Trial, title: str) -> None:

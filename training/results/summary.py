@@ -10,13 +10,13 @@ from poise.configs.reading import is_file, read_json
 from poise.configs.schema import checked
 from poise.training.running.summary import Rate, Summary, check_format
 
-#: keys of an entry or a pair that are there together or not at all
-TOGETHER = (
+#: keys of an entry that are there together or not at all
+ENTRY = (
     ("directions", "j50_mean", "j50_mean_ci95", "j50_mean_per_mass", "j50_min", "j50_bounded",
      "eta_mean", "eta_mean_ci95", "eta_min"),
     ("sectors", "fraction_of", "fraction50"),
-    ("both", "only_a", "only_b", "neither", "p_mcnemar"),
 )  # fmt: skip
+PAIR = (("both", "only_a", "only_b", "neither", "p_mcnemar"),)  # the same, of a pair
 
 
 def read_summary(path: str | Path) -> Summary:
@@ -37,12 +37,12 @@ def read_summary(path: str | Path) -> Summary:
             raise ConfigError(f"no such controller: {shown(name)}", source=path, choices=entries)
     for name, entry in entries.items():
         _check_rate(entry, path, f"controllers.{name}")
-        _check_together(entry, path, f"controllers.{name}")
+        _check_together(entry, ENTRY, path, f"controllers.{name}")
         for factor in entry.get("factors", ()):
             for level in factor["levels"]:
                 _check_rate(level, path, f"controllers.{name}.factors")
     for k, pair in enumerate(summary["pairs"]):
-        _check_together(pair, path, f"pairs[{k}]")
+        _check_together(pair, PAIR, path, f"pairs[{k}]")
     for k, steps in enumerate(summary["step_limits"]):
         curves = steps["curves"]
         if len({len(curves[key]) for key in ("directions", "1", "2", "inf")}) != 1:
@@ -51,8 +51,10 @@ def read_summary(path: str | Path) -> Summary:
     return summary
 
 
-def _check_together(entry: Mapping[str, object], path: Path, field: str) -> None:
-    for keys in TOGETHER:
+def _check_together(
+    entry: Mapping[str, object], groups: tuple[tuple[str, ...], ...], path: Path, field: str
+) -> None:
+    for keys in groups:
         lacking = [key for key in keys if key not in entry]
         if 0 < len(lacking) < len(keys):
             raise ConfigError("is missing", source=path, field=f"{field}.{lacking[0]}")

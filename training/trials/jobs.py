@@ -9,8 +9,8 @@ from pathlib import Path
 from poise.envs.balance.config import StartNoise
 from poise.envs.robots.robot import Robot, load_robot
 
+from .agents import Agent, load_agent
 from .play import run_trial
-from .players import Player, load_player
 from .trial import Outcome, Trial, failed
 from .worlds import Worlds
 
@@ -29,15 +29,15 @@ class Stage:
     duration: float
     noise: StartNoise
 
-    def load(self, controller: str, robot: Robot | None = None) -> Player:
-        """The player of this name; `robot` if it is loaded. Raises ConfigError."""
+    def load(self, controller: str, robot: Robot | None = None) -> Agent:
+        """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
         robot = robot or _robot(self.robot)
-        return load_player(controller, robot, duration=self.duration, pushes=None, noise=self.noise)
+        return load_agent(controller, robot, duration=self.duration, pushes=None, noise=self.noise)
 
 
 @dataclass(frozen=True)
 class Job:
-    """One trial for one controller, by the name that `load_player` takes."""
+    """One trial for one controller, by the name that `load_agent` takes."""
 
     stage: Stage
     controller: str

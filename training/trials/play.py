@@ -1,4 +1,4 @@
-"""Playing one trial: the outcome depends on the trial and the player alone, bit for bit."""
+"""Playing one trial: the outcome depends on the trial and the agent alone, bit for bit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
 
-from .players import Player
+from .agents import Agent
 from .signals import Sway
 from .trial import Outcome, Trial
 
@@ -20,12 +20,12 @@ AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bou
 Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
 
 
-def run_trial(player: Player, trial: Trial, watch: Watch | None = None) -> Outcome:
-    """Play a trial to its end in the environment that the player has."""
-    env = player.env
+def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome:
+    """Play a trial to its end in the environment that the agent has."""
+    env = agent.env
     observation, _ = env.reset(seed=trial.seed, options=trial.options)
-    if player.begin is not None:
-        player.begin()
+    if agent.begin is not None:
+        agent.begin()
     settled = Settled()
     touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
     sway = Sway() if trial.pushes else None
@@ -34,7 +34,7 @@ def run_trial(player: Player, trial: Trial, watch: Watch | None = None) -> Outco
     while not done:
         for each in watches:
             each(env)
-        action = player.act(observation)
+        action = agent.act(observation)
         _, terminated, truncated = env.step_in_place(action)
         observation = env.episode.observation.astype(np.float32)
         done = terminated or truncated

@@ -17,7 +17,7 @@ from poise.envs.maths.pendulum import capture_distance, duration_factor
 from poise.envs.maths.polygons import ray_to_edge
 from poise.training.running.summary import Curves, Direction, Envelope, StepCurves
 
-from .players import Player
+from .agents import Agent
 from .push_limits import PushLimits
 from .trial import Outcome
 
@@ -82,7 +82,7 @@ class NStepLimit:
 
 
 def stepping_limits(
-    players: Iterable[Player], outcomes: Mapping[str, Sequence[Outcome]], limits: PushLimits
+    agents: Iterable[Agent], outcomes: Mapping[str, Sequence[Outcome]], limits: PushLimits
 ) -> dict[str, NStepLimit]:
     """The N-step limit of every controller that steps, by what its planner allows.
 
@@ -93,18 +93,18 @@ def stepping_limits(
     if len(limits.robot.soles) != 2:
         return {}
     planned, others = {}, {}
-    for player in players:
-        own = _own_limits(player)
-        stepped = [o.foot_displaced and o.steps > 0 for o in outcomes[player.name] if o.recovered]
+    for agent in agents:
+        own = _own_limits(agent)
+        stepped = [o.foot_displaced and o.steps > 0 for o in outcomes[agent.name] if o.recovered]
         if own is not None:
-            planned[player.name] = NStepLimit(limits, own)
+            planned[agent.name] = NStepLimit(limits, own)
         elif stepped and np.mean(stepped) > STEPPING:
-            others[player.name] = NStepLimit(limits)
+            others[agent.name] = NStepLimit(limits)
     return planned | others
 
 
-def _own_limits(player: Player) -> StepLimits | None:
-    env = player.env
+def _own_limits(agent: Agent) -> StepLimits | None:
+    env = agent.env
     if not isinstance(env, ResidualBalanceEnv):
         return None
     controller = told_by(env.controller, env.robot).unwrapped

@@ -22,9 +22,9 @@ from poise.training.evaluation import run
 from poise.training.evaluation.evaluate import benchmark, default_controllers
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
+from poise.training.trials.agents import load_agent
 from poise.training.trials.jobs import Job, Stage, play
 from poise.training.trials.play import run_trial
-from poise.training.trials.players import load_player
 from poise.training.trials.table import outcome_cells
 from poise.training.trials.trial import Trial, World
 from poise.training.trials.worlds import Worlds
@@ -57,7 +57,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("benchmark")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run, "Crew", InProcessCrew)
-        patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+        patch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
         benchmark(BOTH, write_small(out), out=out / "out", seed=2)
     return out / "out"
 
@@ -69,10 +69,10 @@ def rows(folder: Path) -> list[dict[str, str]]:
 
 def test_the_standard_case_is_that_of_an_evaluation() -> None:
     """Bit for bit the outcome of `run_trial`, also after other worlds were played."""
-    player = load_player("momentum-qp", robot(), duration=1.6, pushes=None)
+    agent = load_agent("momentum-qp", robot(), duration=1.6, pushes=None)
     trial = Trial(0, 5, (Push("torso", 0.1, 0.1, 8.0, 30.0),))
-    expected = run_trial(player, trial)
-    worlds = Worlds(load_player("momentum-qp", robot(), duration=1.6, pushes=None))
+    expected = run_trial(agent, trial)
+    worlds = Worlds(load_agent("momentum-qp", robot(), duration=1.6, pushes=None))
     several = [World(), World(friction=0.4), World(delay=0.02), World(mass_error=0.1), World()]
     outcomes = [run_trial(worlds.enter(world), trial) for world in several]
     assert outcomes[0] == outcomes[-1] == expected

@@ -27,7 +27,7 @@ from poise.training.running.files import csv_text
 from poise.training.running.provenance import Circumstances
 from poise.training.running.summary import Entry, Rate, Summary
 from poise.training.suites.plan import Plan
-from poise.training.trials.players import Player, load_player
+from poise.training.trials.agents import Agent, load_agent
 from poise.training.trials.table import COLUMNS, trial_row
 from poise.training.trials.trial import Trial, failed
 from tests.support.shared import robot
@@ -277,18 +277,18 @@ def test_pairs_are_trials_alike_in_all() -> None:
 
 def test_ticks_are_timed_and_leave_no_trace() -> None:
     """A number for each, none for one that raises; the controller is in its place again."""
-    players = {name: load_player(name, robot(), pushes=None) for name in ("momentum-qp", "zero")}
+    agents = {name: load_agent(name, robot(), pushes=None) for name in ("momentum-qp", "zero")}
 
     def broken(observation: object) -> None:
         raise RuntimeError
 
-    env = load_player("pd", robot(), pushes=None).env
-    players["broken"] = Player("broken", env, broken, "")
-    inner = players["momentum-qp"].env.controller
-    times = tick_times(players)
+    env = load_agent("pd", robot(), pushes=None).env
+    agents["broken"] = Agent("broken", env, broken, "")
+    inner = agents["momentum-qp"].env.controller
+    times = tick_times(agents)
     assert 5.0 < times["momentum-qp"] < 1e5 and times["broken"] is None
     assert 0.0 < times["zero"] < times["momentum-qp"]
-    assert players["momentum-qp"].env.controller is inner and players["momentum-qp"].env._compiled
+    assert agents["momentum-qp"].env.controller is inner and agents["momentum-qp"].env._compiled
 
 
 def test_the_committed_leaderboard_is_generated() -> None:

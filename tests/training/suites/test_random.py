@@ -16,8 +16,8 @@ from poise.envs.robots.robot import load_robot
 from poise.training.suites.plan import Plan
 from poise.training.suites.random import Sequence
 from poise.training.suites.suite import Suite, load_suite
+from poise.training.trials.agents import load_agent
 from poise.training.trials.play import Touchdowns, run_trial
-from poise.training.trials.players import load_player
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.table import read_trial, trial_row
 from poise.training.trials.trial import Trial
@@ -72,19 +72,19 @@ def test_a_share_of_a_controllers_own_limits(limits: PushLimits) -> None:
 
 def test_later_pushes_are_played(limits: PushLimits) -> None:
     """A huge second push makes a fall, after it."""
-    player = load_player("momentum-qp", limits.robot, duration=2.0, pushes=None)
+    agent = load_agent("momentum-qp", limits.robot, duration=2.0, pushes=None)
     push = Push("torso", 0.2, 0.1, 1.0, 0.0)
-    alone = run_trial(player, Trial(0, 1, (push,)))
+    alone = run_trial(agent, Trial(0, 1, (push,)))
     assert alone.recovered and alone.steps == 0
-    then = run_trial(player, Trial(0, 1, (push, Push("torso", 1.0, 0.1, 90.0, 0.0))))
+    then = run_trial(agent, Trial(0, 1, (push, Push("torso", 1.0, 0.1, 90.0, 0.0))))
     assert then.fallen and then.fall_time is not None and then.fall_time > 1.0
 
 
 def test_a_line_of_trials_csv_holds_all_pushes(limits: PushLimits, tmp_path: Path) -> None:
     """What is read back for a replay is the trial, exactly."""
     trial = drawn(load_suite("repeated").resized(1), limits)[0]
-    player = load_player("momentum-qp", limits.robot, duration=1.1, pushes=None)
-    line = trial_row(trial, "momentum-qp", run_trial(player, trial))
+    agent = load_agent("momentum-qp", limits.robot, duration=1.1, pushes=None)
+    line = trial_row(trial, "momentum-qp", run_trial(agent, trial))
     assert len(json.loads(line["later"])) == len(trial.pushes) - 1
     text = {key: "" if value is None else str(value) for key, value in line.items()}
     assert read_trial(text, tmp_path) == trial

@@ -21,7 +21,7 @@ from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate
 from poise.training.evaluation.figures import controller_entry
 from poise.training.evaluation.plots import _step_lines
-from poise.training.trials.players import Player, load_player
+from poise.training.trials.agents import Agent, load_agent
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import (
     COUNTS,
@@ -81,19 +81,19 @@ def test_length_is_within_the_box_and_the_speeds(limit: NStepLimit) -> None:
     assert NStepLimit(limit.limits, slow).length(90.0) / h == pytest.approx(0.1)
 
 
-def stander(name: str, count: int, elsewhere: bool = True) -> tuple[Player, list[Outcome]]:
+def stander(name: str, count: int, elsewhere: bool = True) -> tuple[Agent, list[Outcome]]:
     """A controller without a planner; in `count` of 20 recoveries a foot landed."""
     env = SimpleNamespace(controller=SimpleNamespace())
     landed = replace(OUTCOME, steps=1, foot_displaced=elsewhere)
-    return Player(name, env, np.asarray, ""), [landed] * count + [OUTCOME] * (20 - count)
+    return Agent(name, env, np.asarray, ""), [landed] * count + [OUTCOME] * (20 - count)
 
 
 def test_the_limits_are_those_of_the_planner() -> None:
     """Of the controller itself, and of the one under a policy; feet in place have none."""
     names = ["zero", "momentum-qp", "ipm-step", "capture-step", "residual-step"]
-    players = [load_player(name, robot()) for name in names]
+    agents = [load_agent(name, robot()) for name in names]
     nothing = {name: [replace(OUTCOME, recovered=False)] for name in names}
-    found = stepping_limits(players, nothing, PushLimits(robot()))
+    found = stepping_limits(agents, nothing, PushLimits(robot()))
     assert list(found) == names[2:]
     for name in ("capture-step", "ipm-step"):
         assert found[name].steps == controller_config(name).limits
@@ -109,9 +109,9 @@ def test_without_a_planner_it_is_who_steps_that_counts(limit: NStepLimit) -> Non
     controller.planner.limits = own
     planner = ResidualBalanceEnv(robot(), controller=controller)
     cases = [stander("often", 10), stander("rare", 1), stander("tilts", 10, False)]
-    cases.append((Player("planned", planner, np.asarray, ""), []))
-    outcomes = {player.name: results for player, results in cases}
-    found = stepping_limits([player for player, _ in cases], outcomes, limit.limits)
+    cases.append((Agent("planned", planner, np.asarray, ""), []))
+    outcomes = {agent.name: results for agent, results in cases}
+    found = stepping_limits([agent for agent, _ in cases], outcomes, limit.limits)
     assert [(name, one.steps) for name, one in found.items()] == [
         ("planned", own), ("often", StepLimits()),
     ]  # fmt: skip
