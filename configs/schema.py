@@ -6,7 +6,16 @@ import dataclasses
 import math
 import types
 from pathlib import Path
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Any,
+    Literal,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+    is_typeddict,
+)
 
 import numpy as np
 import yaml
@@ -84,6 +93,18 @@ def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
     return _build(cls, data, str(source), "", {})
 
 
+def checked(hint: type[T], data: Any, source: str | Path) -> T:
+    """Plain values as a type hint describes them, checked as :func:`build` does.
+
+    The hint may also hold TypedDicts. Their unknown keys are kept as they are: whoever wrote the
+    file may know more.
+
+    Raises:
+        ConfigError: a missing key, a wrong type; it names `source` and the field.
+    """
+    return _build(hint, data, str(source), "", {})
+
+
 def to_dict(obj: Any, levels: int = DEPTH) -> Any:
     """A dataclass as plain dicts, lists, strings and numbers; the inverse of :func:`build`.
 
@@ -125,6 +146,8 @@ def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:
         return value
     if dataclasses.is_dataclass(hint):
         return _build_dataclass(_of_kind(hint, value, source, path), value, source, path)
+    if is_typeddict(hint):
+        return _build_typed_dict(hint, value, source, path)
     if origin in (Union, types.UnionType):
         return _build_union(args, value, source, path, bounds)
     if origin is Literal:
@@ -202,6 +225,17 @@ def _of_kind(cls: Any, data: Any, source: str, path: str) -> Any:
         problem = "this field is missing" if kind is None else f"no such kind: {shown(kind)}"
         raise ConfigError(problem, source=source, field=field, choices=kinds)
     return kinds[kind]
+
+
+def _build_typed_dict(cls: Any, data: Any, source: str, path: str) -> dict[str, Any]:
+    if not isinstance(data, dict):
+        raise ConfigError(f"must be a mapping, not {shown(data)}", source=source, field=path)
+    prefix, values, hints = f"{path}." if path else "", dict(data), get_type_hints(cls)
+    for name in cls.__required_keys__ - data.keys():
+        raise ConfigError("is missing", source=source, field=f"{prefix}{name}")
+    for name in hints.keys() & data.keys():
+        values[name] = _build(hints[name], data[name], source, prefix + name, {})
+    return values
 
 
 def _build_union(args: tuple, value: Any, source: str, path: str, bounds: Any) -> Any:

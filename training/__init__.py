@@ -11,6 +11,7 @@ __all__ = [
     "Policy",
     "ThreadedVecEnv",
     "TrainConfig",
+    "benchmark",
     "compare",
     "evaluate",
     "frame_strip",
@@ -18,7 +19,6 @@ __all__ = [
     "load_results",
     "record",
     "replay",
-    "run_benchmark",
     "train",
     "train_seeds",
     "tune",
@@ -26,8 +26,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from poise.training.benchmark.run import benchmark as run_benchmark
-    from poise.training.evaluation.evaluate import evaluate
+    from poise.training.evaluation.evaluate import benchmark, evaluate
     from poise.training.figures.video import frame_strip, record
     from poise.training.learning.config import TrainConfig
     from poise.training.learning.policy import Policy, load_policy
@@ -43,8 +42,7 @@ else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
-            "benchmark.run": ("benchmark as run_benchmark",),
-            "evaluation.evaluate": ("evaluate",),
+            "evaluation.evaluate": ("benchmark", "evaluate"),
             "figures.video": ("frame_strip", "record"),
             "learning.config": ("TrainConfig",),
             "learning.policy": ("Policy", "load_policy"),

@@ -60,8 +60,7 @@ if TYPE_CHECKING:
     from poise.baselines.registry import load_controller
     from poise.configs.errors import ConfigError, PoiseError
     from poise.envs.robots.robot import load_robot
-    from poise.training.benchmark.run import benchmark
-    from poise.training.evaluation.evaluate import evaluate
+    from poise.training.evaluation.evaluate import benchmark, evaluate
     from poise.training.learning.policy import load_policy
 else:
     __getattr__, __dir__ = lazy(
@@ -72,8 +71,7 @@ else:
             "baselines.registry": ("load_controller",),
             "configs.errors": ("ConfigError", "PoiseError"),
             "envs.robots.robot": ("load_robot",),
-            "training.benchmark.run": ("benchmark",),
-            "training.evaluation.evaluate": ("evaluate",),
+            "training.evaluation.evaluate": ("benchmark", "evaluate"),
             "training.learning.policy": ("load_policy",),
         },
     )

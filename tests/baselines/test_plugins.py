@@ -18,8 +18,9 @@ from poise.baselines.registry import controller_config, load_controller
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
-from poise.training.trials.players import load_player
-from poise.training.trials.trial import Trial, run_trial
+from poise.training.trials.agents import load_agent
+from poise.training.trials.play import run_trial
+from poise.training.trials.trial import Trial
 from tests.support.shared import robot
 
 SETTINGS = {"duration": 1.2, "pushes": None}
@@ -76,11 +77,11 @@ def example(tmp_path: Path) -> Iterator[Path]:
 def test_the_example_of_the_docs_is_played(example: Path) -> None:
     """The controller holds a quiet robot and takes part as any other; the policy does, too."""
     trial = Trial(0, seed=1)
-    player = load_player(f"{example}:ShiftedCoM", robot(), **SETTINGS)
-    assert run_trial(player, trial).recovered
-    policy = load_player(f"{example}:Still", robot(), **SETTINGS)
+    agent = load_agent(f"{example}:ShiftedCoM", robot(), **SETTINGS)
+    assert run_trial(agent, trial).recovered
+    policy = load_agent(f"{example}:Still", robot(), **SETTINGS)
     assert isinstance(policy.env, ResidualBalanceEnv)
-    alone = load_player("momentum-qp", robot(), **SETTINGS)
+    alone = load_agent("momentum-qp", robot(), **SETTINGS)
     assert run_trial(policy, trial) == run_trial(alone, trial)
 
 
@@ -89,10 +90,10 @@ def test_what_sb3_has_trained_is_played(example: Path, monkeypatch: pytest.Monke
     monkeypatch.chdir(example.parent)
     model = PPO("MlpPolicy", ResidualBalanceEnv(robot()), n_steps=8, batch_size=8, device="cpu")
     model.save("sb3_residual")
-    player = load_player("my_sb3.py:MyPolicy", robot(), **SETTINGS)
-    seen, _ = player.env.reset(seed=0)
+    agent = load_agent("my_sb3.py:MyPolicy", robot(), **SETTINGS)
+    seen, _ = agent.env.reset(seed=0)
     expected = model.predict(seen, deterministic=True)[0]
-    assert np.array_equal(player.act(seen), expected)
+    assert np.array_equal(agent.act(seen), expected)
 
 
 def test_a_module_in_the_current_folder_is_found(module: str) -> None:
@@ -100,7 +101,7 @@ def test_a_module_in_the_current_folder_is_found(module: str) -> None:
     for name in (f"{module}:Zero", f"{module}.py:Zero", f"{module}:make"):
         controller = load_controller(name, robot())
         assert isinstance(controller, OutsideController) and controller.period == 0.004
-        assert load_player(name, robot(), **SETTINGS).name == name
+        assert load_agent(name, robot(), **SETTINGS).name == name
 
 
 def test_arguments_come_from_a_file(module: str, tmp_path: Path) -> None:
@@ -111,7 +112,7 @@ def test_arguments_come_from_a_file(module: str, tmp_path: Path) -> None:
     with pytest.raises(PoiseError, match=r"torques have shape \(3,\), not \(21,\)"):
         controller.torques(Simulation(robot()).state, None)
     names = (str(path), f"{module}:Zero")
-    assert len({load_player(name, robot(), **SETTINGS).fingerprint for name in names}) == 2
+    assert len({load_agent(name, robot(), **SETTINGS).fingerprint for name in names}) == 2
 
 
 def test_the_fingerprint_follows_the_file(module: str, tmp_path: Path) -> None:
@@ -131,12 +132,12 @@ def test_numbers_that_are_none_are_an_error(module: str) -> None:
 
 def test_a_policy_starts_every_trial_anew(module: str) -> None:
     """In the torque environment, unless it says otherwise; `reset` is called before each trial."""
-    player = load_player(f"{module}:Counting", robot(), **SETTINGS)
-    assert type(player.env) is TorqueBalanceEnv
+    agent = load_agent(f"{module}:Counting", robot(), **SETTINGS)
+    assert type(agent.env) is TorqueBalanceEnv
     for number in (1, 2):
-        run_trial(player, Trial(0, seed=1))
-        assert player.act.__self__.begun == number
-    assert np.array_equal(player.act(np.zeros(1)), np.zeros(21))
+        run_trial(agent, Trial(0, seed=1))
+        assert agent.act.__self__.begun == number
+    assert np.array_equal(agent.act(np.zeros(1)), np.zeros(21))
 
 
 def test_several_environments_get_a_controller_each(module: str) -> None:
@@ -160,7 +161,7 @@ def test_several_environments_get_a_controller_each(module: str) -> None:
 def test_what_is_wrong_is_said(module: str, name: str, message: str) -> None:
     """One line that names the module or the class."""
     with pytest.raises(ConfigError, match=message) as error:
-        load_player(name.format(module), robot(), **SETTINGS)
+        load_agent(name.format(module), robot(), **SETTINGS)
     assert "\n" not in str(error.value)
 
 

@@ -37,11 +37,10 @@ from poise.configs.schema import build
 from poise.configs.yaml_loader import DEPTH, DIGITS, NODES
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmark.suite import load_benchmark
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
-from poise.training.suites.registry import load_suite
-from poise.training.trials.players import load_player
+from poise.training.suites.suite import load_suite
+from poise.training.trials.agents import load_agent
 from poise.training.trials.push_limits import load_limits
 from poise.training.tuning.search import tune_config
 from tests.support.hangs import no_hang
@@ -53,7 +52,6 @@ LOADERS: dict[str, Callable[[Any], Any]] = {
     "controllers": controller_config,
     "motions": lambda path: load_motion(path, robot()),
     "suites": load_suite,
-    "benchmarks": load_benchmark,
     "training": train_config,
     "tuning": tune_config,
     "limits": lambda path: load_limits(robot(), path),
@@ -170,9 +168,9 @@ def test_names_of_bases(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES[:-1])
-def test_names_of_players_and_policies(name: str) -> None:
+def test_names_of_agents_and_policies(name: str) -> None:
     """No controller and no policy is called so."""
-    assert "no such" in message(lambda: load_player(name, robot()))
+    assert "no such" in message(lambda: load_agent(name, robot()))
     assert "no such" in message(lambda: load_policy(name))
     assert not is_file(name) and not exists(f"{name}\0") and not is_folder(f"{name}\0")
 

@@ -22,7 +22,7 @@ import yaml
 from poise.configs.schema import to_yaml
 from poise.training.learning.checkpoints import STATE, find_checkpoint, read_state
 from tests.support.benchmarks_small import SMALL
-from tests.support.evaluations import RANDOM
+from tests.support.evaluations import random_suite
 from tests.support.shared import tiny_config
 
 RUN = ("command", "versions", "machine", "workers", "backend", "commit", "seconds", "tick_us")
@@ -57,7 +57,7 @@ def commands(room: Path, trials: int = 60) -> list[Command]:
     small = {**SMALL, "mix": {"trials": trials // 3, "delay": [0.008]}}
     train = to_yaml(tiny_config(steps=1536))
     files = {
-        "suite": yaml.safe_dump({**RANDOM, "trials": trials}),
+        "suite": yaml.safe_dump(random_suite(trials)),
         "small": yaml.safe_dump(small),
         "train": train,
         "tune": yaml.safe_dump(TUNING),
@@ -69,7 +69,7 @@ def commands(room: Path, trials: int = 60) -> list[Command]:
         Command(
             "evaluate",
             ("evaluate", *both, "--suite", f"{room}/suite.yaml", "--seed", "3", *workers),
-            _evaluation, lambda out: _lines(out / "trials.partial.jsonl"),
+            _evaluation, lambda out: _lines(out / "trials.jsonl"),
         ),
         Command(
             "benchmark",

@@ -12,9 +12,8 @@ import pytest
 import stable_baselines3
 from hypothesis import strategies as st
 
-from poise.training.benchmark import run
 from poise.training.cli import commands
-from poise.training.evaluation import evaluate
+from poise.training.evaluation import run
 from poise.training.figures import video
 from poise.training.learning import train_seeds
 from poise.training.qp_set import export
@@ -89,7 +88,7 @@ def cases(draw: Draw) -> Json:
 def _stops() -> tuple[tuple[Any, str], ...]:
     """What long runs begin with."""
     return (
-        (evaluate, "Crew"), (run, "Crew"), (search, "Crew"), (train_seeds, "Crew"),
+        (run, "Crew"), (search, "Crew"), (train_seeds, "Crew"),
         (stable_baselines3.PPO, "learn"), (export, "recoveries"), (page, "film"),
         (video, "record"),
     )  # fmt: skip
@@ -99,7 +98,7 @@ def play(case: Json, folder: Path) -> None:
     """Run it here: code 2 with one line, or usage, or a result; raises AssertionError otherwise."""
     for name in ("evaluation", "benchmark"):
         copy_sample(name, folder)
-    (folder / "bad.yaml").write_text("kind: random\ntrials: many\n")
+    (folder / "bad.yaml").write_text("random: {trials: many}\n")
     (folder / "latin.yaml").write_bytes(b"kind: \xe9\xff\n")
     (folder / "file").write_text("text\n")
     out, err = io.BytesIO(), io.BytesIO()

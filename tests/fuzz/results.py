@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from poise.training.evaluation.folder import read_settings
 from poise.training.report.page import write_report
-from poise.training.results.benchmark import load_benchmark_data
 from poise.training.results.compare import compare, print_comparison
 from poise.training.results.leaderboard import write_leaderboard
 from poise.training.results.read import load_results
@@ -25,7 +24,7 @@ from .texts import Draw, changed
 from .values import NUMBERS, TEXTS, Json, decode, packed
 
 FILES = {
-    "evaluation": ("settings.yaml", "summary.json", "trials.csv"),
+    "evaluation": ("settings.yaml", "summary.json", "trials.csv", "trials.jsonl"),
     "benchmark": ("settings.yaml", "summary.json", "trials.csv", "trials.jsonl"),
 }
 FORMS = {".yaml": "yaml", ".json": "json", ".csv": "csv", ".jsonl": "lines"}
@@ -40,7 +39,6 @@ def _compared(path: Path, first: bool) -> None:
 READERS: dict[str, Callable[[Path], Any]] = {
     "results": load_results,
     "settings": read_settings,
-    "benchmark": load_benchmark_data,
     "compare": lambda path: _compared(path, True),
     "compare with": lambda path: _compared(path, False),
     "leaderboard": lambda path: write_leaderboard([path], path.parent / "page.md"),

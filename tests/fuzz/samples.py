@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.benchmark import run
-from poise.training.evaluation import evaluate as evaluation
-from poise.training.evaluation.evaluate import evaluate
+from poise.training.evaluation import run
+from poise.training.evaluation import run as evaluation
+from poise.training.evaluation.evaluate import benchmark, evaluate
 from tests.support.benchmarks_small import InProcessCrew, write_small
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
@@ -37,10 +37,10 @@ def make_samples(path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evaluation, "Crew", InProcess)
         patch.setattr(run, "Crew", InProcessCrew)
-        patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+        patch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
         suite = write_suite(path, RANDOM)
         evaluate(CONTROLLERS, suite, out=path / "evaluation", seed=4)
-        run.benchmark(CONTROLLERS, write_small(path), out=path / "benchmark", seed=2)
+        benchmark(CONTROLLERS, write_small(path), out=path / "benchmark", seed=2)
 
 
 def copy_sample(name: str, to: Path) -> Path:

@@ -14,9 +14,9 @@ from poise.configs.files import packaged_folder
 from poise.configs.schema import to_yaml
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmark.suite import load_benchmark
 from poise.training.learning.config import train_config
-from poise.training.suites.registry import load_suite
+from poise.training.suites.plan import Plan
+from poise.training.suites.suite import load_suite
 from poise.training.trials.push_limits import load_limits
 from poise.training.tuning.gains import Gains
 from poise.training.tuning.search import tune_config
@@ -28,8 +28,10 @@ from .values import Json, decode, packed
 
 def _suite(path: Path) -> None:
     suite = load_suite(path).resized(2)
-    if suite.count(1) <= 100:
-        suite.first(load_limits(robot()), 0)
+    grid = suite.grid
+    if grid is None or grid.directions * len(grid.magnitudes) <= 100:
+        if suite.envelope is None or suite.envelope.directions <= 100:
+            Plan(suite, load_limits(robot()), 0, ["zero"])
 
 
 def _tuning(path: Path) -> None:
@@ -43,7 +45,6 @@ LOADERS: dict[str, Callable[[Path], Any]] = {
     "policies": lambda path: train_config(path).make_env(robot()),
     "training": lambda path: train_config(path).make_env(robot()),
     "suites": _suite,
-    "benchmarks": load_benchmark,
     "motions": lambda path: load_motion(path, robot()),
     "tuning": _tuning,
     "limits": lambda path: load_limits(robot(), path),

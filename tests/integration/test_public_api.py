@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 import poise
-import poise.training.benchmark  # the room, which hides no name of its package
 
 ROOT = Path(__file__).parents[2]
 LAZY = {
@@ -70,7 +69,7 @@ def test_one_thing_has_one_identity() -> None:
     assert poise.load_robot is poise.envs.load_robot
     assert poise.load_controller is poise.baselines.load_controller
     assert poise.evaluate is poise.training.evaluate
-    assert poise.benchmark is poise.training.run_benchmark and callable(poise.benchmark)
+    assert poise.benchmark is poise.training.benchmark and callable(poise.benchmark)
 
 
 def test_a_star_import_brings_what_all_says() -> None:
@@ -120,6 +119,6 @@ def test_a_deep_import_is_found() -> None:
     assert list(deep_names(text)) == [
         "poise.envs.robots.robot", "poise.envs.robots.robot Robot", "poise.envs Robots",
     ]  # fmt: skip
-    assert list(deep_names("`poise.training.benchmark.run` and poise.envs.Robot")) == [
-        "poise.training.benchmark.run"
+    assert list(deep_names("`poise.training.evaluation.evaluate` and poise.envs.Robot")) == [
+        "poise.training.evaluation.evaluate"
     ]

@@ -9,16 +9,15 @@ import pytest
 
 from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.files import packaged
-from poise.training.benchmark import run
-from poise.training.benchmark.run import benchmark
-from poise.training.evaluation import evaluate as evaluation
-from poise.training.evaluation.evaluate import evaluate
+from poise.training.evaluation import run
+from poise.training.evaluation import run as evaluation
+from poise.training.evaluation.evaluate import benchmark, evaluate
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train
 from poise.training.results.replay import replay
 from tests.support.benchmarks_small import InProcessCrew, write_small
-from tests.support.evaluations import RANDOM, InProcess, write_suite
+from tests.support.evaluations import InProcess, random_suite, write_suite
 from tests.support.shared import tiny_config
 
 
@@ -34,7 +33,7 @@ def test_a_residual_on_a_rival_end_to_end(
     last = str(tmp_path / "run/last")
     policy = load_policy(last)
     assert policy.config.controller == controller and np.abs(policy.layers[-1][0]).max() > 0.0
-    suite = write_suite(tmp_path, {**RANDOM, "trials": 1})
+    suite = write_suite(tmp_path, random_suite(1))
     summary = evaluate([controller, last], suite, out=tmp_path / "out", seed=1)
     assert not summary["pairs"][0]["identical"]  # the action moves what the controller follows
     assert replay(tmp_path / "out", 0, last).differences == {}

@@ -38,11 +38,10 @@ FLOORS = """
 14 training/trials
 15 training/figures, training/suites, training/tuning
 16 training/evaluation, training/qp_set
-17 training/benchmark
-18 training/results
-19 training/report
-20 training/cli
-21 envs, baselines, training
+17 training/results
+18 training/report
+19 training/cli
+20 envs, baselines, training
 """
 FLOOR = {
     room: int(line.split()[0])

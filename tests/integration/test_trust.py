@@ -28,10 +28,8 @@ from poise.baselines.plugins import find_outside
 from poise.baselines.registry import controller_config, load_controller, momentum_qp_config
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled import warmup
-from poise.training.benchmark.run import benchmark
-from poise.training.benchmark.world import Job, Stage, play
 from poise.training.cli.commands import main
-from poise.training.evaluation.evaluate import evaluate
+from poise.training.evaluation.evaluate import benchmark, evaluate
 from poise.training.evaluation.seed_groups import seed_groups
 from poise.training.learning.checkpoints import check_controller, controller_fingerprint
 from poise.training.learning.config import train_config
@@ -41,13 +39,13 @@ from poise.training.learning.train_seeds import train_seeds
 from poise.training.qp_set.export import write_qp_set
 from poise.training.report import page
 from poise.training.report.page import write_report
-from poise.training.results.benchmark import load_benchmark_data, replay_case
 from poise.training.results.compare import compare
 from poise.training.results.leaderboard import write_leaderboard
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.running.crew import Crew
-from poise.training.trials.players import load_player
+from poise.training.trials.agents import load_agent
+from poise.training.trials.jobs import Job, Stage, play
 from poise.training.tuning.candidates import Candidate
 from poise.training.tuning.candidates import play as play_candidate
 from poise.training.tuning.gains import Gains
@@ -122,8 +120,8 @@ LOADERS: dict[str, Callable[[Ground, str], Any]] = {
     "controller_config, mapping": lambda g, n: controller_config({"kind": "outside", "name": n}),
     "load_controller": lambda g, n: load_controller(n, robot()),
     "find_outside": lambda g, n: find_outside(n),
-    "load_player": lambda g, n: load_player(n, robot()),
-    "load_player, a policy's folder": lambda g, n: load_player(str(policy(g, n)), robot()),
+    "load_agent": lambda g, n: load_agent(n, robot()),
+    "load_agent, a policy's folder": lambda g, n: load_agent(str(policy(g, n)), robot()),
     "load_policy, best checkpoint": lambda g, n: load_policy(
         _once(lambda g, n: g.policy(n, "run/best"), "run")(g, n)
     ),
@@ -144,7 +142,7 @@ LOADERS: dict[str, Callable[[Ground, str], Any]] = {
     "replay, YAML in a benchmark": lambda g, n: replay(finished(g, NAMES["YAML"](g)), 0),
     "replay, of a policy": lambda g, n: replay(evaluation(g, str(policy(g, n))), 0),
     "replay, of a benchmark": lambda g, n: replay(finished(g, n), 0),
-    "replay_case": lambda g, n: replay_case(load_benchmark_data(finished(g, n)), n, 0),
+    "replay, of what was read": lambda g, n: replay(load_results(finished(g, n)), 0, n),
     "evaluate, a policy's folder": lambda g, n: evaluate([str(policy(g, n))], out=g.here / "out"),
     "evaluate, a folder of seeds": lambda g, n: evaluate([str(seeds(g, n))], out=g.here / "out"),
     "evaluate, YAML on YAML": lambda g, n: evaluate([NAMES["YAML on YAML"](g)], out=g.here / "out"),
@@ -157,7 +155,7 @@ LOADERS: dict[str, Callable[[Ground, str], Any]] = {
     "benchmark, what its folder holds": lambda g, n: benchmark(
         ["zero"], g.suite(), out=finished(g, n)
     ),
-    "a benchmark's job": lambda g, n: play(Job(Stage("humanoid", 1.0, None), n, None)),
+    "a job": lambda g, n: play(Job(Stage("humanoid", 1.0, None), n, None)),
     "tune": lambda g, n: tune(tune_config(_tuning(g, n)), g.here / "out"),
     "tune, a policy's folder": lambda g, n: tune(
         TuneConfig("momentum-qp", {"com.weight": (0.1, 1.0)}, policy=str(policy(g, n))),
@@ -265,12 +263,12 @@ ELSEWHERE: dict[str, Callable[[Ground, str], Any]] = {
     "a policy's start": lambda g, n: train(
         tiny_config(start_from=str(g.here / "none")), g.here / "out"
     ),
-    "a robot's file": lambda g, n: load_player(
+    "a robot's file": lambda g, n: load_agent(
         "momentum-qp",
         poise.envs.robots.robot.load_robot(g.yaml("robot.yaml", model=n, root=n, feet=[])),
     ),
     "a suite": lambda g, n: evaluate(
-        ["zero"], g.yaml("suite.yaml", kind="quiet", controllers=[n]), out=g.here / "out"
+        ["zero"], g.yaml("suite.yaml", quiet={}, controllers=[n]), out=g.here / "out"
     ),
     "a suite of benchmarks": lambda g, n: benchmark(
         ["zero"], g.yaml("suite.yaml", duration=1.0, controllers=[n]), out=g.here / "out"
@@ -527,7 +525,7 @@ DANGEROUS = {
         "src/poise/lazy.py",
     },
     "exec_module": {"baselines/plugins.py"},
-    "find_outside": {"baselines/plugins.py", "training/trials/players.py"},
+    "find_outside": {"baselines/plugins.py", "training/trials/agents.py"},
     "OutsideConfig": {"baselines/plugins.py", "baselines/registry.py"},
     # MuJoCo's data within a copy; what the main process and its workers say to each other
     "pickle.loads": {"envs/compiled/copies.py", "training/running/processes.py"},

@@ -15,7 +15,7 @@ from collections import defaultdict
 import numpy as np
 
 from poise.envs.robots.robot import load_robot
-from poise.training.trials.players import load_player
+from poise.training.trials.agents import load_agent
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import NStepLimit
 
@@ -25,10 +25,10 @@ IMPULSES = (*IMPULSES, 30.6, *IMPULSES[:0:-1])
 SHARES = (0.7, 0.8, 0.9, 1.0, 1.1)
 
 
-def first_step(player, impulse: float, direction: float, seed: int):
+def first_step(agent, impulse: float, direction: float, seed: int):
     """Reach r [m], time [s] and length [m] of the first step of a recovery; None for a fall or no
     step."""
-    env = player.env
+    env = agent.env
     push = {"impulse": impulse, "direction": direction, "start": 0.5, "body": "torso"}
     observation, _ = env.reset(seed=seed, options={"push": push})
     away = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
@@ -36,7 +36,7 @@ def first_step(player, impulse: float, direction: float, seed: int):
     start, reach = np.zeros(2), -np.inf
     over = False
     while not over:
-        observation, _, fallen, over, _ = env.step(player.act(observation))
+        observation, _, fallen, over, _ = env.step(agent.act(observation))
         over = over or fallen
         state, now = env.simulation.state, env.simulation.time
         feet = state.sole_points
@@ -62,14 +62,14 @@ def main() -> None:
     )
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for name in names:
-        player = load_player(name, robot)
+        agent = load_agent(name, robot)
         steps = defaultdict(list)
-        limit = NStepLimit(PushLimits(robot), player.env.controller.planner.limits)
+        limit = NStepLimit(PushLimits(robot), agent.env.controller.planner.limits)
         for k in range(16):
             angle = 22.5 * k
             sideways = "sideways" if abs(np.sin(np.radians(angle))) > 0.9 else "others"
             for seed, share in enumerate(SHARES):
-                step = first_step(player, share * IMPULSES[k], angle, seed)
+                step = first_step(agent, share * IMPULSES[k], angle, seed)
                 if step is not None:
                     steps[sideways].append((*step, limit.reach(angle), limit.length(angle)))
         for which, rows in steps.items():

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
-from poise.training.benchmark import run
+from poise.training.evaluation import run
 from tests.support.evaluations import InProcess
 
 SMALL: dict[str, Any] = {
@@ -36,7 +36,7 @@ def write_small(folder: Path, **changes: Any) -> Path:
 def play_in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
     """Trials are played in this process, and ticks are not timed."""
     monkeypatch.setattr(run, "Crew", InProcessCrew)
-    monkeypatch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+    monkeypatch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
     InProcessCrew.played, InProcessCrew.stop_after = 0, None
     return InProcessCrew
 

@@ -8,21 +8,20 @@ from typing import Any, Self
 
 import yaml
 
-RANDOM = {
-    "kind": "random",
-    "duration": 1.6,
-    "trials": 4,
-    "pushes": {"magnitude": [0.05, 2.5], "unit": "ankle_fraction", "start": [0.1, 0.1]},
-}
+PUSHES = {"magnitude": [0.05, 2.5], "unit": "ankle_fraction", "start": [0.1, 0.1]}
+RANDOM = {"duration": 1.6, "random": {"trials": 4, "pushes": PUSHES}}
 ENVELOPE = {
-    "kind": "envelope",
     "duration": 1.6,
-    "directions": 2,
     "start": 0.1,
-    "impulses": [0.05, 1.2],
-    "first_trials": 3,
-    "trials": 2,
-}
+    "envelope": {
+        "directions": 2, "impulses": [0.05, 1.2], "first_trials": 3, "trials": 2, "paired": True,
+    },
+}  # fmt: skip
+
+
+def random_suite(trials: int) -> dict[str, Any]:
+    """`RANDOM` with another number of trials."""
+    return {**RANDOM, "random": {"trials": trials, "pushes": PUSHES}}
 
 
 def write_suite(folder: Path, fields: dict[str, Any], name: str = "suite") -> Path:

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.benchmark import run
-from poise.training.evaluation import evaluate as evaluation
-from poise.training.evaluation.evaluate import evaluate
+from poise.training.evaluation import run
+from poise.training.evaluation import run as evaluation
+from poise.training.evaluation.evaluate import benchmark, evaluate
 from tests.support.benchmarks_small import InProcessCrew, write_small
-from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, write_suite
+from tests.support.evaluations import ENVELOPE, InProcess, random_suite, write_suite
 
 SOFT = 'a "soft" <b>&.yaml'  # a name that must be escaped wherever it is written
 _folders: list[tempfile.TemporaryDirectory] = []  # removed at the end of the process
@@ -35,11 +35,11 @@ def finished(kind: str) -> Path:
     if kind == "benchmark":
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(run, "Crew", InProcessCrew)
-            patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+            patch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
             InProcessCrew.stop_after = None
-            run.benchmark(names, write_small(path), out=path / "out", seed=2)
+            benchmark(names, write_small(path), out=path / "out", seed=2)
         return path / "out"
-    fields = {"random": {**RANDOM, "trials": 8}, "envelope": ENVELOPE}[kind]
+    fields = {"random": random_suite(8), "envelope": ENVELOPE}[kind]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evaluation, "Crew", InProcess)
         InProcess.stop_after = None

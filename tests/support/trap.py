@@ -16,17 +16,17 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged_folder
 from poise.configs.schema import to_dict, to_yaml
 from poise.envs.balance.config import StartNoise
-from poise.training.benchmark.case import COLUMNS as CASE_COLUMNS
-from poise.training.benchmark.case import case_row, failed
-from poise.training.benchmark.cases import Cases
-from poise.training.benchmark.folder import FORMAT, BenchmarkSettings
-from poise.training.benchmark.suite import load_benchmark
+from poise.training.evaluation.figures import controller_entry, robot_figures
 from poise.training.evaluation.folder import Settings
-from poise.training.running.files import csv_text
-from poise.training.running.provenance import versions
-from poise.training.suites.registry import load_suite
-from poise.training.trials.stage import Stage
-from poise.training.trials.trial import COLUMNS, Trial, row
+from poise.training.running.files import csv_text, plain
+from poise.training.running.provenance import circumstances, versions
+from poise.training.running.summary import FORMAT, Summary
+from poise.training.suites.plan import Plan
+from poise.training.suites.suite import load_suite
+from poise.training.trials.jobs import Stage
+from poise.training.trials.push_limits import PushLimits
+from poise.training.trials.table import COLUMNS, trial_row
+from poise.training.trials.trial import failed
 from tests.support.benchmarks_small import write_small
 from tests.support.shared import robot
 
@@ -91,43 +91,33 @@ class Ground:
 
     def evaluation(self, controller: str) -> Path:
         """A finished evaluation of one trial."""
-        out = self.here / "evaluation"
-        out.mkdir()
-        settings = Settings(
-            "quiet", to_dict(load_suite("quiet")), "humanoid", robot().fingerprint,
-            {controller: "0"}, 0, None, {},
-        )  # fmt: skip
-        line = row(Trial(0, seed=1), controller, failed(ValueError()).outcome)
-        entry = {"trials": 1, "recovered": 0, "recovered_rate": 0.0, "falls": 0}
-        summary = {"suite": "quiet", "robot": "humanoid", "controllers": {controller: entry}}
-        (out / "settings.yaml").write_text(to_yaml(settings))
-        (out / "trials.csv").write_text(csv_text([line], COLUMNS))
-        (out / "summary.json").write_text(json.dumps(summary))
-        return out
+        return self._result("evaluation", "quiet", controller)
 
     def benchmark(self, controller: str) -> Path:
         """A benchmark of the suite in `suite()` with one finished trial."""
-        out, suite = self.here / "benchmark", load_benchmark(self.suite())
+        return self._result("benchmark", self.suite(), controller)
+
+    def _result(self, name: str, suite_name: str, controller: str) -> Path:
+        out, suite = self.here / name, load_suite(suite_name)
         out.mkdir()
-        settings = BenchmarkSettings(
-            FORMAT, self.suite(), to_dict(suite), "humanoid", robot().fingerprint, 0,
+        limits = PushLimits(robot())
+        settings = Settings(
+            FORMAT, suite_name, to_dict(suite), "humanoid", robot().fingerprint, 0, None,
             versions(("mujoco", "numpy", "numba")), {controller: "0"},
         )  # fmt: skip
-        line = case_row(Cases(suite, robot(), 0).first[0], controller, failed(ValueError()))
-        entry = {"trials": 1, "errors": 0, "j50_bounded": 0, "directions": [], "factors": []}
-        numbers = ("root_force_max", "j50_mean", "eta_mean", "eta_min")
-        intervals = {"j50_mean_ci95": [0.0, 0.0], "eta_mean_ci95": [0.0, 0.0]}
-        summary = {
-            "benchmark": FORMAT, "suite": self.suite(), "seed": 0, "robot": {"name": "humanoid"},
-            "controllers": {controller: {**entry, **dict.fromkeys(numbers, 0.0), **intervals,
-                                         "tick_us": None}},
-            "reference": controller, "ranking": [controller], "pairs": [], "seeds": [],
-            "versions": {}, "machine": {"processor": "", "cores": 1}, "commit": None,
+        plan = Plan(suite, limits, 0, [controller])
+        played = [(plan.first[0], failed(ValueError()))]
+        summary: Summary = {
+            "format": FORMAT, "suite": suite_name, "seed": 0, "robot": robot_figures(limits),
+            "rated": None, "scale": limits.scale, "reference": controller,
+            "ranking": [controller], "controllers": {controller: controller_entry(played, plan)},
+            "pairs": [], "step_limits": [], "seeds": [], **circumstances(0.0, 1, "local"),
         }  # fmt: skip
+        line = trial_row(plan.first[0], controller, played[0][1])
         (out / "settings.yaml").write_text(to_yaml(settings))
-        (out / "trials.csv").write_text(csv_text([line], CASE_COLUMNS))
+        (out / "trials.csv").write_text(csv_text([line], COLUMNS))
         (out / "trials.jsonl").touch()
-        (out / "summary.json").write_text(json.dumps(summary))
+        (out / "summary.json").write_text(json.dumps(plain(summary)))
         return out
 
     def suite(self) -> str:
@@ -145,7 +135,7 @@ def allowed_there(name: str) -> bool:
 
 
 def loaded_there(name: str) -> str:
-    """The name of a player that the process that is asked has loaded."""
+    """The name of an agent that the process that is asked has loaded."""
     return Stage("humanoid", 6.0, StartNoise()).load(name).name
 
 

@@ -6,13 +6,16 @@ import select
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TextIO
 
 import tyro
 
 from poise.configs.errors import ConfigError, PoiseError
 from poise.training.running.stopping import exit_at_once, stop_code, stop_message, stoppable
 from poise.training.running.terminal import terminal
+
+if TYPE_CHECKING:
+    from poise.training.running.summary import Summary
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
@@ -27,7 +30,7 @@ Allow = Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(meta
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run a sub-command; returns 0, 1 (see `benchmark`), 2 after bad input or on a full disk, 130
+    """Run a sub-command; returns 0, 1 (see `evaluate`), 2 after bad input or on a full disk, 130
     after Ctrl-C, 143 after SIGTERM, 141 if nobody reads the output any more."""
     args = list(sys.argv[1:] if args is None else args)
     # Small matrices lose time to threads, and sums may change their order. Read at import.
@@ -79,7 +82,7 @@ def command() -> None:
 
 
 def _unread(stream: TextIO | None) -> bool:
-    """Whether this is a pipe that nobody reads any more."""
+    """True for a pipe that nobody reads any more."""
     try:
         poll = select.poll()
         poll.register(stream.fileno(), 0)  # type: ignore[union-attr]
@@ -133,44 +136,50 @@ def evaluate(
     robot: str = "humanoid",
     seed: int = 0,
     workers: int | None = None,
+    backend: Literal["local", "joblib", "ray"] = "local",
     trials: int | None = None,
     limits: str | None = None,
     write_limits: Path | None = None,
     overwrite: Switch = False,
     allow: Allow = (),
-) -> None:
+) -> int:
     """Play a suite of pushes with several controllers, all on the same trials.
 
-    Writes settings.yaml, trials.csv, summary.json and plots. A run that was stopped goes on when
-    it is started again alike. The result is the same for any number of workers.
+    Writes settings.yaml, trials.jsonl, trials.csv, summary.json and plots. The same command goes on
+    where it was stopped. The result is the same for any number of workers. Exit code 1 if a
+    controller raised.
 
     Args:
         controllers: a name of `poise list`, such as residual (a shipped policy), zero (no torque),
             a .yaml file of a controller, a folder written by poise train, with --seeds too, or
             module:Class.
-        suite: random, envelope, grid, quiet, repeated, in-step, or a .yaml file.
+        suite: random, envelope, grid, quiet, repeated, in-step, those of poise benchmark, or a
+            .yaml file.
         out: folder to write to; out/SUITE if not given.
         robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the trials.
         workers: number of processes; all cores if not given.
+        backend: local (processes of this machine), joblib (the same by joblib), ray (a cluster).
         trials: number of pushes (random), of starts (quiet), of trials per direction and controller
-            in the second stage (envelope), of repeats (grid), of sequences (repeated, in-step).
+            in the second stage (envelope), of repeats (grid), of sequences (repeated, in-step); of
+            a suite of several parts, at most as many in every cell.
         limits: a .yaml file that pushes are measured by; if not given, the packaged file of the
             robot, else its ankle limit.
         write_limits: write the first controller's J50s to this file, for --limits.
-        overwrite: replace an evaluation that the folder holds.
+        overwrite: replace what the folder holds.
         allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     from poise.training.evaluation.evaluate import evaluate, measured_limits
 
     folder = Path("out") / Path(suite).stem if out is None else out
     summary = evaluate(
-        controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, trials=trials,
-        limits=limits, overwrite=overwrite, console=terminal(), allow=allow,
+        controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, backend=backend,
+        trials=trials, limits=limits, overwrite=overwrite, console=terminal(), allow=allow,
     )  # fmt: skip
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)
         print(write_limits)
+    return _raised(summary, folder)
 
 
 def benchmark(
@@ -197,12 +206,14 @@ def benchmark(
         out: folder to write to.
         controllers: names as poise evaluate takes them; all packaged ones that can rest if not
             given.
-        suite: quick (minutes), standard (an hour), full (many hours), or a .yaml file.
+        suite: quick (minutes), standard (an hour), full (many hours), those of poise evaluate, or a
+            .yaml file.
         robot: a packaged robot or a .yaml description.
         seed: of the cases.
         workers: number of processes; all cores if not given.
         backend: local (processes of this machine), joblib (the same by joblib), ray (a cluster).
-        trials: at most as many in every cell of the suite, to try things out.
+        trials: at most as many in every cell of the suite, to try things out; of a suite of one
+            part, its number.
         overwrite: replace what the folder holds.
         report: write report.html at the end, as poise report does.
         allow: a class from outside, module:Class, that may run though a file names it; repeatable.
@@ -211,19 +222,25 @@ def benchmark(
 
     choose_gl_backend()
     from poise.baselines.allowance import named
-    from poise.training.benchmark.run import benchmark, errors
+    from poise.training.evaluation.evaluate import benchmark
 
     summary = benchmark(
         controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
         trials=trials, overwrite=overwrite, console=terminal(), allow=allow,
     )  # fmt: skip
-    if failed := errors(summary):
-        print(f"poise: a controller raised an error in {failed} trials; see the column error of "
-              f"{out / 'trials.csv'}", file=sys.stderr)  # fmt: skip
+    code = _raised(summary, out)
     if report:
         from poise.training.report.page import write_report
 
         write_report(out, console=terminal(), allow=[*named(*controllers), *allow])
+    return code
+
+
+def _raised(summary: "Summary", out: Path) -> int:
+    """The exit code: 1, with a line that says so, if a controller raised."""
+    if failed := sum(entry["errors"] for entry in summary["controllers"].values()):
+        print(f"poise: a controller raised an error in {failed} trials; see the column error of "
+              f"{out / 'trials.csv'}", file=sys.stderr)  # fmt: skip
     return 1 if failed else 0
 
 
@@ -402,7 +419,6 @@ def list_names() -> None:
         "controllers",
         "policies",
         "suites",
-        "benchmarks",
         "training",
         "motions",
         "tuning",

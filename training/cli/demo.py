@@ -1,15 +1,15 @@
 """The main job in a few minutes: three controllers, and what a policy on two of them gains."""
 
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
 from poise.training.evaluation.evaluate import evaluate
 from poise.training.running.files import PLOTS
 from poise.training.running.stopping import ANEW, keeps
+from poise.training.running.summary import Summary
 from poise.training.running.terminal import print_paths
-from poise.training.trials.players import SHIPPED
+from poise.training.trials.agents import SHIPPED
 
 CONTROLLERS = ("momentum-qp", SHIPPED, "capture-step", "residual-step", "feedback-step")
 SUITES = ("demo-envelope", "demo-random")
@@ -22,7 +22,7 @@ def demo(
     seed: int = 0,
     controllers: tuple[str, ...] = CONTROLLERS,
     console: Console | None = None,
-) -> list[dict[str, Any]]:
+) -> list[Summary]:
     """Evaluate on both suites of the demo; returns their summaries.
 
     An earlier demo in `out` is replaced.

@@ -83,7 +83,7 @@ def parse(args: Sequence[str]) -> Command:
 
 
 def _base(args: Sequence[str]) -> str | Path:
-    """Where the defaults of the flags come from: looked up before the flags are read."""
+    """The file that the flags' defaults come from, looked up before the flags are read."""
     known = _peek(args)
     if known.config is not None:
         return known.config

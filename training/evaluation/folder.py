@@ -1,142 +1,174 @@
-"""The folder of an evaluation: its settings, its finished trials, and what is left of a stop.
+"""The folder of a result: settings, finished trials, and at the end figures.
 
 - settings.yaml: everything that decides the result
-- trials.partial.jsonl: a line for each finished trial, while the evaluation runs
-- trials.csv: a line for each trial and controller, at the end
-- summary.json: written last; with it, the evaluation is finished
+- trials.jsonl: a line for each finished trial; kept, so that controllers can be added later
+- trials.csv: the same as a table, at the end
+- summary.json: written last; with it, the result is finished
 """
 
+from __future__ import annotations
+
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, shown
 from poise.configs.files import write_atomic
 from poise.configs.reading import exists, is_folder
 from poise.configs.schema import build, read_yaml, to_yaml
 from poise.envs.pushes.sampler import LimitTable
-from poise.training.running.files import FILES, PARTIAL, REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
+from poise.training.running.files import FILES, LOG, REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.log import TrialLog, read_log
-from poise.training.trials.trial import COLUMNS, Outcome
+from poise.training.running.summary import Summary, check_format
+from poise.training.trials.table import COLUMNS
+from poise.training.trials.trial import Outcome
+
+ADVICE = "choose another folder, or replace it by --overwrite"
+Key = tuple[str, int]  # controller, number of the trial
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Everything that decides an evaluation's result, but for the machine.
+    """Everything that decides a result, but for the machine.
 
     Attributes:
+        format: of the folder.
         suite_name: as the user wrote it; `suite` holds its fields.
         robot: name or path, as the user wrote it; `robot_fingerprint` of what was loaded.
-        controllers: name → fingerprint, in the user's order.
         seed: of the trials.
-        limits: what the suite's pushes are measured by; None: the ankle limit.
+        limits: what pushes are measured by; None: the ankle limit.
         versions: of what computes the result.
+        controllers: name → fingerprint, in the order in which they came.
     """
 
+    format: int
     suite_name: str
     suite: dict[str, Any]
     robot: str
     robot_fingerprint: str
-    controllers: dict[str, str]
     seed: int = field(metadata={"min": 0})
     limits: LimitTable | None
     versions: dict[str, str]
+    controllers: dict[str, str]
 
 
-class EvaluationFolder:
-    """Opens a new or an interrupted evaluation.
+class ResultFolder:
+    """Opens a new, an interrupted or a finished result.
 
-    `finished` holds the outcomes that an interrupted one has left, by trial number.
+    `finished` holds the outcomes that were there, by controller and number; `settings` the given
+    ones, with the controllers that the folder has besides; `damaged` counts unreadable lines.
 
     Args:
         path: the folder; made if missing.
-        settings: of this evaluation.
-        overwrite: remove what an earlier evaluation has left there.
+        settings: of this result.
+        overwrite: remove what an earlier result has left there.
+        closed: whether no controllers can be added, because trials depend on who takes part.
 
     Raises:
-        ConfigError: the folder holds another or a finished evaluation, and `overwrite` is off.
+        ConfigError: the folder holds something else, and `overwrite` is off; nothing is written.
         PoiseError: the folder cannot be written, or another process writes there.
     """
 
-    def __init__(self, path: Path, settings: Settings, overwrite: bool = False):
-        self.path, self.settings = path, settings
-        self.finished: dict[int, list[Outcome]] = {}
-        self._partial: TrialLog | None = None
+    def __init__(
+        self, path: Path, settings: Settings, overwrite: bool = False, closed: bool = False
+    ):
+        self.path, self.settings, self.damaged = path, settings, 0
+        self.finished: dict[Key, Outcome] = {}
         if exists(path) and not is_folder(path):
             raise ConfigError("is not a folder", source=path, field="out")
         self._lock = FolderLock(path)
         try:
-            self._open(overwrite)
+            self._open(overwrite, closed)
         except BaseException:
             self._lock.release()
             raise
 
-    def _open(self, overwrite: bool) -> None:
-        path = self.path
+    def _open(self, overwrite: bool, closed: bool) -> None:
+        path, settings = self.path, self.settings
         if overwrite:
             for name in (*FILES, REPORT):
                 (path / name).unlink(missing_ok=True)
         elif any(exists(path / name) for name in FILES):
-            self._check()
-            self._read_partial()
+            before = self._check(closed)
+            self.settings = replace(
+                settings, controllers={**before.controllers, **settings.controllers}
+            )
+            self.finished, self.damaged = read_outcomes(path)
         write_atomic(path / SETTINGS, to_yaml(self.settings))
-        entries = {number: _plain(outcomes) for number, outcomes in self.finished.items()}
-        self._partial = TrialLog(path / PARTIAL, entries)
+        entries = {key: asdict(outcome) for key, outcome in self.finished.items()}
+        self._log = TrialLog(path / LOG, entries)
 
-    def append(self, number: int, outcomes: list[Outcome]) -> None:
-        """Keep the outcome of a trial, in the order of the controllers."""
-        assert self._partial is not None
-        self._partial.append(number, _plain(outcomes))
-        self.finished[number] = outcomes
+    def append(self, controller: str, number: int, outcome: Outcome) -> None:
+        """Keep the outcome of a trial; raises PoiseError when the disk refuses."""
+        self._log.append((controller, number), asdict(outcome))
+        self.finished[controller, number] = outcome
 
     def close(self) -> None:
         """Stop; what is finished stays."""
-        if self._partial is not None:
-            self._partial.close()
+        self._log.close()
         self._lock.release()
 
-    def finish(self, rows: Sequence[dict[str, Any]], summary: dict[str, Any]) -> None:
+    def finish(self, rows: Sequence[Mapping[str, object]], summary: Summary) -> None:
         """Write the trials and, last, the summary."""
         write_atomic(self.path / TRIALS, csv_text(rows, COLUMNS))
         write_atomic(self.path / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
-        (self.path / PARTIAL).unlink(missing_ok=True)
         self.close()
 
-    def _check(self) -> None:
-        """Refuse to go on from anything but an interrupted evaluation with equal settings."""
-        advice = "choose another folder, or replace it by --overwrite"
+    def _check(self, closed: bool) -> Settings:
+        """Refuse to go on from anything but this result; returns its settings."""
         path = self.path
-        if (path / SUMMARY).exists() or not (path / SETTINGS).exists():
-            raise ConfigError(f"already holds an evaluation: {advice}", source=path, field="out")
+        if not (path / SETTINGS).exists():
+            raise ConfigError(f"holds files of something else: {ADVICE}", source=path, field="out")
         before = read_settings(path)
-        names = Settings.__dataclass_fields__
-        changed = [n for n in names if getattr(before, n) != getattr(self.settings, n)]
-        if changed:
-            raise ConfigError(
-                f"holds an interrupted evaluation with other settings ({', '.join(changed)}): "
-                f"{advice}",
-                source=path / SETTINGS,
-                field=changed[0],
-            )
+        for name in Settings.__dataclass_fields__:
+            old, new = getattr(before, name), getattr(self.settings, name)
+            if old != new and (name != "controllers" or closed):
+                raise ConfigError(
+                    f"holds a result with {_difference(name, old, new)}: {ADVICE}",
+                    source=path / SETTINGS, field=name,
+                )  # fmt: skip
+        for name, mark in self.settings.controllers.items():
+            if before.controllers.get(name, mark) != mark:
+                raise ConfigError(
+                    f"holds trials of another {shown(name)}, which has changed since: {ADVICE}",
+                    source=path / SETTINGS, field="controllers",
+                )  # fmt: skip
+        if (path / SUMMARY).exists() and not (path / LOG).exists():
+            raise ConfigError(f"is missing, and with it the trials: {ADVICE}", source=path / LOG)
+        return before
 
-    def _read_partial(self) -> None:
-        """Outcomes of all whole lines: a kill may have cut off the last one."""
-        path = self.path / PARTIAL
-        for number, outcomes in read_log(path)[0]:
-            try:
-                self.finished[number] = [build(Outcome, o, str(path)) for o in outcomes]
-            except (TypeError, ConfigError):
-                continue
+
+def read_outcomes(folder: Path) -> tuple[dict[Key, Outcome], int]:
+    """Outcomes by controller and number, and how many lines could not be read."""
+    path = folder / LOG
+    entries, damaged = read_log(path)
+    finished: dict[Key, Outcome] = {}
+    for key, value in entries:
+        try:
+            controller, number = key
+            finished[str(controller), int(number)] = build(Outcome, value, str(path))
+        except (ValueError, TypeError, ConfigError):
+            damaged += 1
+    return finished, damaged
 
 
 def read_settings(folder: Path) -> Settings:
-    """The settings of an evaluation; raises ConfigError where there are none."""
+    """The settings of a result; raises ConfigError where there are none, or of another format."""
     path = folder / SETTINGS
-    return build(Settings, read_yaml(path), str(path))
+    data = read_yaml(path)
+    check_format(data.get("format"), path)
+    return build(Settings, data, str(path))
 
 
-def _plain(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
-    return [asdict(outcome) for outcome in outcomes]
+def _difference(name: str, old: Any, new: Any) -> str:
+    """The difference in words."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        keys = [k for k in {**old, **new} if old.get(k) != new.get(k)]
+        what = ", ".join(f"{k} {old.get(k)}, not {new.get(k)}" for k in keys)
+        return f"other {name} ({what if name == 'versions' else ', '.join(keys)})"
+    if name == "limits":
+        return "other limits"
+    return f"{name} {shown(old)}, not {shown(new)}"

@@ -1,60 +1,59 @@
 """The plots of an evaluation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from poise.training.figures.envelope import fall_probability, polar_envelope
+from poise.training.figures.envelope import Band, Curve, fall_probability, polar_envelope
 from poise.training.running.files import PLOTS
 from poise.training.statistics.bootstrap import EnvelopeFit, mean_over_directions
 from poise.training.statistics.fits import fit_logistic
-from poise.training.suites.base import Suite
-from poise.training.trials.push_limits import PushLimits
+from poise.training.suites.plan import Plan
 from poise.training.trials.step_limits import COUNTS, DRAWN, NStepLimit, groups, line_name
-from poise.training.trials.trial import Trial
 
-from .summary import Outcomes, fractions, pushes, sectors, won
+from .played import DIRECTIONAL, Played, ankle_limits, fractions, part, pushes, sectors, won
 
 
 def draw_plots(
     folder: Path,
-    suite: Suite,
-    trials: Sequence[Trial],
-    outcomes: Outcomes,
-    limits: PushLimits,
+    plan: Plan,
+    played: Mapping[str, Played],
     steps: Mapping[str, NStepLimit] | None = None,
 ) -> list[Path]:
-    """Write the plots of an evaluation; returns their paths, none without pushes.
+    """Write the plots of a result; returns their paths, none without pushes that have a limit.
 
-    Suites by direction show what `steps` of the first controller that steps could stop.
+    Where J50 of directions is measured, they show what `steps` of the first controller that steps
+    could stop; else, the random pushes.
     """
-    if trials[0].push is None or trials[0].later:
-        return []
     polar, fall = (folder / name for name in PLOTS)
-    direction, impulse, duration = pushes(trials)
-    ankle = np.array([limits.ankle(d, t) for d, t in zip(direction, duration, strict=True)])
-    if suite.by_direction:
-        fits = {
-            name: mean_over_directions(direction, impulse, won(results))
-            for name, results in outcomes.items()
-        }
-        fine = np.arange(0.0, 360.0, 2.0)
-        limit = [limits.ankle(d, float(duration[0])) for d in fine]
-        lines = _step_lines(steps or {}, fine, float(duration[0]))
+    limits = plan.limits
+    shown = {name: part(own, *DIRECTIONAL) for name, own in played.items()}
+    directional = all(shown.values())
+    if not directional:
+        shown = {name: part(own, "random") for name, own in played.items()}
+        if not all(shown.values()):
+            return []
+    label = None
+    if directional:
+        fits = {name: mean_over_directions(*pushes(own)[:2], won(own))
+                for name, own in shown.items()}  # fmt: skip
+        share = {name: pushes(own)[1] / ankle_limits(own, limits) for name, own in shown.items()}
+        fine, duration = np.arange(0.0, 360.0, 2.0), plan.suite.push_duration
+        limit = [limits.ankle(d, duration) for d in fine]
+        lines = _step_lines(steps or {}, fine, duration)
         polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit), step_limits=lines)
-        share, label = impulse / ankle, None
     else:
-        fits = {name: sectors(trials, results) for name, results in outcomes.items()}
+        fits = {name: sectors(own) for name, own in shown.items()}
+        share = {name: fractions(own) for name, own in shown.items()}
         unit = f"of the {limits.scale}"
         title = f"Recovered share of the {limits.scale} by push direction"
         polar_envelope(polar, _bands(fits), title=title, unit=unit)
-        share, label = fractions(trials), f"push impulse, as a fraction of the {limits.scale}"
+        label = f"push impulse, as a fraction of the {limits.scale}"
     fall_probability(
         fall,
-        {name: (share, won(results)) for name, results in outcomes.items()},
-        {name: fit_logistic(share, won(results)) for name, results in outcomes.items()},
+        {name: (share[name], won(own)) for name, own in shown.items()},
+        {name: fit_logistic(share[name], won(own)) for name, own in shown.items()},
         unit="fraction",
         xlabel=label,
     )
@@ -63,7 +62,7 @@ def draw_plots(
 
 def _step_lines(
     steps: Mapping[str, NStepLimit], fine: np.ndarray, duration: float
-) -> dict[str, Any]:
+) -> dict[str, Curve]:
     """Limits of one and two steps, as `polar_envelope` takes them."""
     whose = list(groups(steps).values())
     return {
@@ -75,7 +74,7 @@ def _step_lines(
     }
 
 
-def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, Any]:
+def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, Band]:
     """Direction, J50 and its interval, as `polar_envelope` takes them."""
     return {
         name: (

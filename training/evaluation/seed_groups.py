@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 import numpy as np
 
@@ -13,16 +13,17 @@ from poise.configs.errors import ConfigError
 from poise.configs.reading import is_file, is_folder
 from poise.configs.schema import to_yaml
 from poise.training.learning.seeds import SEEDS
-from poise.training.statistics.seeds import FIGURES, seed_figures
+from poise.training.running.summary import Entry, SeedGroup
+from poise.training.statistics.seeds import FIGURES, SeedFigures, seed_figures
 
 
-def seed_groups(names: Sequence[str], entries: Mapping[str, Any]) -> list[dict[str, Any]]:
+def seed_groups(names: Sequence[str], entries: Mapping[str, Entry]) -> list[SeedGroup]:
     """Interquartile means over the seeds of every configuration that has several run folders.
 
-    `entries` are those of a summary, of `poise evaluate` or `poise benchmark`. The scores of η are
-    those of every direction (the tasks); J50's mean and the recovered rates are one task each.
-    The seeds are drawn anew for every task [Agarwal21]. Checkpoints of one run, which share a seed,
-    are no sample of seeds: a configuration with two of the same is left out.
+    `entries` are those of a summary. The scores of η are those of every direction (the tasks);
+    J50's mean and the recovered rate are one task each. The seeds are drawn anew for every task
+    [Agarwal21]. Checkpoints of one run, which share a seed, are no sample of seeds: a
+    configuration with two of the same is left out.
     """
     groups: dict[str, list[tuple[str, int]]] = {}
     for name in names:
@@ -36,16 +37,17 @@ def seed_groups(names: Sequence[str], entries: Mapping[str, Any]) -> list[dict[s
     ]
 
 
-def seed_lines(groups: Sequence[Mapping[str, Any]]) -> list[str]:
+def seed_lines(groups: Sequence[SeedGroup]) -> list[str]:
     """A line of text per group and figure, for the terminal."""
     lines = []
     for group in groups:
         head = f"IQM over {len(group['members'])} training seeds, {group['name']}:"
         for key, title, form in FIGURES:
             if key in group:
-                found = group[key]
+                found = cast(SeedFigures, group.get(key))
                 value, low, high, worst = (
-                    format(x, form) for x in (found["iqm"], *found["iqm_ci95"], found["worst"])
+                    format(x, form) if x is not None else "–"
+                    for x in (found["iqm"], *found["iqm_ci95"], found["worst"])
                 )
                 text = f"{title} {value} [{low}, {high}], worst {worst} (seed"
                 lines.append(f"{head} {text} {found['worst_seed']})")
@@ -53,7 +55,7 @@ def seed_lines(groups: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _configuration(folder: str) -> tuple[str, int]:
-    """What a run was trained with but for its seed, and the seed."""
+    """The configuration of a run but for its seed, and the seed."""
     from poise.training.learning.policy import load_policy
 
     try:
@@ -63,21 +65,20 @@ def _configuration(folder: str) -> tuple[str, int]:
     return to_yaml(replace(config, seed=0)), config.seed
 
 
-def _aggregate(members: list[str], seeds: list[int], entries: Mapping[str, Any]) -> dict[str, Any]:
+def _aggregate(members: list[str], seeds: list[int], entries: Mapping[str, Entry]) -> SeedGroup:
     here = [entries[name] for name in members]
     parents = {str(Path(name).parent) for name in members}
     together = len(parents) == 1 and is_file(Path(members[0]).parent / SEEDS)
-    scores: dict[str, list[list[float]]] = {}
-    if all(entry.get("directions") for entry in here):
-        scores["j50_mean"] = [[entry["j50_mean"]] for entry in here]
-        scores["eta"] = [[direction["eta"] for direction in e["directions"]] for e in here]
-    if all(entry.get("mix") for entry in here):
-        scores["mix"] = [[entry["mix"]["recovered_rate"]] for entry in here]
-    if all("recovered_rate" in entry for entry in here):
-        scores["recovered"] = [[entry["recovered_rate"]] for entry in here]
-    return {
+    group: SeedGroup = {
         "name": parents.pop() if together else ", ".join(members),
         "members": members,
         "seeds": seeds,
-        **{key: seed_figures(np.array(table), seeds) for key, table in scores.items()},
     }
+    if all("directions" in entry for entry in here):
+        j50 = [[entry["j50_mean"]] for entry in here]
+        group["j50_mean"] = seed_figures(np.array(j50), seeds)
+        etas = [[direction["eta"] for direction in entry["directions"]] for entry in here]
+        group["eta"] = seed_figures(np.array(etas), seeds)
+    rates = [[entry["recovered_rate"]] for entry in here]
+    group["recovered"] = seed_figures(np.array(rates), seeds)
+    return group

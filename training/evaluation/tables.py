@@ -1,107 +1,144 @@
-"""An evaluation for people: plots, and tables in the terminal."""
+"""A result for people: tables in the terminal, rows of the leaderboard."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from poise.training.running.summary import Entry, Interval, Summary
+
 from .seed_groups import seed_lines
 
+NONE = "–"
+IN_PAIRS = ("lost, won", "McNemar p")  # headings whose figures the table of pairs has
+BOUNDS = {None: "", "lower": "≥ ", "upper": "≤ "}
 
-def print_summary(summary: Mapping[str, Any], console: Console) -> None:
-    """Tables of the controllers and of the pairs, a line per group of training seeds."""
-    title = escape(f"{summary['suite']} · {summary['robot']} · seed {summary['seed']}")
-    console.print(_controllers(summary, title))
+
+def ranked(entries: Mapping[str, Entry]) -> list[str]:
+    """Controllers, the best first: by mean J50, else by the share of the limit, else by rate."""
+    if all("j50_mean" in entry for entry in entries.values()):
+        return sorted(entries, key=lambda name: -entries[name]["j50_mean"])
+    if all("fraction50" in entry for entry in entries.values()):
+        return sorted(entries, key=lambda name: -entries[name]["fraction50"])
+    return sorted(entries, key=lambda name: -entries[name]["recovered_rate"])
+
+
+def print_summary(summary: Summary, console: Console) -> None:
+    """Tables of the controllers and of the pairs, errors, a line per group of training seeds."""
+    robot = summary["robot"]["name"]
+    title = escape(f"{summary['suite']} · {robot} · seed {summary['seed']}")
+    columns = [
+        (heading, text)
+        for heading, text in table_columns(summary)
+        if heading not in IN_PAIRS
+        and not {text(name) for name in summary["ranking"]} <= {NONE, "0"}
+    ]
+    table = Table(title=title, title_justify="left")
+    table.add_column("controller", overflow="fold", min_width=_room(summary["ranking"], 16))
+    for heading, _ in columns:
+        table.add_column(heading, justify="right", overflow="fold")
+    for name in summary["ranking"]:
+        table.add_row(escape(name), *(text(name) for _, text in columns))
+    console.print(table)
     if summary["pairs"]:
         console.print(_pairs(summary))
     for line in seed_lines(summary["seeds"]):
         console.print(line, markup=False, highlight=False)
+    for name, entry in summary["controllers"].items():
+        if entry["errors"]:
+            console.print(f"[red]{escape(name)} raised an error in {entry['errors']} trials[/red]")
 
 
-def _controllers(summary: Mapping[str, Any], title: str) -> Table:
+def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
+    """Headings, and the text of each for a controller; "–" where it has no such value."""
     entries = summary["controllers"]
-    first = next(iter(entries.values()))
-    table = Table(title=title, title_justify="left")
-    table.add_column("controller", overflow="fold", min_width=_room(entries, 16))
-    columns: list[tuple[str, Any]] = [
-        ("recovered", lambda e: f"{e['recovered']}/{e['trials']}"),
-        ("rate [95 %]", lambda e: _with_range(e, "recovered_rate", "recovered_ci95", ".1%")),
-    ]
-    if "j50_mean" in first:
-        columns += [
-            ("mean J50 [N·s]", lambda e: _with_range(e, "j50_mean", "j50_mean_ci95", ".1f")),
-            ("worst J50", lambda e: f"{e['j50_min']:.1f}{_open(e)}"),
-            ("η mean, min", lambda e: f"{e['eta_mean']:.2f}, {e['eta_min']:.2f}"),
-        ]
-    if "fraction50" in first:
-        columns.append((f"half at, of {first['fraction_of']}", _half))
-    if "j50_mean" not in first and "fraction50" not in first:
-        rate = ("never_fell_rate", "never_fell_ci95", ".1%")
-        columns.append(("never fell [95 %]", lambda e: _with_range(e, *rate)))
-    if any(entry["com_drift_max"] is not None for entry in entries.values()):
-        columns.append(("CoM drift [mm]", lambda e: _milli(e["com_drift_max"])))
-    if any(entry["steps_max"] for entry in entries.values()):
-        columns.append(("steps, mean", lambda e: _number(e["steps_mean"], ".1f")))
-    if any("step_share_1_mean" in entry for entry in entries.values()):
-        columns.append(("of one-step limit", _step_share))
-    columns += [
-        ("solver failures", lambda e: f"{e['solver_failures']}"),
-        ("mean |action|", lambda e: _number(e["mean_abs_action"], ".3f")),
-    ]
-    for name, _ in columns:
-        table.add_column(name, justify="right", overflow="fold")
-    for name, entry in entries.items():
-        table.add_row(escape(name), *(text(entry) for _, text in columns))
-    return table
+    pairs = {p["b"]: p for p in summary["pairs"] if p["a"] == summary["reference"]}
+    of_mix = f" of the {summary['rated']}" if summary["rated"] else ""
+
+    def figure(form: Callable[[Entry], str]) -> Callable[[str], str]:
+        """A text of the entry, where it has the keys."""
+
+        def text(name: str) -> str:
+            try:
+                return form(entries[name])
+            except KeyError:
+                return NONE
+
+        return text
+
+    def lost(name: str) -> str:
+        pair = pairs.get(name)
+        return f"{pair['only_a']}, {pair['only_b']}" if pair and "only_a" in pair else NONE
+
+    def p_value(name: str) -> str:
+        pair = pairs.get(name)
+        return f"{pair['p_mcnemar']:.2g}" if pair and "p_mcnemar" in pair else NONE
+
+    return [
+        ("mean J50 [N·s]", figure(
+            lambda e: with_range(e["j50_mean"], e["j50_mean_ci95"], ".1f") + _bounds(e))),
+        ("worst J50", figure(lambda e: f"{e['j50_min']:.1f}")),
+        ("η mean", figure(lambda e: with_range(e["eta_mean"], e["eta_mean_ci95"], ".2f"))),
+        ("η worst", figure(lambda e: f"{e['eta_min']:.2f}")),
+        (f"half at, of {summary['scale']}", figure(
+            lambda e: f"{BOUNDS[e['fraction50_bound']]}{e['fraction50']:.2f}")),
+        (f"recovered{of_mix}", figure(
+            lambda e: with_range(e["recovered_rate"], e["recovered_ci95"], ".0%"))),
+        ("never fell", figure(_never_fell)),
+        ("lost, won", lost),
+        ("McNemar p", p_value),
+        ("CoM drift [mm]", figure(lambda e: _number(e["com_drift_max"], ".1f", 1000.0))),
+        ("steps, mean", figure(lambda e: _number(e["steps_mean"] or None, ".1f"))),
+        ("of one-step limit", figure(lambda e: f"{e['step_share_1_mean']:.2f}")),
+        ("solver failures", figure(lambda e: f"{e['solver_failures'] or NONE}")),
+        ("mean |action|", figure(lambda e: _number(e["mean_abs_action"] or None, ".3f"))),
+        ("root [N]", figure(lambda e: _number(e["root_force_max"], ".0f"))),
+        ("tick [µs]", figure(lambda e: _number(e["tick_us"], ".0f"))),
+    ]  # fmt: skip
 
 
-def _pairs(summary: Mapping[str, Any]) -> Table:
+def _pairs(summary: Summary) -> Table:
     table = Table()
     titles = [f"{pair['b']} against {pair['a']}" for pair in summary["pairs"]]
     table.add_column("b against a", overflow="fold", min_width=_room(titles, 34))
+    gain = any("j50_gain" in pair for pair in summary["pairs"])
     names = ["both", "only a (lost)", "only b (won)", "neither", "McNemar p"]
-    gain = "j50_gain" in summary["pairs"][0]
     for name in names + (["J50 gain [95 %]"] if gain else []):
         table.add_column(name, justify="right")
     for title, pair in zip(titles, summary["pairs"], strict=True):
-        cells = [str(pair[key]) for key in ("both", "only_a", "only_b", "neither")]
-        cells.append(f"{pair['p_mcnemar']:.2g}")
+        cells = [str(pair.get(key, NONE)) for key in ("both", "only_a", "only_b", "neither")]
+        cells.append(_number(pair.get("p_mcnemar"), ".2g"))
         if gain:
-            cells.append(_with_range(pair, "j50_gain", "j50_gain_ci95", "+.1%"))
+            cells.append(with_range(pair.get("j50_gain"), pair.get("j50_gain_ci95"), "+.1%"))
         table.add_row(escape(title), *cells)
     return table
+
+
+def with_range(value: float | None, interval: Interval | None, form: str) -> str:
+    """A value with its interval."""
+    low, high = (_number(end, form) for end in interval or (None, None))
+    return NONE if value is None else f"{value:{form}} [{low}, {high}]"
+
+
+def _never_fell(entry: Entry) -> str:
+    """Shown where falls are what is counted: neither J50 nor a share of a limit is fitted."""
+    if "j50_mean" in entry or "fraction50" in entry:
+        return NONE
+    return with_range(entry["never_fell_rate"], entry["never_fell_ci95"], ".1%")
+
+
+def _bounds(entry: Entry) -> str:
+    """A mark where the pushes did not reach from recovery to fall in every direction."""
+    return f" ({entry['j50_bounded']} bounds)" if entry["j50_bounded"] else ""
+
+
+def _number(value: float | None, form: str, scale: float = 1.0) -> str:
+    return NONE if value is None else format(scale * value, form)
 
 
 def _room(names: Iterable[str], most: int) -> int:
     """Width of a column of names that are not to be cut, but for those longer than `most`."""
     return min(max(len(name) for name in names), most)
-
-
-def _step_share(entry: Mapping[str, Any]) -> str:
-    """J50 over the one-step limit, mean over the directions; others are in summary.json."""
-    return _number(entry.get("step_share_1_mean"), ".2f")
-
-
-def _half(entry: Mapping[str, Any]) -> str:
-    sign = {None: "", "lower": "≥ ", "upper": "≤ "}[entry["fraction50_bound"]]
-    return f"{sign}{entry['fraction50']:.2f}"
-
-
-def _open(entry: Mapping[str, Any]) -> str:
-    """A remark where the pushes did not reach from recovery to fall in every direction."""
-    return f" ({entry['j50_bounded']} only bounds)" if entry["j50_bounded"] else ""
-
-
-def _with_range(entry: Mapping[str, Any], value: str, interval: str, form: str) -> str:
-    low, high = (_number(end, form) for end in entry[interval])
-    return f"{_number(entry[value], form)} [{low}, {high}]"
-
-
-def _number(value: float | None, form: str) -> str:
-    return "–" if value is None else format(value, form)
-
-
-def _milli(value: float | None) -> str:
-    return "–" if value is None else f"{1000 * value:.1f}"

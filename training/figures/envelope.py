@@ -18,6 +18,8 @@ from poise.training.trials.step_limits import shown_out_to
 from .style import GREY, INK, legend_below, look, saved_figure
 
 Unit = Literal["N·s", "N·s/kg", "fraction"]
+Curve = tuple[ArrayLike, ArrayLike]  # directions [°], values
+Band = tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]  # directions [°], values, low, high
 IMPULSE_LABEL = {
     "N·s": "push impulse J [N·s]",
     "N·s/kg": "push impulse J/m [N·s/kg]",
@@ -30,10 +32,10 @@ RING_LABELS = 33.75  # direction of the ring labels [°], between two of sixteen
 
 def polar_envelope(
     path: str | Path,
-    envelopes: Mapping[str, tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]],
+    envelopes: Mapping[str, Band],
     *,
-    ankle_limit: tuple[ArrayLike, ArrayLike] | None = None,
-    step_limits: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    ankle_limit: Curve | None = None,
+    step_limits: Mapping[str, Curve] | None = None,
     title: str = "Recovered impulse by push direction",
     unit: str = "N·s",
 ) -> None:

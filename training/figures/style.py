@@ -1,4 +1,4 @@
-"""How every picture of Poise looks, and how it is saved. No pyplot, no global backend."""
+"""The look of every picture of Poise, and how it is saved. No pyplot, no global backend."""
 
 from __future__ import annotations
 

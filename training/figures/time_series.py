@@ -23,7 +23,7 @@ def training_curve(
     baseline: float | None = None,
     title: str = "Training",
 ) -> None:
-    """How a training run went: recovery rates on top, one small panel for each other column.
+    """The course of a training run: recovery rates on top, a small panel for each other column.
 
     Args:
         path: PNG file to write.

@@ -1,4 +1,4 @@
-"""What happens beside the learning: evaluation, checkpoints, progress."""
+"""Callbacks beside the learning: evaluation, checkpoints, progress."""
 
 import csv
 import io

@@ -145,7 +145,7 @@ def controller_fingerprint(config: TrainConfig) -> str:
 
 
 def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
-    """What normalises observations and returns, as arrays."""
+    """The statistics that normalise observations and returns, as arrays."""
     arrays = {
         f"{prefix}_{name}": np.asarray(getattr(moments, name), dtype=float)
         for prefix, moments in (("obs", normalize.obs_rms), ("ret", normalize.ret_rms))

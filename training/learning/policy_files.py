@@ -1,4 +1,4 @@
-"""What the files of a policy folder hold: statistics, weights, the optimizer; read and checked.
+"""The files of a policy folder, read and checked: statistics, weights, the optimizer.
 
 Nothing is unpickled: weights come by torch's weights-only reader, statistics as plain arrays.
 """
@@ -93,7 +93,7 @@ def _weights(archive: Archive, path: Path) -> dict[str, torch.Tensor]:
 
 
 def _member(archive: Archive, path: Path, part: str) -> Any:
-    """What torch saved in a member of policy.zip; its tensors are finite floats."""
+    """The content that torch saved in a member of policy.zip; its tensors are finite floats."""
     data = archive.read(f"{part}.pth")
     Archive(data, f"{path}: {part}.pth")  # torch's own format is a zip file too
     with parsing(path):

@@ -1,4 +1,4 @@
-"""What changes as a training run goes on: the size of the pushes, and the exploration."""
+"""Schedules of a training run: the size of the pushes, and the exploration."""
 
 from dataclasses import replace
 

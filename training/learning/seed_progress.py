@@ -1,4 +1,4 @@
-"""What the terminal shows of several training runs, while they run and at their end."""
+"""The terminal shows several training runs, while they run and at their end."""
 
 from __future__ import annotations
 

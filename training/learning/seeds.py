@@ -13,7 +13,7 @@ SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
 
 
 def seed_folder(out: Path, seed: int) -> Path:
-    """Where the run of a seed lies."""
+    """The folder of a seed's run."""
     return out / f"seed-{seed}"
 
 

@@ -39,7 +39,7 @@ class BothSides(FlattenExtractor):
         self.mirror = TorchMirror(mirror)
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Of observations (n, no)."""
+        """The features of observations (n, no) and of their mirror images."""
         features = super().forward(observations)
         return torch.stack([features, self.mirror(features)])
 

@@ -116,7 +116,7 @@ def _train(
     summary = {
         "runs": entries,
         "recovered": recovered,
-        **circumstances(started, crew.workers, backend=crew.backend),
+        **circumstances(started, crew.workers, crew.backend),
     }
     write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
     print_seeds(summary, console)
@@ -173,7 +173,7 @@ def _finished(run: SeedRun) -> bool:
 
 
 def _entry(run: SeedRun) -> dict[str, Any]:
-    """What seeds.json says of a run: the evaluations at its start and at its best."""
+    """The evaluations of a run at its start and at its best, for seeds.json."""
     checkpoint = find_checkpoint(run.folder / LAST)
     state: dict[str, Any] = read_state(checkpoint / STATE) if checkpoint else {"timesteps": 0}
     rows = state.get("evaluations") or [None]

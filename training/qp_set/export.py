@@ -28,14 +28,14 @@ from poise.envs.robots.robot import load_robot
 from poise.training.running.provenance import commit, versions
 from poise.training.trials.push_limits import load_limits
 
-from .recordings import PUSH_DURATION, Recovery, Tick, recoveries
+from .recordings import PUSH_DURATION, RecordedTick, Recovery, recoveries
 
 Form = Literal["reduced", "full"]
 PER_TRIAL = 25  # problems
 LIBRARIES = ("mujoco", "numpy", "numba", "scipy")
 
 
-def qp_of(tick: Tick, controller: MomentumQP, form: Form) -> dict[str, Any]:
+def qp_of(tick: RecordedTick, controller: MomentumQP, form: Form) -> dict[str, Any]:
     """The arrays of one file: those of `qpsolvers.Problem`, and how torques follow from x."""
     if form == "reduced":
         qp, T, offset = tick.reduced, tick.torque_matrix, tick.torque_offset

@@ -18,7 +18,7 @@ from poise.envs.physics.state import RobotState
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
-from poise.training.suites.base import generator, start_seed
+from poise.training.suites.draw import generator, start_seed
 from poise.training.trials.push_limits import PushLimits
 
 End = Literal["recovered", "fell", "not quiet"]
@@ -28,8 +28,8 @@ PUSH_START, PUSH_DURATION = 0.2, 0.1  # [s]
 SPAN, TRIAL_DURATION = 2.0, 5.0  # [s]
 
 
-class Tick(NamedTuple):
-    """What the controller met, and its answer."""
+class RecordedTick(NamedTuple):
+    """A control tick: what the controller met, and its answer."""
 
     time: float
     state: RobotState
@@ -53,7 +53,7 @@ class Recorder(MomentumQP):
 
     def reset(self, state: RobotState | None = None) -> None:
         super().reset(state)
-        self.ticks: list[Tick] = []
+        self.ticks: list[RecordedTick] = []
         self.met = 0
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
@@ -68,7 +68,7 @@ class Recorder(MomentumQP):
         if solution.solved:
             kept = replace(targets)  # copies what it holds
             active = int(np.count_nonzero(solution.lam))
-            self.ticks.append(Tick(state.time, state.copy(), kept, cop_vel, qp,
+            self.ticks.append(RecordedTick(state.time, state.copy(), kept, cop_vel, qp,
                                    matrix, offset, torques, active))  # fmt: skip
         return torques
 
@@ -80,7 +80,7 @@ class Recovery:
     push: Push
     seed: int
     end: End
-    ticks: list[Tick]
+    ticks: list[RecordedTick]
     met: int
 
 

@@ -6,11 +6,13 @@ import base64
 import csv
 import gzip
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from markupsafe import Markup
+
+from poise.training.running.summary import Interval, both_ends
 
 from .svg import number_text
 
@@ -45,7 +47,7 @@ class Cell(NamedTuple):
 
     @property
     def sort_key(self) -> str:
-        """What the page sorts by; nothing sorts last."""
+        """The text that the page sorts by; nothing sorts last."""
         return "" if self.value is None else str(self.value)
 
 
@@ -140,3 +142,11 @@ def p_cell(value: float | None) -> Cell:
 def name_cell(name: str, series: int) -> Cell:
     """A controller's name with its sign."""
     return Cell(name, name, series=series)
+
+
+def figure_cell(
+    entry: Mapping[str, object], key: str, form: str, ends_key: str = "", sign: str = ""
+) -> Cell:
+    """A figure of a summary's entry, with its interval; empty where the entry has none."""
+    value = cast("float | None", entry.get(key))
+    return cell(value, form, both_ends(cast("Interval | None", entry.get(ends_key))), sign)

@@ -23,7 +23,7 @@ OUT = 1.0 + 16.0 / RADIUS  # where the names of directions stand
 
 @dataclass(frozen=True)
 class Series:
-    """What one controller reached.
+    """The figures of one controller.
 
     Attributes:
         name, index: of the controller; the index chooses its look.

@@ -1,19 +1,19 @@
-"""What only a benchmark has: sensitivity to factors, indicators, training seeds, errors."""
+"""Tables that only some suites have: sensitivity to factors, indicators, seeds, errors."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TypedDict, cast
 
 import numpy as np
+from markupsafe import Markup
 
-from poise.configs.errors import ConfigError
 from poise.training.results.read import Results
-from poise.training.results.values import interval, number
+from poise.training.running.summary import Level, Margin, both_ends
 from poise.training.statistics.rates import wilson_interval
 from poise.training.statistics.seeds import FIGURES
 
-from .cells import Cell, Column, Table, cell, name_cell, p_cell
+from .cells import Cell, Column, Table, cell, figure_cell, name_cell, p_cell
 from .charts import Series, level_curves, level_text
 from .svg import right_angle
 
@@ -28,39 +28,40 @@ TITLES = {
 }
 
 
-def factor_levels(results: Results) -> list[tuple[str, str, Mapping[str, Any], str]]:
-    """(controller, factor, level's entry, where) of all levels in the summary."""
-    found = []
-    for name, entry in results.summary["controllers"].items():
-        where = f"{results.folder}: summary.json: controllers.{name}.factors"
-        for factor in _mappings(entry.get("factors"), where):
-            levels = _mappings(factor.get("levels"), where)
-            for level in levels:
-                if not isinstance(level.get("level"), str):
-                    raise ConfigError("must be a text", source=where, field="level")
-                for key in ("trials", "recovered", "recovered_rate"):
-                    number(level, key, where, needed=True)
-                found.append((name, str(factor.get("factor")), level, where))
-    return found
+class FactorPlot(TypedDict):
+    """A picture with its title."""
+
+    title: str
+    picture: Markup
 
 
-def factor_plots(results: Results, order: Sequence[str]) -> list[dict[str, Any]]:
+def factor_levels(results: Results) -> list[tuple[str, str, Level]]:
+    """(controller, factor, level's entry) of all levels in the summary."""
+    return [
+        (name, factor["factor"], level)
+        for name, entry in results.summary["controllers"].items()
+        for factor in entry.get("factors", ())
+        for level in factor["levels"]
+    ]
+
+
+def factor_plots(results: Results, order: Sequence[str]) -> list[FactorPlot]:
     """A picture of every factor, controllers as in `order`."""
-    pictures = []
+    pictures: list[FactorPlot] = []
     found = factor_levels(results)
-    for factor in dict.fromkeys(factor for _, factor, _, _ in found):
-        entries: dict[str, list[Mapping[str, Any]]] = {}
-        for name, own, level, _ in found:
+    for factor in dict.fromkeys(factor for _, factor, _ in found):
+        entries: dict[str, list[Level]] = {}
+        for name, own, level in found:
             if own == factor:
                 entries.setdefault(name, []).append(level)
-        levels = list(dict.fromkeys(e["level"] for own in entries.values() for e in own))
-        standard = [levels.index(e["level"]) for own in entries.values() for e in own
-                    if e.get("standard")]  # fmt: skip
+        levels = list(dict.fromkeys(e["level"] for each in entries.values() for e in each))
+        standard = [levels.index(e["level"]) for each in entries.values() for e in each
+                    if e["standard"]]  # fmt: skip
         series = []
         for name in order:
             own_levels = entries.get(name, [])
-            ends = [wilson_interval(e["recovered"], e["trials"]) for e in own_levels]
-            low, high = np.array(ends, dtype=float).reshape(-1, 2).T
+            around = [wilson_interval(e["recovered"], e["trials"]) for e in own_levels]
+            low, high = np.array(around, dtype=float).reshape(-1, 2).T
             x = np.array([levels.index(e["level"]) for e in own_levels], dtype=float)
             y = np.array([e["recovered_rate"] for e in own_levels], dtype=float)
             series.append(Series(name, results.controllers.index(name), x, y, low, high))
@@ -88,16 +89,15 @@ def factor_table(results: Results) -> Table | None:
             name_cell(name, results.controllers.index(name)),
             Cell(factor, factor),
             Cell(level["level"], level_text(level["level"])
-                 + (" (standard)" if level.get("standard") else "")),
-            cell(number(level, "trials", where), "g"),
-            cell(number(level, "recovered", where), "g"),
-            cell(number(level, "recovered_rate", where), ".0%",
-                 interval(level, "recovered_ci95", where)),
-            cell(number(level, "lost", where), "g"),
-            cell(number(level, "won", where), "g"),
-            p_cell(number(level, "p_mcnemar", where)),
+                 + (" (standard)" if level["standard"] else "")),
+            cell(level["trials"], "d"),
+            cell(level["recovered"], "d"),
+            cell(level["recovered_rate"], ".0%", both_ends(level["recovered_ci95"])),
+            cell(level["lost"], "d"),
+            cell(level["won"], "d"),
+            p_cell(level["p_mcnemar"]),
         ]
-        for name, factor, level, where in factor_levels(results)
+        for name, factor, level in factor_levels(results)
     ]  # fmt: skip
     caption = "Recovered share at every level of every factor."
     return Table("factors", caption, columns, rows) if rows else None
@@ -106,18 +106,18 @@ def factor_table(results: Results) -> Table | None:
 def sensitivity(results: Results, order: Sequence[str]) -> Table | None:
     """The largest loss of each controller by each factor; None without factors."""
     found = factor_levels(results)
-    factors = list(dict.fromkeys(factor for _, factor, _, _ in found))
+    factors = list(dict.fromkeys(factor for _, factor, _ in found))
     columns = [Column("controller", "Controller"), Column("standard", "Standard case")]
     columns += [Column(f, f.replace("_", " "), TITLES.get(f, "")) for f in factors]
     rows = []
     for name in order:
-        own = [(f, level) for other, f, level, _ in found if other == name]
-        base = [level["recovered_rate"] for _, level in own if level.get("standard")]
+        own = [(f, level) for other, f, level in found if other == name]
+        base = [level["recovered_rate"] for _, level in own if level["standard"]]
         if not base:
             continue
         row = [name_cell(name, results.controllers.index(name)), cell(base[0], ".0%")]
         for factor in factors:
-            levels = [level for f, level in own if f == factor and not level.get("standard")]
+            levels = [level for f, level in own if f == factor and not level["standard"]]
             worst = min(levels, key=lambda level: level["recovered_rate"], default=None)
             if worst is None:
                 row.append(cell(None))
@@ -131,20 +131,14 @@ def sensitivity(results: Results, order: Sequence[str]) -> Table | None:
 
 
 def indicators(results: Results, order: Sequence[str]) -> Table | None:
-    """EUROBENCH's indicators; None where the folder has none."""
-    entries, rows = results.summary["controllers"], []
-    angles: dict[float, None] = {}
-    margins: dict[str, dict[float, Mapping[str, Any]]] = {}
-    for name in order:
-        where = f"{results.folder}: summary.json: controllers.{name}.eurobench"
-        found = entries[name].get("eurobench")
-        if not isinstance(found, dict):
-            return None
-        for entry in _mappings(found.get("margins"), where):
-            angle = number(entry, "direction", where, needed=True)
-            assert angle is not None
-            angles[angle] = None
-            margins.setdefault(name, {})[angle] = entry
+    """EUROBENCH's indicators; None where no standard pushes were played."""
+    entries = results.summary["controllers"]
+    order = [name for name in order if "eurobench" in entries[name]]
+    margins: dict[str, dict[float, Margin]] = {
+        name: {margin["direction"]: margin for margin in entries[name]["eurobench"]["margins"]}
+        for name in order
+    }
+    angles = list(dict.fromkeys(angle for own in margins.values() for angle in own))
     columns = [
         Column("controller", "Controller"),
         Column("body_sway_mean", "Body sway [rad]", "mean over recovered standard pushes"),
@@ -158,24 +152,24 @@ def indicators(results: Results, order: Sequence[str]) -> Table | None:
             Column(f"{key}_force_normalised", "at human size [N]", f"margin {to}, normalised"),
             Column(f"{key}_energy_normalised", "energy [J]", f"margin {to}, normalised"),
         ]
+    rows = []
     for name in order:
-        where = f"{results.folder}: summary.json: controllers.{name}.eurobench"
         found = entries[name]["eurobench"]
         row = [
             name_cell(name, results.controllers.index(name)),
-            cell(number(found, "body_sway_mean", where), ".3f"),
-            cell(number(found, "recovery_time_mean", where), ".2f"),
-            cell(number(found, "recovery_time_trials", where), "g"),
+            figure_cell(found, "body_sway_mean", ".3f"),
+            figure_cell(found, "recovery_time_mean", ".2f"),
+            figure_cell(found, "recovery_time_trials", "d"),
         ]
         for angle in angles:
-            entry = margins.get(name, {}).get(angle, {})
-            sign = "≥ " if entry.get("largest_tried") else ""
+            margin = margins[name].get(angle, Margin(direction=angle))
+            sign = "≥ " if margin.get("largest_tried") else ""
             for key in ("force", "force_normalised", "energy_normalised"):
-                row.append(cell(number(entry, key, where), ".1f" if "energy" in key else ".0f",
-                                sign=sign))  # fmt: skip
+                form = ".1f" if "energy" in key else ".0f"
+                row.append(figure_cell(margin, key, form, sign=sign))
         rows.append(row)
     caption = "Indicators of simulated subjects, as EUROBENCH's protocols define them."
-    return Table("indicators", caption, columns, rows).without_empty()
+    return Table("indicators", caption, columns, rows).without_empty() if rows else None
 
 
 def seed_table(results: Results) -> Table | None:
@@ -187,14 +181,11 @@ def seed_table(results: Results) -> Table | None:
             Column(f"{key}_worst", "worst seed", "the smallest value of a seed"),
         ]
     rows = []
-    where = f"{results.folder}: summary.json: seeds"
-    for group in _mappings(results.source.get("seeds"), where):
-        name = str(group.get("name", ", ".join(str(member) for member in group.get("members", []))))
-        row = [Cell(name, name), cell(len(group.get("seeds", [])), "d")]
+    for group in results.summary["seeds"]:
+        row = [Cell(group["name"], group["name"]), cell(len(group["seeds"]), "d")]
         for key, _, form in FIGURES:
-            found = group.get(key) or {}
-            row.append(cell(number(found, "iqm", where), form, interval(found, "iqm_ci95", where)))
-            row.append(cell(number(found, "worst", where), form))
+            found = cast(Mapping[str, object], group.get(key, {}))
+            row += [figure_cell(found, "iqm", form, "iqm_ci95"), figure_cell(found, "worst", form)]
         rows.append(row)
     if not rows:
         return None
@@ -221,12 +212,3 @@ def error_table(results: Results) -> Table | None:
     ]
     caption = "Trials in which a controller raised an error; they count as not recovered."
     return Table("errors", caption, columns, rows) if rows else None
-
-
-def _mappings(value: Any, where: str) -> list[Mapping[str, Any]]:
-    """A list of mappings; nothing where there is none."""
-    if value is None:
-        return []
-    if not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
-        raise ConfigError("must be a list of mappings", source=where)
-    return value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import re
 import shlex
 from collections.abc import Iterable, Sequence
@@ -16,9 +15,9 @@ from rich.console import Console
 from poise.baselines.allowance import allowing
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
-from poise.configs.reading import TABLE_BYTES, read_text
+from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
 from poise.training.results.read import Record, Results, load_results
-from poise.training.running.files import REPORT, TRIALS
+from poise.training.running.files import REPORT, SUMMARY, TRIALS
 from poise.training.running.terminal import print_paths
 
 from . import factors, plots, words
@@ -26,7 +25,7 @@ from . import tables as report_tables
 from .cells import Download, download
 from .svg import swatch
 from .time_chart import signals_csv, time_plot
-from .worst_trials import AFTER, Case, Film, can_draw, choose_cases, film, frame_times
+from .worst_trials import AFTER, Exhibit, Film, can_draw, choose_exhibits, film, frame_times
 
 CROWD = 4  # of controllers; with more, bands and bars are shown for the one that is pointed at
 EMBEDDED = 600_000  # [bytes] trials.csv is embedded up to this size, beyond it packed
@@ -71,7 +70,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
     """The page; raises ConfigError where the summary does not hold what it should."""
     console = console or Console(quiet=True)
     baseline = results.reference
-    order = report_tables.ranked(results)
+    order = results.summary["ranking"]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("poise.training.report", "templates"),
         autoescape=True,
@@ -125,7 +124,7 @@ def _cases(
     results: Results, baseline: str, order: Sequence[str], films: bool, console: Console
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """The trials shown, and what to say of those that are not."""
-    cases = choose_cases(results, baseline, order)
+    cases = choose_exhibits(results, baseline, order)
     notes: list[str] = []
     if not films:
         notes.append("The trials were not played again: the report was asked to go without.")
@@ -171,11 +170,12 @@ def _film(
     return None
 
 
-def _shown(case: Case, films: Sequence[Film], results: Results) -> dict[str, Any]:
+def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, Any]:
     """A case for the template."""
     record = case.record
+    trial = results.trial(record)
     start = _float(record.line.get("start"))
-    pushes = words.push_times(record)
+    pushes = words.push_times(trial)
     end = _end(record, start or 0.0)
     parts = []
     for played in films:
@@ -198,7 +198,7 @@ def _shown(case: Case, films: Sequence[Film], results: Results) -> dict[str, Any
         })  # fmt: skip
     return {
         "case": case,
-        "facts": words.push_text(record),
+        "facts": words.push_text(record, trial),
         "end": _ending(record),
         "films": parts,
         "command": f"poise replay {shlex.quote(str(results.folder))} --trial {record.trial} "
@@ -218,23 +218,20 @@ def _ending(record: Record) -> str:
 
 
 def _facts(results: Results) -> list[tuple[str, str]]:
-    """Where the result comes from, as far as the summary says."""
+    """The origin of the result."""
     summary, settings = results.summary, results.settings
-    machine = summary.get("machine")
-    machine = machine if isinstance(machine, dict) else {}
-    versions = summary.get("versions")
-    versions = versions if isinstance(versions, dict) else settings.versions
+    machine, versions = summary["machine"], summary["versions"]
     rows = [
-        ("Command", summary.get("command")),
-        ("Commit", summary.get("commit")),
+        ("Command", summary["command"]),
+        ("Commit", summary["commit"]),
         ("Suite", settings.suite_name),
         ("Seed", settings.seed),
         ("Robot", f"{settings.robot} ({settings.robot_fingerprint[:12]})"),
-        ("Processor", machine.get("processor")),
-        ("Cores", machine.get("cores")),
-        ("Workers", summary.get("workers")),
-        ("System", machine.get("system")),
-        ("Duration", f"{summary['seconds']} s" if summary.get("seconds") is not None else None),
+        ("Processor", machine["processor"]),
+        ("Cores", machine["cores"]),
+        ("Workers", summary["workers"]),
+        ("System", machine["system"]),
+        ("Duration", f"{summary['seconds']} s"),
         ("Versions", ", ".join(f"{name} {version}" for name, version in versions.items())),
         ("Fingerprints", ", ".join(f"{n} {mark[:12]}" for n, mark in settings.controllers.items())),
     ]
@@ -251,8 +248,8 @@ def _trials(results: Results) -> Download | None:
 
 
 def _summary_file(results: Results) -> Download:
-    text = json.dumps(results.source, indent=1)
-    return download("summary.json", text, pack=len(text) > EMBEDDED)
+    text = read_text(results.folder / SUMMARY, JSON_BYTES)
+    return download(SUMMARY, text, pack=len(text) > EMBEDDED)
 
 
 def _float(text: Any) -> float | None:

@@ -48,7 +48,7 @@ class Svg:
 
     @contextmanager
     def group(self, **attributes: object) -> Iterator[None]:
-        """What is added inside shares these attributes."""
+        """A context: all elements that are added inside share these attributes."""
         self._parts.append(f"<g{_written(attributes)}>")
         yield
         self._parts.append("</g>")

@@ -3,43 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import cast
 
-from poise.configs.errors import ConfigError, shown
+from poise.training.evaluation.tables import BOUNDS
 from poise.training.results.read import Results
-from poise.training.results.values import interval, number
+from poise.training.running.summary import Bound, Direction, Sector
 from poise.training.statistics.rates import wilson_interval
 
-from .cells import Cell, Column, Table, cell, name_cell, p_cell
+from .cells import Cell, Column, Table, cell, figure_cell, name_cell, p_cell
 from .worst_trials import smallest_lost
 
 SMALLEST = 3  # pushes listed for each controller
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
 STEP_LIMITS = {"1": "1-step limit", "2": "2-step limit", "inf": "∞-step limit"}
-BOUNDS = {None: "", "lower": "≥ ", "upper": "≤ "}
-
-
-def ranked(results: Results) -> list[str]:
-    """Controllers, the best first: by mean J50, else by the share of the limit, else by rate."""
-    entries = results.summary["controllers"]
-    for key in ("j50_mean", "fraction50", "recovered_rate"):
-        if all(isinstance(entry.get(key), (int, float)) for entry in entries.values()):
-            return sorted(entries, key=lambda name: -entries[name][key])
-    return list(entries)
 
 
 def assisted(results: Results, name: str) -> bool:
-    """Whether a controller took force from nowhere, at a soft root."""
-    entry, where = results.summary["controllers"][name], f"{results.folder}: summary.json"
-    return (number(entry, "root_force_max", where) or 0.0) > ROOT_FORCE
+    """True if a controller took force from nowhere, at a soft root."""
+    return (results.summary["controllers"][name].get("root_force_max") or 0.0) > ROOT_FORCE
 
 
 def ranking(results: Results, baseline: str) -> Table:
     """Every controller with what the benchmark measures, the best first."""
-    order = results.controllers
-    against = _against(results, baseline)
-    mix = " of the mix" if results.parts else ""
+    order, ranked = results.controllers, results.summary["ranking"]
+    scale = results.summary["scale"]
+    against, rated = _against(results, baseline), results.summary["rated"]
+    mix = f" of the {rated}" if rated else ""
     columns = [
         Column("rank", "#", "by mean J50, else by the share of the limit, else by rate"),
         Column("controller", "Controller"),
@@ -50,7 +40,7 @@ def ranking(results: Results, baseline: str) -> Table:
         Column("j50_bounds", "Bounds", "directions in which J50 is only a bound"),
         Column("eta_mean", "η mean", "J50 over the ankle limit, mean of all", interval=True),
         Column("eta_worst", "η worst", "in the worst direction"),
-        Column("fraction50", "Half at", f"half of the trials survive, of the {results.scale}"),
+        Column("fraction50", "Half at", f"half of the trials survive, of the {scale}"),
         Column("recovered_rate", "Recovered", f"share of all trials{mix}", interval=True),
         Column("trials", "Trials", f"that the rate is of{mix}"),
         Column("lost", "Lost", f"trials that {baseline} recovers and this controller does not"),
@@ -63,42 +53,36 @@ def ranking(results: Results, baseline: str) -> Table:
         Column("root_force_max", "Root [N]", "largest force that a soft root took from nowhere"),
     ]  # fmt: skip
     rows = []
-    fair = [name for name in ranked(results) if not assisted(results, name)]
-    for name in ranked(results):
+    fair = [name for name in ranked if not assisted(results, name)]
+    for name in ranked:
         entry = results.summary["controllers"][name]
-        where = f"{results.folder}: summary.json: controllers.{name}"
-
-        def value(key: str, entry: Mapping[str, Any] = entry, where: str = where) -> float | None:
-            return number(entry, key, where)
-
         lost, won, p = against.get(name, (None, None, None))
-        rate, root = value("recovered_rate"), value("root_force_max")
-        count, of = int(value("recovered") or 0), int(value("trials") or 0)
         bound = BOUNDS.get(entry.get("fraction50_bound"), "")
         rows.append([
             cell(fair.index(name) + 1 if name in fair else None, "d"),
             name_cell(name, order.index(name)),
-            cell(value("j50_mean"), ".1f", interval(entry, "j50_mean_ci95", where)),
-            cell(value("j50_mean_per_mass"), ".3f"),
-            cell(value("j50_min"), ".1f"),
-            cell(value("j50_bounded") or None, "g"),
-            cell(value("eta_mean"), ".2f", interval(entry, "eta_mean_ci95", where)),
-            cell(value("eta_min"), ".2f"),
-            cell(value("fraction50"), ".2f", sign=bound),
-            cell(rate, ".1%", wilson_interval(count, of)),
-            cell(of, "d"),
+            figure_cell(entry, "j50_mean", ".1f", "j50_mean_ci95"),
+            figure_cell(entry, "j50_mean_per_mass", ".3f"),
+            figure_cell(entry, "j50_min", ".1f"),
+            cell(entry.get("j50_bounded") or None, "d"),
+            figure_cell(entry, "eta_mean", ".2f", "eta_mean_ci95"),
+            figure_cell(entry, "eta_min", ".2f"),
+            figure_cell(entry, "fraction50", ".2f", sign=bound),
+            cell(entry["recovered_rate"], ".1%",
+                 wilson_interval(entry["recovered"], entry["trials"])),
+            cell(entry["trials"], "d"),
             cell(lost, "d"),
             cell(won, "d"),
             p_cell(p),
-            cell(value("fallen"), "d"),
-            cell(value("errors") or None, "d"),
-            cell(value("solver_failures"), "d"),
-            cell(value("tick_us"), ".0f"),
-            cell(root or None, ".0f"),
+            figure_cell(entry, "fallen", "d"),
+            cell(entry["errors"] or None, "d"),
+            figure_cell(entry, "solver_failures", "d"),
+            figure_cell(entry, "tick_us", ".0f"),
+            cell(entry.get("root_force_max") or None, ".0f"),
         ])  # fmt: skip
     caption = f"Controllers, the best first. Lost and won are counted against {baseline}."
-    if results.parts:
-        caption = caption[:-1] + "; like the recovered rate, on the random mix."
+    if rated:
+        caption = f"{caption[:-1]}; like the recovered rate, on the random {rated}."
     return Table("ranking", caption, columns, rows).without_empty()
 
 
@@ -115,16 +99,12 @@ def pairs(results: Results) -> Table:
         Column("j50_gain", "J50 gain", "of b over a, relative", interval=True),
     ]
     rows, order = [], results.controllers
-    for k, pair in enumerate(results.summary.get("pairs", [])):
-        where = f"{results.folder}: summary.json: pairs.{k}"
-        names = [_member(pair.get(key), order, where) for key in ("b", "a")]
-        counts = [number(pair, key, where) for key in ("both", "only_a", "only_b", "neither")]
-        gain = cell(number(pair, "j50_gain", where), "+.1%", interval(pair, "j50_gain_ci95", where))
+    for pair in results.summary["pairs"]:
         rows.append([
-            *(name_cell(name, order.index(name)) for name in names),
-            *(cell(count, "g") for count in counts),
-            p_cell(number(pair, "p_mcnemar", where)),
-            gain,
+            *(name_cell(name, order.index(name)) for name in (pair["b"], pair["a"])),
+            *(figure_cell(pair, key, "d") for key in ("both", "only_a", "only_b", "neither")),
+            p_cell(pair.get("p_mcnemar")),
+            figure_cell(pair, "j50_gain", "+.1%", "j50_gain_ci95"),
         ])  # fmt: skip
     return Table("pairs", "All pairs on the same trials.", columns, rows).without_empty()
 
@@ -146,66 +126,50 @@ def directions(results: Results) -> Table | None:
         columns.append(Column(f"step_limit_{name}", title, "of a pendulum that steps [N·s]"))
         columns.append(Column(f"step_share_{name}", "of it", "share of that limit that J50 is"))
     rows: list[list[Cell]] = []
-    for name, index, entry, where in per_direction(results):
-        bound = BOUNDS.get(entry.get("j50_bound", entry.get("fraction50_bound")), "")
-
-        def shown(
-            key: str, form: str, ends: str = "", sign: str = "",
-            entry: Mapping[str, Any] = entry, where: str = where,
-        ) -> Cell:  # fmt: skip
-            found = interval(entry, ends, where) if ends else None
-            return cell(number(entry, key, where), form, found, sign)
-
+    for name, index, entry in per_direction(results):
+        bound = BOUNDS[_bound(entry)]
         rows.append([
             name_cell(name, index),
-            shown("direction", "g"),
-            shown("trials", "g"),
-            shown("recovered", "g"),
-            shown("j50", ".1f", "j50_ci95", bound),
-            shown("j90", ".1f", "j90_ci95"),
-            shown("fraction50", ".2f", "fraction50_ci95", bound),
-            shown("ankle_limit", ".1f"),
-            shown("eta", ".2f"),
+            *(figure_cell(entry, key, "g") for key in ("direction", "trials", "recovered")),
+            figure_cell(entry, "j50", ".1f", "j50_ci95", bound),
+            figure_cell(entry, "j90", ".1f", "j90_ci95"),
+            figure_cell(entry, "fraction50", ".2f", "fraction50_ci95", bound),
+            figure_cell(entry, "ankle_limit", ".1f"),
+            figure_cell(entry, "eta", ".2f"),
         ])  # fmt: skip
         for key in STEP_LIMITS:
-            share = shown(f"step_share_{key}", ".2f", sign=bound)
-            rows[-1] += [shown(f"step_limit_{key}", ".1f"), share]
+            share = figure_cell(entry, f"step_share_{key}", ".2f", sign=bound)
+            rows[-1] += [figure_cell(entry, f"step_limit_{key}", ".1f"), share]
     if not rows:
         return None
     return Table("directions", "Every direction.", columns, rows).without_empty()
 
 
-def per_direction(results: Results) -> list[tuple[str, int, Mapping[str, Any], str]]:
-    """(controller, its number, entry, where) of all directions or sectors of the summary."""
-    found = []
-    for index, (name, entry) in enumerate(results.summary["controllers"].items()):
-        where = f"{results.folder}: summary.json: controllers.{name}"
-        entries = entry.get("directions", entry.get("sectors", []))
-        if not isinstance(entries, list) or not all(isinstance(e, dict) for e in entries):
-            number({"directions": entries}, "directions", where, needed=True)  # raises
-        found += [(name, index, e, where) for e in entries]
-    return found
+def per_direction(results: Results) -> list[tuple[str, int, Direction | Sector]]:
+    """(controller, its number, entry) of all directions, or of all sectors where there are none."""
+    return [
+        (name, index, each)
+        for index, (name, entry) in enumerate(results.summary["controllers"].items())
+        for each in entry.get("directions") or entry.get("sectors", [])
+    ]
 
 
-def _against(results: Results, baseline: str) -> dict[str, tuple[float, float, float | None]]:
+def _bound(entry: Direction | Sector) -> Bound:
+    bound = entry.get("j50_bound") or entry.get("fraction50_bound")
+    return cast(Bound, bound)
+
+
+def _against(results: Results, baseline: str) -> dict[str, tuple[int, int, float]]:
     """controller → (trials lost, trials won, p) against the baseline."""
-    found: dict[str, tuple[float, float, float | None]] = {}
-    for k, pair in enumerate(results.summary.get("pairs", [])):
-        where = f"{results.folder}: summary.json: pairs.{k}"
-        a, b, p = pair.get("a"), pair.get("b"), number(pair, "p_mcnemar", where)
-        only_a = int(number(pair, "only_a", where, needed=True) or 0)
-        only_b = int(number(pair, "only_b", where, needed=True) or 0)
-        if a == baseline:
-            found[str(b)] = (only_a, only_b, p)
-        elif b == baseline:
-            found[str(a)] = (only_b, only_a, p)
+    found: dict[str, tuple[int, int, float]] = {}
+    for pair in results.summary["pairs"]:
+        if baseline not in (pair["a"], pair["b"]) or "p_mcnemar" not in pair:
+            continue
+        if pair["a"] == baseline:
+            found[pair["b"]] = (pair["only_a"], pair["only_b"], pair["p_mcnemar"])
+        else:
+            found[pair["a"]] = (pair["only_b"], pair["only_a"], pair["p_mcnemar"])
     return found
-
-
-def _member(name: Any, names: tuple[str, ...], where: str) -> str:
-    if name not in names:
-        raise ConfigError(f"no such controller: {shown(name)}", source=where, choices=names)
-    return str(name)
 
 
 def smallest(results: Results, order: Sequence[str]) -> Table:

@@ -1,69 +1,63 @@
-"""What a report says in words."""
+"""Sentences of a report."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from poise.training.results.read import Record, Results
-from poise.training.results.values import interval, number
+from poise.training.running.summary import both_ends
+from poise.training.trials.trial import Trial
 
 from .svg import number_text, towards
-from .tables import assisted, ranked
+from .tables import assisted
 
 
 def lead(results: Results) -> list[str]:
-    """What the result says, in a sentence or three."""
-    fair = [name for name in ranked(results) if not assisted(results, name)]
-    first = (fair or ranked(results))[0]
-    best, where = results.summary["controllers"][first], f"{results.folder}: summary.json"
-    rate = number(best, "recovered_rate", where, needed=True)
+    """The result in a sentence or three."""
+    summary = results.summary
+    fair = [name for name in summary["ranking"] if not assisted(results, name)]
+    first = (fair or summary["ranking"])[0]
+    best = summary["controllers"][first]
     unfair = len(fair) < len(results.controllers)
     alone = " of those that take no force from outside" if unfair else ""
-    what = "random trials" if results.parts else "trials"
-    said = [f"{first} comes first{alone}: it recovers {rate:.1%} of {best['trials']} {what}."]
-    mean = number(best, "j50_mean", where)
-    if mean is not None:
-        ends = interval(best, "j50_mean_ci95", where)
-        text = f"Half of its trials are recovered at {mean:.1f} N·s"
-        text += f" ({ends[0]:.1f} to {ends[1]:.1f})" if ends else ""
-        share, worst = number(best, "eta_mean", where), number(best, "eta_min", where)
-        if share is not None and worst is not None:
-            text += f": {share:.2f} of the ankle limit, {worst:.2f} in the worst direction"
-        said.append(text + ", over all directions.")
+    what = "random trials" if summary["rated"] else "trials"
+    said = [f"{first} comes first{alone}: it recovers {best['recovered_rate']:.1%} of "
+            f"{best['trials']} {what}."]  # fmt: skip
+    if "j50_mean" in best:
+        around = both_ends(best["j50_mean_ci95"])
+        text = f"Half of its trials are recovered at {best['j50_mean']:.1f} N·s"
+        text += f" ({around[0]:.1f} to {around[1]:.1f})" if around else ""
+        text += f": {best['eta_mean']:.2f} of the ankle limit, {best['eta_min']:.2f} in the worst"
+        said.append(text + " direction, over all directions.")
     return said
 
 
-def push_text(record: Record) -> str:
-    """The push in words."""
+def push_text(record: Record, trial: Trial) -> str:
+    """The first push in words, and in what the trial differs from the standard one."""
     if not math.isfinite(record.impulse):
         return "No push."
     share = f", {record.fraction:.2f} of the limit" if math.isfinite(record.fraction) else ""
-    share += "".join(f"; {text}" for text in _world(record.line))
+    share += "".join(f"; {text}" for text in _world(trial))
     return (
         f"{record.impulse:.1f}\u00a0N·s in {record.duration:.2f}\u00a0s on {record.line['body']}, "
         f"towards {record.direction:.0f}° ({towards(record.direction)}){share}."
     )
 
 
-def push_times(record: Record) -> list[tuple[float, float]]:
+def push_times(trial: Trial) -> list[tuple[float, float]]:
     """(start, duration) of every push of a trial [s]."""
-    line = record.line
-    if not line.get("start"):
-        return []
-    count, interval = int(line.get("pushes") or 1), float(line.get("interval") or 0.0)
-    return [(float(line["start"]) + k * interval, record.duration) for k in range(count)]
+    return [(push.start, push.duration) for push in trial.pushes]
 
 
-def _world(line: Mapping[str, str]) -> list[str]:
-    """In what the world of a benchmark's trial differs from the standard one."""
-    said = []
-    if line.get("friction"):
-        said.append(f"friction {float(line['friction']):.2f}")
-    if float(line.get("delay") or 0.0):
-        said.append(f"sensors {1000.0 * float(line['delay']):.0f}\u00a0ms late")
-    if float(line.get("mass_error") or 0.0):
-        said.append(number_text(float(line["mass_error"]), "+.0%") + " mass")
-    if int(line.get("pushes") or 1) > 1:
-        said.append(f"{line['pushes']} pushes, {float(line['interval']):g}\u00a0s apart")
+def _world(trial: Trial) -> list[str]:
+    """In what the trial differs from the standard one."""
+    said, world = [], trial.world
+    if world.friction is not None:
+        said.append(f"friction {world.friction:.2f}")
+    if world.delay:
+        said.append(f"sensors {1000.0 * world.delay:.0f}\u00a0ms late")
+    if world.mass_error:
+        said.append(number_text(world.mass_error, "+.0%") + " mass")
+    if len(trial.pushes) > 1:
+        said.append(f"{len(trial.pushes)} pushes")
     return said

@@ -1,4 +1,4 @@
-"""Which trials a report shows, and how they are played again: frames and signals."""
+"""The trials that a report shows are chosen and played again: frames and signals."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AFTER = 0.4  # [s] shown after the last moment that matters
 
 
 @dataclass(frozen=True)
-class Case:
+class Exhibit:
     """A trial worth looking at.
 
     Attributes:
@@ -57,7 +57,7 @@ class Film:
     same: bool
 
 
-def choose_cases(results: Results, baseline: str, order: Sequence[str]) -> list[Case]:
+def choose_exhibits(results: Results, baseline: str, order: Sequence[str]) -> list[Exhibit]:
     """One trial for each controller, in this order, if it lost any.
 
     For a rival, the smallest push that it lost and the baseline recovered; else, and for the
@@ -67,26 +67,26 @@ def choose_cases(results: Results, baseline: str, order: Sequence[str]) -> list[
     recovered: dict[tuple[str, ...], dict[str, Record]] = {}
     for record in results.records:
         if record.recovered:
-            recovered.setdefault(record.push, {})[record.controller] = record
-    cases = []
+            recovered.setdefault(record.met, {})[record.controller] = record
+    exhibits = []
     for name in order:
         lost = smallest_lost(results, name)
         if not lost:
             continue
-        shown = [r for r in lost if name != baseline and baseline in recovered.get(r.push, {})]
+        shown = [r for r in lost if name != baseline and baseline in recovered.get(r.met, {})]
         record = (shown or lost)[0]
-        winners = recovered.get(record.push, {})
+        winners = recovered.get(record.met, {})
         what = "The smallest push" if math.isfinite(record.fraction) else "The first trial"
         reason = f"{what} that {name} did not recover"
         if shown:
             reason += f" and {baseline} did"
         others = tuple(winner for winner in winners if winner != baseline)
-        cases.append(Case(record, reason, winners.get(baseline), others))
-    return cases
+        exhibits.append(Exhibit(record, reason, winners.get(baseline), others))
+    return exhibits
 
 
 def smallest_lost(results: Results, name: str) -> list[Record]:
-    """What a controller did not recover, the smallest push first, without its errors."""
+    """The trials that a controller did not recover, the smallest push first, without its errors."""
     lost = [r for r in results.of(name) if not r.recovered and not r.error]
     return sorted(lost, key=_size)
 
@@ -107,7 +107,7 @@ def film(results: Results, record: Record, times: Sequence[float], draw: bool = 
             camera(env)
 
     try:
-        again = replay(results.folder, record.trial, record.controller, watch=watch)
+        again = replay(results, record.trial, record.controller, watch=watch)
     finally:
         if camera is not None:
             camera.close()

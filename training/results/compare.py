@@ -1,26 +1,21 @@
-"""What changed between two results: evaluations or benchmarks, with intervals."""
+"""Two results are compared here, with intervals."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from poise.configs.errors import ConfigError
-from poise.configs.reading import is_file, read_json, read_table, read_yaml
-from poise.training.running.files import SETTINGS, SUMMARY, TRIALS
+from poise.training.evaluation.folder import Settings
+from poise.training.running.summary import Entry, Interval, Level, Rate, both_ends
 from poise.training.statistics.differences import difference, paired_rates
 from poise.training.statistics.rates import mcnemar
 
-from .summary_form import check_compared
-from .values import interval, number
-
-IGNORED = ("controllers",)  # of settings: compared one by one
+from .read import Results, load_results
 
 
 @dataclass(frozen=True)
@@ -38,7 +33,7 @@ class Change:
 
     @property
     def certain(self) -> bool:
-        """Whether the interval leaves zero out."""
+        """True if the interval leaves zero out."""
         return self.low > 0.0 or self.high < 0.0
 
 
@@ -56,28 +51,25 @@ class Comparison:
 
 
 def compare(a: str | Path, b: str | Path) -> Comparison:
-    """Compare two folders of one kind, written by `poise benchmark` or `poise evaluate`.
+    """Compare two folders written by `poise evaluate` or `poise benchmark`.
 
-    Rates of trials that both have, alike in seed and push, are compared in pairs (McNemar,
-    Newcombe); all else by the intervals of the two figures [Zou08].
+    Rates of trials that both have, alike in all, are compared in pairs (McNemar, Newcombe); all
+    else by the intervals of the two figures [Zou08].
 
-    Raises ConfigError for a folder that holds no finished result, or two of different kinds.
+    Raises ConfigError for a folder that holds no finished result.
     """
-    first, second = _Result(Path(a)), _Result(Path(b))
-    if first.is_benchmark != second.is_benchmark:
-        raise ConfigError("one is a benchmark, the other an evaluation", source=f"{a}, {b}")
+    first, second = load_results(a), load_results(b)
     names = [name for name in first.controllers if name in second.controllers]
-    identical = tuple(name for name in names if first.outcomes(name) == second.outcomes(name))
-    marks_a, marks_b = first.settings["controllers"], second.settings["controllers"]
+    identical = tuple(name for name in names if _outcomes(first, name) == _outcomes(second, name))
+    marks = first.settings.controllers, second.settings.controllers
+    compared = (f.name for f in fields(Settings) if f.name != "controllers")
     return Comparison(
         settings=tuple(
-            key
-            for key in {**first.settings, **second.settings}
-            if key not in IGNORED and first.settings.get(key) != second.settings.get(key)
+            key for key in compared if getattr(first.settings, key) != getattr(second.settings, key)
         ),
         only_a=tuple(name for name in first.controllers if name not in second.controllers),
         only_b=tuple(name for name in second.controllers if name not in first.controllers),
-        changed=tuple(name for name in names if marks_a.get(name) != marks_b.get(name)),
+        changed=tuple(name for name in names if marks[0][name] != marks[1][name]),
         identical=identical,
         changes=tuple(
             change
@@ -116,121 +108,87 @@ def print_comparison(found: Comparison, a: str | Path, b: str | Path, console: C
     console.print(table)
 
 
-class _Result:
-    """A result folder, as far as a comparison needs it."""
-
-    def __init__(self, folder: Path):
-        self.folder = folder
-        if not is_file(folder / SUMMARY):
-            raise ConfigError(
-                "cannot be read (no such file): not a finished result", source=folder / SUMMARY
-            )
-        self.summary = read_json(folder / SUMMARY)
-        controllers = self.summary.get("controllers")
-        if not isinstance(controllers, dict):
-            raise ConfigError("is no summary of a result: it has no controllers",
-                              source=folder / SUMMARY)  # fmt: skip
-        check_compared(self.summary, folder / SUMMARY)
-        self.controllers: dict[str, Any] = controllers
-        self.settings = read_yaml(folder / SETTINGS)
-        if not isinstance(self.settings.get("controllers"), dict):
-            raise ConfigError("must be a mapping", source=folder / SETTINGS, field="controllers")
-        self.is_benchmark = "benchmark" in self.summary
-        self.trials = self._trials() if is_file(folder / TRIALS) else {}
-
-    def outcomes(self, name: str) -> dict[tuple[str, ...], bool]:
-        """The trials of a controller."""
-        return {key: won for key, won in self.trials.items() if key[1] == name}
-
-    def _trials(self) -> dict[tuple[str, ...], bool]:
-        """What both must share to be a pair → whether it was recovered."""
-        columns, rows = read_table(self.folder / TRIALS)
-        if "recovered" not in columns:
-            raise ConfigError("has no column 'recovered'", source=self.folder / TRIALS)
-        shared = columns[: columns.index("recovered")]
-        if shared[1:2] != ("controller",):
-            raise ConfigError("its second column must be 'controller'", source=self.folder / TRIALS)
-        return {tuple(row[c] for c in shared): row["recovered"] == "True" for row in rows}
+Key = tuple[str, ...]
 
 
-def _changes(name: str, a: _Result, b: _Result) -> Iterator[Change]:
-    one, two = a.controllers[name], b.controllers[name]
-    for title, key in (("mean J50 [N·s]", "j50_mean"), ("mean η", "eta_mean")):
-        yield from _by_intervals(name, title, one, two, key, f"{key}_ci95")
-    if a.is_benchmark:
-        if one.get("mix") and two.get("mix"):
-            yield from _rates(name, "recovered of the mix", one["mix"], two["mix"], a, b, ("mix",))
-        for factor, level, before, after in _levels(one["factors"], two["factors"]):
-            yield from _rates(name, f"{factor} {level}", before, after, a, b,
-                              ("factors", factor, level))  # fmt: skip
-    else:
-        yield from _rates(name, "recovered", one, two, a, b, ())
-    angles: dict[float, Mapping] = {d["direction"]: d for d in two.get("directions", ())}
-    for before in one.get("directions", ()):
-        other = angles.get(before["direction"])
-        if other is not None:
-            title = f"J50 at {before['direction']:g}° [N·s]"
-            yield from _by_intervals(name, title, before, other, "j50", "j50_ci95")
+def _outcomes(results: Results, name: str) -> dict[Key, bool]:
+    """A mapping from what a trial must share to be a pair, to whether the controller recovered."""
+    return {record.met: record.recovered for record in results.of(name)}
 
 
-def _by_intervals(
-    name: str, title: str, one: Mapping, two: Mapping, key: str, ends: str
-) -> Iterator[Change]:
-    """A figure with an interval of its own in both."""
-    where = f"controllers.{name}"
-    before, after = (number(entry, key, where) for entry in (one, two))
-    around = [interval(entry, ends, where) for entry in (one, two)]
-    if before is None or after is None or around[0] is None or around[1] is None:
-        return
-    change, (low, high) = difference(before, around[0], after, around[1])
-    yield Change(name, title, before, after, change, low, high)
+def _changes(name: str, a: Results, b: Results) -> Iterator[Change]:
+    one, two = (results.summary["controllers"][name] for results in (a, b))
+    if "j50_mean" in one and "j50_mean" in two:
+        for title, *estimates in (
+            ("mean J50 [N·s]", (one["j50_mean"], one["j50_mean_ci95"]),
+             (two["j50_mean"], two["j50_mean_ci95"])),
+            ("mean η", (one["eta_mean"], one["eta_mean_ci95"]),
+             (two["eta_mean"], two["eta_mean_ci95"])),
+        ):  # fmt: skip
+            yield from _by_intervals(name, title, *estimates)
+    if a.summary["rated"] == b.summary["rated"]:
+        rated = a.summary["rated"]
+        title = f"recovered of the {rated}" if rated else "recovered"
+        yield from _rates(name, title, one, two, a, b, part=rated)
+    for (factor, level), before, after in _levels(one, two):
+        yield from _rates(name, f"{factor} {level}", before, after, a, b, factor, level)
+    angles = {d["direction"]: d for d in two.get("directions", ())}
+    for d in one.get("directions", ()):
+        if (other := angles.get(d["direction"])) is not None:
+            title = f"J50 at {d['direction']:g}° [N·s]"
+            pair = (d["j50"], d["j50_ci95"]), (other["j50"], other["j50_ci95"])
+            yield from _by_intervals(name, title, *pair)
+
+
+Estimate = tuple[float, Interval]
+
+
+def _by_intervals(name: str, title: str, before: Estimate, after: Estimate) -> Iterator[Change]:
+    """A figure with an interval of its own in both; none where an interval is open."""
+    around = both_ends(before[1]), both_ends(after[1])
+    if around[0] is not None and around[1] is not None:
+        change, (low, high) = difference(before[0], around[0], after[0], around[1])
+        yield Change(name, title, before[0], after[0], change, low, high)
 
 
 def _rates(
     name: str,
     title: str,
-    one: Mapping,
-    two: Mapping,
-    a: _Result,
-    b: _Result,
-    where: tuple[str, ...],
+    one: Rate,
+    two: Rate,
+    a: Results,
+    b: Results,
+    factor: str | None = None,
+    level: str | None = None,
+    *,
+    part: str | None = None,
 ) -> Iterator[Change]:
     """A recovered rate: in pairs if both played the same trials, else by intervals."""
-    counts = _pairs(name, a, b, where)
-    rate_a, rate_b = one["recovered_rate"], two["recovered_rate"]
-    if counts is None or sum(counts) != one["trials"] or sum(counts) != two["trials"]:
-        change, (low, high) = difference(
-            rate_a, one["recovered_ci95"], rate_b, two["recovered_ci95"]
-        )
-        yield Change(name, title, rate_a, rate_b, change, low, high)
-        return
-    change, (low, high) = paired_rates(*counts)
-    p = mcnemar(counts[1], counts[2]).p_value
-    note = f"{counts[1]} lost, {counts[2]} won, p = {p:.2g}"
-    yield Change(name, title, rate_a, rate_b, change, low, high, note)
-
-
-def _pairs(
-    name: str, a: _Result, b: _Result, where: tuple[str, ...]
-) -> tuple[int, int, int, int] | None:
-    """Both, only a, only b, neither: of the trials that are alike in a and b.
-
-    `where` are the first of part, factor and level, in a benchmark.
-    """
+    wanted = {"factor": factor, "level": level, "part": part}
     table = {(x, y): 0 for x in (True, False) for y in (True, False)}
-    for key, recovered in a.trials.items():
-        if key[1] == name and key[4 : 4 + len(where)] == where and key in b.trials:
-            table[recovered, b.trials[key]] += 1
-    return tuple(table.values()) if sum(table.values()) else None  # type: ignore[return-value]
+    others = _outcomes(b, name)
+    for record in a.of(name):
+        here = all(value is None or record.line[key] == value for key, value in wanted.items())
+        if here and record.met in others:
+            table[record.recovered, others[record.met]] += 1
+    both, only_a, only_b, neither = table.values()
+    if not sum(table.values()) == one["trials"] == two["trials"]:
+        estimates = ((r["recovered_rate"], r["recovered_ci95"]) for r in (one, two))
+        yield from _by_intervals(name, title, *estimates)
+        return
+    change, (low, high) = paired_rates(both, only_a, only_b, neither)
+    note = f"{only_a} lost, {only_b} won, p = {mcnemar(only_a, only_b).p_value:.2g}"
+    rates = one["recovered_rate"], two["recovered_rate"]
+    yield Change(name, title, *rates, change, low, high, note)
 
 
-def _levels(
-    one: Sequence[Mapping], two: Sequence[Mapping]
-) -> Iterator[tuple[str, str, Mapping, Mapping]]:
-    """Levels of the factors that both have."""
-    after = {(f["factor"], level["level"]): level for f in two for level in f["levels"]}
-    for factor in one:
-        for level in factor["levels"]:
-            if (factor["factor"], level["level"]) in after and not level["standard"]:
-                yield (factor["factor"], level["level"], level,
-                       after[factor["factor"], level["level"]])  # fmt: skip
+def _levels(one: Entry, two: Entry) -> Iterator[tuple[tuple[str, str], Level, Level]]:
+    """Levels of the factors that both have, but for the standard case."""
+    before, after = (
+        {(factor["factor"], level["level"]): level
+         for factor in entry.get("factors", ()) for level in factor["levels"]}
+        for entry in (one, two)
+    )  # fmt: skip
+    for key, level in before.items():
+        if key in after and not level["standard"]:
+            yield key, level, after[key]

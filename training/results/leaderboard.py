@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Final
 
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_folder
-from poise.training.benchmark.table import COLUMNS, ranking_rows
 from poise.training.evaluation.seed_groups import seed_lines
+from poise.training.evaluation.tables import ranked, table_columns
+from poise.training.running.files import SUMMARY
+from poise.training.running.summary import Entry, Summary
 
-from .benchmark import read_summary
-from .summary_form import shape
+from .summary import read_summary
 
 HEAD = """# Leaderboard
 
@@ -27,11 +28,18 @@ force that a controller took from nowhere: only those with 0 obey physics.
 """
 
 
-SAME = ("suite", "seed", "robot", "reference")  # of results whose rows may stand in one table
+COLUMNS = ("mean J50 [N·s]", "η mean", "η worst", "recovered of the mix", "recovered", "lost, won",
+           "McNemar p", "root [N]", "tick [µs]")  # fmt: skip
+SAME: Final = (
+    "suite",
+    "seed",
+    "robot",
+    "reference",
+)  # of results whose rows may stand in one table
 
 
 def write_leaderboard(sources: Sequence[str | Path], page: str | Path) -> None:
-    """Write the page from files summary.json of `poise benchmark`, or folders that hold one.
+    """Write the page from files summary.json that have J50s, or folders that hold one.
 
     Raises ConfigError for another file, or of another suite, seed, robot or reference than the
     first; PoiseError when the page cannot be written.
@@ -39,39 +47,52 @@ def write_leaderboard(sources: Sequence[str | Path], page: str | Path) -> None:
     summaries = {}
     for source in sources:
         path = Path(source)
-        path = path / "summary.json" if is_folder(path) else path
+        path = path / SUMMARY if is_folder(path) else path
         summaries[str(source)] = read_summary(path)
     write_atomic(page, leaderboard(summaries))
 
 
-def merged(summaries: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], dict[str, str]]:
+def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
     """The first result with the rows of later ones; and whose result each row is.
 
     A controller of a later result takes the place of an earlier one of its name; the reference
     stays that of the first.
     """
     (first, summary), *later = summaries.items()
-    whole = dict(summary)
-    entries, origin = dict(whole["controllers"]), dict.fromkeys(whole["controllers"], first)
-    pairs = {pair["b"]: pair for pair in whole["pairs"]}
+    reference = summary["reference"]
+    entries, origin = dict(summary["controllers"]), dict.fromkeys(summary["controllers"], first)
+    pairs = {pair["b"]: pair for pair in summary["pairs"] if pair["a"] == reference}
     for source, other in later:
-        for key in SAME:
-            if other[key] != whole[key]:
+        for key, own, theirs in zip(SAME, _same(summary), _same(other), strict=True):
+            if own != theirs:
                 raise ConfigError(f"is not that of {first}", source=source, field=key)
-        names = [name for name in other["controllers"] if name != whole["reference"]]
-        for name in names:
-            if shape(other["controllers"][name]) != shape(entries[whole["reference"]]):
-                raise ConfigError(f"has other directions or levels than {first}", source=source,
-                                  field=f"controllers.{name}")  # fmt: skip
-            entries[name], origin[name] = other["controllers"][name], source
-            pairs.pop(name, None)
-        pairs |= {pair["b"]: pair for pair in other["pairs"] if pair["b"] in names}
-    whole["controllers"], whole["pairs"] = entries, list(pairs.values())
-    whole["ranking"] = sorted(entries, key=lambda name: -entries[name]["j50_mean"])
+        for name in other["controllers"]:
+            if name != reference:
+                entries[name], origin[name] = other["controllers"][name], source
+                pairs.pop(name, None)
+        pairs |= {pair["b"]: pair for pair in other["pairs"] if pair["a"] == reference}
+    for name, entry in entries.items():
+        if not entry.get("directions"):
+            raise ConfigError("does not measure J50", source=origin[name],
+                              field=f"controllers.{name}")  # fmt: skip
+        if _shape(entry) != _shape(entries[reference]):
+            raise ConfigError(f"has other directions or levels than {first}", source=origin[name],
+                              field=f"controllers.{name}")  # fmt: skip
+    whole: Summary = {**summary, "controllers": entries, "pairs": list(pairs.values()),
+                      "ranking": ranked(entries)}  # fmt: skip
     return whole, origin
 
 
-def leaderboard(summaries: Mapping[str, Mapping[str, Any]]) -> str:
+def _same(summary: Summary) -> tuple[object, ...]:
+    return tuple(summary[key] for key in SAME)
+
+
+def _shape(entry: Entry) -> tuple[int, list[int]]:
+    """The number of a controller's directions, and of levels of each factor."""
+    return len(entry["directions"]), [len(f["levels"]) for f in entry.get("factors", ())]
+
+
+def leaderboard(summaries: Mapping[str, Summary]) -> str:
     """The page as Markdown; `summaries` by where they come from."""
     summary, origin = merged(summaries)
     versions, machine = summary["versions"], summary["machine"]
@@ -91,7 +112,7 @@ def leaderboard(summaries: Mapping[str, Mapping[str, Any]]) -> str:
         names = ", ".join(f"`{name}`" for name in summary["ranking"] if origin[name] == source)
         text += f"Played later, commit `{(other['commit'] or 'unknown')[:10]}`, "
         text += f"{other['machine']['processor']}, {other['machine']['cores']} cores: {names}.\n\n"
-    text += _table(["", *(name for name, _ in COLUMNS)], _ranked(summary))
+    text += _table(*_ranked(summary))
     if lines := seed_lines(summary["seeds"]):
         text += "\n" + "\n".join(f"- {line}" for line in lines) + "\n"
     directions = _directions(summary)
@@ -102,12 +123,17 @@ def leaderboard(summaries: Mapping[str, Mapping[str, Any]]) -> str:
     return text
 
 
-def _ranked(summary: Mapping[str, Any]) -> list[list[str]]:
-    rows = ranking_rows(summary)
-    return [[str(place), f"`{row[0]}`", *row[1:]] for place, row in enumerate(rows, 1)]
+Cells = list[list[str]]
 
 
-def _directions(summary: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
+def _ranked(summary: Summary) -> tuple[list[str], Cells]:
+    columns = [column for column in table_columns(summary) if column[0] in COLUMNS]
+    rows = [[str(place), f"`{name}`", *(text(name) for _, text in columns)]
+            for place, name in enumerate(summary["ranking"], 1)]  # fmt: skip
+    return ["", "controller", *(heading for heading, _ in columns)], rows
+
+
+def _directions(summary: Summary) -> tuple[list[str], Cells]:
     entries = summary["controllers"]
     angles = [d["direction"] for d in entries[summary["ranking"][0]]["directions"]]
     rows = [
@@ -117,10 +143,10 @@ def _directions(summary: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]
     return ["controller", *(f"{angle:g}°" for angle in angles)], rows
 
 
-def _factors(summary: Mapping[str, Any]) -> tuple[list[str], list[list[str]]] | None:
+def _factors(summary: Summary) -> tuple[list[str], Cells] | None:
     names, entries = summary["ranking"], summary["controllers"]
     rows = []
-    for k, factor in enumerate(entries[names[0]]["factors"]):
+    for k, factor in enumerate(entries[names[0]].get("factors", ())):
         for i, level in enumerate(factor["levels"]):
             here = [entries[name]["factors"][k]["levels"][i] for name in names]
             mark = " (standard)" if level["standard"] else ""

@@ -1,36 +1,35 @@
-"""The folder of a finished evaluation or benchmark, read back and checked."""
+"""The folder of a finished result, read back and checked."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from poise.configs.errors import ConfigError, shown
-from poise.configs.reading import is_file, is_folder, read_json, read_table, read_yaml
-from poise.training.benchmark.folder import LOG, BenchmarkSettings, read_benchmark_settings
+from poise.configs.reading import is_file, is_folder, read_table
 from poise.training.evaluation.folder import Settings, read_settings
-from poise.training.running.files import PARTIAL, SETTINGS, SUMMARY, TRIALS
+from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS
+from poise.training.running.summary import Summary
+from poise.training.trials.table import CASE_COLUMNS, COLUMNS, read_trial
+from poise.training.trials.trial import Trial
 
-from .flat import flat
-from .values import number
+from .summary import read_summary
 
-NEEDED = ("trial", "controller", "seed", "body", "impulse", "direction", "duration",
-          "limit_fraction", "recovered", "fallen", "fall_time")  # fmt: skip
 FLAGS = {"True": True, "False": False}
 
 
 @dataclass(frozen=True)
 class Record:
-    """How one controller fared in one trial.
+    """A controller in a trial: a line of trials.csv.
 
     Attributes:
         trial, controller: which.
         recovered, fallen: whether.
-        impulse [N·s], direction [deg], duration [s]: of the push; NaN without one.
-        fraction: impulse over the limit of the suite; NaN without a push.
+        impulse [N·s], direction [deg], duration [s]: of the first push; NaN without one.
+        fraction: impulse over the limit of the suite; NaN where it has none.
         fall_time: [s] after the reset; NaN without a fall.
-        part: of a benchmark's suite; empty in an evaluation.
-        error: what the controller raised, if it did.
         line: all columns of trials.csv, as they are written there.
     """
 
@@ -47,129 +46,102 @@ class Record:
 
     @property
     def part(self) -> str:
-        return self.line.get("part", "")
+        """The part of the suite."""
+        return self.line["part"]
 
     @property
     def error(self) -> str:
-        return self.line.get("error", "")
+        """The error that the controller raised, or nothing."""
+        return self.line["error"]
 
-    @property
-    def push(self) -> tuple[str, ...]:
+    @cached_property
+    def met(self) -> tuple[str, ...]:
         """Equal for two controllers that met the same: trials of one number may differ."""
-        return tuple(self.line[name] for name in ("trial", "seed", "impulse", "direction"))
+        return tuple(self.line[name] for name in CASE_COLUMNS if name != "controller")
 
 
 @dataclass(frozen=True)
 class Results:
-    """What a folder holds.
+    """The content of a result's folder.
 
     Attributes:
         folder: where it was read.
         settings: everything that decides the result.
-        summary: summary.json; of a benchmark in the form of an evaluation's, see `flat`.
+        summary: summary.json.
         records: of every trial and controller, as in trials.csv.
-        source: summary.json as it is.
     """
 
     folder: Path
-    settings: Settings | BenchmarkSettings
-    summary: Mapping[str, Any]
+    settings: Settings
+    summary: Summary
     records: tuple[Record, ...]
-    source: Mapping[str, Any]
 
     @property
     def reference(self) -> str:
         """The controller that others are compared with."""
-        name = self.summary.get("reference")
-        return name if name in self.controllers else self.controllers[0]
+        return self.summary["reference"]
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """Parts of a benchmark's suite; none for an evaluation."""
-        return tuple(dict.fromkeys(record.part for record in self.records if record.part))
-
-    @property
-    def scale(self) -> str:
-        """What `fraction` is a fraction of."""
-        measured = isinstance(self.settings, Settings) and self.settings.limits is not None
-        return "baseline's J50" if measured else "ankle limit"
+        """Parts of the suite."""
+        return tuple(dict.fromkeys(record.part for record in self.records))
 
     @property
     def controllers(self) -> tuple[str, ...]:
-        """Names, in the order of the evaluation."""
+        """Names, in the order in which they came."""
         return tuple(self.summary["controllers"])
 
     def of(self, controller: str) -> list[Record]:
         """All trials of a controller."""
         return [record for record in self.records if record.controller == controller]
 
+    def record(self, controller: str, trial: int) -> Record:
+        """The line of a controller in a trial; raises ConfigError where there is none."""
+        if controller not in self.controllers:
+            raise ConfigError(f"{shown(controller)} took no part", source=self.folder,
+                              field="controller", choices=self.controllers)  # fmt: skip
+        numbers = {record.trial: record for record in self.of(controller)}
+        if trial not in numbers:
+            raise ConfigError(f"no trial {trial}; they are numbered from 0 to {max(numbers)}",
+                              source=self.folder / TRIALS, field="trial")  # fmt: skip
+        return numbers[trial]
+
+    def trial(self, record: Record) -> Trial:
+        """The trial of a record, exactly; raises ConfigError where its line does not parse."""
+        return read_trial(record.line, self.folder / TRIALS)
+
 
 def load_results(folder: str | Path) -> Results:
-    """Read the folder of a finished evaluation or benchmark.
+    """Read the folder of a finished result of `evaluate` or `benchmark`.
 
     Raises:
-        ConfigError: no folder, no finished evaluation, or files that are cut off, do not parse or
-            do not belong together.
+        ConfigError: no folder, no finished result, one of another format, or files that are cut
+            off, do not parse or do not belong together.
     """
     folder = Path(folder)
     if not is_folder(folder):
         raise ConfigError("no such folder", source=folder)
     missing = [name for name in (SETTINGS, SUMMARY, TRIALS) if not is_file(folder / name)]
     if missing:
-        stopped = (folder / PARTIAL).exists() or (folder / LOG).exists()
-        why = "it was stopped: the command that began it goes on" if stopped else (
-            f"holds no finished evaluation or benchmark: {', '.join(missing)} missing"
-        )  # fmt: skip
+        why = f"holds no finished result: {', '.join(missing)} missing"
+        why += "; the command that began it goes on" if is_file(folder / LOG) else ""
         raise ConfigError(why, source=folder)
-    path, records = folder / SUMMARY, _records(folder / TRIALS)
-    settings: Settings | BenchmarkSettings
-    source = summary = read_json(path)
-    if "benchmark" in read_yaml(folder / SETTINGS):
-        settings = read_benchmark_settings(folder)
-        summary = flat(source, [record.line for record in records], str(path))
-    else:
-        settings = read_settings(folder)
-    _check_summary(summary, path)
+    settings, summary = read_settings(folder), read_summary(folder / SUMMARY)
+    records = _records(folder / TRIALS)
     _check(folder, settings, summary, records)
-    return Results(folder, settings, summary, records, source)
-
-
-def _check_summary(summary: Mapping[str, Any], path: Path) -> None:
-    for name in ("suite", "robot"):
-        if not isinstance(summary.get(name), str):
-            raise ConfigError("must be a text", source=path, field=name)
-    entries = summary.get("controllers")
-    if not isinstance(entries, dict) or not entries:
-        raise ConfigError("must be a mapping with an entry for each controller", source=path,
-                          field="controllers")  # fmt: skip
-    for name, entry in entries.items():
-        if not isinstance(entry, dict):
-            raise ConfigError("must be a mapping", source=path, field=f"controllers.{name}")
-        _check_counts(entry, f"{path}: controllers.{name}")
-    pairs = summary.get("pairs", [])
-    if not isinstance(pairs, list) or not all(isinstance(pair, dict) for pair in pairs):
-        raise ConfigError("must be a list of mappings", source=path, field="pairs")
-
-
-def _check_counts(entry: Mapping[str, Any], where: str) -> None:
-    trials, recovered = (number(entry, key, where, needed=True) for key in ("trials", "recovered"))
-    number(entry, "recovered_rate", where, needed=True)
-    if not (isinstance(trials, int) and isinstance(recovered, int) and 0 <= recovered <= trials):
-        raise ConfigError(f"must be a whole number from 0 to trials, not {shown(recovered)}",
-                          source=where, field="recovered")  # fmt: skip
-    if trials == 0:
-        raise ConfigError("must be at least 1", source=where, field="trials")
+    return Results(folder, settings, summary, records)
 
 
 def _records(path: Path) -> tuple[Record, ...]:
-    columns, lines = read_table(path)
-    lacking = [name for name in NEEDED if name not in columns]
+    columns, lines = read_table(path, ": run the same command again, it writes the file anew "
+                                "without playing a trial")  # fmt: skip
+    lacking = [name for name in COLUMNS if name not in columns]
     if lacking:
         raise ConfigError(f"lacks the columns {', '.join(lacking)}", source=path)
     return tuple(_record(line, number, path) for number, line in enumerate(lines, 2))
 
 
-def _record(line: Mapping[str, Any], number: int, path: Path) -> Record:
+def _record(line: Mapping[str, str], number: int, path: Path) -> Record:
     try:
         impulse, direction, duration, fraction, fall_time = (
             float(line[name] or "nan")
@@ -184,12 +156,7 @@ def _record(line: Mapping[str, Any], number: int, path: Path) -> Record:
         raise ConfigError(f"line {number} does not parse: {error}", source=path) from None
 
 
-def _check(
-    folder: Path,
-    settings: Settings | BenchmarkSettings,
-    summary: Mapping[str, Any],
-    records: tuple[Record, ...],
-) -> None:
+def _check(folder: Path, settings: Settings, summary: Summary, records: tuple[Record, ...]) -> None:
     """The three files must tell of one and the same."""
     entries = summary["controllers"]
     if set(entries) != set(settings.controllers):
@@ -202,10 +169,9 @@ def _check(
                               source=folder / TRIALS, field="controller")  # fmt: skip
         counts[record.controller] += 1
     for name, entry in entries.items():
-        expected = entry.get("played", entry["trials"])
-        if counts[name] != expected:
+        if counts[name] != entry["played"]:
             raise ConfigError(
                 f"has {counts[name]} trials of {shown(name)}, but {SUMMARY} has "
-                f"{shown(expected)}: cut off?",
+                f"{entry['played']}: cut off?",
                 source=folder / TRIALS,
             )

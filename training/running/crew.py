@@ -1,4 +1,4 @@
-"""Who does the jobs: processes of this machine, joblib, or joblib on a Ray cluster.
+"""Jobs are done by processes of this machine, by joblib, or by joblib on a Ray cluster.
 
 Whoever does them, a job's result is the same, so that back ends differ in speed alone.
 """

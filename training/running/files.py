@@ -4,20 +4,18 @@ import csv
 import dataclasses
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-SETTINGS, PARTIAL, TRIALS, SUMMARY = (
-    "settings.yaml", "trials.partial.jsonl", "trials.csv", "summary.json",
-)  # fmt: skip
+SETTINGS, LOG, TRIALS, SUMMARY = "settings.yaml", "trials.jsonl", "trials.csv", "summary.json"
 PLOTS = ("polar_envelope.png", "fall_probability.png")
 REPORT = "report.html"  # by `poise report`; not of the result, but gone with it
-FILES = (SUMMARY, SETTINGS, PARTIAL, TRIALS, *PLOTS)
+FILES = (SUMMARY, SETTINGS, LOG, TRIALS, *PLOTS)
 
 
-def csv_text(rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> str:
+def csv_text(rows: Sequence[Mapping[str, object]], columns: Sequence[str]) -> str:
     """Rows as CSV with a header."""
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n")

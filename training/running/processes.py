@@ -136,7 +136,7 @@ class Worker:
             pass  # it is dead, which the answer tells
 
     def death(self) -> str:
-        """How it has died, in words."""
+        """The way it has died, in words."""
         self.process.join(PATIENCE)
         self.process.kill()
         self.process.join()
@@ -151,7 +151,7 @@ class Worker:
 
 
 class WorkerTraceback(Exception):
-    """Where in the worker an error was raised."""
+    """Tells where in the worker an error was raised."""
 
 
 def tell(text: str) -> None:
@@ -182,7 +182,7 @@ def _result(answer: bytes) -> Any:
 
 
 def _serve(connection: multiprocessing.connection.Connection) -> None:
-    """What a worker does until the main process closes the pipe, or ends."""
+    """Does tasks until the main process closes the pipe, or ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(EOFError, OSError):  # the main process has closed the pipe, or died

@@ -1,4 +1,4 @@
-"""Where a result comes from: command, versions, machine, commit and time."""
+"""The origin of a result: command, versions, machine, commit and time."""
 
 import importlib.metadata
 import os
@@ -8,21 +8,41 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import poise
 
 LIBRARIES = ("mujoco", "numpy", "numba", "torch", "stable-baselines3", "gymnasium", "scipy")
 
 
-def circumstances(started: float, workers: int, **more: Any) -> dict[str, Any]:
-    """What a result says of how it was made; `started` is of `time.perf_counter`."""
+class Machine(TypedDict):
+    """System, processor and number of usable cores."""
+
+    system: str
+    processor: str
+    cores: int
+
+
+class Circumstances(TypedDict):
+    """The origin of a result; `seconds` counts the last call alone."""
+
+    command: str
+    versions: dict[str, str]
+    machine: Machine
+    workers: int
+    backend: str
+    commit: str | None
+    seconds: float
+
+
+def circumstances(started: float, workers: int, backend: str) -> Circumstances:
+    """The origin of a result that this process makes; `started` is of `time.perf_counter`."""
     return {
         "command": shlex.join(sys.argv),
         "versions": versions(),
         "machine": machine(),
         "workers": workers,
-        **more,
+        "backend": backend,
         "commit": commit(),
         "seconds": round(time.perf_counter() - started, 1),
     }
@@ -39,8 +59,8 @@ def versions(names: tuple[str, ...] = LIBRARIES) -> dict[str, str]:
     return found
 
 
-def machine() -> dict[str, Any]:
-    """System, processor and number of usable cores."""
+def machine() -> Machine:
+    """This machine."""
     return {
         "system": platform.platform(),
         "processor": _processor(),

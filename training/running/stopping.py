@@ -51,7 +51,7 @@ def stop_message() -> str:
 
 
 def stop_code() -> int | None:
-    """What a command exits with that was asked to stop; None if it was not."""
+    """The exit code of a command that was asked to stop; None if it was not."""
     return 128 + _asked[0] if _asked else None
 
 

@@ -17,7 +17,7 @@ class Terminal(Console):
 
 
 def terminal() -> Console:
-    """Where a command prints."""
+    """The console that a command prints to."""
     console = Terminal()
     return console if console.is_terminal else Terminal(width=WIDTH)
 

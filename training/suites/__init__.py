@@ -1,1 +1,1 @@
-"""Which trials an evaluation is made of."""
+"""Suites choose the trials that controllers play."""

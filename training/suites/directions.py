@@ -1,148 +1,138 @@
-"""Suites that ask the same of every direction: the envelope of J50, and the grid."""
+"""Parts that ask the same of every direction: the envelope of J50, the grid, and margins."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
-import numpy as np
-
-from poise.envs.pushes.options import check_body, to_impulse
-from poise.envs.pushes.push import Push
-from poise.envs.pushes.sampler import Range, push_bodies
+from poise.envs.pushes.options import to_impulse
+from poise.envs.pushes.sampler import Range
 from poise.training.statistics.fits import fit_logistic
-from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.trial import Trial
 
-from .base import MOST_TRIALS, Recovered, Suite, generator, make_trial
+from .draw import MOST_TRIALS, Draw, Part, Recovered
 
 
 @dataclass(frozen=True)
-class EnvelopeSuite(Suite):
+class Envelope(Part):
     """J50 in each of many directions, in two stages.
 
-    The first spreads `first_trials` impulses over `impulses`, one in each of as many equal parts.
-    Its fit gives each controller's rough J50; the second stage spreads `trials` more over
-    J50 · (1 ± spread), for every controller. All controllers play all trials.
+    The first spreads `first_trials` impulses over the whole range, one in each of as many equal
+    parts. Its fit gives each controller's rough J50; the second stage spreads `trials` more over
+    J50 · (1 ± spread). A controller plays its own, so that its trials do not depend on who else
+    takes part; `paired`, all controllers play those of all, so that they can be compared in pairs.
     """
 
-    kind: Literal["envelope"] = "envelope"
-    # evenly around the circle
-    directions: int = field(default=16, metadata={"min": 1, "max": 3600})
-    body: str | None = None  # the robot's first push body
-    push_duration: float = field(default=0.1, metadata={"above": 0.0})  # square [s]
-    start: float = field(default=0.5, metadata={"min": 0.0})  # [s]
-    impulses: Range = field(default=(0.12, 0.9), metadata={"above": 0.0})  # [N·s/kg]
-    first_trials: int = field(default=12, metadata={"min": 2, "max": MOST_TRIALS})  # per direction
-    trials: int = field(
-        default=24, metadata={"min": 1, "max": MOST_TRIALS}
-    )  # per direction and controller
+    directions: int = field(default=16, metadata={"min": 1, "max": 3600})  # evenly around
+    fractions: Range = field(default=(0.2, 1.5), metadata={"above": 0.0})  # of the ankle limit
+    impulses: Range | None = field(default=None, metadata={"above": 0.0})  # instead [N·s/kg]
+    first_trials: int = field(default=8, metadata={"min": 2, "max": MOST_TRIALS})  # per direction
+    trials: int = field(default=12, metadata={"min": 1, "max": MOST_TRIALS})  # the same, second
     spread: float = field(default=0.3, metadata={"above": 0.0, "max": 1.0})
-    by_direction: ClassVar[bool] = True
+    paired: bool = False
 
     def __post_init__(self) -> None:
-        if self.impulses[0] >= self.impulses[1]:
-            raise ValueError(f"impulses: {self.impulses} must increase")
+        for name, pair in (("fractions", self.fractions), ("impulses", self.impulses)):
+            if pair is not None and pair[0] >= pair[1]:
+                raise ValueError(f"{name}: {pair} must increase")
 
-    def count(self, controllers: int) -> int:
-        return self.directions * (self.first_trials + controllers * self.trials)
+    def capped(self, trials: int) -> Self:
+        most = replace(self, first_trials=max(min(self.first_trials, trials), 2))
+        return most.resized(min(self.trials, trials))
 
-    def resized(self, trials: int) -> "EnvelopeSuite":
-        return replace(self, trials=trials)
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        return draw.spread(
+            number, ((a, *self._range(draw, a), self.first_trials) for a in self._angles()), stage=1
+        )
 
-    def first(self, limits: PushLimits, seed: int) -> list[Trial]:
-        low, high = (limits.robot.mass * j for j in self.impulses)
-        ranges = [(angle, low, high, self.first_trials) for angle in self._angles()]
-        return self._spread(limits, seed, 0, ranges, stage=1)
+    def second_count(self, controllers: int) -> int:
+        return self.directions * self.trials * (controllers if self.paired else 1)
 
-    def more(
-        self, limits: PushLimits, seed: int, trials: Sequence[Trial], recovered: Recovered
-    ) -> list[Trial]:
-        if trials[-1].stage == 2:
-            return []
-        direction = np.array([_push(t).direction for t in trials])
-        impulse = np.array([_push(t).impulse for t in trials])
-        ranges = []
-        for angle in self._angles():
-            here = direction == angle
-            for outcome in recovered.values():
-                rough = fit_logistic(impulse[here], np.asarray(outcome)[here]).j50
-                low, high = (1.0 - self.spread) * rough, (1.0 + self.spread) * rough
-                ranges.append((angle, low, high, self.trials))
-        return self._spread(limits, seed, len(trials), ranges, stage=2)
+    def second(
+        self, draw: Draw, number: int, first: Sequence[Trial], recovered: Recovered
+    ) -> dict[str, list[Trial]]:
+        def around(names: Iterable[str]) -> list[Trial]:
+            rough = ((angle, self._rough(first, recovered[name], angle))
+                     for angle in self._angles() for name in names)  # fmt: skip
+            ranges = ((angle, (1.0 - self.spread) * j50, (1.0 + self.spread) * j50, self.trials)
+                      for angle, j50 in rough)  # fmt: skip
+            return draw.spread(number, ranges, stage=2)
+
+        if self.paired:
+            return dict.fromkeys(recovered, around(tuple(recovered)))
+        return {name: around((name,)) for name in recovered}
 
     def _angles(self) -> list[float]:
         return [360.0 * k / self.directions for k in range(self.directions)]
 
-    def _spread(
-        self,
-        limits: PushLimits,
-        seed: int,
-        number: int,
-        ranges: Sequence[tuple[float, float, float, int]],
-        stage: int,
-    ) -> list[Trial]:
-        """`count` trials per (direction, low, high, count), one in each of as many equal parts."""
-        body = _body(self.body, limits)
-        trials = []
-        for angle, low, high, count in ranges:
-            for part in range(count):
-                share = (part + generator(seed, number).uniform()) / count
-                impulse = low + share * (high - low)
-                push = Push(body, self.start, self.push_duration, impulse, angle)
-                trials.append(make_trial(seed, number, push, limits, stage))
-                number += 1
-        return trials
+    def _range(self, draw: Draw, angle: float) -> Range:
+        """Impulses of the first stage [N·s]."""
+        if self.impulses is not None:
+            low, high = (draw.robot.mass * j for j in self.impulses)
+        else:
+            limit = draw.limits.ankle(angle, draw.standard.push_duration)
+            low, high = (share * limit for share in self.fractions)
+        return low, high
+
+    def _rough(self, first: Sequence[Trial], recovered: Sequence[bool], angle: float) -> float:
+        """J50 [N·s] by the first stage."""
+        here = [(trial.pushes[0].impulse, won) for trial, won in zip(first, recovered, strict=True)
+                if trial.pushes[0].direction == angle]  # fmt: skip
+        impulse, won = zip(*here, strict=True)
+        return fit_logistic(impulse, won).j50
 
 
 @dataclass(frozen=True)
-class GridSuite(Suite):
+class Grid(Part):
     """Every magnitude in every direction, `repeats` times from differently disturbed starts."""
 
-    kind: Literal["grid"] = "grid"
     directions: int = field(default=8, metadata={"min": 1, "max": 3600})
     magnitudes: tuple[float, ...] = field(
         default=(0.2, 0.3, 0.4, 0.5, 0.6), metadata={"above": 0.0}
     )
     unit: Literal["impulse", "force", "specific_impulse", "ankle_fraction"] = "specific_impulse"
     repeats: int = field(default=5, metadata={"min": 1, "max": MOST_TRIALS})
-    body: str | None = None
-    push_duration: float = field(default=0.1, metadata={"above": 0.0})
-    start: float = field(default=0.5, metadata={"min": 0.0})
-    by_direction: ClassVar[bool] = True
+    SIZE: ClassVar[str] = "repeats"
 
     def __post_init__(self) -> None:
         if not self.magnitudes:
             raise ValueError("magnitudes: must not be empty")
 
-    def count(self, controllers: int) -> int:
-        return self.directions * len(self.magnitudes) * self.repeats
-
-    def resized(self, trials: int) -> "GridSuite":
-        return replace(self, repeats=trials)
-
-    def first(self, limits: PushLimits, seed: int) -> list[Trial]:
-        body = _body(self.body, limits)
+    def first(self, draw: Draw, number: int) -> list[Trial]:
         trials: list[Trial] = []
         for k in range(self.directions):
             angle = 360.0 * k / self.directions
             for magnitude in self.magnitudes:
                 impulse = to_impulse(
-                    self.unit, magnitude, limits.robot, angle, self.push_duration, "square",
-                    limits.margin,
+                    self.unit, magnitude, draw.robot, angle, draw.standard.push_duration, "square",
+                    draw.limits.margin,
                 )  # fmt: skip
-                push = Push(body, self.start, self.push_duration, impulse, angle)
                 for _ in range(self.repeats):
-                    trials.append(make_trial(seed, len(trials), push, limits))
+                    push = draw.push(angle, impulse)
+                    trials.append(draw.trial(number + len(trials), [push], part="grid"))
         return trials
 
 
-def _body(name: str | None, limits: PushLimits) -> str:
-    if name is None:
-        return push_bodies(limits.robot)[0]
-    check_body(name, limits.robot, "suite")
-    return name
+@dataclass(frozen=True)
+class Margin(Part):
+    """Equal pushes, repeated from differently disturbed starts: EUROBENCH's stability margin."""
 
+    directions: tuple[float, ...] = field(
+        default=(0.0, 90.0), metadata={"min": -360.0, "max": 360.0}
+    )
+    levels: tuple[float, ...] = field(default=(), metadata={"above": 0.0})  # of the ankle limit
+    runs: int = field(default=10, metadata={"min": 1, "max": MOST_TRIALS})
+    SIZE: ClassVar[str] = "runs"
 
-def _push(trial: Trial) -> Push:
-    assert trial.push is not None
-    return trial.push
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        trials: list[Trial] = []
+        for angle in self.directions:
+            for level in self.levels:
+                limit = draw.limits.ankle(angle, draw.standard.push_duration)
+                push = draw.push(angle, level * limit)
+                for _ in range(self.runs):
+                    trials.append(
+                        draw.trial(number + len(trials), [push], part="margin", level=f"{level:g}")
+                    )
+        return trials

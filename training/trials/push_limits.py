@@ -1,4 +1,4 @@
-"""How large a push is for a robot: over what its ankles hold, and over what its baseline holds."""
+"""The size of a push for a robot: over what its ankles hold, and over what its baseline holds."""
 
 from dataclasses import dataclass
 from pathlib import Path

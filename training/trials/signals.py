@@ -1,10 +1,13 @@
-"""What a trial looks like over time: CoM, CoP, capture point, angular momentum, torque."""
+"""Signals of a trial over time: CoM, CoP, capture point, angular momentum, torque, sway."""
 
 from typing import Any
 
 import numpy as np
 
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.physics.simulation import Simulation
+from poise.envs.pushes.push import Push
+from poise.training.statistics.eurobench import body_sway, recovery_time, sway_angle
 
 
 class Signals:
@@ -52,3 +55,40 @@ class Signals:
 
     def _local(self, points: np.ndarray) -> np.ndarray:
         return (points - self._origin) @ self._axes
+
+
+class Sway:
+    """Keeps CoM and ankles at every policy step; hand it to `run_trial`."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[np.ndarray, np.ndarray]] = []
+        self._heading = np.array([1.0, 0.0])  # of the start
+
+    def __call__(self, env: BalanceEnv) -> None:
+        state = env.simulation.state
+        if not self._rows:
+            self._heading = state.heading.copy()
+        self._rows.append((state.com.copy(), _ankles(env.simulation)))
+
+    def of(self, push: Push, period: float) -> tuple[float, float | None]:
+        """Body sway [rad] and recovery time [s] in the plane of a push, at rows `period` apart."""
+        angle, start = self.angle(push.direction), round(push.start / period)
+        return body_sway(angle, start), recovery_time(angle, start, 1.0 / period)
+
+    def angle(self, direction: float) -> np.ndarray:
+        """θ (n,) in the plane of a push towards `direction` [deg]."""
+        cos, sin = self._heading
+        c, s = np.cos(np.radians(direction)), np.sin(np.radians(direction))
+        com, ankles = (np.array(column) for column in zip(*self._rows, strict=True))
+        return sway_angle(com, ankles, [cos * c - sin * s, sin * c + cos * s])
+
+
+def _ankles(simulation: Simulation) -> np.ndarray:
+    """(3,) middle of the feet's own joints, or of the feet where a foot has none [m]."""
+    model, data = simulation.model, simulation.data
+    points = []
+    for sole in simulation.robot.soles:
+        first, count = model.body_jntadr[sole.body_id], model.body_jntnum[sole.body_id]
+        joints = data.xanchor[first : first + count]
+        points.append(joints.mean(axis=0) if count else data.xpos[sole.body_id])
+    return np.mean(points, axis=0)

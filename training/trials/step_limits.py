@@ -1,10 +1,10 @@
-"""What steps could recover at best: the N-step limit of a linear inverted pendulum."""
+"""The N-step limit of a linear inverted pendulum: an upper bound of what steps recover."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import cast
 
 import numpy as np
 
@@ -15,8 +15,9 @@ from poise.baselines.stepping.planner import StepLimits
 from poise.baselines.stepping.reach import Reach
 from poise.envs.maths.pendulum import capture_distance, duration_factor
 from poise.envs.maths.polygons import ray_to_edge
+from poise.training.running.summary import Curves, Direction, Envelope, StepCurves
 
-from .players import Player
+from .agents import Agent
 from .push_limits import PushLimits
 from .trial import Outcome
 
@@ -64,24 +65,24 @@ class NStepLimit:
         d = capture_distance(count, r, length, omega, self.time)
         return mass * omega * d * duration_factor(omega, duration)
 
-    def add_to(self, figures: dict[str, Any], duration: float) -> None:
+    def add_to(self, figures: Envelope, duration: float) -> None:
         """Complete the figures of an envelope: in each of its `directions` r, l and T_s, the limits
         of `COUNTS` and the share of each that J50 is; over all directions the shares' means."""
         for entry in figures["directions"]:
             angle = entry["direction"]
             entry["step_reach"], entry["step_length"] = self.reach(angle), self.length(angle)
             entry["step_time"] = self.time
-            for name, count in COUNTS.items():
-                limit = self(angle, duration, count)
-                entry[f"step_limit_{name}"] = limit
-                entry[f"step_share_{name}"] = entry["j50"] / limit
-        for name in COUNTS:
-            shares = [entry[f"step_share_{name}"] for entry in figures["directions"]]
-            figures[f"step_share_{name}_mean"] = float(np.mean(shares))
+            limits = {f"step_limit_{n}": self(angle, duration, c) for n, c in COUNTS.items()}
+            found = {f"step_share_{n}": entry["j50"] / limits[f"step_limit_{n}"] for n in COUNTS}
+            entry.update(cast(Direction, limits | found))
+        entries = cast(list[dict[str, float]], figures["directions"])
+        shares = {name: [entry[f"step_share_{name}"] for entry in entries] for name in COUNTS}
+        means = {f"step_share_{name}_mean": float(np.mean(shares[name])) for name in COUNTS}
+        figures.update(cast(Envelope, means))
 
 
 def stepping_limits(
-    players: Iterable[Player], outcomes: Mapping[str, Sequence[Outcome]], limits: PushLimits
+    agents: Iterable[Agent], outcomes: Mapping[str, Sequence[Outcome]], limits: PushLimits
 ) -> dict[str, NStepLimit]:
     """The N-step limit of every controller that steps, by what its planner allows.
 
@@ -92,18 +93,18 @@ def stepping_limits(
     if len(limits.robot.soles) != 2:
         return {}
     planned, others = {}, {}
-    for player in players:
-        own = _own_limits(player)
-        stepped = [o.stepped and o.steps > 0 for o in outcomes[player.name] if o.recovered]
+    for agent in agents:
+        own = _own_limits(agent)
+        stepped = [o.foot_displaced and o.steps > 0 for o in outcomes[agent.name] if o.recovered]
         if own is not None:
-            planned[player.name] = NStepLimit(limits, own)
+            planned[agent.name] = NStepLimit(limits, own)
         elif stepped and np.mean(stepped) > STEPPING:
-            others[player.name] = NStepLimit(limits)
+            others[agent.name] = NStepLimit(limits)
     return planned | others
 
 
-def _own_limits(player: Player) -> StepLimits | None:
-    env = player.env
+def _own_limits(agent: Agent) -> StepLimits | None:
+    env = agent.env
     if not isinstance(env, ResidualBalanceEnv):
         return None
     controller = told_by(env.controller, env.robot).unwrapped
@@ -111,39 +112,40 @@ def _own_limits(player: Player) -> StepLimits | None:
 
 
 def groups(steps: Mapping[str, NStepLimit]) -> dict[StepLimits, list[str]]:
-    """Which controllers have the same limits of a step."""
+    """The controllers that have the same limits of a step."""
     found: dict[StepLimits, list[str]] = {}
     for name, limit in steps.items():
         found.setdefault(limit.steps, []).append(name)
     return found
 
 
-def curves(steps: Mapping[str, NStepLimit], duration: float) -> list[dict[str, Any]]:
+def curves(steps: Mapping[str, NStepLimit], duration: float) -> list[StepCurves]:
     """For summary.json: limits around the robot [N·s], one entry for each of the `groups`."""
     fine = [float(angle) for angle in range(0, 360, 5)]
     return [
         {
             "controllers": names,
             "steps": asdict(own),
-            "curves": {
-                "directions": fine,
-                **{
+            "curves": cast(
+                Curves,
+                {"directions": fine}
+                | {
                     name: [steps[names[0]](angle, duration, count) for angle in fine]
                     for name, count in COUNTS.items()
                 },
-            },
+            ),
         }
         for own, names in groups(steps).items()
     ]
 
 
 def line_name(name: str, whose: Sequence[Sequence[str]]) -> str:
-    """Of a line of a plot; it says whose it is where not all controllers that step are alike."""
+    """The name of a line of a plot; it says whose it is where not all that step are alike."""
     return DRAWN[name] + (f" of {whose[0][0]}" if len(whose) > 1 else "")
 
 
 def shown_out_to(top: float, limits: Iterable[float]) -> float:
-    """How far out a plot goes that shows values up to `top`, and limits as far as there is room."""
+    """The reach of a plot that shows values up to `top`, and limits as far as there is room."""
     return max(top, min(max(limits, default=0.0), ROOM * top))
 
 

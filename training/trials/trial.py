@@ -1,58 +1,78 @@
-"""One trial of the benchmark: a start, a push, and what became of it."""
+"""One trial: a start, the pushes, the world that they meet, and what became of it."""
 
-import json
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
-from poise.envs.balance import episode
-from poise.envs.balance.base import BalanceEnv
 from poise.envs.pushes.push import Push
 
-from .players import Player
 
-STEP_LENGTH = 0.05  # [m] a foot that moves further has stepped, or slid as far
-SETTLED = 1.0  # [s] after which actions and drift count
+@dataclass(frozen=True)
+class World:
+    """The difference of a trial's robot from the one that its controller knows.
+
+    Attributes:
+        friction: of floor and soles; None: the robot's own.
+        delay: of the sensors [s].
+        mass_error: by which all masses differ from those that the controller knows.
+    """
+
+    friction: float | None = None
+    delay: float = 0.0
+    mass_error: float = 0.0
+
+
+OWN_WORLD = World()  # the robot as its controller knows it
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What every controller meets alike.
+    """A trial that controllers meet alike.
 
     Attributes:
-        number: of the trial within its evaluation.
+        number: of the trial within its suite.
         seed: of the disturbed start.
-        push: the push, or the first one; None for none.
-        limit_fraction: impulse over the limit of the suite (see `PushLimits.scale`).
-        stage: of suites that choose trials by the outcome of earlier ones.
-        later: further pushes.
+        pushes: one after the other; none where the robot only stands.
+        world: in which it is played.
+        limit_fraction: impulse of the only push over its limit (see `PushLimits.scale`), of
+            repeated pushes that of each.
+        part: of the suite.
+        stage: 2 if it was chosen by the outcome of earlier ones.
+        factor: which factor the trial varies; "standard" for the case they are compared with.
+        level: the factor's value, as text.
     """
 
     number: int
     seed: int
-    push: Push | None = None
+    pushes: tuple[Push, ...] = ()
+    world: World = OWN_WORLD
     limit_fraction: float | None = None
+    part: str = ""
     stage: int = 1
-    later: tuple[Push, ...] = ()
+    factor: str | None = None
+    level: str | None = None
 
     @property
-    def options(self) -> dict[str, Any]:
-        """For the environment's `reset`."""
-        return {"push": [] if self.push is None else [self.push, *self.later]}
+    def push(self) -> Push | None:
+        """The first push, or None."""
+        return self.pushes[0] if self.pushes else None
+
+    @property
+    def options(self) -> dict[str, list[Push]]:
+        """The argument `options` of the environment's `reset`."""
+        return {"push": list(self.pushes)}
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a trial. Distances [m], times [s]; None where there is no such value, or
+    """The outcome of a trial. Distances [m], times [s]; None where there is no such value, or
     where a simulation has blown up.
 
     Attributes:
         recovered: upright and quiet for the last second.
         fallen: whether it fell; `fall_time` counts from the reset.
         recovery_time: from the start of the last push to the last moment that was not quiet.
-        stepped: a foot moved more than 5 cm.
+        foot_displaced: a foot moved more than 5 cm; the column `stepped` of trials.csv.
         steps: touchdowns of feet that were in the air for 0.08 s.
         max_com, max_capture: largest distance of CoM and capture point from the soles' centre.
         min_cop_margin: smallest distance of the CoP from the edge of the support.
@@ -66,148 +86,35 @@ class Outcome:
             the first second.
         final_speed: |ċ| at the end [m/s].
         root_force: largest force [N] that a soft root took from nowhere; 0 with a hard root.
+        sway, sway_recovery: body sway [rad] and recovery time by the sway's speed, of a recovered
+            push, see `training/statistics/eurobench.py`.
+        error: what the controller raised, on one line; the trial then counts as not recovered.
     """
 
     recovered: bool
     fallen: bool
-    fall_time: float | None
-    recovery_time: float | None
-    stepped: bool
-    steps: int
-    max_com: float | None
-    max_capture: float | None
-    min_cop_margin: float | None
-    max_slide: float | None
-    energy: float | None
-    peak_torque: float | None
-    saturation: float
-    solver_failures: int
-    mean_abs_action: float | None
-    com_drift: float | None
-    final_speed: float | None
-    root_force: float | None
+    fall_time: float | None = None
+    recovery_time: float | None = None
+    foot_displaced: bool = False
+    steps: int = 0
+    max_com: float | None = None
+    max_capture: float | None = None
+    min_cop_margin: float | None = None
+    max_slide: float | None = None
+    energy: float | None = None
+    peak_torque: float | None = None
+    saturation: float = 0.0
+    solver_failures: int = 0
+    mean_abs_action: float | None = None
+    com_drift: float | None = None
+    final_speed: float | None = None
+    root_force: float | None = None
+    sway: float | None = None
+    sway_recovery: float | None = None
+    error: str | None = None
 
 
-OUTCOMES = tuple(Outcome.__dataclass_fields__)
-PUSH_COLUMNS = (
-    *("body", "start", "duration", "impulse", "direction", "elevation"),
-    *("point_x", "point_y", "point_z", "profile"),
-)
-COLUMNS = (
-    "trial",
-    "controller",
-    "seed",
-    "stage",
-    *PUSH_COLUMNS,
-    "limit_fraction",
-    "later",
-    *OUTCOMES,
-)
-
-
-def run_trial(
-    player: Player, trial: Trial, watch: Callable[[BalanceEnv], Any] | None = None
-) -> Outcome:
-    """Play a trial to its end; `watch(env)` is called after the reset and after every step."""
-    env = player.env
-    observation, _ = env.reset(seed=trial.seed, options=trial.options)
-    if player.begin is not None:
-        player.begin()
-    state = env.simulation.state  # its arrays follow the simulation
-    settled = round(SETTLED / env.config.policy_period)
-    actions, steps, drift = 0.0, 0, 0.0
-    touchdowns = Touchdowns(len(state.contacts), env.config.policy_period)
-    start: np.ndarray | None = None
-    done = False
-    while not done:
-        if watch is not None:
-            watch(env)
-        action = player.act(observation)
-        _, terminated, truncated = env.step_without_info(action)
-        observation = env.episode.observation.astype(np.float32)
-        done = terminated or truncated
-        touchdowns.update(state.contacts)
-        if env.steps == settled:
-            start = state.com[:2].copy()
-        elif start is not None:
-            actions += float(np.mean(np.abs(action)))
-            steps += 1
-            drift = max(drift, float(np.linalg.norm(state.com[:2] - start)))
-    if watch is not None:
-        watch(env)
-    return Outcome(
-        mean_abs_action=actions / steps if steps else None,
-        steps=touchdowns.count,
-        com_drift=_finite(drift) if steps and trial.push is None else None,
-        **_record(env, trial),
-    )
-
-
-def _record(env: BalanceEnv, trial: Trial) -> dict[str, Any]:
-    """What the environment has recorded about the episode."""
-    m = env.episode.metrics
-    recovered = env.recovered and not env.fallen
-    pushed = max((push.start for push in trial.options["push"]), default=0.0)
-    return {
-        "recovered": recovered,
-        "fallen": env.fallen,
-        "fall_time": env.simulation.time if env.fallen else None,
-        "recovery_time": max(float(m[episode.LAST_MOVING]) - pushed, 0.0) if recovered else None,
-        "stepped": bool(m[episode.MAX_SLIDE] > STEP_LENGTH),
-        "max_com": _finite(m[episode.MAX_COM]),
-        "max_capture": _finite(m[episode.MAX_CAPTURE]),
-        "min_cop_margin": _finite(m[episode.MIN_COP_MARGIN]),
-        "max_slide": _finite(m[episode.MAX_SLIDE]),
-        "energy": _finite(m[episode.ENERGY]),
-        "peak_torque": _finite(m[episode.PEAK_TORQUE]),
-        "saturation": float(m[episode.SATURATED] / max(m[episode.TICKS], 1.0)),
-        "solver_failures": int(m[episode.FAILURES]),
-        "final_speed": _finite(float(np.linalg.norm(env.simulation.state.com_vel))),
-        "root_force": _finite(m[episode.ROOT_FORCE]),
-    }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Any]:
-    """A line of trials.csv; numbers are written so that they read back exactly."""
-    line: dict[str, Any] = dict.fromkeys(PUSH_COLUMNS)
-    if trial.push is not None:
-        push = asdict(trial.push)
-        push.update(zip(("point_x", "point_y", "point_z"), push.pop("point"), strict=True))
-        line.update(push)
-    return {
-        "trial": trial.number,
-        "controller": controller,
-        "seed": trial.seed,
-        "stage": trial.stage,
-        **line,
-        "limit_fraction": trial.limit_fraction,
-        "later": json.dumps([asdict(push) for push in trial.later]) if trial.later else None,
-        **asdict(outcome),
-    }
-
-
-AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
-
-
-class Touchdowns:
-    """Counts touchdowns of feet that were in the air for at least `AIR_TIME`.
-
-    Args:
-        feet: number of feet.
-        period: seconds between two calls of `update`.
-    """
-
-    def __init__(self, feet: int, period: float):
-        self.count = 0
-        self._least = max(round(AIR_TIME / period), 1)
-        self._air = np.zeros(feet, dtype=int)  # updates in a row without contact
-
-    def update(self, contacts: np.ndarray) -> None:
-        """(feet,) 1 where a foot touches the ground, else 0."""
-        down = contacts > 0.5
-        self.count += int(np.sum(down & (self._air >= self._least)))
-        self._air = np.where(down, 0, self._air + 1)
+def failed(error: Exception) -> Outcome:
+    """The outcome of a trial in which the controller raised."""
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    return Outcome(recovered=False, fallen=False, error=text)

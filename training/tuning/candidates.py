@@ -1,4 +1,4 @@
-"""What a candidate of `poise tune` is worth: how pushes around the limit end."""
+"""A candidate of `poise tune` is judged here, by how pushes around the limit end."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,8 +12,9 @@ from poise.baselines.registry import controller_config
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.trials.players import Player
-from poise.training.trials.trial import Trial, run_trial
+from poise.training.trials.agents import Agent
+from poise.training.trials.play import run_trial
+from poise.training.trials.trial import Trial
 
 START = 0.5  # [s] of a push
 UNQUIET, FALLEN = 0.6, 0.3  # what a trial counts at most that is up but not quiet, or fell
@@ -54,7 +55,7 @@ class TuningPushes:
                 angle = (direction + self.jitter * rng.uniform(-1.0, 1.0)) % 360.0
                 push = Push(body, START, self.duration, float(level * limit), float(angle))
                 number = len(trials)
-                trials.append(Trial(number, seed + number, push, level))
+                trials.append(Trial(number, seed + number, (push,), limit_fraction=level))
         return trials
 
 
@@ -83,23 +84,23 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
     if candidate.alone:
         env = ResidualBalanceEnv(robot, **settings)
         action = np.zeros(len(env.action_names))
-        player = Player("alone", env, lambda observation: action, "")
-        alone = [worth(player, trial, candidate.in_place) for trial in candidate.alone]
+        agent = Agent("alone", env, lambda observation: action, "")
+        alone = [worth(agent, trial, candidate.in_place) for trial in candidate.alone]
     if candidate.policy is not None and candidate.below:
         policy = _policy(candidate.policy, candidate.robot)
-        player = Player("policy", policy.make_env(robot=robot, **settings), policy.act, "")
-        below = [worth(player, trial, candidate.in_place) for trial in candidate.below]
+        agent = Agent("policy", policy.make_env(robot=robot, **settings), policy.act, "")
+        below = [worth(agent, trial, candidate.in_place) for trial in candidate.below]
     return alone, below
 
 
-def worth(player: Player, trial: Trial, in_place: bool) -> float:
+def worth(agent: Agent, trial: Trial, in_place: bool) -> float:
     """1 for a recovery, 0.6 for one that does not come to rest, at most 0.3 for a fall, by the time
-    until then. With `in_place` one whose foot moved (`Outcome.stepped`) is no recovery.
+    until then. With `in_place` one whose foot moved (`Outcome.foot_displaced`) is no recovery.
     """
-    outcome, env = run_trial(player, trial), player.env
+    outcome, env = run_trial(agent, trial), agent.env
     if outcome.fallen:
         return FALLEN * env.steps / env.max_steps
-    moved = in_place and outcome.stepped
+    moved = in_place and outcome.foot_displaced
     return 1.0 if outcome.recovered and not moved else UNQUIET
 
 

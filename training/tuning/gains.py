@@ -23,7 +23,7 @@ class Gain:
 
     @property
     def log(self) -> bool:
-        """Whether both ends are above 0."""
+        """True if both ends are above 0."""
         return self.low > 0.0
 
     def value(self, unit: float) -> float:

@@ -117,7 +117,7 @@ def tune(
 
 
 def _known(config: TuneConfig, out: Path, resume: bool) -> list[dict[str, Any]]:
-    """What an earlier call has tried."""
+    """The generations that an earlier call has tried."""
     if not is_file(out / CONFIG):
         if resume:
             raise ConfigError("holds no search to resume", source=out, field="resume")
@@ -185,7 +185,7 @@ class _Search:
             for number, u in enumerate(units)
         ]  # fmt: skip
         found = {job.number: values for job, values in crew.each(play, jobs)}
-        values = [[found[k][player] for k in range(len(units))] for player in range(2)]
+        values = [[found[k][agent] for k in range(len(units))] for agent in range(2)]
         row = {
             "generation": self.generation,
             "units": [u.tolist() for u in units],
@@ -212,7 +212,7 @@ class _Search:
         self._take(units, values)
 
     def _are_worths(self, values: Any) -> bool:
-        """Whether these are values of all candidates and pushes, or of no pushes."""
+        """True if these are values of all candidates and pushes, or of no pushes."""
         found, pushes = np.asarray(values, float), self.config.pushes
         trials = len(pushes.directions) * len(pushes.levels)
         sizes = [(self.config.population, count) for count in (0, trials)]
@@ -222,11 +222,11 @@ class _Search:
         share = self.config.policy_share if values[1][0] else 0.0
         scores = np.zeros(len(units))
         shape = (len(units), len(self.limits[0]), len(self.config.pushes.levels))
-        for player, weight in enumerate((1.0 - share, share)):
-            if values[player][0]:
-                found = np.reshape(values[player], shape)
+        for agent, weight in enumerate((1.0 - share, share)):
+            if values[agent][0]:
+                found = np.reshape(values[agent], shape)
                 scores += weight * found.mean(axis=(1, 2))
-                self.limits[player] = follow(self.limits[player], found)
+                self.limits[agent] = follow(self.limits[agent], found)
         self.cma.tell(units, (-scores).tolist())
         better = np.argsort(-scores, kind="stable")[: (len(units) + 1) // 2]
         self.centres.append(np.mean([units[k] for k in better], axis=0))

@@ -18,7 +18,7 @@ from poise.training.cli import commands
 from poise.training.cli import train as train_command
 from poise.training.cli.commands import main
 from poise.training.cli.train import parse
-from poise.training.evaluation import evaluate
+from poise.training.evaluation import run
 from poise.training.learning.config import TrainConfig, train_config
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
@@ -27,7 +27,7 @@ RICH = (
     "from poise.training.running.terminal import terminal\n"
     "commands._run = lambda _: terminal().print('x')"
 )
-BAD_SUITE = "kind: random\ntrials: many\n"
+BAD_SUITE = "random: {trials: many}\n"
 BAD_ROBOT = "name: a\nsource: {mjcf: nowhere.xml}\nroot: b\nfeet: []\n"
 
 
@@ -98,20 +98,23 @@ def test_a_broken_pipe_of_another_kind_is_raised(
         (["evaluate", "zero", "--suite", "rndom"], "no such name: 'rndom'"),
         (["evaluate", "zero", "--robot", "robby"], "no such name: 'robby'"),
         (["evaluate", "zero", "--workers", "0"], "workers: must be at least 1"),
-        (["evaluate", "zero", "--suite", "bad.yaml"], "bad.yaml: trials: must be a whole number"),
+        (
+            ["evaluate", "zero", "--suite", "bad.yaml"],
+            "bad.yaml: random.trials: must be a whole",
+        ),
         (["evaluate", "zero", "--suite", "text.yaml"], "text.yaml: not valid YAML"),
         (["evaluate", "zero", "--robot", "robot.yaml"], "robot.yaml: feet: a biped has two feet"),
         (["evaluate", "run"], "a policy folder holds"),
-        (["replay", "run", "--trial", "0"], "settings.yaml: cannot be read"),
+        (["replay", "run", "--trial", "0"], "holds no finished result: settings.yaml"),
         (["benchmark", "--out", "out", "--controllers", "pid"], "no such controller: 'pid'"),
-        (["benchmark", "--out", "out", "--suite", "bad.yaml"], "bad.yaml: kind: unknown field"),
-        (["compare", "run", "run"], "summary.json: cannot be read"),
+        (["benchmark", "--out", "out", "--suite", "bad.yaml"], "bad.yaml: random.trials: must be"),
+        (["compare", "run", "run"], "settings.yaml, summary.json, trials.csv missing"),
         (["leaderboard", "run"], "summary.json: cannot be read"),
-        (["report", "run"], "holds no finished evaluation or benchmark"),
+        (["report", "run"], "holds no finished result: settings.yaml, summary.json"),
         (["report", "nowhere"], "nowhere: no such folder"),
         (["train", "--out", "run", "--config", "nothing"], "no such name: 'nothing'"),
         (["train", "--out", "run", "--seed", "1", "--ppo.gamma", "2"], "ppo.gamma"),
-        (["train", "--out", "run", "--config", "bad.yaml"], "bad.yaml: kind: unknown field"),
+        (["train", "--out", "run", "--config", "bad.yaml"], "bad.yaml: random: unknown field"),
         (["tune", "--out", "run", "--controller", "pid"], "controllers: no such name: 'pid'"),
     ],
 )
@@ -170,15 +173,17 @@ def test_evaluate_and_replay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One command plays, the other plays one of its trials again and says that it is the same."""
-    monkeypatch.setattr(evaluate, "Crew", InProcess)
+    monkeypatch.setattr(run, "Crew", InProcess)
     InProcess.played, InProcess.stop_after = 0, None
     suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
     args = ["evaluate", "zero", "--suite", suite, "--out", out, "--trials", "2", "--seed", "3"]
     assert main(args) == 0
     assert InProcess.played == 2 and f"{out}/summary.json" in capsys.readouterr().out
-    assert main(args) == 2
-    assert "already holds an evaluation" in capsys.readouterr().err
-    assert main([*args, "--overwrite"]) == 0
+    assert main(args) == 0 and InProcess.played == 2
+    other = [*args[:-1], "4"]
+    assert main(other) == 2
+    assert "holds a result with seed 3, not 4" in capsys.readouterr().err
+    assert main([*other, "--overwrite"]) == 0 and InProcess.played == 4
     capsys.readouterr()
     assert main(["replay", out, "--trial", "1"]) == 0
     shown = capsys.readouterr().out
@@ -189,7 +194,7 @@ def test_ctrl_c_says_how_to_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 130, no traceback; the same command finishes the evaluation."""
-    monkeypatch.setattr(evaluate, "Crew", InProcess)
+    monkeypatch.setattr(run, "Crew", InProcess)
     InProcess.played, InProcess.stop_after = 0, 1
     suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
     args = ["evaluate", "zero", "--suite", suite, "--out", out]

@@ -1,4 +1,4 @@
-"""training/evaluation/evaluate.py, training/trials/job.py, training/evaluation/tables.py and
+"""`poise evaluate`: training/evaluation/run.py and tables.py, training/trials/jobs.py and
 training/cli/demo.py.
 """
 
@@ -17,10 +17,14 @@ from rich.console import Console
 
 from poise.configs.errors import ConfigError
 from poise.training.cli import demo
-from poise.training.evaluation import evaluate as evaluation
+from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate, measured_limits
 from poise.training.running.crew import Crew
-from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, write_suite
+from poise.training.running.provenance import Circumstances
+from poise.training.running.summary import Summary
+from poise.training.trials.table import CASE_COLUMNS
+from tests.support.benchmarks_small import TRIALS, write_small
+from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, random_suite, write_suite
 
 BOTH = ("momentum-qp", "zero")
 
@@ -62,8 +66,8 @@ def test_controllers_meet_the_same_trials(tmp_path: Path, in_process: type[InPro
         (str(n), name) for n in range(4) for name in BOTH
     ]
     for a, b in zip(rows[::2], rows[1::2], strict=True):
-        push = [name for name in a if name != "controller"][: list(a).index("recovered") - 1]
-        assert [a[name] for name in push] == [b[name] for name in push]
+        shared = [name for name in CASE_COLUMNS if name != "controller"]
+        assert [a[name] for name in shared] == [b[name] for name in shared]
     assert len({row["seed"] for row in rows}) == 4
     pair, trials = summary["pairs"][0], summary["controllers"]["zero"]["trials"]
     assert trials == 4
@@ -77,10 +81,7 @@ def test_the_summary_has_what_readers_rely_on(tmp_path: Path, in_process: type[I
     console = Console(file=text, width=140)
     evaluate(BOTH, write_suite(tmp_path, ENVELOPE), out=out, seed=2, console=console)
     summary = json.loads((out / "summary.json").read_text())
-    assert {
-        "suite", "seed", "robot", "controllers", "pairs", "command", "versions", "machine",
-        "commit", "seconds",
-    } <= set(summary)  # fmt: skip
+    assert set(Summary.__annotations__) | set(Circumstances.__annotations__) == set(summary)
     for entry in summary["controllers"].values():
         assert {
             "trials", "recovered", "recovered_rate", "recovered_ci95", "solver_failures",
@@ -110,17 +111,52 @@ def test_a_stopped_evaluation_ends_as_if_it_had_not_been(
         in_process.played, in_process.stop_after = 0, stop - (2 if stop == 8 else 0)
         with pytest.raises(KeyboardInterrupt):
             evaluate(["momentum-qp"], suite, out=out, seed=2)
-        assert {path.name for path in out.iterdir()} == {"settings.yaml", "trials.partial.jsonl"}
+        assert {path.name for path in out.iterdir()} == {"settings.yaml", "trials.jsonl"}
     in_process.played, in_process.stop_after = 0, None
     evaluate(["momentum-qp"], suite, out=out, seed=2)
     assert in_process.played == total - 8
     assert (out / "trials.csv").read_bytes() == (tmp_path / "whole/trials.csv").read_bytes()
 
 
+def test_a_finished_evaluation_is_not_played_again(
+    tmp_path: Path, in_process: type[InProcess]
+) -> None:
+    """A lost table is written anew; another controller adds its own trials only, unless trials
+    depend on who takes part."""
+    suite, out = write_suite(tmp_path, RANDOM), tmp_path / "out"
+    before = evaluate(["zero"], suite, out=out, seed=1)
+    rows = (out / "trials.csv").read_bytes()
+    (out / "trials.csv").unlink()
+    evaluate(["zero"], suite, out=out, seed=1)
+    assert in_process.played == 4 and (out / "trials.csv").read_bytes() == rows
+    summary = evaluate(["momentum-qp"], suite, out=out, seed=1)
+    assert in_process.played == 8 and list(summary["controllers"]) == ["zero", "momentum-qp"]
+    assert summary["controllers"]["zero"] == before["controllers"]["zero"]
+    envelope = write_suite(tmp_path, ENVELOPE, "envelope")
+    evaluate(["zero"], envelope, out=tmp_path / "env")
+    with pytest.raises(ConfigError, match="holds a result with other controllers"):
+        evaluate(["momentum-qp"], envelope, out=tmp_path / "env")
+
+
+def test_one_command_plays_what_the_other_has_suites_for(
+    tmp_path: Path, in_process: type[InProcess]
+) -> None:
+    """Factors, margins and the mix, with the plots of an evaluation; every pair is compared."""
+    names = ["zero", "pd", "momentum-qp"]
+    summary = evaluate(names, write_small(tmp_path), out=tmp_path / "out", seed=2)
+    assert summary["rated"] == "mix" and summary["scale"] == "baseline J50"
+    assert [(pair["a"], pair["b"]) for pair in summary["pairs"]] == [
+        ("zero", "pd"), ("zero", "momentum-qp"), ("pd", "momentum-qp"),
+    ]  # fmt: skip
+    for entry in summary["controllers"].values():
+        assert entry["trials"] == 2 and entry["played"] == TRIALS and entry["factors"]
+    assert (tmp_path / "out/polar_envelope.png").exists()
+
+
 def test_a_quiet_suite_counts_falls_and_drift(tmp_path: Path, in_process: type[InProcess]) -> None:
     """Without a push there are no plots, and the table shows the drift."""
     text = io.StringIO()
-    suite = write_suite(tmp_path, {"kind": "quiet", "duration": 2.5, "trials": 2})
+    suite = write_suite(tmp_path, {"duration": 2.5, "quiet": {"trials": 2}})
     summary = evaluate(
         ["momentum-qp"], suite, out=tmp_path / "out", console=Console(file=text, width=140)
     )
@@ -139,7 +175,7 @@ def test_measured_limits_are_what_the_random_suite_pushes_by(
     table = yaml.safe_load(limits.read_text())["table"]
     j50 = [d["j50"] for d in summary["controllers"]["momentum-qp"]["directions"]]
     assert table["impulses"] == pytest.approx(j50, abs=1e-3)
-    suite = write_suite(tmp_path, {**RANDOM, "trials": 2})
+    suite = write_suite(tmp_path, random_suite(2))
     found = evaluate(["momentum-qp"], suite, out=tmp_path / "random", limits=limits)
     assert found["controllers"]["momentum-qp"]["fraction_of"] == "baseline J50"
     with pytest.raises(ConfigError, match="does not measure J50"):
@@ -174,18 +210,18 @@ def test_a_dead_worker_costs_nothing_that_is_finished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A process killed from outside is one line; the trials are those of an undisturbed run."""
-    suite = write_suite(tmp_path, {**RANDOM, "trials": 12})
-    appended, killed = evaluation.EvaluationFolder.append, []
+    suite = write_suite(tmp_path, random_suite(12))
+    appended, killed = evaluation.ResultFolder.append, []
 
-    def append_and_kill(folder: Any, number: int, outcomes: Any) -> None:
-        appended(folder, number, outcomes)
+    def append_and_kill(folder: Any, *finished: Any) -> None:
+        appended(folder, *finished)
         if not killed:
             killed.extend(multiprocessing.active_children())
             for process in killed:
                 process.kill()
 
     with monkeypatch.context() as patch:
-        patch.setattr(evaluation.EvaluationFolder, "append", append_and_kill)
+        patch.setattr(evaluation.ResultFolder, "append", append_and_kill)
         evaluate(["zero"], suite, out=tmp_path / "out", workers=1)
     assert len(killed) == 1 and capsys.readouterr().err.count("has died by SIGKILL") == 1
     monkeypatch.setattr(evaluation, "Crew", InProcess)

@@ -47,7 +47,7 @@ def test_seeds_of_one_configuration_are_taken_together(
         name: {
             "directions": [{"eta": eta} for eta in etas],
             "j50_mean": 20.0 * etas[0],
-            "mix": {"recovered_rate": etas[0]},
+            "recovered_rate": etas[0],
         }
         for name, etas in scores.items()
     }
@@ -58,11 +58,13 @@ def test_seeds_of_one_configuration_are_taken_together(
     assert group["eta"]["iqm"] == pytest.approx(0.7) and group["eta"]["tasks"] == 2
     assert group["eta"]["values"] == pytest.approx([0.35, 1.35])
     assert (group["eta"]["worst"], group["eta"]["worst_seed"]) == (pytest.approx(0.35), 0)
-    assert group["mix"]["iqm"] == pytest.approx(0.45)
+    assert group["recovered"]["iqm"] == pytest.approx(0.45)
     assert group["j50_mean"]["iqm"] == pytest.approx(9.0)
-    assert "recovered" not in group
     low, high = group["eta"]["iqm_ci95"]
     assert low < 0.7 < high
+
+
+ENTRY: Any = {"recovered_rate": 0.5}
 
 
 def test_checkpoints_of_one_run_are_no_seeds(tmp_path: Path, configurations: None) -> None:
@@ -70,7 +72,7 @@ def test_checkpoints_of_one_run_are_no_seeds(tmp_path: Path, configurations: Non
     names = [str(tmp_path / run / "a0") for run in ("best", "last")]
     for name in names:
         Path(name).mkdir(parents=True)
-    assert seed_groups(names, {name: {"j50_mean": 20.0} for name in names}) == []
+    assert seed_groups(names, {name: ENTRY for name in names}) == []
 
 
 def test_a_folder_of_seeds_stands_for_its_runs(tmp_path: Path, configurations: None) -> None:
@@ -78,7 +80,9 @@ def test_a_folder_of_seeds_stands_for_its_runs(tmp_path: Path, configurations: N
     out = write_seeds(tmp_path / "five", a0=True, a1=True)
     names = expand_seeds(["pd", str(out), "zero"])
     assert names == ("pd", str(out / "a0"), str(out / "a1"), "zero")
-    entries = {name: {"recovered_rate": 0.5 + 0.1 * k} for k, name in enumerate(names)}
+    entries: dict[str, Any] = {
+        name: {"recovered_rate": 0.5 + 0.1 * k} for k, name in enumerate(names)
+    }
     (group,) = seed_groups(names, entries)
     assert group["name"] == str(out) and group["recovered"]["values"] == [0.6, 0.7]
     (line,) = seed_lines([group])

@@ -28,7 +28,7 @@ from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, t
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import _env_seed, train
 from poise.training.learning.train_seeds import train_seeds
-from poise.training.trials.players import load_player
+from poise.training.trials.agents import load_agent
 from tests.support.shared import finished_run, robot, tiny_config
 
 ROOT = Path(__file__).parents[3]
@@ -362,7 +362,7 @@ def test_steps_are_trained_by_a_word_in_the_configuration(tmp_path):
         action="step", controller="capture-step", step_residual=config.step_residual, steps=128
     )
     train(small, tmp_path / "run", progress=False)
-    player = load_player(str(tmp_path / "run"), robot(), duration=0.5)
-    assert type(player.env) is ResidualStepEnv
-    action = player.act(player.env.reset(seed=0)[0])
-    assert action.shape == (len(player.env.action_names),)
+    agent = load_agent(str(tmp_path / "run"), robot(), duration=0.5)
+    assert type(agent.env) is ResidualStepEnv
+    action = agent.act(agent.env.reset(seed=0)[0])
+    assert action.shape == (len(agent.env.action_names),)

@@ -28,7 +28,7 @@ from poise.training.learning.config import PPOConfig
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import SeedRun, train_seeds
 from tests.support.benchmarks_small import InProcessCrew
-from tests.support.evaluations import RANDOM, write_suite
+from tests.support.evaluations import random_suite, write_suite
 from tests.support.shared import finished_run, tiny_config
 from tests.training.learning.test_train import ROOT, weights
 
@@ -223,7 +223,7 @@ def test_an_evaluation_of_a_folder_of_seeds(
     tmp_path: Path, in_process: type[InProcessCrew], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its runs play, and their IQM and the worst seed are in the summary and on the terminal."""
-    from poise.training.evaluation import evaluate as evaluation
+    from poise.training.evaluation import run as evaluation
     from tests.support.evaluations import InProcess
 
     monkeypatch.setattr(evaluation, "Crew", InProcess)
@@ -231,7 +231,7 @@ def test_an_evaluation_of_a_folder_of_seeds(
     runs, text = tmp_path / "runs", io.StringIO()
     train_seeds(tiny_config(steps=SHORT), [0, 1], runs)
     summary = evaluate(
-        ["momentum-qp", str(runs)], write_suite(tmp_path, {**RANDOM, "trials": 2}),
+        ["momentum-qp", str(runs)], write_suite(tmp_path, random_suite(2)),
         out=tmp_path / "out", console=Console(file=text, width=140),
     )  # fmt: skip
     members = [str(runs / "seed-0"), str(runs / "seed-1")]

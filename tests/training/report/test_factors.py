@@ -1,4 +1,4 @@
-"""training/report/factors.py, and training/results/flat.py, which hands over the figures."""
+"""training/report/factors.py, and the ranking of a suite with a mix."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from typing import Any
 import pytest
 
 from poise.configs.errors import ConfigError
+from poise.training.evaluation.evaluate import benchmark
 from poise.training.report import factors as factor_tables
 from poise.training.report.cells import Table
-from poise.training.report.tables import ranked, ranking
+from poise.training.report.tables import ranking
 from poise.training.results.read import Results, load_results
+from tests.support.benchmarks_small import play_in_process, write_small
 from tests.support.report_folders import copied, finished
 
 
@@ -43,7 +45,7 @@ def test_every_level_is_in_the_table_and_a_picture(results: Results) -> None:
         assert (len(own), sum(own)) == (int(row["trials"]), int(row["recovered"]))
     factors = tuple(dict.fromkeys(row["factor"] for row in table))
     assert factors == ("friction", "delay", "mass_error", "pushes")
-    pictures = factor_tables.factor_plots(results, ranked(results))
+    pictures = factor_tables.factor_plots(results, results.summary["ranking"])
     assert [p["title"] for p in pictures] == [
         "Friction", "Delay of the sensors [s]", "Error of the masses", "Number of pushes",
     ]  # fmt: skip
@@ -67,8 +69,8 @@ def test_sensitivity_is_the_worst_level(results: Results) -> None:
 
 def test_indicators_are_those_of_the_summary(results: Results) -> None:
     """Sway, time, and a margin for each direction in which it was sought."""
-    for row in rows(factor_tables.indicators(results, ranked(results))):
-        found = results.source["controllers"][row["controller"]]["eurobench"]
+    for row in rows(factor_tables.indicators(results, results.summary["ranking"])):
+        found = results.summary["controllers"][row["controller"]]["eurobench"]
         assert row["body_sway_mean"] == ("" if found["body_sway_mean"] is None
                                          else str(found["body_sway_mean"]))  # fmt: skip
         (margin,) = found["margins"]
@@ -79,16 +81,14 @@ def test_indicators_are_those_of_the_summary(results: Results) -> None:
 def test_the_ranking_counts_the_mix(results: Results) -> None:
     """J50 of the envelope, rate, trials, lost and won of the random mix, time of a tick."""
     for row in rows(ranking(results, results.reference)):
-        entry = results.source["controllers"][row["controller"]]
+        entry = results.summary["controllers"][row["controller"]]
         assert float(row["j50_mean"]) == entry["j50_mean"] and float(row["tick_us"]) == 12.5
-        assert int(row["trials"]) == entry["mix"]["trials"] == 2
-        assert float(row["recovered_rate"]) == entry["mix"]["recovered_rate"]
-        pair = results.source["pairs"][0]
+        mix = [r for r in results.of(row["controller"]) if r.part == "mix"]
+        assert int(row["trials"]) == entry["trials"] == len(mix) == 2
+        assert float(row["recovered_rate"]) == sum(r.recovered for r in mix) / 2
+        pair = results.summary["pairs"][0]
         if row["controller"] == pair["b"]:
-            assert (int(row["lost"]), int(row["won"])) == (
-                pair["mix"]["only_a"],
-                pair["mix"]["only_b"],
-            )
+            assert (int(row["lost"]), int(row["won"])) == (pair["only_a"], pair["only_b"])
 
 
 def test_errors_are_listed_with_their_seeds(tmp_path: Path) -> None:
@@ -109,13 +109,14 @@ def test_training_seeds_have_a_row_for_each_group(tmp_path: Path) -> None:
     folder = copied("benchmark", tmp_path)
     data = json.loads((folder / "summary.json").read_text())
     assert factor_tables.seed_table(load_results(folder)) is None
-    figures = {"iqm": 0.8, "iqm_ci95": [0.7, 0.9], "tasks": 2, "worst": 0.65, "worst_seed": 1}
+    figures = {"iqm": 0.8, "iqm_ci95": [0.7, 0.9], "tasks": 2, "values": [0.65, 0.9],
+               "worst": 0.65, "worst_seed": 1}  # fmt: skip
     data["seeds"] = [{"name": "runs", "members": ["runs/0", "runs/1"], "seeds": [0, 1],
                       "eta": figures}]  # fmt: skip
     (folder / "summary.json").write_text(json.dumps(data))
     (row,) = rows(factor_tables.seed_table(load_results(folder)))
     assert row["name"] == "runs" and row["eta_iqm_high"] == "0.9" and row["eta_worst"] == "0.65"
-    assert "mix_iqm" not in row
+    assert "recovered_iqm" not in row
 
 
 def first(data: dict[str, Any]) -> dict[str, Any]:
@@ -128,11 +129,17 @@ def first(data: dict[str, Any]) -> dict[str, Any]:
         (lambda data: data.update(robot="humanoid"), "robot: must be a mapping"),
         (lambda data: data.update(pairs={}), "pairs: must be a list"),
         (lambda data: data.update(controllers=[]), "controllers: must be a mapping"),
-        (lambda data: first(data).update(mix=[]), "mix: must be a mapping"),
-        (lambda data: first(data).update(factors="all"), "must be a list of mappings"),
+        (lambda data: data.update(rated=3), "rated: must be text"),
+        (lambda data: first(data).update(factors="all"), "factors: must be a list"),
         (lambda data: first(data)["factors"][0]["levels"][0].update(trials=None), "trials"),
-        (lambda data: first(data)["factors"][0]["levels"][0].update(level=3), "level: must be a"),
-        (lambda data: first(data)["eurobench"].update(margins=[1]), "must be a list of mappings"),
+        (
+            lambda data: first(data)["factors"][0]["levels"][0].update(level=3),
+            "level: must be text",
+        ),
+        (
+            lambda data: first(data)["eurobench"].update(margins=[1]),
+            "margins[0]: must be a mapping",
+        ),
     ],
 )
 def test_a_summary_of_another_form_is_refused(
@@ -144,22 +151,19 @@ def test_a_summary_of_another_form_is_refused(
     change(data)
     (folder / "summary.json").write_text(json.dumps(data))
     with pytest.raises(ConfigError) as caught:
-        results = load_results(folder)
-        factor_tables.factor_table(results)
-        factor_tables.indicators(results, ranked(results))
+        load_results(folder)
     assert message in str(caught.value) and "summary.json" in str(caught.value)
 
 
-def test_a_benchmark_without_a_mix_counts_all_trials(tmp_path: Path) -> None:
+def test_without_a_mix_all_trials_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The rate is then that of everything that was played."""
-    folder = copied("benchmark", tmp_path)
-    data = json.loads((folder / "summary.json").read_text())
-    for entry in data["controllers"].values():
-        entry["mix"] = None
-    data["pairs"][0]["mix"] = None
-    (folder / "summary.json").write_text(json.dumps(data))
-    results = load_results(folder)
+    play_in_process(monkeypatch)
+    suite = write_small(tmp_path, mix=None, factors=None)
+    benchmark(["momentum-qp", "zero"], suite, out=tmp_path / "out")
+    results = load_results(tmp_path / "out")
+    assert results.summary["rated"] is None
     for name, entry in results.summary["controllers"].items():
         assert entry["trials"] == len(results.of(name)) == entry["played"]
         assert entry["recovered"] == sum(r.recovered for r in results.of(name))
-    assert results.summary["pairs"][0]["both"] == data["pairs"][0]["all"]["both"]
+    (pair,) = results.summary["pairs"]
+    assert pair["all"] is not None and pair["both"] == pair["all"]["both"]

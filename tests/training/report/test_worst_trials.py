@@ -11,8 +11,9 @@ import pytest
 from PIL import Image
 
 from poise.training.report import worst_trials
-from poise.training.report.worst_trials import choose_cases, film, frame_times, smallest_lost
+from poise.training.report.worst_trials import choose_exhibits, film, frame_times, smallest_lost
 from poise.training.results.read import Record, Results, load_results
+from poise.training.trials.table import COLUMNS
 from tests.support.report_folders import finished
 
 
@@ -23,7 +24,9 @@ def results() -> Results:
 
 def record(trial: int, name: str, recovered: bool, fraction: float, **line: str) -> Record:
     """A trial in which the fall came at once."""
-    line = {"trial": str(trial), "seed": "1", "impulse": str(fraction), "direction": "0", **line}
+    line = dict.fromkeys(COLUMNS, "") | {
+        "trial": str(trial), "seed": "1", "impulse": str(fraction), "direction": "0", **line,
+    }  # fmt: skip
     fall = math.nan if recovered else 1.0
     return Record(trial, name, recovered, not recovered, fraction, 0.0, 0.1, fraction, fall, line)
 
@@ -40,11 +43,11 @@ def test_a_rival_is_shown_where_the_baseline_did_better(results: Results) -> Non
         *(record(1, "a", True, 0.9), record(1, "b", False, 0.9), record(1, "c", True, 0.9)),
         *(record(2, "a", True, 1.2), record(2, "b", False, 1.2)),
     )
-    a, b = choose_cases(trials, "a", ["a", "b", "c"])  # c lost nothing
+    a, b = choose_exhibits(trials, "a", ["a", "b", "c"])  # c lost nothing
     assert a.record.trial == 0 and a.baseline is None
     assert b.record.trial == 1 and b.baseline is not None and b.baseline.controller == "a"
     assert b.others == ("c",) and "a did" in b.reason
-    (alone,) = choose_cases(made(results, *trials.records[:2]), "a", ["b"])
+    (alone,) = choose_exhibits(made(results, *trials.records[:2]), "a", ["b"])
     assert alone.record.trial == 0 and alone.baseline is None and "did not recover" in alone.reason
     assert [r.trial for r in smallest_lost(trials, "b")] == [0, 1, 2]
 
@@ -56,7 +59,7 @@ def test_only_equal_pushes_are_compared(results: Results) -> None:
         *(record(0, "a", True, 0.5), record(0, "b", False, 0.6)),
         record(1, "b", False, 0.1, error="ValueError: no"),
     )
-    (case,) = choose_cases(trials, "a", ["b"])
+    (case,) = choose_exhibits(trials, "a", ["b"])
     assert case.record.trial == 0 and case.baseline is None
 
 

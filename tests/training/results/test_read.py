@@ -1,4 +1,4 @@
-"""training/results/read.py and training/results/values.py."""
+"""training/results/read.py and training/running/summary.py."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from poise.configs.errors import ConfigError
 from poise.training.results.read import load_results
-from poise.training.results.values import interval, number
+from poise.training.results.summary import read_summary
+from poise.training.running.summary import both_ends
 from tests.support.report_folders import copied, finished
 
 
@@ -68,17 +70,26 @@ def summary(**changes: object) -> Callable[[Path], None]:
         (lambda folder: (folder / "settings.yaml").unlink(), "settings.yaml missing"),
         (lambda folder: (folder / "trials.csv").write_bytes(b"\xff\xfe\0"), "trials.csv: "),
         (lambda folder: (folder / "summary.json").write_text("[]"), "must be a mapping"),
-        (lambda folder: (folder / "summary.json").write_text("{}"), "suite: must be a text"),
+        (lambda folder: (folder / "summary.json").write_text("{}"), "is of an older Poise"),
         (cut("summary.json", 0.5), "summary.json: is not valid JSON"),
         (cut("trials.csv", 0.5), "trials.csv"),
         (cut("trials.csv", 0.0), "trials.csv: lacks the columns"),
         (edit("trials.csv", ",recovered,", ",won,"), "lacks the columns recovered"),
         (edit("trials.csv", "False", "Maybe"), "does not parse"),
         (edit("trials.csv", ",zero,", ",one,"), "'one' is not in summary.json"),
-        (edit("summary.json", '"zero": {', '"other": {'), "not those of settings.yaml"),
-        (summary(trials=9), "has 8 trials"),
+        (edit("summary.json", '"zero": {', '"other": {'), "ranking: must name all controllers"),
+        (edit("settings.yaml", "zero: ", "one: "), "not those of settings.yaml"),
+        (summary(played=9), "has 8 trials"),
         (summary(recovered=99), "recovered: must be a whole number"),
         (summary(recovered_rate="all"), "recovered_rate: must be a number, not 'all'"),
+        (summary(trials=0), "trials: must be at least 1"),
+        (summary(recovered_ci95=[1]), "recovered_ci95: must be a list of 2"),
+        (summary(sectors="all"), "sectors: must be a list"),
+        (summary(sectors=[{"direction": "north"}]), "sectors[0]"),
+        (summary(directions=[]), "j50_mean: is missing"),
+        (edit("summary.json", '"format": 2', '"format": 3'), "is of format 3, this one reads"),
+        (edit("settings.yaml", "format: 2", "benchmark: 1"), "is of an older Poise"),
+        (edit("summary.json", '"reference": "', '"reference": "other '), "no such controller"),
         (edit("settings.yaml", "seed: 4", "seed: four"), "settings.yaml: seed"),
     ],
 )
@@ -98,23 +109,30 @@ def test_a_stopped_evaluation_is_told_apart(tmp_path: Path) -> None:
     """The text says how to finish it."""
     folder = copied("random", tmp_path)
     (folder / "summary.json").unlink()
-    (folder / "trials.partial.jsonl").write_text("")
-    with pytest.raises(ConfigError, match="the command that began it goes on"):
+    with pytest.raises(ConfigError, match="summary.json missing; the command that began it"):
         load_results(folder)
     with pytest.raises(ConfigError, match="no such folder"):
         load_results(tmp_path / "nowhere")
 
 
-def test_numbers_and_intervals_are_checked() -> None:
-    """null is nothing; true, text, infinity and three ends are refused."""
-    assert number({"a": 2}, "a", "file") == 2 and number({"a": None}, "a", "file") is None
-    assert interval({"a": [1, 2.5]}, "a", "file") == (1, 2.5)
-    assert interval({"a": [None, None]}, "a", "file") is None
-    for wrong in (True, "1", math.inf, [1]):
-        with pytest.raises(ConfigError, match="file: a: must be a number"):
-            number({"a": wrong}, "a", "file")
-    with pytest.raises(ConfigError, match="must be a number"):
-        number({}, "a", "file", needed=True)
-    for wrong in ([1], [1, 2, 3], 5):
-        with pytest.raises(ConfigError, match=r"must be \[low, high\]"):
-            interval({"a": wrong}, "a", "file")
+def test_intervals_may_be_open() -> None:
+    """An end that is null is nothing to compute with."""
+    assert both_ends((1.0, 2.5)) == (1.0, 2.5)
+    assert both_ends((None, 2.5)) is None and both_ends(None) is None
+
+
+@pytest.mark.parametrize("name", ["leaderboard", "leaderboard-feedback-step"])
+def test_the_committed_results_are_read(name: str) -> None:
+    """Those of the leaderboard have the form of today."""
+    path = Path(__file__).parents[3] / f"docs/results/{name}.json"
+    summary = read_summary(path)
+    assert summary == json.loads(path.read_text(), object_hook=_as_read)
+    assert summary["rated"] == "mix" and summary["reference"] in summary["controllers"]
+
+
+def _as_read(mapping: dict[str, Any]) -> dict[str, Any]:
+    """Intervals as pairs."""
+    pairs = {key: tuple(value) for key, value in mapping.items() if key.endswith("ci95") and value}
+    if "ankle_limit" in mapping and isinstance(mapping["ankle_limit"], list):
+        pairs["ankle_limit"] = [tuple(row) for row in mapping["ankle_limit"]]
+    return mapping | pairs

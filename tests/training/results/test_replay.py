@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from poise.configs.errors import ConfigError
-from poise.training.evaluation import evaluate as evaluation
+from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate
 from poise.training.results.replay import replay
 from tests.support.evaluations import RANDOM, InProcess, write_suite
@@ -63,11 +63,11 @@ def test_a_video_is_written(folder: Path, tmp_path: Path) -> None:
 
 def test_wrong_names_are_refused(folder: Path, tmp_path: Path) -> None:
     """No such folder, trial or controller; the text says what there is."""
-    with pytest.raises(ConfigError, match="settings.yaml: cannot be read"):
+    with pytest.raises(ConfigError, match="settings.yaml, summary.json, trials.csv missing"):
         replay(tmp_path, 0)
     with pytest.raises(ConfigError, match="no trial 4; they are numbered from 0 to 3"):
         replay(folder / "out", 4)
-    with pytest.raises(ConfigError, match="'pid' was not evaluated.*choices.*zero"):
+    with pytest.raises(ConfigError, match="'pid' took no part.*choices.*zero"):
         replay(folder / "out", 0, "pid")
 
 
@@ -78,7 +78,7 @@ def test_what_has_changed_since_is_refused(folder: Path, tmp_path: Path) -> None
     settings = yaml.safe_load((tmp_path / "settings.yaml").read_text())
     name = next(iter(settings["controllers"]))
     for change, message in (
-        ({"controllers": {name: "0"}}, "controller.*has changed"),
+        ({"controllers": {**settings["controllers"], name: "0"}}, "controller.*has changed"),
         ({"robot_fingerprint": "0"}, "robot 'humanoid' has changed"),
     ):
         (tmp_path / "settings.yaml").write_text(yaml.safe_dump({**settings, **change}))
@@ -89,5 +89,5 @@ def test_what_has_changed_since_is_refused(folder: Path, tmp_path: Path) -> None
 def test_a_stopped_evaluation_cannot_be_replayed(folder: Path, tmp_path: Path) -> None:
     """Without a summary there is no finished evaluation."""
     (tmp_path / "settings.yaml").write_text((folder / "out/settings.yaml").read_text())
-    with pytest.raises(ConfigError, match="no finished evaluation"):
+    with pytest.raises(ConfigError, match="no finished result: summary.json, trials.csv missing"):
         replay(tmp_path, 0)

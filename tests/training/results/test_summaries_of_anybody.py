@@ -1,20 +1,25 @@
-"""`poise compare` and `poise leaderboard` on summaries whose entries are wrong: one line each."""
+"""Summaries whose entries are wrong, and all that reads them: one line each."""
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import pytest
 from rich.console import Console
 
 from poise.configs.errors import PoiseError
+from poise.training.evaluation.tables import print_summary
+from poise.training.report.factors import indicators, seed_table
+from poise.training.report.plots import step_lines
 from poise.training.results.compare import compare, print_comparison
 from poise.training.results.leaderboard import write_leaderboard
-from tests.training.results.test_benchmark import NO, YES, rate, write_result
+from poise.training.results.read import load_results
+from poise.training.results.summary import read_summary
+from tests.training.results.test_compare import NO, YES, write_result
 
 WRONG = (None, True, "x", [], -1, 10**300, [1, None], {"x": 1})
 GONE = object()
@@ -41,39 +46,42 @@ def changed(summary: dict, place: tuple, value: Any) -> dict:
     return whole
 
 
-def refused(summary: dict, path: Path, call: Callable[[], Any]) -> int:
-    """How many changes of the summary are refused; anything but a PoiseError is raised."""
-    count = 0
+def test_wrong_entries_are_refused_in_one_line(tmp_path: Path) -> None:
+    """Every entry of a summary, missing or of another kind: what is not refused when it is read
+    can be compared, ranked and reported; anything but a PoiseError is raised here."""
+    a = write_result(tmp_path / "a", {"pd": YES, "abe07": YES})
+    b = write_result(tmp_path / "b", {"pd": YES, "abe07": NO}, abe07=15.0)
+    path, page = b / "summary.json", tmp_path / "page.md"
+    summary = json.loads(path.read_text())
+    scores = {"iqm": 1.0, "iqm_ci95": [0.5, 1.5], "tasks": 1, "values": [1.0], "worst": 0.5,
+              "worst_seed": 1}  # fmt: skip
+    summary["seeds"] = [{"name": "pd", "members": ["pd"], "seeds": [1], "eta": scores}]
+    curves = {"directions": [0.0, 90.0], "1": [1.0, 2.0], "2": [1.0, 2.0], "inf": [1.0, 2.0]}
+    summary["step_limits"] = [{"controllers": ["pd"], "steps": {"speed": 1.0}, "curves": curves}]
+    margin = {"direction": 0.0, "impulse": 9.0, "force": 90.0, "largest_tried": True}
+    summary["controllers"]["pd"]["eurobench"] = {
+        "body_sway_mean": 0.1, "recovery_time_mean": None, "recovery_time_trials": 0, "trials": 1,
+        "margins": [margin],
+    }  # fmt: skip
+    refused = accepted = 0
     for place in places(summary):
         for value in (GONE, *WRONG):
             path.write_text(json.dumps(changed(summary, place, value)))
             try:
-                call()
-            except PoiseError:
-                count += 1
-    return count
-
-
-@pytest.mark.parametrize("benchmark", [True, False], ids=["benchmark", "evaluation"])
-def test_wrong_entries_are_refused_in_one_line(tmp_path: Path, benchmark: bool) -> None:
-    """Every entry of a summary, missing or of another kind, in comparisons and leaderboards."""
-    a = write_result(tmp_path / "a", {"pd": YES, "abe07": YES})
-    b = write_result(tmp_path / "b", {"pd": YES, "abe07": NO}, abe07=15.0)
-    path = b / "summary.json"
-    summary = json.loads(path.read_text())
-    scores = {"iqm": 1.0, "iqm_ci95": [0.5, 1.5], "worst": 0.5, "worst_seed": 1}
-    summary["seeds"] = [{"name": "pd", "members": ["pd"], "eta": scores}]
-    if not benchmark:
-        for folder in (a, b):
-            data = json.loads((folder / "summary.json").read_text())
-            del data["benchmark"]
-            data["controllers"] = {name: rate(2, 4) for name in data["controllers"]}
-            (folder / "summary.json").write_text(json.dumps(data))
-        summary = json.loads(path.read_text())
-    assert (
-        refused(summary, path, lambda: print_comparison(compare(a, b), a, b, Console(quiet=True)))
-        > 50
-    )
-    if benchmark:
-        page = tmp_path / "page.md"
-        assert refused(summary, path, lambda: write_leaderboard([a, b], page)) > 150
+                read_summary(path)
+            except PoiseError as error:
+                assert "\n" not in str(error) and str(path) in str(error)
+                refused += 1
+                continue
+            accepted += 1
+            for read in (
+                lambda: print_comparison(compare(a, b), a, b, Console(quiet=True)),
+                lambda: write_leaderboard([a, b], page),
+                lambda: print_summary(read_summary(path), Console(quiet=True)),
+                lambda: seed_table(load_results(b)),
+                lambda: indicators(load_results(b), ["pd"]),
+                lambda: step_lines(load_results(b)),
+            ):
+                with contextlib.suppress(PoiseError):
+                    read()
+    assert refused > 600 and accepted > 50

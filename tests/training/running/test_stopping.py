@@ -17,7 +17,7 @@ from poise.training.cli import commands
 from poise.training.cli.commands import main
 from poise.training.running.stopping import Stopped, stop_code, stoppable, uninterrupted
 from tests.endurance.processes import Running, heed_interrupts, kill
-from tests.support.evaluations import RANDOM, write_suite
+from tests.support.evaluations import random_suite, write_suite
 
 # A native call of minutes that no signal interrupts, as a compilation is. It speaks from within the
 # call: a signal before it would be heard.
@@ -53,12 +53,12 @@ def test_a_process_that_cannot_listen_is_ended(number: signal.Signals) -> None:
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="processes are found in /proc")
 def test_a_stopped_evaluation_leaves_no_process_and_says_how_to_go_on(tmp_path: Path) -> None:
     """SIGTERM while two processes play: the finished trials stay, and the code is 143."""
-    suite = write_suite(tmp_path, {**RANDOM, "trials": 5000})
+    suite = write_suite(tmp_path, random_suite(5000))
     out = tmp_path / "out"
     running = Running(
         ["evaluate", "zero", "--suite", str(suite), "--out", str(out), "--workers", "2"]
     )
-    log = out / "trials.partial.jsonl"
+    log = out / "trials.jsonl"
     while not log.exists() or log.stat().st_size == 0:
         assert running.process.poll() is None, running.wait() or running.output
         time.sleep(0.05)
@@ -69,7 +69,7 @@ def test_a_stopped_evaluation_leaves_no_process_and_says_how_to_go_on(tmp_path: 
         f"poise: stopped; the finished trials are kept in {out}; the same command goes on"
     )
     assert "Traceback" not in running.output
-    assert {path.name for path in out.iterdir()} == {"settings.yaml", "trials.partial.jsonl"}
+    assert {path.name for path in out.iterdir()} == {"settings.yaml", "trials.jsonl"}
 
 
 def test_signals_wait_while_processes_are_started(monkeypatch: pytest.MonkeyPatch) -> None:

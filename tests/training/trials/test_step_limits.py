@@ -16,13 +16,12 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.stepping.planner import StepLimits
 from poise.envs.maths.pendulum import drifted, duration_factor
-from poise.training.benchmark.case import Result
-from poise.training.benchmark.figures import controller_figures
-from poise.training.evaluation import evaluate as evaluation
 from poise.training.evaluation import plots
+from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate
+from poise.training.evaluation.figures import controller_entry
 from poise.training.evaluation.plots import _step_lines
-from poise.training.trials.players import Player, load_player
+from poise.training.trials.agents import Agent, load_agent
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import (
     COUNTS,
@@ -35,8 +34,8 @@ from poise.training.trials.step_limits import (
 from poise.training.trials.trial import Outcome
 from tests.support.evaluations import ENVELOPE, InProcess, write_suite
 from tests.support.shared import robot
-from tests.training.benchmark.test_cases import small
 from tests.training.evaluation.test_folder import OUTCOME
+from tests.training.suites.test_factors import small, won_below
 
 
 @pytest.fixture(scope="module")
@@ -82,19 +81,19 @@ def test_length_is_within_the_box_and_the_speeds(limit: NStepLimit) -> None:
     assert NStepLimit(limit.limits, slow).length(90.0) / h == pytest.approx(0.1)
 
 
-def stander(name: str, count: int, elsewhere: bool = True) -> tuple[Player, list[Outcome]]:
+def stander(name: str, count: int, elsewhere: bool = True) -> tuple[Agent, list[Outcome]]:
     """A controller without a planner; in `count` of 20 recoveries a foot landed."""
     env = SimpleNamespace(controller=SimpleNamespace())
-    landed = replace(OUTCOME, steps=1, stepped=elsewhere)
-    return Player(name, env, np.asarray, ""), [landed] * count + [OUTCOME] * (20 - count)
+    landed = replace(OUTCOME, steps=1, foot_displaced=elsewhere)
+    return Agent(name, env, np.asarray, ""), [landed] * count + [OUTCOME] * (20 - count)
 
 
 def test_the_limits_are_those_of_the_planner() -> None:
     """Of the controller itself, and of the one under a policy; feet in place have none."""
     names = ["zero", "momentum-qp", "ipm-step", "capture-step", "residual-step"]
-    players = [load_player(name, robot()) for name in names]
+    agents = [load_agent(name, robot()) for name in names]
     nothing = {name: [replace(OUTCOME, recovered=False)] for name in names}
-    found = stepping_limits(players, nothing, PushLimits(robot()))
+    found = stepping_limits(agents, nothing, PushLimits(robot()))
     assert list(found) == names[2:]
     for name in ("capture-step", "ipm-step"):
         assert found[name].steps == controller_config(name).limits
@@ -110,9 +109,9 @@ def test_without_a_planner_it_is_who_steps_that_counts(limit: NStepLimit) -> Non
     controller.planner.limits = own
     planner = ResidualBalanceEnv(robot(), controller=controller)
     cases = [stander("often", 10), stander("rare", 1), stander("tilts", 10, False)]
-    cases.append((Player("planned", planner, np.asarray, ""), []))
-    outcomes = {player.name: results for player, results in cases}
-    found = stepping_limits([player for player, _ in cases], outcomes, limit.limits)
+    cases.append((Agent("planned", planner, np.asarray, ""), []))
+    outcomes = {agent.name: results for agent, results in cases}
+    found = stepping_limits([agent for agent, _ in cases], outcomes, limit.limits)
     assert [(name, one.steps) for name, one in found.items()] == [
         ("planned", own), ("often", StepLimits()),
     ]  # fmt: skip
@@ -169,16 +168,15 @@ def test_a_plot_has_room_for_limits_but_not_for_any() -> None:
 
 def test_the_envelope_of_one_that_steps_is_measured_by_the_step_limits() -> None:
     """Every direction has limits and shares; without a limit of steps it has neither."""
-    cases = small()
-    second = cases.second(dict.fromkeys(range(4), True))
-    played = [(case, Result(OUTCOME)) for case in [*cases.first, *second, *cases.others]]
-    own = NStepLimit(cases.limits, StepLimits(speed=0.55))
-    entry, plain = controller_figures(played, cases, own), controller_figures(played, cases)
+    plan = small()
+    played = [(trial, OUTCOME) for trial in plan.trials(won_below(plan, 1e9))["a"]]
+    own = NStepLimit(plan.limits, StepLimits(speed=0.55))
+    entry, plain = controller_entry(played, plan, own), controller_entry(played, plan)
     for d, before in zip(entry["directions"], plain["directions"], strict=True):
-        assert d["step_limit_1"] == own(d["direction"], cases.suite.push_duration, 1)
+        assert d["step_limit_1"] == own(d["direction"], plan.suite.push_duration, 1)
         assert d["step_share_1"] == d["j50"] / d["step_limit_1"]
-        assert {key: d[key] for key in before} == before and len(d) == len(before) + 9
-    assert "step_share_1_mean" in entry and not any("step" in key for key in plain)
+        assert d | before == d and len(d) == len(before) + 9
+    assert "step_share_1_mean" in entry and not any("step_share" in key for key in plain)
 
 
 def test_an_evaluation_draws_and_prints_them(

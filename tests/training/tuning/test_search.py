@@ -14,7 +14,7 @@ from poise.configs.schema import build, read_yaml, to_dict
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.training.trials import trial as trials
-from poise.training.trials.players import Player
+from poise.training.trials.agents import Agent
 from poise.training.trials.trial import Trial
 from poise.training.tuning.candidates import Candidate, TuningPushes, follow, play, worth
 from poise.training.tuning.gains import Gains
@@ -35,23 +35,23 @@ def small(**changes):
 
 
 @pytest.fixture(scope="module")
-def player():
+def agent():
     env = ResidualBalanceEnv(robot(), duration=3.0, pushes=None)
-    return Player("momentum-qp", env, lambda observation: np.zeros(len(env.action_names)), "")
+    return Agent("momentum-qp", env, lambda observation: np.zeros(len(env.action_names)), "")
 
 
 def trial(impulse):
     """A push forward."""
-    return Trial(0, 5, Push("torso", 0.5, 0.1, impulse, 0.0))
+    return Trial(0, 5, (Push("torso", 0.5, 0.1, impulse, 0.0),))
 
 
-def test_a_fall_is_worth_less_than_standing(player, monkeypatch):
+def test_a_fall_is_worth_less_than_standing(agent, monkeypatch):
     """A recovery counts fully, a fall by how long it took; a dragged foot is no recovery."""
-    assert worth(player, trial(5.0), in_place=True) == 1.0
-    assert 0.03 < worth(player, trial(40.0), in_place=True) < 0.15
+    assert worth(agent, trial(5.0), in_place=True) == 1.0
+    assert 0.03 < worth(agent, trial(40.0), in_place=True) < 0.15
     monkeypatch.setattr(trials, "STEP_LENGTH", 1e-6)
-    assert worth(player, trial(5.0), in_place=True) == 0.6
-    assert worth(player, trial(5.0), in_place=False) == 1.0
+    assert worth(agent, trial(5.0), in_place=True) == 0.6
+    assert worth(agent, trial(5.0), in_place=False) == 1.0
 
 
 def test_pushes_surround_the_limits():

@@ -1,4 +1,4 @@
-"""training/suites/sequences.py and training/trials/trial.py."""
+"""Several pushes in a trial: training/suites/random.py and training/trials."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ from poise.configs.schema import build
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import LimitTable, PushSampler
 from poise.envs.robots.robot import load_robot
-from poise.training.results.replay import _trial
-from poise.training.suites.registry import load_suite
-from poise.training.suites.sequences import SequenceSuite
-from poise.training.trials.players import load_player
+from poise.training.suites.plan import Plan
+from poise.training.suites.random import Sequence
+from poise.training.suites.suite import Suite, load_suite
+from poise.training.trials.agents import load_agent
+from poise.training.trials.play import Touchdowns, run_trial
 from poise.training.trials.push_limits import PushLimits
-from poise.training.trials.trial import Touchdowns, Trial, row, run_trial
+from poise.training.trials.table import read_trial, trial_row
+from poise.training.trials.trial import Trial
 from tests.support.evaluations import write_suite
 
 
@@ -27,12 +29,16 @@ def limits() -> PushLimits:
     return PushLimits(load_robot(), LimitTable((0.0,), (16.0,)))
 
 
+def drawn(suite: Suite, limits: PushLimits) -> list[Trial]:
+    return Plan(suite, limits, 3, ["a"]).first
+
+
 def test_repeated_pushes_come_every_two_to_five_seconds_for_a_minute(limits: PushLimits) -> None:
     """All alike but for time and direction, which are random; none begins after a minute."""
-    trials = load_suite("repeated").resized(20).first(limits, 3)
+    trials = drawn(load_suite("repeated").resized(20), limits)
     directions = []
     for trial in trials:
-        pushes = trial.options["push"]
+        pushes = trial.pushes
         starts = np.array([push.start for push in pushes])
         gaps = np.diff(starts) - pushes[0].duration
         assert gaps.min() >= 2.0 and gaps.max() <= 5.0
@@ -46,10 +52,10 @@ def test_repeated_pushes_come_every_two_to_five_seconds_for_a_minute(limits: Pus
 
 def test_the_second_push_of_in_step_is_the_smaller_one(limits: PushLimits) -> None:
     """It begins 0.15 to 0.4 s after the end of the first, in a direction of its own."""
-    trials = load_suite("in-step").resized(50).first(limits, 3)
+    trials = drawn(load_suite("in-step").resized(50), limits)
     shares = []
     for trial in trials:
-        first, second = trial.options["push"]
+        first, second = trial.pushes
         assert 0.15 <= second.start - first.start - first.duration <= 0.4
         assert trial.limit_fraction is None
         assert 16.0 <= first.impulse <= 1.4 * 16.0 and first.direction != second.direction
@@ -60,28 +66,28 @@ def test_the_second_push_of_in_step_is_the_smaller_one(limits: PushLimits) -> No
 def test_a_share_of_a_controllers_own_limits(limits: PushLimits) -> None:
     """controller_fraction is one of the table given, which may be any controller's."""
     pushes = PushSampler(magnitude=(0.5, 0.5), unit="controller_fraction", count=(2, 2))
-    trials = SequenceSuite(trials=2, pushes=pushes).first(limits, 0)
-    assert [push.impulse for t in trials for push in t.options["push"]] == [8.0] * 4
+    trials = drawn(Suite(sequence=Sequence(trials=2, pushes=pushes)), limits)
+    assert [push.impulse for t in trials for push in t.pushes] == [8.0] * 4
 
 
 def test_later_pushes_are_played(limits: PushLimits) -> None:
     """A huge second push makes a fall, after it."""
-    player = load_player("momentum-qp", limits.robot, duration=2.0, pushes=None)
+    agent = load_agent("momentum-qp", limits.robot, duration=2.0, pushes=None)
     push = Push("torso", 0.2, 0.1, 1.0, 0.0)
-    alone = run_trial(player, Trial(0, 1, push))
+    alone = run_trial(agent, Trial(0, 1, (push,)))
     assert alone.recovered and alone.steps == 0
-    then = run_trial(player, Trial(0, 1, push, later=(Push("torso", 1.0, 0.1, 90.0, 0.0),)))
+    then = run_trial(agent, Trial(0, 1, (push, Push("torso", 1.0, 0.1, 90.0, 0.0))))
     assert then.fallen and then.fall_time is not None and then.fall_time > 1.0
 
 
 def test_a_line_of_trials_csv_holds_all_pushes(limits: PushLimits, tmp_path: Path) -> None:
     """What is read back for a replay is the trial, exactly."""
-    trial = load_suite("repeated").resized(1).first(limits, 3)[0]
-    player = load_player("momentum-qp", limits.robot, duration=1.1, pushes=None)
-    line = row(trial, "momentum-qp", run_trial(player, trial))
-    assert len(json.loads(line["later"])) == len(trial.later)
+    trial = drawn(load_suite("repeated").resized(1), limits)[0]
+    agent = load_agent("momentum-qp", limits.robot, duration=1.1, pushes=None)
+    line = trial_row(trial, "momentum-qp", run_trial(agent, trial))
+    assert len(json.loads(line["later"])) == len(trial.pushes) - 1
     text = {key: "" if value is None else str(value) for key, value in line.items()}
-    assert _trial(text, tmp_path) == trial
+    assert read_trial(text, tmp_path) == trial
 
 
 def test_touchdowns_count_feet_that_were_in_the_air() -> None:
@@ -109,7 +115,7 @@ def test_touchdowns_count_feet_that_were_in_the_air() -> None:
 )
 def test_a_wrong_sequence_is_refused(tmp_path: Path, fields: dict, message: str) -> None:
     """The text names the field."""
-    path = write_suite(tmp_path, {"kind": "sequence", **fields})
+    path = write_suite(tmp_path, {"sequence": fields})
     with pytest.raises(ConfigError, match=message):
         load_suite(path)
-    assert build(SequenceSuite, {"kind": "sequence"}, "") == SequenceSuite()
+    assert build(Suite, {"sequence": {}}, "") == Suite(sequence=Sequence())

@@ -1,4 +1,4 @@
-"""How long a control tick takes, all controllers measured in turn in one process."""
+"""The time of a control tick is measured here, of all controllers in turn in one process."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from poise.baselines.controller import Controller, WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.robots.robot import Robot
-from poise.training.trials.players import Player
+from poise.training.trials.agents import Agent
 
 ROUNDS = 3  # in which every controller has its turn
 SECONDS = 0.6  # of simulated time in a round, with a push at its start
@@ -32,12 +32,12 @@ class Clocked(WrappedController):
             self.seconds.append(time.perf_counter() - begun)
 
 
-def tick_times(players: dict[str, Player]) -> dict[str, float | None]:
+def tick_times(agents: dict[str, Agent]) -> dict[str, float | None]:
     """Median time of a control tick [µs] from Python; None for a controller that raises.
 
     For a policy the time of one of its actions is shared among the ticks that it is held for.
     """
-    clocks = {name: _Clock(player) for name, player in players.items()}
+    clocks = {name: _Clock(agent) for name, agent in agents.items()}
     for turn in range(ROUNDS):
         for clock in clocks.values():
             clock.play(seed=turn)
@@ -45,13 +45,13 @@ def tick_times(players: dict[str, Player]) -> dict[str, float | None]:
 
 
 class _Clock:
-    def __init__(self, player: Player):
-        self.player, self.broken = player, False
+    def __init__(self, agent: Agent):
+        self.agent, self.broken = agent, False
         self.acts: list[float] = []
         self.ticks: list[float] = []
 
     def play(self, seed: int) -> None:
-        env, act = self.player.env, self._timed(self.player.act)
+        env, act = self.agent.env, self._timed(self.agent.act)
         inner = env.controller if isinstance(env, ResidualBalanceEnv) else None
         try:
             clocked = None
@@ -84,7 +84,7 @@ class _Clock:
     def median(self) -> float | None:
         if self.broken or not self.acts:
             return None
-        env = self.player.env
+        env = self.agent.env
         ticks = env.ticks if isinstance(env, ResidualBalanceEnv) else 1
         tick = float(np.median(self.ticks)) if self.ticks else 0.0
         return 1e6 * (tick + float(np.median(self.acts)) / ticks)

@@ -1,4 +1,4 @@
-"""training/evaluation/summary.py."""
+"""training/evaluation/figures.py and training/evaluation/pairs.py."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ import pytest
 from poise.baselines.stepping.planner import StepLimits
 from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import load_robot
-from poise.training.evaluation.summary import summarise
+from poise.training.evaluation.figures import controller_entry
+from poise.training.evaluation.pairs import pair_figures
 from poise.training.running.files import plain
-from poise.training.suites.random import QuietSuite, RandomSuite
-from poise.training.suites.registry import EnvelopeSuite
-from poise.training.suites.sequences import SequenceSuite
+from poise.training.running.summary import Entry, Pair
+from poise.training.suites.plan import Plan
+from poise.training.suites.random import Quiet
+from poise.training.suites.suite import Suite
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import NStepLimit
 from poise.training.trials.trial import Outcome, Trial
@@ -28,28 +30,47 @@ def limits() -> PushLimits:
 
 
 def outcomes(won: list[bool]) -> list[Outcome]:
-    fallen = replace(OUTCOME, recovered=False, fallen=True, solver_failures=1, stepped=True)
+    fallen = replace(OUTCOME, recovered=False, fallen=True, solver_failures=1, foot_displaced=True)
     return [replace(OUTCOME, solver_failures=0) if w else fallen for w in won]
 
 
-def trials(limits: PushLimits, impulses: list[float], angles: list[float]) -> list[Trial]:
+def trials(
+    limits: PushLimits, impulses: list[float], angles: list[float], part: str = "envelope"
+) -> list[Trial]:
     pushes = [Push("torso", 0.5, 0.1, j, a) for j, a in zip(impulses, angles, strict=True)]
-    return [Trial(i, i, p, limits.fraction(p)) for i, p in enumerate(pushes)]
+    return [
+        Trial(i, i, (p,), limit_fraction=limits.fraction(p), part=part)
+        for i, p in enumerate(pushes)
+    ]
+
+
+def summarise(
+    trials: list[Trial],
+    results: dict[str, list[Outcome]],
+    limits: PushLimits,
+    steps: dict[str, NStepLimit] | None = None,
+) -> tuple[dict[str, Entry], list[Pair]]:
+    """Entries of the controllers, and the pair of the first two."""
+    plan = Plan(Suite(quiet=Quiet()), limits, 0, tuple(results))
+    played = {name: list(zip(trials, own, strict=True)) for name, own in results.items()}
+    entries = {name: controller_entry(own, plan, (steps or {}).get(name))
+               for name, own in played.items()}  # fmt: skip
+    names = list(played)
+    return entries, [pair_figures(*names[:2], played, entries)] if len(names) > 1 else []
 
 
 def test_counts_and_pairs(limits: PushLimits) -> None:
     """Recovered, lost and won trials are counted, each pair once, b against a."""
-    some = trials(limits, [5.0, 10.0, 15.0, 20.0], [0.0, 100.0, 200.0, 300.0])
-    found = summarise(
-        RandomSuite(), some,
+    some = trials(limits, [5.0, 10.0, 15.0, 20.0], [0.0, 100.0, 200.0, 300.0], "random")
+    entries, (pair,) = summarise(
+        some,
         {"a": outcomes([True, False, False, True]), "b": outcomes([True, True, True, False])},
         limits,
-    )  # fmt: skip
-    a = found["controllers"]["a"]
+    )
+    a = entries["a"]
     assert (a["trials"], a["recovered"], a["recovered_rate"]) == (4, 2, 0.5)
     assert a["fallen"] == 2 and a["solver_failures"] == 2 and a["recovered_with_step"] == 0
     assert 0.1 < a["recovered_ci95"][0] < 0.5 < a["recovered_ci95"][1]
-    (pair,) = found["pairs"]
     assert (pair["both"], pair["only_a"], pair["only_b"], pair["neither"]) == (1, 1, 2, 0)
     assert pair["p_mcnemar"] == 1.0 and pair["rate_gain"] == 0.25 and not pair["identical"]
     assert a["fraction_of"] == "ankle limit"
@@ -65,10 +86,10 @@ def test_the_envelope_finds_the_impulse_that_was_put_in(limits: PushLimits) -> N
         "base": outcomes((impulses < threshold).tolist()),
         "better": outcomes((impulses < 1.25 * threshold).tolist()),
     }
-    found = summarise(
-        EnvelopeSuite(), trials(limits, impulses.tolist(), angles.tolist()), results, limits
+    entries, (pair,) = summarise(
+        trials(limits, impulses.tolist(), angles.tolist()), results, limits
     )
-    base = found["controllers"]["base"]
+    base = entries["base"]
     assert base["j50_mean"] == pytest.approx(18.0, abs=0.4)
     assert base["j50_min"] == pytest.approx(16.0, abs=0.4)
     assert base["j50_mean_ci95"][0] < 18.0 < base["j50_mean_ci95"][1]
@@ -76,7 +97,6 @@ def test_the_envelope_finds_the_impulse_that_was_put_in(limits: PushLimits) -> N
     assert forward["direction"] == 0.0 and forward["trials"] == 45
     assert forward["eta"] == pytest.approx(forward["j50"] / limits.ankle(0.0, 0.1))
     assert base["eta_min"] == min(d["eta"] for d in base["directions"])
-    (pair,) = found["pairs"]
     assert pair["j50_gain"] == pytest.approx(0.25, abs=0.03)
     assert pair["j50_gain_ci95"][0] < 0.25 < pair["j50_gain_ci95"][1]
     assert [d["direction"] for d in pair["directions"]] == [0.0, 180.0]
@@ -88,45 +108,42 @@ def test_shares_of_the_step_limits_are_added_and_nothing_else_changes(limits: Pu
     some = trials(limits, impulses.tolist(), angles.tolist())
     results = {name: outcomes((impulses < at).tolist()) for name, at in (("a", 15.0), ("b", 21.0))}
     own = NStepLimit(limits, StepLimits(speed=0.55))
-    before = summarise(EnvelopeSuite(), some, results, limits)
-    found = summarise(EnvelopeSuite(), some, results, limits, {"b": own})
-    entry = found["controllers"]["b"]
+    before, _ = summarise(some, results, limits)
+    found, _ = summarise(some, results, limits, {"b": own})
+    entry = found["b"]
     for d in entry["directions"]:
         assert d["step_limit_2"] == own(d["direction"], 0.1, 2)
         assert d["step_share_2"] == d["j50"] / d["step_limit_2"]
     assert entry["step_share_1_mean"] > entry["step_share_inf_mean"] > 0.0
-    (curve,) = found.pop("step_limits")
-    assert curve["controllers"] == ["b"] and curve["steps"]["speed"] == 0.55
 
     def less(value):
         if isinstance(value, dict):
             return {k: less(v) for k, v in value.items() if not k.startswith("step_")}
         return [less(v) for v in value] if isinstance(value, list) else value
 
-    assert less(found) == before and found["controllers"]["a"] == before["controllers"]["a"]
-    random = summarise(RandomSuite(), some, results, limits, {"b": own})
-    assert random == summarise(RandomSuite(), some, results, limits)
+    assert less(found) == less(before) and found["a"] == before["a"]
+    random = trials(limits, impulses.tolist(), angles.tolist(), "random")
+    assert summarise(random, results, limits, {"b": own}) == summarise(random, results, limits)
 
 
 def test_without_pushes_there_is_no_j50(limits: PushLimits) -> None:
     """A quiet suite counts falls and drift alone."""
     quiet = [replace(OUTCOME, com_drift=d, mean_abs_action=0.01) for d in (0.001, 0.004)]
-    found = summarise(QuietSuite(), [Trial(0, 0), Trial(1, 1)], {"a": quiet}, limits)
-    entry = found["controllers"]["a"]
+    entries, pairs = summarise([Trial(0, 0), Trial(1, 1)], {"a": quiet}, limits)
+    entry = entries["a"]
     assert entry["com_drift_max"] == 0.004 and entry["mean_abs_action"] == 0.01
-    assert "j50_mean" not in entry and "fraction50" not in entry and found["pairs"] == []
+    assert "j50_mean" not in entry and "fraction50" not in entry and pairs == []
 
 
 def test_steps_are_counted_and_feet_in_place_apart(limits: PushLimits) -> None:
     """A recovery with feet in place has neither a touchdown nor a foot that slid."""
     four = [
         OUTCOME,
-        replace(OUTCOME, stepped=True, steps=2),
-        replace(OUTCOME, stepped=True),  # slid
-        replace(OUTCOME, recovered=False, fallen=True, stepped=True, steps=5),
+        replace(OUTCOME, foot_displaced=True, steps=2),
+        replace(OUTCOME, foot_displaced=True),  # slid
+        replace(OUTCOME, recovered=False, fallen=True, foot_displaced=True, steps=5),
     ]
-    found = summarise(QuietSuite(), [Trial(i, i) for i in range(4)], {"a": four}, limits)
-    entry = found["controllers"]["a"]
+    entry = summarise([Trial(i, i) for i in range(4)], {"a": four}, limits)[0]["a"]
     assert entry["recovered"] == 3 and entry["recovered_in_place"] == 1
     assert entry["recovered_with_step"] == 2
     assert entry["steps_mean"] == 7 / 4 and entry["steps_max"] == 5
@@ -137,9 +154,10 @@ def test_steps_are_counted_and_feet_in_place_apart(limits: PushLimits) -> None:
 def test_pushes_one_after_the_other_have_no_direction(limits: PushLimits) -> None:
     """Falls are counted; no J50 is fitted to the first push of many."""
     push = Push("torso", 0.5, 0.1, 10.0, 0.0)
-    many = [Trial(i, i, push, 0.5, later=(replace(push, start=2.0),)) for i in range(2)]
+    both = (push, replace(push, start=2.0))
+    many = [Trial(i, i, both, part="sequence") for i in range(2)]
     results = {"a": [OUTCOME, replace(OUTCOME, recovered=False, fallen=True)]}
-    entry = summarise(SequenceSuite(), many, results, limits)["controllers"]["a"]
+    entry = summarise(many, results, limits)[0]["a"]
     assert entry["never_fell_rate"] == 0.5 and "fraction50" not in entry
 
 

@@ -1,4 +1,4 @@
-"""training/trials/players.py."""
+"""training/trials/agents.py."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.benchmark.run import default_controllers
+from poise.training.evaluation.evaluate import default_controllers
 from poise.training.learning import policy
 from poise.training.learning.policy import load_policy
-from poise.training.trials.players import load_player
+from poise.training.trials.agents import load_agent
 from tests.support.shared import finished_run
 
 
@@ -28,31 +28,31 @@ def robot() -> Robot:
 
 def test_the_baseline_is_the_residual_environment_with_action_zero(robot: Robot) -> None:
     """momentum-qp never moves its targets, whatever it observes."""
-    player = load_player("momentum-qp", robot, duration=2.0, pushes=None)
-    assert isinstance(player.env, ResidualBalanceEnv)
-    assert player.env.config.duration == 2.0 and player.env.config.pushes is None
-    assert np.array_equal(player.act(np.ones(player.env.observation_space.shape)), np.zeros(4))
+    agent = load_agent("momentum-qp", robot, duration=2.0, pushes=None)
+    assert isinstance(agent.env, ResidualBalanceEnv)
+    assert agent.env.config.duration == 2.0 and agent.env.config.pushes is None
+    assert np.array_equal(agent.act(np.ones(agent.env.observation_space.shape)), np.zeros(4))
 
 
 def test_zero_gives_no_torque(robot: Robot) -> None:
     """zero acts on the joints themselves, by nothing."""
-    player = load_player("zero", robot)
-    assert isinstance(player.env, TorqueBalanceEnv)
-    player.env.reset(seed=0)
-    player.env.step(player.act(np.zeros(player.env.observation_space.shape)))
-    assert not player.env.simulation.views.ctrl.any()
+    agent = load_agent("zero", robot)
+    assert isinstance(agent.env, TorqueBalanceEnv)
+    agent.env.reset(seed=0)
+    agent.env.step(agent.act(np.zeros(agent.env.observation_space.shape)))
+    assert not agent.env.simulation.views.ctrl.any()
 
 
 def test_a_controllers_file_is_played_and_told_apart(robot: Robot, tmp_path: Path) -> None:
-    """A .yaml of a controller is a player of its own; other gains give another fingerprint."""
+    """A .yaml of a controller is an agent of its own; other gains give another fingerprint."""
     same, other = tmp_path / "same.yaml", tmp_path / "other.yaml"
-    default = load_player("momentum-qp", robot)
+    default = load_agent("momentum-qp", robot)
     same.write_text("kind: momentum-qp\n")
     other.write_text("kind: momentum-qp\ncom: {stiffness: 3.21}\n")
-    env = load_player(str(other), robot).env
+    env = load_agent(str(other), robot).env
     assert isinstance(env, ResidualBalanceEnv) and env.controller.config.com.stiffness == 3.21
-    assert load_player(str(other), robot).fingerprint != default.fingerprint
-    assert load_player(str(same), robot).name == str(same)
+    assert load_agent(str(other), robot).fingerprint != default.fingerprint
+    assert load_agent(str(same), robot).name == str(same)
 
 
 @pytest.mark.parametrize("name", ["momentum", "missing.yaml", "nowhere/run"])
@@ -61,20 +61,20 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     with pytest.raises(
         ConfigError, match="momentum-qp, .*residual, residual-lqr-lip, residual-step, zero"
     ) as error:
-        load_player(name, robot)
+        load_agent(name, robot)
     assert name in str(error.value)
 
 
 def test_a_folder_without_a_policy_is_refused(robot: Robot, tmp_path: Path) -> None:
     """An existing folder is taken for a policy; its missing file is named."""
     with pytest.raises(ConfigError, match="a policy folder holds"):
-        load_player(str(tmp_path), robot)
+        load_agent(str(tmp_path), robot)
 
 
 def test_a_packaged_policy_is_known_by_its_folder(
     robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Any folder of configs/policies, as a player and by load_policy; an error lists them all."""
+    """Any folder of configs/policies, as an agent and by load_policy; an error lists them all."""
     shutil.copytree(file_names.packaged_folder("policies"), tmp_path / "policies")
     shutil.copytree(finished_run() / "last", tmp_path / "policies/residual-pd")
     real = file_names.packaged_folder
@@ -84,21 +84,21 @@ def test_a_packaged_policy_is_known_by_its_folder(
 
     for module in (file_names, policy):
         monkeypatch.setattr(module, "packaged_folder", here)
-    player = load_player("residual-pd", robot)
-    assert player.fingerprint == load_player(str(finished_run() / "last"), robot).fingerprint
-    assert player.fingerprint != load_player("residual", robot).fingerprint
+    agent = load_agent("residual-pd", robot)
+    assert agent.fingerprint == load_agent(str(finished_run() / "last"), robot).fingerprint
+    assert agent.fingerprint != load_agent("residual", robot).fingerprint
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
     names = ["ppo-torque", "residual", "residual-lqr-lip", "residual-pd", "residual-step"]
     assert packaged("policies") == names
     assert default_controllers()[-5:] == tuple(names)
     with pytest.raises(ConfigError, match=", ".join([*names, "zero"])):
-        load_player("residual-abe07", robot)
+        load_agent("residual-abe07", robot)
 
 
 def test_a_fingerprint_tells_how_a_policy_plays(robot: Robot, tmp_path: Path) -> None:
     """Other statistics or another environment change it, another number of epochs does not."""
     last = finished_run() / "last"
-    player = load_player(str(last), robot)
+    agent = load_agent(str(last), robot)
     for name, old, new, same in (
         ("statistics", "", "", False),
         ("epochs", "n_epochs: 2", "n_epochs: 3", True),
@@ -112,7 +112,7 @@ def test_a_fingerprint_tells_how_a_policy_plays(robot: Robot, tmp_path: Path) ->
             with np.load(folder / "vecnormalize.npz") as data:
                 arrays = {**data, "obs_mean": data["obs_mean"] + 0.1}
             np.savez(folder / "vecnormalize.npz", **arrays)
-        assert (load_player(str(folder), robot).fingerprint == player.fingerprint) is same
+        assert (load_agent(str(folder), robot).fingerprint == agent.fingerprint) is same
 
 
 @pytest.mark.parametrize("name", packaged("policies"))

@@ -1,4 +1,4 @@
-"""training/benchmark: run.py, benchmark/world.py, figures.py, reading.py and the command."""
+"""`poise benchmark`: training/evaluation, training/trials/worlds.py and the command."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import csv
 import json
 import os
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +16,18 @@ import poise
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.balance.config import StartNoise
-from poise.training.benchmark import run
-from poise.training.benchmark.case import Case
-from poise.training.benchmark.run import benchmark, default_controllers
-from poise.training.benchmark.world import BenchmarkPlayer, Job, play, play_case
+from poise.envs.pushes.push import Push
 from poise.training.cli.commands import main
-from poise.training.results.benchmark import load_benchmark_data, read_case, replay_case
+from poise.training.evaluation import run
+from poise.training.evaluation.evaluate import benchmark, default_controllers
+from poise.training.results.read import load_results
 from poise.training.results.replay import replay
-from poise.training.trials.players import load_player
-from poise.training.trials.stage import Stage
-from poise.training.trials.trial import Trial, run_trial
+from poise.training.trials.agents import load_agent
+from poise.training.trials.jobs import Job, Stage, play
+from poise.training.trials.play import run_trial
+from poise.training.trials.table import outcome_cells
+from poise.training.trials.trial import Trial, World
+from poise.training.trials.worlds import Worlds
 from tests.support.benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small
 from tests.support.shared import robot
 
@@ -56,7 +57,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("benchmark")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run, "Crew", InProcessCrew)
-        patch.setattr(run, "tick_times", lambda players: dict.fromkeys(players, 12.5))
+        patch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
         benchmark(BOTH, write_small(out), out=out / "out", seed=2)
     return out / "out"
 
@@ -68,36 +69,29 @@ def rows(folder: Path) -> list[dict[str, str]]:
 
 def test_the_standard_case_is_that_of_an_evaluation() -> None:
     """Bit for bit the outcome of `run_trial`, also after other worlds were played."""
-    player = load_player("momentum-qp", robot(), duration=1.6, pushes=None)
-    push = read_case(CASE_LINE).push
-    expected = run_trial(player, Trial(0, seed=5, push=push))
-    arena = BenchmarkPlayer(load_player("momentum-qp", robot(), duration=1.6, pushes=None))
-    worlds = [{}, {"friction": 0.4}, {"delay": 0.02}, {"mass_error": 0.1}, {}]
-    outcomes = [play_case(arena, Case(0, 5, push, **world)).outcome for world in worlds]
+    agent = load_agent("momentum-qp", robot(), duration=1.6, pushes=None)
+    trial = Trial(0, 5, (Push("torso", 0.1, 0.1, 8.0, 30.0),))
+    expected = run_trial(agent, trial)
+    worlds = Worlds(load_agent("momentum-qp", robot(), duration=1.6, pushes=None))
+    several = [World(), World(friction=0.4), World(delay=0.02), World(mass_error=0.1), World()]
+    outcomes = [run_trial(worlds.enter(world), trial) for world in several]
     assert outcomes[0] == outcomes[-1] == expected
     assert all(outcome != expected for outcome in outcomes[1:-1])
-
-
-CASE_LINE = {
-    "trial": "0", "seed": "5", "stage": "1", "body": "torso", "start": "0.1", "duration": "0.1",
-    "impulse": "8.0", "direction": "30.0", "elevation": "0", "point_x": "0", "point_y": "0",
-    "point_z": "0", "profile": "square", "limit_fraction": "0.3", "part": "envelope", "factor": "",
-    "level": "", "friction": "", "delay": "0", "mass_error": "0", "pushes": "1", "interval": "1",
-}  # fmt: skip
 
 
 def test_the_summary_has_what_readers_rely_on(finished: Path) -> None:
     """Keys, counts and order of docs/benchmark.md."""
     summary = json.loads((finished / "summary.json").read_text())
-    assert {"benchmark", "suite", "seed", "robot", "reference", "ranking", "controllers", "pairs",
-            "seeds", "command", "versions", "machine", "workers", "backend", "commit",
-            "seconds"} == set(summary)  # fmt: skip
+    assert {"format", "suite", "seed", "robot", "rated", "scale", "reference", "ranking",
+            "controllers", "pairs", "step_limits", "seeds", "command", "versions", "machine",
+            "workers", "backend", "commit", "seconds"} == set(summary)  # fmt: skip
     assert summary["ranking"] == list(BOTH) and summary["reference"] == "momentum-qp"
     entry = summary["controllers"]["momentum-qp"]
-    assert {"trials", "errors", "root_force_max", "tick_us", "fingerprint", "j50_mean",
-            "j50_mean_ci95", "eta_mean", "eta_mean_ci95", "eta_min", "directions", "mix", "factors",
+    assert {"trials", "played", "errors", "root_force_max", "tick_us", "fingerprint", "j50_mean",
+            "j50_mean_ci95", "eta_mean", "eta_mean_ci95", "eta_min", "directions", "factors",
             "eurobench"} <= set(entry)  # fmt: skip
-    assert entry["trials"] == TRIALS and entry["errors"] == 0 and entry["tick_us"] == 12.5
+    assert entry["played"] == TRIALS and entry["errors"] == 0 and entry["tick_us"] == 12.5
+    assert summary["rated"] == "mix" and entry["trials"] == 2
     assert [d["trials"] for d in entry["directions"]] == [4, 4]
     for d in entry["directions"]:
         assert d["eta"] == pytest.approx(d["j50"] / d["ankle_limit"])
@@ -109,24 +103,27 @@ def test_the_summary_has_what_readers_rely_on(finished: Path) -> None:
         (standard,) = (level for level in factor["levels"] if level["standard"])
         assert standard["level"] == factor["standard"] and standard["lost"] == 0
     (pair,) = summary["pairs"]
-    mix = pair["mix"]
-    assert mix["both"] + mix["only_a"] + mix["only_b"] + mix["neither"] == 2
+    assert pair["both"] + pair["only_a"] + pair["only_b"] + pair["neither"] == 2
     # both met all but the second stage, which is each one's own
     assert sum(pair["all"][k] for k in ("both", "only_a", "only_b", "neither")) >= TRIALS - 4
 
 
 def test_the_table_of_trials_reads_back_exactly(finished: Path) -> None:
     """A row per controller and trial; cases and outcomes to the last bit when played again."""
-    data = load_benchmark_data(finished)
-    assert len(data.rows) == 2 * TRIALS
-    assert [row["controller"] for row in data.rows] == [n for n in BOTH for _ in range(TRIALS)]
-    for line in (row for row in data.rows[:TRIALS] if row["part"] in ("factors", "mix")):
-        case, result, player = replay_case(data, "momentum-qp", int(line["trial"]))
-        assert case == read_case(line) and player.env.steps > 0
-        texts = {k: "" if v is None else str(v) for k, v in asdict(result.outcome).items()}
-        assert texts == {key: line[key] for key in texts}
-    again = replay(finished, TRIALS - 1, "zero")
-    assert not again.differences and again.trial.number == TRIALS - 1
+    results = load_results(finished)
+    own = [(record.trial, record.controller) for record in results.records]
+    assert own == [(number, name) for number in range(TRIALS) for name in BOTH]
+    records = [r for r in results.of("momentum-qp") if r.part in ("factors", "mix")]
+    assert len(records) == 7
+    for record in records:
+        again = replay(results, record.trial, "momentum-qp")
+        assert again.trial == results.trial(record) and not again.differences
+        texts = {k: "" if v is None else str(v) for k, v in outcome_cells(again.outcome).items()}
+        assert texts == {key: record.line[key] for key in texts}
+    worlds = {results.trial(record).world for record in records}
+    assert {World(friction=0.4), World(delay=0.02), World(mass_error=0.1)} <= worlds
+    last = replay(finished, TRIALS - 1, "zero")
+    assert not last.differences and last.trial.number == TRIALS - 1
 
 
 def test_reading_names_what_is_wrong(finished: Path, tmp_path: Path) -> None:
@@ -139,24 +136,25 @@ def test_reading_names_what_is_wrong(finished: Path, tmp_path: Path) -> None:
     text = table.read_text()
     table.write_text(text[: len(text) // 2])
     with pytest.raises(ConfigError, match=r"trials.csv: line \d+ has another number.*: run the"):
-        load_benchmark_data(copy)
+        load_results(copy)
     table.write_text(text[: text.rindex("\n", 0, len(text) // 2) + 1])
-    with pytest.raises(ConfigError, match=r"trials.csv: has \d+ trials instead of 34: run the"):
-        load_benchmark_data(copy)
+    with pytest.raises(ConfigError, match=r"trials.csv: has \d+ trials of .*has 17: cut off"):
+        load_results(copy)
     table.write_text(text.replace("mass_error", "weight_error", 1))
-    with pytest.raises(ConfigError, match="trials.csv: has other columns"):
-        load_benchmark_data(copy)
+    with pytest.raises(ConfigError, match="trials.csv: lacks the columns mass_error"):
+        load_results(copy)
     table.unlink()
-    with pytest.raises(ConfigError, match="trials.csv: cannot be read"):
-        load_benchmark_data(copy)
+    with pytest.raises(ConfigError, match="trials.csv missing"):
+        load_results(copy)
+    table.write_text(text)
     (copy / "summary.json").write_text("{")
     with pytest.raises(ConfigError, match="summary.json: is not valid JSON"):
-        load_benchmark_data(copy)
-    data = load_benchmark_data(finished)
+        load_results(copy)
+    data = load_results(finished)
     with pytest.raises(ConfigError, match="numbered from 0 to 16"):
-        data.row("zero", 99)
+        data.record("zero", 99)
     with pytest.raises(ConfigError, match="'pd' took no part"):
-        replay_case(data, "pd", 0)
+        replay(data, 0, "pd")
 
 
 def test_a_finished_benchmark_is_not_played_again(
@@ -227,7 +225,7 @@ def test_a_controller_that_cannot_be_loaded_is_no_trial(
     with pytest.raises(KeyboardInterrupt):
         benchmark(["flaky.py:Flaky"], suite, out=out)
     before = (out / "trials.jsonl").read_bytes()
-    job = Job(Stage("humanoid", 1.6, StartNoise()), "gone.py:Gone", read_case(CASE_LINE))
+    job = Job(Stage("humanoid", 1.6, StartNoise()), "gone.py:Gone", Trial(0, 5))
     with poise.allowing("gone.py:Gone"):
         with pytest.raises(ConfigError, match="gone.py.*cannot be imported"):
             play(job)
@@ -242,7 +240,7 @@ def test_a_controller_that_cannot_be_loaded_is_no_trial(
     [
         ({"controllers": ["zero", "zero"]}, "'zero' is given twice"),
         ({"controllers": ["pid"]}, "no such controller: 'pid'"),
-        ({"suite": "tiny"}, "benchmarks: no such name: 'tiny'.*quick"),
+        ({"suite": "tiny"}, "suites: no such name: 'tiny'.*quick"),
         ({"seed": -1}, "seed: must be at least 0"),
         ({"workers": 0}, "workers: must be at least 1"),
         ({"trials": 0}, "trials: must be at least 1"),
@@ -290,9 +288,9 @@ def test_progress_and_ranking_are_printed(
     """The table has a row for each controller."""
     from rich.console import Console
 
-    from poise.training.benchmark.table import print_benchmark
+    from poise.training.evaluation.tables import print_summary
 
-    show: Callable[..., None] = print_benchmark
+    show: Callable[..., None] = print_summary
     show(json.loads((finished / "summary.json").read_text()), Console(width=140))
     text = capsys.readouterr().out
     assert "momentum-qp" in text and "η mean" in text and "small.yaml" in text

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.benchmark.run import benchmark
 from poise.training.cli.commands import main
+from poise.training.evaluation.evaluate import benchmark
 from poise.training.running import log as trial_log
 from tests.support.benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small
 
@@ -21,14 +21,14 @@ ROOT = Path(__file__).parents[3]
 BOTH = ("momentum-qp", "zero")
 KILLED = """
 import os, signal
-from poise.training.benchmark.folder import BenchmarkFolder
-from poise.training.benchmark.run import benchmark
-append = BenchmarkFolder.append
+from poise.training.evaluation.folder import ResultFolder
+from poise.training.evaluation.evaluate import benchmark
+append = ResultFolder.append
 def and_die(folder, *rest):
     append(folder, *rest)
     if len(folder.finished) == 5:
         os.kill(os.getpid(), signal.SIGKILL)
-BenchmarkFolder.append = and_die
+ResultFolder.append = and_die
 benchmark({both!r}, {suite!r}, out={out!r}, workers=2)
 """
 

@@ -1,4 +1,4 @@
-"""Who is evaluated: a controller by its name, ready to act in an environment of its own."""
+"""Agents are evaluated: a controller by its name, ready to act in its own environment."""
 
 import hashlib
 from collections.abc import Callable
@@ -25,7 +25,7 @@ SHIPPED, NO_CONTROL = "residual", "zero"
 
 
 @dataclass(frozen=True, eq=False)
-class Player:
+class Agent:
     """A name, an environment, and what to do in it.
 
     Attributes:
@@ -43,8 +43,8 @@ class Player:
     begin: Callable[[], Any] | None = None
 
 
-def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
-    """A player from the name of a controller.
+def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
+    """An agent from the name of a controller.
 
     Args:
         name: a packaged controller or a path to a ``.yaml`` of one (played with action zero),
@@ -77,16 +77,16 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
     return _idle(name, ResidualBalanceEnv(robot, controller=config, **overrides), to_yaml(config))
 
 
-def _idle(name: str, env: BalanceEnv, content: str) -> Player:
-    """A player whose action is always zero."""
+def _idle(name: str, env: BalanceEnv, content: str) -> Agent:
+    """An agent whose action is always zero."""
     action = np.zeros(len(env.action_names))
-    return Player(name, env, lambda observation: action, _hash(content.encode()))
+    return Agent(name, env, lambda observation: action, _hash(content.encode()))
 
 
-def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
+def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Agent:
     from poise.training.learning.checkpoints import controller_fingerprint
     from poise.training.learning.policy import (
-        load_policy,  # loads torch, which the other players do without
+        load_policy,  # loads torch, which the other agents do without
     )
 
     policy = load_policy(name, robot)
@@ -102,7 +102,7 @@ def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
     world = {k: v for k, v in to_dict(policy.config).items() if k not in TRAINING}
     below = controller_fingerprint(policy.config)
     content = _hash(to_yaml(world).encode(), below.encode(), *policy.content())
-    return Player(name, env, policy.act, content)
+    return Agent(name, env, policy.act, content)
 
 
 # fields of a training configuration that do not change how its policy plays
@@ -115,12 +115,12 @@ ENVIRONMENTS = {
 
 
 def _is_controller(name: str, robot: Robot) -> bool:
-    """Whether a class, or what a function makes, gives torques."""
+    """True if a class, or what a function makes, gives torques."""
     found = find_outside(name)
     return hasattr(found if isinstance(found, type) else make_outside(name, robot), "torques")
 
 
-def _outside_policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Player:
+def _outside_policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Agent:
     """A policy from outside: `act(observation)` in the environment that it names, or makes."""
     policy = make_outside(name, robot)
     if not hasattr(policy, "act"):
@@ -134,7 +134,7 @@ def _outside_policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Playe
                               field="environment", choices=ENVIRONMENTS)  # fmt: skip
         env = ENVIRONMENTS[kind](robot, **overrides)
     content = to_yaml(outside_config(name)).encode()
-    return Player(name, env, policy.act, _hash(content), getattr(policy, "reset", None))
+    return Agent(name, env, policy.act, _hash(content), getattr(policy, "reset", None))
 
 
 def _hash(*parts: bytes) -> str:

@@ -1,1 +1,0 @@
-"""The push-recovery benchmark: suites with factors, trials on many processes, figures, ranking."""

@@ -1,0 +1,68 @@
+"""summary.json, read back: anybody may have written it, so all of it is checked first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from poise.configs.errors import ConfigError, shown
+from poise.configs.reading import is_file, read_json
+from poise.configs.schema import checked
+from poise.training.running.summary import Rate, Summary, check_format
+
+#: keys of an entry that are there together or not at all
+ENTRY = (
+    ("directions", "j50_mean", "j50_mean_ci95", "j50_mean_per_mass", "j50_min", "j50_bounded",
+     "eta_mean", "eta_mean_ci95", "eta_min"),
+    ("sectors", "fraction_of", "fraction50"),
+)  # fmt: skip
+PAIR = (("both", "only_a", "only_b", "neither", "p_mcnemar"),)  # the same, of a pair
+
+
+def read_summary(path: str | Path) -> Summary:
+    """A summary.json; raises ConfigError, naming the file and the field, where it is not one."""
+    path = Path(path)
+    if not is_file(path):
+        raise ConfigError("cannot be read (no such file): not a finished result", source=path)
+    data = read_json(path)
+    check_format(data.get("format"), path)
+    summary = checked(Summary, data, path)
+    entries = summary["controllers"]
+    if not entries or sorted(summary["ranking"]) != sorted(entries):
+        raise ConfigError("must name all controllers", source=path, field="ranking")
+    named = [[summary["reference"]], *([pair["a"], pair["b"]] for pair in summary["pairs"]),
+             *(curves["controllers"] or [""] for curves in summary["step_limits"])]  # fmt: skip
+    for name in (name for names in named for name in names):
+        if name not in entries:
+            raise ConfigError(f"no such controller: {shown(name)}", source=path, choices=entries)
+    for name, entry in entries.items():
+        _check_rate(entry, path, f"controllers.{name}")
+        _check_together(entry, ENTRY, path, f"controllers.{name}")
+        for factor in entry.get("factors", ()):
+            for level in factor["levels"]:
+                _check_rate(level, path, f"controllers.{name}.factors")
+    for k, pair in enumerate(summary["pairs"]):
+        _check_together(pair, PAIR, path, f"pairs[{k}]")
+    for k, steps in enumerate(summary["step_limits"]):
+        curves = steps["curves"]
+        if len({len(curves[key]) for key in ("directions", "1", "2", "inf")}) != 1:
+            raise ConfigError("must have as many values as directions", source=path,
+                              field=f"step_limits[{k}].curves")  # fmt: skip
+    return summary
+
+
+def _check_together(
+    entry: Mapping[str, object], groups: tuple[tuple[str, ...], ...], path: Path, field: str
+) -> None:
+    for keys in groups:
+        lacking = [key for key in keys if key not in entry]
+        if 0 < len(lacking) < len(keys):
+            raise ConfigError("is missing", source=path, field=f"{field}.{lacking[0]}")
+
+
+def _check_rate(rate: Rate, path: Path, field: str) -> None:
+    if rate["trials"] < 1:
+        raise ConfigError("must be at least 1", source=path, field=f"{field}.trials")
+    if not 0 <= rate["recovered"] <= rate["trials"]:
+        raise ConfigError(f"must be a whole number from 0 to trials, not {rate['recovered']}",
+                          source=path, field=f"{field}.recovered")  # fmt: skip

@@ -1,0 +1,297 @@
+"""The form of summary.json: what is written and what is read.
+
+Impulses are N·s, lengths m, rates and gains shares; an `Interval` is [low, high] of 95 %. null is
+"no such value"; a key that a suite does not measure is left out.
+"""
+
+# without `from __future__ import annotations`: TypedDict must see which keys are required
+from pathlib import Path
+from typing import Literal, TypedDict
+
+from poise.configs.errors import ConfigError, shown
+from poise.training.statistics.seeds import SeedFigures
+
+from .provenance import Circumstances
+
+FORMAT = 2  # of a result's folder and of its summary
+Number = float | None
+Interval = tuple[Number, Number]
+Bound = Literal["lower", "upper"] | None  # where a fit is only a bound
+
+
+class Rate(TypedDict):
+    """The number of recovered trials, and their rate."""
+
+    trials: int
+    recovered: int
+    recovered_rate: float
+    recovered_ci95: Interval
+
+
+class Counts(Rate, total=False):
+    """Counts of how trials ended, and medians of what was recorded."""
+
+    fallen: int
+    never_fell_rate: float
+    never_fell_ci95: Interval
+    recovered_with_step: int
+    recovered_in_place: int
+    steps_mean: Number
+    steps_max: Number
+    solver_failures: int
+    recovery_time_median: Number
+    max_com_median: Number
+    max_capture_median: Number
+    min_cop_margin_median: Number
+    max_slide: Number
+    energy_median: Number
+    peak_torque_median: Number
+    mean_abs_action: Number
+    mean_abs_action_max: Number
+    com_drift_max: Number
+    root_force_max: Number
+
+
+class Angle(TypedDict):
+    """A direction [deg], counter-clockwise from forward."""
+
+    direction: float
+
+
+class Sector(Angle):
+    """Random pushes within 22.5° of a direction: the share of the limit at which half of them are
+    recovered."""
+
+    trials: int
+    recovered: int
+    fraction50: float
+    fraction50_ci95: Interval
+    fraction50_bound: Bound
+
+
+class DirectionJ50(Angle):
+    """J50 of a direction."""
+
+    trials: int
+    recovered: int
+    j50: float
+    j50_ci95: Interval
+    ankle_limit: float
+    eta: float
+
+
+class Direction(DirectionJ50, total=False):
+    """J50 and J90 of a direction, over the limits of ankles and of steps."""
+
+    j50_bound: Bound
+    j50_per_mass: float
+    j90: Number
+    j90_ci95: Interval
+    eta_ci95: Interval
+    eta90: Number
+    step_reach: float
+    step_length: float
+    step_time: float
+    step_limit_1: float
+    step_limit_2: float
+    step_limit_inf: float
+    step_share_1: float
+    step_share_2: float
+    step_share_inf: float
+
+
+class Envelope(TypedDict, total=False):
+    """J50 over the directions."""
+
+    j50_mean: float
+    j50_mean_ci95: Interval
+    j50_mean_per_mass: float
+    j50_min: float
+    j90_mean: Number
+    j50_bounded: int
+    eta_mean: float
+    eta_mean_ci95: Interval
+    eta_min: float
+    directions: list[Direction]
+    step_share_1_mean: float
+    step_share_2_mean: float
+    step_share_inf_mean: float
+
+
+class Level(Rate):
+    """A level of a factor; lost and won are against the standard case."""
+
+    level: str
+    standard: bool
+    lost: int
+    won: int
+    p_mcnemar: float
+
+
+class Factor(TypedDict):
+    """A factor that is varied alone; `standard` is its level in the standard case."""
+
+    factor: str
+    standard: str
+    levels: list[Level]
+
+
+class Margin(Angle, total=False):
+    """EUROBENCH's stability margin in a direction."""
+
+    impulse: Number
+    force: float
+    force_normalised: float
+    energy: float
+    energy_normalised: float
+    largest_tried: bool
+
+
+class Eurobench(TypedDict):
+    """EUROBENCH's indicators of simulated subjects."""
+
+    body_sway_mean: Number
+    recovery_time_mean: Number
+    recovery_time_trials: int
+    trials: int
+    margins: list[Margin]
+
+
+class Fractions(TypedDict, total=False):
+    """The share of the limit at which half of the random pushes are recovered."""
+
+    fraction_of: str
+    fraction50: float
+    fraction50_bound: Bound
+    sectors: list[Sector]
+
+
+class Played(Rate):
+    """The number of trials played, and of those in which the controller raised."""
+
+    played: int
+    errors: int
+
+
+class Entry(Played, Counts, Envelope, Fractions, total=False):
+    """A controller. The counts are of the part that is rated, else of all trials."""
+
+    tick_us: Number
+    fingerprint: str
+    factors: list[Factor]
+    eurobench: Eurobench
+
+
+class Paired(TypedDict, total=False):
+    """Trials that both met, alike in all."""
+
+    both: int
+    only_a: int
+    only_b: int
+    neither: int
+    p_mcnemar: float
+    rate_gain: float
+    rate_gain_ci95: Interval
+
+
+class DirectionGain(Angle):
+    """The gain in one direction."""
+
+    j50_gain: Number
+    j50_gain_ci95: Interval
+
+
+class Names(TypedDict):
+    """Two controllers."""
+
+    a: str
+    b: str
+
+
+class Pair(Names, Paired, total=False):
+    """b against a on the rated trials, and on all that both met."""
+
+    all: Paired | None
+    identical: bool
+    j50_gain: Number
+    j50_gain_ci95: Interval | None
+    directions: list[DirectionGain]
+
+
+class SeedNames(TypedDict):
+    """Runs of one configuration that differ in the seed alone."""
+
+    name: str
+    members: list[str]
+    seeds: list[int]
+
+
+class SeedGroup(SeedNames, total=False):
+    """Their figures."""
+
+    j50_mean: SeedFigures
+    eta: SeedFigures
+    recovered: SeedFigures
+
+
+Curves = TypedDict(
+    "Curves",
+    {"directions": list[float], "1": list[float], "2": list[float], "inf": list[float]},
+)
+
+
+class StepCurves(TypedDict):
+    """The impulses that 1, 2 and any number of steps can stop, of controllers with the same
+    limits of a step."""
+
+    controllers: list[str]
+    steps: dict[str, float]
+    curves: Curves
+
+
+class RobotFigures(TypedDict):
+    """The robot's figures; its ankle limit is [direction, N·s] of a 0.1 s push."""
+
+    name: str
+    mass: float
+    height_com: float
+    omega: float
+    human_com_height: float
+    ankle_limit: list[tuple[float, float]]
+
+
+class Summary(Circumstances):
+    """summary.json."""
+
+    format: int
+    suite: str
+    seed: int
+    robot: RobotFigures
+    rated: str | None
+    scale: str
+    reference: str
+    ranking: list[str]
+    controllers: dict[str, Entry]
+    pairs: list[Pair]
+    step_limits: list[StepCurves]
+    seeds: list[SeedGroup]
+
+
+def check_format(found: object, path: Path) -> None:
+    """Raise ConfigError for a file of another format than `FORMAT`."""
+    if found == FORMAT:
+        return
+    other = "an older Poise" if found in (None, 1) else f"format {shown(found)}"
+    raise ConfigError(
+        f"is of {other}, this one reads format {FORMAT}: play it again in another folder, "
+        "or with --overwrite",
+        source=path,
+        field="format",
+    )
+
+
+def both_ends(interval: Interval | None) -> tuple[float, float] | None:
+    """Both ends of an interval, or None where one is open."""
+    if interval is None or interval[0] is None or interval[1] is None:
+        return None
+    return interval[0], interval[1]

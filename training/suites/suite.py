@@ -1,0 +1,66 @@
+"""A suite: a list of parts, and what they share; `configs/suites/*.yaml` or a file like them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from poise.configs.files import resolve
+from poise.configs.schema import build, read_yaml
+
+from .directions import Envelope, Grid, Margin
+from .draw import Part, Standard
+from .factors import Factors, Mix
+from .random import Quiet, Random, Sequence
+
+
+@dataclass(frozen=True)
+class Suite(Standard):
+    """A part that is null is left out; the others are played in this order."""
+
+    envelope: Envelope | None = None
+    grid: Grid | None = None
+    margin: Margin | None = None
+    factors: Factors | None = None
+    mix: Mix | None = None
+    random: Random | None = None
+    sequence: Sequence | None = None
+    quiet: Quiet | None = None
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            raise ValueError(f"needs one part or more: {', '.join(PARTS)}")
+
+    @property
+    def parts(self) -> dict[str, Part]:
+        """The parts that it has, by name."""
+        found = {name: getattr(self, name) for name in PARTS}
+        return {name: part for name, part in found.items() if part is not None}
+
+    @property
+    def paired(self) -> bool:
+        """True if trials depend on who takes part."""
+        return self.envelope is not None and self.envelope.paired
+
+    def resized(self, trials: int) -> Suite:
+        """The suite with another number of trials in its only part; of several parts, with at most
+        as many in every cell: a direction and stage, a level, the mix."""
+        alone = len(self.parts) == 1
+        changed: dict[str, Any] = {
+            name: part.resized(trials) if alone else part.capped(trials)
+            for name, part in self.parts.items()
+        }
+        return replace(self, **changed)
+
+
+PARTS = tuple(f.name for f in fields(Suite) if f.name not in Standard.__dataclass_fields__)
+
+
+def load_suite(name: str | Path) -> Suite:
+    """A packaged suite (`configs/suites`) or a path to one.
+
+    Raises ConfigError naming the file, the field and the choices.
+    """
+    path = resolve("suites", name)
+    return build(Suite, read_yaml(path), str(path))

@@ -1,0 +1,74 @@
+"""Jobs tell a process what to play, and `play` plays it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from poise.envs.balance.config import StartNoise
+from poise.envs.robots.robot import Robot, load_robot
+
+from .agents import Agent, load_agent
+from .play import run_trial
+from .trial import Outcome, Trial, failed
+from .worlds import Worlds
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The robot, duration and noise that all trials of a suite share.
+
+    Attributes:
+        robot: name or path.
+        duration: of a trial [s].
+        noise: of the start.
+    """
+
+    robot: str | Path
+    duration: float
+    noise: StartNoise
+
+    def load(self, controller: str, robot: Robot | None = None) -> Agent:
+        """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
+        robot = robot or _robot(self.robot)
+        return load_agent(controller, robot, duration=self.duration, pushes=None, noise=self.noise)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One trial for one controller, by the name that `load_agent` takes."""
+
+    stage: Stage
+    controller: str
+    trial: Trial
+
+
+def play(job: Job) -> Outcome:
+    """Play a job; what the controller raises while it plays becomes the outcome's `error`.
+
+    Raises PoiseError when the controller cannot be loaded here: that is no trial.
+    """
+    worlds = _loaded(job.stage, job.controller)
+    try:
+        return run_trial(worlds.enter(job.trial.world), job.trial)
+    except MemoryError:  # of this process, not of the controller
+        raise
+    except Exception as error:  # a controller from outside may raise anything
+        del _worlds[job.stage, job.controller]  # it may be broken: the next trial gets a new one
+        return failed(error)
+
+
+@lru_cache(maxsize=1)
+def _robot(name: str | Path) -> Robot:
+    return load_robot(name)
+
+
+_worlds: dict[tuple[Stage, str], Worlds] = {}  # of this process
+
+
+def _loaded(stage: Stage, controller: str) -> Worlds:
+    key = (stage, controller)
+    if key not in _worlds:
+        _worlds[key] = Worlds(stage.load(controller))
+    return _worlds[key]

@@ -1,0 +1,124 @@
+"""Playing one trial: the outcome depends on the trial and the agent alone, bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from poise.envs.balance import episode
+from poise.envs.balance.base import BalanceEnv
+
+from .agents import Agent
+from .signals import Sway
+from .trial import Outcome, Trial
+
+FOOT_DISPLACED = 0.05  # [m]
+SETTLED = 1.0  # [s] after which actions and drift count
+AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
+Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
+
+
+def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome:
+    """Play a trial to its end in the environment that the agent has."""
+    env = agent.env
+    observation, _ = env.reset(seed=trial.seed, options=trial.options)
+    if agent.begin is not None:
+        agent.begin()
+    settled = Settled()
+    touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
+    sway = Sway() if trial.pushes else None
+    watches = [each for each in (sway, watch) if each is not None]
+    done = False
+    while not done:
+        for each in watches:
+            each(env)
+        action = agent.act(observation)
+        _, terminated, truncated = env.step_without_info(action)
+        observation = env.episode.observation.astype(np.float32)
+        done = terminated or truncated
+        touchdowns.update(env.simulation.state.contacts)
+        settled.update(env, action)
+    for each in watches:
+        each(env)
+    outcome = _outcome(env, trial, settled, touchdowns.count)
+    if sway is None or not outcome.recovered:
+        return outcome
+    body, recovery = sway.of(trial.pushes[0], env.config.policy_period)
+    return replace(outcome, sway=body, sway_recovery=recovery)
+
+
+def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -> Outcome:
+    """The outcome that the environment has recorded."""
+    m = env.episode.metrics
+    recovered = env.recovered and not env.fallen
+    pushed = max((push.start for push in trial.pushes), default=0.0)
+    return Outcome(
+        recovered=recovered,
+        fallen=env.fallen,
+        fall_time=env.simulation.time if env.fallen else None,
+        recovery_time=max(float(m[episode.LAST_MOVING]) - pushed, 0.0) if recovered else None,
+        foot_displaced=bool(m[episode.MAX_SLIDE] > FOOT_DISPLACED),
+        steps=touchdowns,
+        max_com=_finite(m[episode.MAX_COM]),
+        max_capture=_finite(m[episode.MAX_CAPTURE]),
+        min_cop_margin=_finite(m[episode.MIN_COP_MARGIN]),
+        max_slide=_finite(m[episode.MAX_SLIDE]),
+        energy=_finite(m[episode.ENERGY]),
+        peak_torque=_finite(m[episode.PEAK_TORQUE]),
+        saturation=float(m[episode.SATURATED] / max(m[episode.TICKS], 1.0)),
+        solver_failures=int(m[episode.FAILURES]),
+        mean_abs_action=settled.actions / settled.steps if settled.steps else None,
+        com_drift=_finite(settled.drift) if settled.steps and not trial.pushes else None,
+        final_speed=_finite(float(np.linalg.norm(env.simulation.state.com_vel))),
+        root_force=_finite(m[episode.ROOT_FORCE]),
+    )
+
+
+class Settled:
+    """Actions and the drift of the CoM after the first second.
+
+    Attributes:
+        steps: policy steps after it.
+        actions: sum of their mean |action|.
+        drift: largest horizontal distance of the CoM from where it was then [m].
+    """
+
+    def __init__(self) -> None:
+        self.actions, self.steps, self.drift = 0.0, 0, 0.0
+        self._start: np.ndarray | None = None
+
+    def update(self, env: BalanceEnv, action: np.ndarray) -> None:
+        """Call it after every step."""
+        com = env.simulation.state.com[:2]
+        if env.steps == round(SETTLED / env.config.policy_period):
+            self._start = com.copy()
+        elif self._start is not None:
+            self.actions += float(np.mean(np.abs(action)))
+            self.steps += 1
+            self.drift = max(self.drift, float(np.linalg.norm(com - self._start)))
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+class Touchdowns:
+    """Counts touchdowns of feet that were in the air for at least `AIR_TIME`.
+
+    Args:
+        feet: number of feet.
+        period: seconds between two calls of `update`.
+    """
+
+    def __init__(self, feet: int, period: float):
+        self.count = 0
+        self._least = max(round(AIR_TIME / period), 1)
+        self._air = np.zeros(feet, dtype=int)  # updates in a row without contact
+
+    def update(self, contacts: np.ndarray) -> None:
+        """(feet,) 1 where a foot touches the ground, else 0."""
+        down = contacts > 0.5
+        self.count += int(np.sum(down & (self._air >= self._least)))
+        self._air = np.where(down, 0, self._air + 1)

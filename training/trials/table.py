@@ -1,0 +1,100 @@
+"""Trials and outcomes as lines of trials.csv: what is written reads back exactly."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from poise.configs.errors import ConfigError
+from poise.configs.reading import parse_json
+from poise.configs.schema import build
+from poise.envs.pushes.push import Push
+
+from .trial import Outcome, Trial, World
+
+Cell = str | float | bool | None
+PUSH_COLUMNS = (
+    *("body", "start", "duration", "impulse", "direction", "elevation"),
+    *("point_x", "point_y", "point_z", "profile"),
+)
+WORLD_COLUMNS = tuple(World.__dataclass_fields__)
+CASE_COLUMNS = (
+    *("trial", "controller", "seed", "stage", "part", "factor", "level"),
+    *(*PUSH_COLUMNS, *WORLD_COLUMNS, "limit_fraction", "later"),
+)
+OUTCOME_COLUMNS = tuple(
+    "stepped" if name == "foot_displaced" else name for name in Outcome.__dataclass_fields__
+)
+COLUMNS = (*CASE_COLUMNS, *OUTCOME_COLUMNS)
+
+
+def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell]:
+    """The line of a trial and a controller; `later` has the pushes after the first, as JSON."""
+    later = [asdict(push) for push in trial.pushes[1:]]
+    return {
+        "trial": trial.number,
+        "controller": controller,
+        "seed": trial.seed,
+        "stage": trial.stage,
+        "part": trial.part,
+        "factor": trial.factor,
+        "level": trial.level,
+        **_push_cells(trial.push),
+        **asdict(trial.world),
+        "limit_fraction": trial.limit_fraction,
+        "later": json.dumps(later) if later else None,
+        **outcome_cells(outcome),
+    }
+
+
+def outcome_cells(outcome: Outcome) -> dict[str, Cell]:
+    """The columns of an outcome."""
+    return dict(zip(OUTCOME_COLUMNS, asdict(outcome).values(), strict=True))
+
+
+def _push_cells(push: Push | None) -> dict[str, Cell]:
+    if push is None:
+        return dict.fromkeys(PUSH_COLUMNS)
+    cells = asdict(push)
+    cells.update(zip(("point_x", "point_y", "point_z"), cells.pop("point"), strict=True))
+    return {name: cells[name] for name in PUSH_COLUMNS}
+
+
+def read_trial(line: Mapping[str, str], path: Path) -> Trial:
+    """The trial of a line that has all `COLUMNS`; raises ConfigError where it does not parse."""
+    try:
+        later = parse_json(line["later"]) if line["later"] else []
+        pushes = [_read_push(line)] if line["body"] else []
+        return Trial(
+            number=int(line["trial"]),
+            seed=int(line["seed"]),
+            pushes=tuple(build(Push, push, str(path)) for push in [*pushes, *later]),
+            world=World(
+                friction=_number(line["friction"]),
+                delay=float(line["delay"]),
+                mass_error=float(line["mass_error"]),
+            ),
+            limit_fraction=_number(line["limit_fraction"]),
+            part=line["part"],
+            stage=int(line["stage"]),
+            factor=line["factor"] or None,
+            level=line["level"] or None,
+        )
+    except (ValueError, TypeError) as error:
+        raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None
+
+
+def _read_push(line: Mapping[str, str]) -> dict[str, Any]:
+    texts = ("body", "profile")
+    data: dict[str, Any] = {
+        key: line[key] if key in texts else float(line[key]) for key in PUSH_COLUMNS
+    }
+    data["point"] = [data.pop(key) for key in ("point_x", "point_y", "point_z")]
+    return data
+
+
+def _number(text: str) -> float | None:
+    return float(text) if text else None
