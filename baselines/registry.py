@@ -46,6 +46,8 @@ KINDS: dict[str, tuple[type, type]] = {
     "simbicon": (SimbiconConfig, Simbicon),
     "policy-file": (PolicyFileConfig, PolicyFile),
 }
+#: folder of packaged policies of others, which are for one robot each
+RIVALS = "rivals"
 
 
 def controller_config(controller: str | Path | Mapping[str, Any]) -> Any:
@@ -106,6 +108,8 @@ def _described(controller: str | Path | Mapping[str, Any]) -> Any:
         return _build(dict(controller), "controller")
     if is_outside(controller):
         return OutsideConfig(str(controller))
+    if str(controller) in packaged(RIVALS):
+        return _build(read_yaml(resolve(RIVALS, controller)), str(resolve(RIVALS, controller)))
     if str(controller) not in packaged("controllers") and is_policy_place(controller):
         return policy_place_config(Path(controller))
     path = resolve("controllers", controller)

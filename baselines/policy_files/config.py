@@ -57,7 +57,9 @@ class PolicyFileConfig:
         policy_period: of the policy [s].
         hold: joints that the policy does not have are held in the standing posture, critically
             damped, with this natural frequency [rad/s].
-        digest: SHA-256 of the policy's files, so that results tell versions apart; it is filled in.
+        digest: SHA-256 of the policy's files, so that results tell versions apart; it is filled in,
+            as is
+        described_in: the file that says all this, for errors.
     """
 
     kind: Literal["policy-file"] = "policy-file"
@@ -79,3 +81,4 @@ class PolicyFileConfig:
     policy_period: float = field(default=0.02, metadata={"above": 0.0, "max": 1.0})
     hold: float = field(default=15.0, metadata={"min": 0.0, "max": 200.0})
     digest: str = ""
+    described_in: str = field(default="", compare=False)

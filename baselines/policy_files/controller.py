@@ -79,12 +79,12 @@ class PolicyFile(CompiledController):
         if abs(every * self.period - config.policy_period) > 1e-9:
             raise ConfigError(
                 f"{config.policy_period} s is no whole number of physics steps of {self.period} s",
-                source=config.policy,
+                source=config.described_in,
                 field="policy_period",
             )
         self.joints = joint_servos(robot, config)
         moved = len(self.joints.moved)
-        self.observer = Observer(config, len(self.joints.index), moved, config.policy)
+        self.observer = Observer(config, len(self.joints.index), moved, config.described_in)
         self.action = np.zeros(moved)
         self.network = load_network(Path(config.policy))
         self._check_sizes()
@@ -106,19 +106,19 @@ class PolicyFile(CompiledController):
     def _check_sizes(self) -> None:
         """Ask the network once, with zeros."""
         observation = np.zeros(self.observer.size, dtype=np.float32)
+        name, source = Path(self.config.policy).name, self.config.described_in
         try:
             action = self.network.act(observation)
         except Exception as error:  # of onnxruntime or torch
             raise ConfigError(
-                f"the policy does not take {len(observation)} numbers ({self.observer.parts}): "
-                f"{error}",
-                source=self.config.policy,
+                f"{name} does not take {len(observation)} numbers ({self.observer.parts}): {error}",
+                source=source,
                 field="observations",
             ) from None
         if len(action) != len(self.action):
             raise ConfigError(
-                f"the policy gives {len(action)} actions for {len(self.action)} joints",
-                source=self.config.policy,
+                f"{name} gives {len(action)} actions for {len(self.action)} joints",
+                source=source,
                 field="joints",
             )
         self.network.reset()
@@ -181,5 +181,6 @@ class PolicyFile(CompiledController):
         return Outputs(self._servos.tau, self._no_wrench, self._failures, False)
 
     def gains(self) -> Servos:
-        """See `CompiledController`."""
+        """See `CompiledController`; raises what went wrong in the step before."""
+        self.check()
         return self._servos

@@ -101,7 +101,7 @@ def _count(config: PolicyFileConfig) -> int:
 def _spread(values: PerJoint, names: list[str], field: str, config: PolicyFileConfig) -> np.ndarray:
     """A number for each name."""
     if isinstance(values, dict):
-        found = match_names(values, names, config.policy, field)
+        found = match_names(values, names, config.described_in, field)
         lost = [name for name in names if name not in found]
         if lost:
             raise _wrong(config, field, f"has nothing for {', '.join(lost)}")
@@ -115,4 +115,4 @@ def _spread(values: PerJoint, names: list[str], field: str, config: PolicyFileCo
 def _wrong(
     config: PolicyFileConfig, field: str, problem: str, choices: list[str] | None = None
 ) -> ConfigError:
-    return ConfigError(problem, source=config.policy, field=field, choices=choices)
+    return ConfigError(problem, source=config.described_in, field=field, choices=choices)

@@ -63,7 +63,8 @@ ALIASES = {
 class Observer:
     """The observation of a policy with `joints` joints and `actions` actions, step by step.
 
-    Raises ConfigError for an unknown term, and a scale of another size than its term.
+    Raises ConfigError for an unknown term, a scale of another size than its term, and frames of
+    terms with different histories.
     """
 
     def __init__(self, config: PolicyFileConfig, joints: int, actions: int, source: str):
@@ -77,6 +78,10 @@ class Observer:
                 raise ConfigError(f"no such term: {shown(described.term)}", source=source,
                                   field=f"observations[{i}].term",
                                   choices=(*TERMS, *ALIASES))  # fmt: skip
+            first = config.observations[0].history
+            if self._by_frame and described.history != first:
+                raise ConfigError(f"{described.history} steps, where the first term shows {first}",
+                                  source=source, field=f"observations[{i}].history")  # fmt: skip
             self._terms.append(_Term(described, name, sizes.get(name, 3), source, i))
 
     @property

@@ -59,7 +59,7 @@ def policy_file_config(data: dict[str, Any], source: Path) -> PolicyFileConfig:
     config = build(PolicyFileConfig, {**below, **data, "policy": str(path)}, source)
     if not config.observations:
         raise ConfigError("what the policy sees is not said", source=source, field="observations")
-    return replace(config, digest=digest(path, source))
+    return replace(config, digest=digest(path, source), described_in=str(source))
 
 
 def _network(name: str | None, folder: Path, source: Path) -> Path:

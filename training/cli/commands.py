@@ -401,6 +401,7 @@ def list_names() -> None:
         "robots",
         "controllers",
         "policies",
+        "rivals",
         "suites",
         "benchmarks",
         "training",

@@ -13,7 +13,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.plugins import find_outside, make_outside, outside_config
 from poise.baselines.policy_files.files import is_policy_place
-from poise.baselines.registry import controller_config
+from poise.baselines.registry import RIVALS, controller_config
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged
 from poise.configs.reading import is_file, is_folder
@@ -67,7 +67,7 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
         return _policy(name, robot, overrides)
     if is_outside(name) and not _is_controller(name, robot):
         return _outside_policy(name, robot, overrides)
-    names = packaged("controllers")
+    names = [*packaged("controllers"), *packaged(RIVALS)]
     found = is_file(name) and Path(name).suffix in (".yaml", ".yml")
     if name not in names and not (found or from_outside or is_outside(name)):
         raise ConfigError(
