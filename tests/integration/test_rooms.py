@@ -29,7 +29,7 @@ FLOORS = """
  6 envs/physics
  7 envs/sensors, envs/viewing, baselines/controller
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
- 9 envs/vector, baselines/in_place, baselines/stepping
+ 9 envs/vector, baselines/in_place, baselines/policy_files, baselines/stepping
 10 baselines/walking
 11 baselines/registry
 12 baselines/environments

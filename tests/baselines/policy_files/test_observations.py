@@ -42,7 +42,7 @@ def test_terms_mean_what_others_call_so() -> None:
     w, x, y, z = state.qpos[3:7]
     turn = Rotation.from_quat([x, y, z, w]).inv()
     expected = {
-        "base_lin_vel": turn.apply(state.qvel[:3]),
+        "base_lin_vel": turn.apply(np.array(state.qvel[:3])),
         "base_ang_vel": state.qvel[3:6],
         "projected_gravity": turn.apply([0.0, 0.0, -1.0]),
         "velocity_commands": [1.0, 2.0, 3.0],

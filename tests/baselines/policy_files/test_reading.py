@@ -1,7 +1,5 @@
 """Policies are read from the files of other projects as they are, and what is wrong is named."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any
