@@ -13,9 +13,7 @@ from poise.baselines.in_place.macchietto09 import Macchietto09, Macchietto09Conf
 from poise.baselines.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
-from poise.baselines.policy_files.deploy import is_deploy
-from poise.baselines.policy_files.files import is_policy_place
-from poise.baselines.policy_files.reading import policy_file_config, policy_place_config
+from poise.baselines.policy_files.reading import is_policy, policy_config, policy_file_config
 from poise.baselines.stepping.capture_step import CaptureStep, CaptureStepConfig
 from poise.baselines.stepping.ipm_step import IPMStep, IPMStepConfig
 from poise.baselines.walking.simbicon import Simbicon, SimbiconConfig
@@ -46,10 +44,6 @@ KINDS: dict[str, tuple[type, type]] = {
     "simbicon": (SimbiconConfig, Simbicon),
     "policy-file": (PolicyFileConfig, PolicyFile),
 }
-#: folder of packaged policies of others, which are for one robot each
-RIVALS = "rivals"
-
-
 def controller_config(controller: str | Path | Mapping[str, Any]) -> Any:
     """The configuration in a packaged file, a path or a mapping, of the class of its `kind`.
 
@@ -108,15 +102,10 @@ def _described(controller: str | Path | Mapping[str, Any]) -> Any:
         return _build(dict(controller), "controller")
     if is_outside(controller):
         return OutsideConfig(str(controller))
-    if str(controller) in packaged(RIVALS):
-        return _build(read_yaml(resolve(RIVALS, controller)), str(resolve(RIVALS, controller)))
-    if str(controller) not in packaged("controllers") and is_policy_place(controller):
-        return policy_place_config(Path(controller))
+    if controller not in packaged("controllers") and is_policy(controller):
+        return policy_config(controller)
     path = resolve("controllers", controller)
-    data = read_yaml(path)
-    if is_deploy(data):
-        return policy_file_config({"deploy": path.name}, path)
-    return _build(data, str(path))
+    return _build(read_yaml(path), str(path))
 
 
 def _build(data: dict[str, Any], source: str) -> Any:

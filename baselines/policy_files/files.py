@@ -17,13 +17,16 @@ NETWORKS = ("", "exported", "params")  # folders in which frameworks put them
 _LOCATION = re.compile(rb"\n\x08location\x12(.)", re.DOTALL)  # of tensors outside of an ONNX file
 
 
+def is_network(path: Path) -> bool:
+    """Whether it is an ONNX file."""
+    return path.suffix in ONNX and is_file(path)
+
+
 def is_policy_place(name: str | Path) -> bool:
-    """Whether it is an ONNX file, or a folder with one and what describes it."""
+    """Whether it is an ONNX file, or a folder with one or with what describes one."""
     path = Path(name)
-    if path.suffix in ONNX:
-        return is_file(path)
     if not is_folder(path):
-        return False
+        return is_network(path)
     return any(is_file(path / each) for each in DESCRIPTIONS) or bool(networks(path))
 
 

@@ -8,23 +8,46 @@ from typing import Any
 
 from poise.baselines.allowance import check_allowed, is_script
 from poise.configs.errors import ConfigError, shown
+from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder, read_yaml
 from poise.configs.schema import build
 
 from .config import PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
-from .files import description, digest, only_network
+from .files import description, digest, is_network, is_policy_place, only_network
 from .metadata import metadata_fields
 from .networks import onnx_session
 
 
-def policy_place_config(place: Path) -> PolicyFileConfig:
-    """The policy in an ONNX file, or in a folder (see `is_policy_place`).
+RIVALS = "rivals"  # folder of packaged policies of others, which are for one robot each
 
-    Raises ConfigError as `policy_file_config`.
+
+def is_policy(name: Any) -> bool:
+    """Whether it names a policy from outside.
+
+    That is a packaged one, an ONNX file, a folder with one or with what describes one, or a
+    ``deploy.yaml``.
     """
-    if not is_folder(place):
+    if not isinstance(name, (str, Path)):
+        return False
+    is_yaml = Path(name).suffix in (".yaml", ".yml") and is_file(name)
+    return name in packaged(RIVALS) or is_policy_place(name) or (
+        is_yaml and is_deploy(read_yaml(name))
+    )  # fmt: skip
+
+
+def policy_config(name: str | Path) -> PolicyFileConfig:
+    """The policy that a name stands for, see `is_policy`; raises as `policy_file_config`."""
+    place = resolve(RIVALS, name) if name in packaged(RIVALS) else Path(name)
+    if is_folder(place):
+        return _in_folder(place)
+    if is_network(place):
         return policy_file_config({"policy": place.name}, place)
+    data = read_yaml(place)
+    return policy_file_config({"deploy": place.name} if is_deploy(data) else data, place)
+
+
+def _in_folder(place: Path) -> PolicyFileConfig:
     described = description(place)
     if described is None:
         return policy_file_config({"policy": str(only_network(place, place).resolve())}, place)

@@ -12,8 +12,8 @@ from poise.baselines.allowance import is_outside
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.plugins import find_outside, make_outside, outside_config
-from poise.baselines.policy_files.files import is_policy_place
-from poise.baselines.registry import RIVALS, controller_config
+from poise.baselines.policy_files.reading import RIVALS, is_policy
+from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged
 from poise.configs.reading import is_file, is_folder
@@ -62,14 +62,14 @@ def load_player(name: str, robot: Robot, **overrides: Any) -> Player:
     if name == NO_CONTROL:
         return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
     policies = packaged("policies")
-    from_outside = is_policy_place(name)
-    if name in policies or (is_folder(name) and not from_outside):
+    theirs = is_policy(name)
+    if name in policies or (is_folder(name) and not theirs):
         return _policy(name, robot, overrides)
     if is_outside(name) and not _is_controller(name, robot):
         return _outside_policy(name, robot, overrides)
     names = [*packaged("controllers"), *packaged(RIVALS)]
     found = is_file(name) and Path(name).suffix in (".yaml", ".yml")
-    if name not in names and not (found or from_outside or is_outside(name)):
+    if name not in names and not (found or theirs or is_outside(name)):
         raise ConfigError(
             f"no such controller: {shown(name)}; give a name, a .yaml file of a controller, "
             "a folder written by poise train, an ONNX file or a folder with a deploy.yaml, or "
