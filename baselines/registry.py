@@ -44,6 +44,8 @@ KINDS: dict[str, tuple[type, type]] = {
     "simbicon": (SimbiconConfig, Simbicon),
     "policy-file": (PolicyFileConfig, PolicyFile),
 }
+
+
 def controller_config(controller: str | Path | Mapping[str, Any]) -> Any:
     """The configuration in a packaged file, a path or a mapping, of the class of its `kind`.
 

@@ -1,4 +1,4 @@
-"""What a learned policy from outside is, as data: its network, its joints, what it sees and does."""
+"""What a learned policy from outside is, as data: its network, joints, what it sees and does."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class PolicyFileConfig:
     The action is computed every `policy_period`, τ in every physics step.
 
     Attributes:
-        policy: an ONNX file, or TorchScript (``.pt``), which is code and has to be allowed; relative
-            to the YAML file. Empty: the one beside it.
+        policy: an ONNX file, or TorchScript (``.pt``), which is code and has to be allowed;
+            relative to the YAML file. Empty: the one beside it.
         deploy: a configuration of unitree_rl_mjlab, unitree_rl_lab or unitree_rl_gym that says what
             is not said here; relative to the YAML file.
         joints: names in the policy's order; empty: `motors` tells.

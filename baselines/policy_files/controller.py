@@ -1,4 +1,4 @@
-"""A learned policy as a controller: its actions are targets of joints, reached for by PD control."""
+"""A learned policy as a controller: its actions are joint targets that PD control reaches for."""
 
 from __future__ import annotations
 

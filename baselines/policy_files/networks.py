@@ -120,7 +120,7 @@ def _module(content: bytes, path: Path) -> Callable[..., Any]:
     import torch
 
     try:
-        return torch.jit.load(io.BytesIO(content), map_location="cpu").eval()
+        return torch.jit.load(io.BytesIO(content), map_location="cpu").train(False)
     except Exception as error:
         raise ConfigError(f"is no TorchScript ({error})", source=path) from None
 

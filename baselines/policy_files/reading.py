@@ -18,7 +18,6 @@ from .files import description, digest, is_network, is_policy_place, only_networ
 from .metadata import metadata_fields
 from .networks import onnx_session
 
-
 RIVALS = "rivals"  # folder of packaged policies of others, which are for one robot each
 
 

@@ -1,4 +1,4 @@
-"""Where this machine has the models of MuJoCo Menagerie: public robots, of which Poise ships none."""
+"""Where this machine has the models of MuJoCo Menagerie: public robots. Poise ships none."""
 
 from __future__ import annotations
 

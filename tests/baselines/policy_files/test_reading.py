@@ -191,7 +191,7 @@ BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
     "two networks": (two_networks, ("policy: several networks", "choices: a.onnx, b.onnx")),
     "no network": (lambda f: write_yaml(f / "deploy.yaml", **lab_deploy(N)).parent,
                    ("deploy.yaml: policy: no network", ".onnx")),
-    "no such network": (lambda f: bare(f, policy="lost.onnx"), ("policy: no such file", "lost.onnx")),
+    "no such network": (lambda f: bare(f, policy="lost.onnx"), ("policy: no such file", "lost")),
     "policy no text": (lambda f: bare(f, policy=3), ("own.yaml: policy: must be a path",)),
     "nothing seen": (bare, ("own.yaml: observations: what the policy sees is not said",)),
     "no such deploy": (lambda f: bare(f, deploy="lost.yaml"), ("lost.yaml: cannot be read",)),
