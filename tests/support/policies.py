@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
+import pytest
 import yaml
-from onnx import TensorProto, helper, numpy_helper
+
+onnx = pytest.importorskip("onnx", reason="writes ONNX files: pip install onnx")
+pytest.importorskip("onnxruntime", reason="plays ONNX files: pip install 'poise[onnx]'")
+helper, numpy_helper = onnx.helper, onnx.numpy_helper
 
 
 def linear(inputs: int, outputs: int, size: float = 0.1, seed: int = 0) -> np.ndarray:
@@ -47,7 +50,10 @@ def _write(
     outside: bool = False,
 ) -> Path:
     ends = [
-        [helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, size]) for name, size in side]
+        [
+            helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, [1, size])
+            for name, size in side
+        ]
         for side in (inputs, outputs)
     ]
     tensors = [numpy_helper.from_array(value, name) for name, value in weights.items()]

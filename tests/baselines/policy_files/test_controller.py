@@ -9,7 +9,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import onnxruntime
 import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
@@ -72,7 +71,9 @@ def own(robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def actions_apart(robot: Robot, qpos: np.ndarray, qvel: np.ndarray, fields: dict[str, Any],
                   network: Path, hold: float = 15.0) -> np.ndarray:  # fmt: skip
     """(STEPS, na) what the policy does in a plain MuJoCo loop, written from the papers' side."""
-    session = onnxruntime.InferenceSession(str(network), providers=["CPUExecutionProvider"])
+    session = pytest.importorskip("onnxruntime").InferenceSession(
+        str(network), providers=["CPUExecutionProvider"]
+    )
     model, data = robot.model, mujoco.MjData(robot.model)
     places = [model.joint(name).qposadr[0] for name in fields["joints"]]
     dofs = [model.joint(name).dofadr[0] for name in fields["joints"]]
@@ -312,7 +313,9 @@ def test_the_packaged_rival_acts_as_in_a_loop_of_its_own(g1: Robot) -> None:
     env.reset(seed=1, options=SHAKY)
     data = mujoco.MjData(g1.model)
     data.qpos[:], data.qvel[:] = env.simulation.data.qpos, env.simulation.data.qvel
-    session = onnxruntime.InferenceSession(config.policy, providers=["CPUExecutionProvider"])
+    session = pytest.importorskip("onnxruntime").InferenceSession(
+        config.policy, providers=["CPUExecutionProvider"]
+    )
     kp, kd, target = (np.array(getattr(config, k)) for k in ("stiffness", "damping", "default"))
     default, action, apart = target.copy(), np.zeros(29), []
     for _ in range(STEPS):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import ConfigError
@@ -15,7 +16,6 @@ from poise.envs.robots import menagerie
 from poise.envs.robots.description import RobotDescription, match_names
 from poise.envs.robots.menagerie import VARIABLES, WHEEL, find_model
 from poise.envs.robots.robot import load_robot
-from tests.support.policies import write_yaml
 from tests.support.small_biped import write_biped
 
 #: name → mass [kg] and number of joints, by the makers' model
@@ -98,7 +98,8 @@ def test_a_description_of_ones_own_may_use_it(
     written = write_biped(nothing / "checkout/own_robot")
     fields = read_yaml(written)
     fields["source"] = {"menagerie": f"own_robot/{fields['source']['mjcf']}"}
-    own = write_yaml(nothing / "own.yaml", **fields)
+    own = nothing / "own.yaml"
+    own.write_text(yaml.safe_dump(fields))
     monkeypatch.setenv(VARIABLES[0], str(nothing / "checkout"))
     assert load_robot(own).fingerprint == load_robot(written).fingerprint
 
