@@ -10,8 +10,15 @@ import pytest
 import yaml
 
 onnx = pytest.importorskip("onnx", reason="writes ONNX files: pip install onnx")
-pytest.importorskip("onnxruntime", reason="plays ONNX files: pip install 'poise[onnx]'")
+onnxruntime = pytest.importorskip(
+    "onnxruntime", reason="plays ONNX files: pip install 'poise[onnx]'"
+)
 helper, numpy_helper = onnx.helper, onnx.numpy_helper
+
+
+def onnx_session(path: str | Path) -> Any:
+    """onnxruntime's own session of a file."""
+    return onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
 
 
 def linear(inputs: int, outputs: int, size: float = 0.1, seed: int = 0) -> np.ndarray:

@@ -18,7 +18,7 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.robots.menagerie import WHEEL
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.batch import EnvBatch, replicate
-from tests.support.policies import linear, write_onnx, write_yaml
+from tests.support.policies import linear, onnx_session, write_onnx, write_yaml
 from tests.support.shared import robot as shared_robot
 
 STEPS, SUBSTEPS = 200, 10
@@ -71,9 +71,7 @@ def own(robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def actions_apart(robot: Robot, qpos: np.ndarray, qvel: np.ndarray, fields: dict[str, Any],
                   network: Path, hold: float = 15.0) -> np.ndarray:  # fmt: skip
     """(STEPS, na) what the policy does in a plain MuJoCo loop, written from the papers' side."""
-    session = pytest.importorskip("onnxruntime").InferenceSession(
-        str(network), providers=["CPUExecutionProvider"]
-    )
+    session = onnx_session(network)
     model, data = robot.model, mujoco.MjData(robot.model)
     places = [model.joint(name).qposadr[0] for name in fields["joints"]]
     dofs = [model.joint(name).dofadr[0] for name in fields["joints"]]
@@ -313,9 +311,7 @@ def test_the_packaged_rival_acts_as_in_a_loop_of_its_own(g1: Robot) -> None:
     env.reset(seed=1, options=SHAKY)
     data = mujoco.MjData(g1.model)
     data.qpos[:], data.qvel[:] = env.simulation.data.qpos, env.simulation.data.qvel
-    session = pytest.importorskip("onnxruntime").InferenceSession(
-        config.policy, providers=["CPUExecutionProvider"]
-    )
+    session = onnx_session(config.policy)
     kp, kd, target = (np.array(getattr(config, k)) for k in ("stiffness", "damping", "default"))
     default, action, apart = target.copy(), np.zeros(29), []
     for _ in range(STEPS):
