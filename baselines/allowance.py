@@ -28,6 +28,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.schema import read_yaml
 
 NAME = re.compile(r"(?P<place>[^:\s]+):(?P<name>[A-Za-z_]\w*)")
+SCRIPTS = (".pt", ".pth", ".jit", ".ts")  # of files of TorchScript, which is code
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -49,8 +50,16 @@ def is_outside(name: Any) -> bool:
     return isinstance(name, str) and name.isprintable() and NAME.fullmatch(name) is not None
 
 
+def is_script(name: str | Path) -> bool:
+    """Whether a file of this name is TorchScript."""
+    return Path(name).suffix in SCRIPTS and str(name).isprintable()
+
+
 def check_allowed(name: str) -> None:
-    """Raise ConfigError, which says how to allow it, unless the user has named ``module:Class``."""
+    """Raise ConfigError, which says how to allow it, unless the user has named it.
+
+    That is ``module:Class``, or a file of TorchScript.
+    """
     allowance = _current.get()
     if _key(name) not in allowance.names:
         raise ConfigError(
@@ -65,7 +74,8 @@ def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) 
     """Inside, these classes may run, besides those that already may; a context.
 
     Args:
-        names: ``module:Class`` or ``file.py:Class``; a file is the same by any path to it.
+        names: ``module:Class``, ``file.py:Class``, or a file of TorchScript; a file is the same by
+            any path to it.
         source: the file that is read inside, which errors then name.
 
     Raises:
@@ -73,7 +83,7 @@ def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) 
     """
     names = [names] if isinstance(names, str) else list(names)
     for name in names:
-        if not is_outside(name):
+        if not is_outside(name) and not is_script(name):
             raise ConfigError(f"{name!r} is not of the form module:Class", field="allow")
     with _opened(frozenset(map(_key, names)), None if source is None else str(source)):
         yield
@@ -153,5 +163,7 @@ def _file(path: Path) -> Mapping[str, Any] | None:
 
 def _key(name: str) -> str:
     """What a name stands for: a file by its whole path, links followed."""
+    if is_script(name):
+        return str(Path(name).resolve())
     place, _, attribute = name.rpartition(":")
     return f"{Path(place).resolve()}:{attribute}" if place.endswith(".py") else name

@@ -156,6 +156,9 @@ class BaseController(Copyable):
     def reset(self, state: RobotState) -> None:
         """Forget everything; a new trial starts at `state`. By default there is nothing."""
 
+    def check(self) -> None:
+        """Raise what went wrong inside compiled ticks, which cannot. By default nothing does."""
+
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] to hold for one `period`."""
         raise NotImplementedError
@@ -233,6 +236,10 @@ class WrappedController(BaseController):
     def reset(self, state: RobotState) -> None:
         """Forget everything; a new trial starts at `state`."""
         self.inner.reset(state)
+
+    def check(self) -> None:
+        """See `BaseController`."""
+        self._told.check()
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] to hold for one `period`."""

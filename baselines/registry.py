@@ -11,6 +11,9 @@ from poise.baselines.in_place.lip_mpc import LIPMPC, LIPMPCConfig
 from poise.baselines.in_place.lqr_lip import LQRLIP, LQRLIPConfig
 from poise.baselines.in_place.macchietto09 import Macchietto09, Macchietto09Config
 from poise.baselines.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
+from poise.baselines.policy_files.config import PolicyFileConfig
+from poise.baselines.policy_files.controller import PolicyFile
+from poise.baselines.policy_files.reading import is_policy, policy_config, policy_file_config
 from poise.baselines.stepping.capture_step import CaptureStep, CaptureStepConfig
 from poise.baselines.stepping.ipm_step import IPMStep, IPMStepConfig
 from poise.baselines.walking.simbicon import Simbicon, SimbiconConfig
@@ -39,13 +42,15 @@ KINDS: dict[str, tuple[type, type]] = {
     "capture-step": (CaptureStepConfig, CaptureStep),
     "ipm-step": (IPMStepConfig, IPMStep),
     "simbicon": (SimbiconConfig, Simbicon),
+    "policy-file": (PolicyFileConfig, PolicyFile),
 }
 
 
 def controller_config(controller: str | Path | Mapping[str, Any]) -> Any:
     """The configuration in a packaged file, a path or a mapping, of the class of its `kind`.
 
-    ``module:Class`` is one from outside.
+    ``module:Class`` is one from outside. An ONNX file, and a folder with one or with a
+    ``deploy.yaml``, is a learned policy, see `PolicyFileConfig`.
 
     Raises ConfigError naming the file, the field and the choices; and for one from outside that the
     user has not allowed, see `allowing`.
@@ -99,6 +104,8 @@ def _described(controller: str | Path | Mapping[str, Any]) -> Any:
         return _build(dict(controller), "controller")
     if is_outside(controller):
         return OutsideConfig(str(controller))
+    if controller not in packaged("controllers") and is_policy(controller):
+        return policy_config(controller)
     path = resolve("controllers", controller)
     return _build(read_yaml(path), str(path))
 
@@ -115,6 +122,8 @@ def _build(data: dict[str, Any], source: str) -> Any:
         raise ConfigError(
             f"no such kind of controller: {shown(kind)}", source=source, field="kind", choices=KINDS
         )
+    if kind == "policy-file":
+        return policy_file_config(data, Path(source))
     if isinstance(data.get("qp"), str):
         inner = resolve("controllers", data["qp"])
         data = {**data, "qp": read_yaml(inner)}

@@ -292,6 +292,7 @@ class ResidualBalanceEnv(BalanceEnv):
         step = self.compiled_step()
         if step is not None:
             step.play()
+            self._told.check()
         else:
             self._advance_in_python()
 

@@ -13,19 +13,23 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True)
 class SourceDescription:
-    """Where the model comes from: one of the two.
+    """Where the model comes from: one of the first three.
 
     Attributes:
         builder: a model that Poise builds itself.
         mjcf: path of an MJCF file, relative to the YAML file.
+        menagerie: folder and file of a model of MuJoCo Menagerie, see `find_model`.
+        licence: of the model's files, for whoever reads the description.
     """
 
     builder: Literal["humanoid"] | None = None
     mjcf: str | None = None
+    menagerie: str | None = None
+    licence: str = ""
 
     def __post_init__(self) -> None:
-        if (self.builder is None) == (self.mjcf is None):
-            raise ValueError("give exactly one of builder and mjcf")
+        if sum(given is not None for given in (self.builder, self.mjcf, self.menagerie)) != 1:
+            raise ValueError("give exactly one of builder, mjcf and menagerie")
 
 
 @dataclass(frozen=True)

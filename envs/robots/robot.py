@@ -25,6 +25,7 @@ from .ground import (
     set_options,
 )
 from .humanoid import humanoid_spec
+from .menagerie import model_file
 from .mjcf import read_mjcf
 from .model_check import check_numbers, check_standing
 from .soles import Sole, build_sole, find_sole_plane, sole_geoms
@@ -190,7 +191,7 @@ def _prepare(
         spec = BUILDERS[description.source.builder]()
     else:
         feet = tuple(foot.body for foot in description.feet)
-        spec = read_mjcf(path.parent / str(description.source.mjcf), feet, source)
+        spec = read_mjcf(model_file(description.source, path), feet, source)
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i}"
     ground = install_ground(spec, description.ground, source)

@@ -50,6 +50,7 @@ LOADERS: dict[str, Callable[[Any], Any]] = {
     "robots": load_robot,
     "envs": env_config,
     "controllers": controller_config,
+    "rivals": controller_config,
     "motions": lambda path: load_motion(path, robot()),
     "suites": load_suite,
     "training": train_config,

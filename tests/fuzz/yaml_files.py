@@ -42,6 +42,7 @@ def _tuning(path: Path) -> None:
 LOADERS: dict[str, Callable[[Path], Any]] = {
     "robots": load_robot,
     "controllers": lambda path: load_controller(path, robot()),
+    "rivals": lambda path: load_controller(path, robot()),
     "policies": lambda path: train_config(path).make_env(robot()),
     "training": lambda path: train_config(path).make_env(robot()),
     "suites": _suite,

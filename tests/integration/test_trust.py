@@ -527,6 +527,9 @@ DANGEROUS = {
     "exec_module": {"baselines/plugins.py"},
     "find_outside": {"baselines/plugins.py", "training/trials/agents.py"},
     "OutsideConfig": {"baselines/plugins.py", "baselines/registry.py"},
+    # TorchScript, of a file that `policy_file_config` has asked about
+    "torch.jit.load": {"baselines/policy_files/networks.py"},
+    "load_network": {"baselines/policy_files/controller.py"},
     # MuJoCo's data within a copy; what the main process and its workers say to each other
     "pickle.loads": {"envs/compiled/copies.py", "training/running/processes.py"},
     **{name: set() for name in ("exec", "eval", "__import__", "run_path", "Unpickler")},

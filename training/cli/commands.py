@@ -418,6 +418,7 @@ def list_names() -> None:
         "robots",
         "controllers",
         "policies",
+        "rivals",
         "suites",
         "training",
         "motions",

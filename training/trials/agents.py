@@ -12,6 +12,7 @@ from poise.baselines.allowance import is_outside
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.plugins import find_outside, make_outside, outside_config
+from poise.baselines.policy_files.reading import RIVALS, is_policy
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged
@@ -49,7 +50,8 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
     Args:
         name: a packaged controller or a path to a ``.yaml`` of one (played with action zero),
             a packaged policy (``residual``), ``zero`` (no torque at all), a folder written by
-            ``poise train``, or ``module:Class`` or ``file.py:Class`` of a controller or a policy.
+            ``poise train``, a policy from outside (an ONNX file, or a folder with a
+            ``deploy.yaml``), or ``module:Class`` or ``file.py:Class`` of a controller or a policy.
         robot: who is controlled. A policy must have been trained on it.
         overrides: arguments of the environment, or fields of its `EnvConfig`.
 
@@ -60,16 +62,18 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
     if name == NO_CONTROL:
         return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
     policies = packaged("policies")
-    if name in policies or is_folder(name):
+    theirs = is_policy(name)
+    if name in policies or (is_folder(name) and not theirs):
         return _policy(name, robot, overrides)
     if is_outside(name) and not _is_controller(name, robot):
         return _outside_policy(name, robot, overrides)
-    names = packaged("controllers")
+    names = [*packaged("controllers"), *packaged(RIVALS)]
     found = is_file(name) and Path(name).suffix in (".yaml", ".yml")
-    if name not in names and not found and not is_outside(name):
+    if name not in names and not (found or theirs or is_outside(name)):
         raise ConfigError(
             f"no such controller: {shown(name)}; give a name, a .yaml file of a controller, "
-            "a folder written by poise train, or module:Class",
+            "a folder written by poise train, an ONNX file or a folder with a deploy.yaml, or "
+            "module:Class",
             field="controller",
             choices=(*names, *policies, NO_CONTROL),
         )

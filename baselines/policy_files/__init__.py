@@ -1,0 +1,1 @@
+"""Learned policies from outside: read from their files, and played as controllers."""

@@ -1,0 +1,80 @@
+"""The files of a policy: which they are, and what tells one version from another."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+from poise.baselines.allowance import SCRIPTS, is_script
+from poise.configs.errors import ConfigError
+from poise.configs.reading import MIB, is_file, is_folder, read_bytes
+
+BYTES = 64 * MIB  # of each file
+ONNX = (".onnx",)
+DESCRIPTIONS = ("policy.yaml", "deploy.yaml", "params/deploy.yaml")
+NETWORKS = ("", "exported", "params")  # folders in which frameworks put them
+_LOCATION = re.compile(rb"\n\x08location\x12(.)", re.DOTALL)  # of tensors outside of an ONNX file
+
+
+def is_network(path: Path) -> bool:
+    """Whether it is an ONNX file."""
+    return path.suffix in ONNX and is_file(path)
+
+
+def is_policy_place(name: str | Path) -> bool:
+    """Whether it is an ONNX file, or a folder with one or with what describes one."""
+    path = Path(name)
+    if not is_folder(path):
+        return is_network(path)
+    return any(is_file(path / each) for each in DESCRIPTIONS) or bool(networks(path))
+
+
+def description(folder: Path) -> Path | None:
+    """The YAML file that describes the policy in a folder."""
+    return next((folder / each for each in DESCRIPTIONS if is_file(folder / each)), None)
+
+
+def networks(folder: Path) -> list[Path]:
+    """The ONNX files of a policy's folder; TorchScript where there is none."""
+    files = [path for place in NETWORKS for path in sorted((folder / place).glob("*"))]
+    onnx = [path for path in files if path.suffix in ONNX]
+    return onnx or [path for path in files if is_script(path)]
+
+
+def only_network(folder: Path, source: str | Path) -> Path:
+    """The one network in a folder; raises ConfigError where there is none, or several."""
+    found = networks(folder)
+    if len(found) == 1:
+        return found[0]
+    named = [path for path in found if path.stem == "policy"]
+    if len(named) == 1:
+        return named[0]
+    what = "several networks" if found else f"no network ({', '.join(ONNX + SCRIPTS)})"
+    raise ConfigError(f"{what} in {folder}: say which", source=source, field="policy",
+                      choices=[path.name for path in found] or None)  # fmt: skip
+
+
+def digest(path: Path, source: str | Path) -> str:
+    """SHA-256 (hexadecimal) of a network and of the files that its tensors are in.
+
+    Raises ConfigError where one of them is missing, or lies elsewhere than beside it.
+    """
+    content = read_bytes(path, BYTES)
+    found = hashlib.sha256(content)
+    for name in _outside(content) if path.suffix in ONNX else ():
+        if Path(name).name != name:
+            raise ConfigError(f"{path.name} has data in {name!r}, not beside it", source=source,
+                              field="policy")  # fmt: skip
+        if not is_file(path.with_name(name)):
+            raise ConfigError(f"{path.name} needs the file {name!r} beside it, which is missing",
+                              source=source, field="policy")  # fmt: skip
+        found.update(read_bytes(path.with_name(name), BYTES))
+    return found.hexdigest()
+
+
+def _outside(content: bytes) -> list[str]:
+    """Names of the files that an ONNX file says its tensors are in."""
+    places = (match.end() for match in _LOCATION.finditer(content))
+    names = {content[at : at + content[at - 1]].decode(errors="replace") for at in places}
+    return sorted(names)

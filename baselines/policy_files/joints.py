@@ -1,0 +1,118 @@
+"""Which joints of a robot are a policy's, and how they and the others are controlled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.configs.errors import ConfigError
+from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.description import match_names
+from poise.envs.robots.robot import Robot
+
+from .config import PerJoint, PolicyFileConfig
+
+
+@dataclass(frozen=True, eq=False)
+class JointServos:
+    """PD control of all joints of a robot (nj), of which n are the policy's and it moves na."""
+
+    index: np.ndarray  # (n,) int: the robot's joint of each of the policy's
+    moved: np.ndarray  # (na,) int: the robot's joint that each action moves
+    default: np.ndarray  # (n,) [rad]
+    offset: np.ndarray  # (na,) target of action zero [rad]
+    scale: np.ndarray  # (na,) [rad]
+    clip: np.ndarray  # (na, 2)
+    stiffness: np.ndarray  # (nj,) [N·m/rad]
+    damping: np.ndarray  # (nj,) [N·m·s/rad]
+    target: np.ndarray  # (nj,) before the first action [rad]
+
+    def targets(self, action: np.ndarray) -> np.ndarray:
+        """(na,) targets [rad] of an action."""
+        return self.offset + self.scale * np.clip(action, self.clip[:, 0], self.clip[:, 1])
+
+
+def joint_servos(robot: Robot, config: PolicyFileConfig) -> JointServos:
+    """The joints of `config` on `robot`. Others hold the standing posture.
+
+    These are held with K = ω² M_jj and D = 2 ω M_jj, M the inertia of the standing robot and ω
+    `hold`.
+
+    Raises ConfigError for joints that the robot lacks, and lists of other sizes.
+    """
+    index = _index(robot, config)
+    n, names = len(index), [robot.joint_names[i] for i in index]
+    places = config.action_joints or tuple(range(n))
+    if max(places, default=0) >= n or len(set(places)) < len(places):
+        raise _wrong(config, "action_joints", f"must be different places in {n} joints")
+    default = _spread(config.default, names, "default", config)
+    offset = default
+    if config.action_offset is not None:
+        moved_names = [names[i] for i in places]
+        offset_moved = _spread(config.action_offset, moved_names, "action_offset", config)
+    else:
+        offset_moved = offset[list(places)]
+    na = len(places)
+    bounds = np.tile([-np.inf, np.inf], (na, 1))
+    if config.action_clip:
+        if len(config.action_clip) != na:
+            raise _wrong(config, "action_clip", f"has {len(config.action_clip)} pairs for {na}")
+        bounds = np.array(config.action_clip)
+    simulation = Simulation(robot)
+    inertia = np.diag(simulation.state.M)[6:]
+    stiffness, damping = config.hold**2 * inertia, 2.0 * config.hold * inertia
+    stiffness[index] = _spread(config.stiffness, names, "stiffness", config)
+    damping[index] = _spread(config.damping, names, "damping", config)
+    target = robot.standing_qpos[7:].copy()
+    target[index] = default
+    target[index[list(places)]] = offset_moved
+    return JointServos(
+        index, index[list(places)], default, offset_moved,
+        _spread(config.action_scale, names[:na], "action_scale", config), bounds, stiffness,
+        damping, target,
+    )  # fmt: skip
+
+
+def _index(robot: Robot, config: PolicyFileConfig) -> np.ndarray:
+    """(n,) the robot's joint of each of the policy's."""
+    names = list(robot.joint_names)
+    if config.joints:
+        lost = [name for name in config.joints if name not in names]
+        if lost:
+            raise _wrong(config, "joints", f"{robot.name!r} lacks {', '.join(lost)}", names)
+        found = [names.index(name) for name in config.joints]
+    else:
+        found = list(config.motors or range(_count(config)))
+        if max(found, default=0) >= len(names):
+            raise _wrong(config, "motors", f"number {max(found)} of the policy's is beyond the "
+                         f"{len(names)} joints of {robot.name!r}")  # fmt: skip
+    if len(set(found)) < len(found) or not found:
+        raise _wrong(config, "joints", "must be different, at least one")
+    return np.array(found, dtype=np.int64)
+
+
+def _count(config: PolicyFileConfig) -> int:
+    """Joints of a policy that names none."""
+    lists = (config.default, config.stiffness, config.damping, config.action_scale)
+    return max(len(values) for values in (*lists, ()) if isinstance(values, tuple))
+
+
+def _spread(values: PerJoint, names: list[str], field: str, config: PolicyFileConfig) -> np.ndarray:
+    """A number for each name."""
+    if isinstance(values, dict):
+        found = match_names(values, names, config.described_in, field)
+        lost = [name for name in names if name not in found]
+        if lost:
+            raise _wrong(config, field, f"has nothing for {', '.join(lost)}")
+        return np.array([found[name] for name in names], dtype=float)
+    array = np.atleast_1d(np.asarray(values, dtype=float))
+    if len(array) not in (1, len(names)) or (isinstance(values, tuple) and len(array) == 0):
+        raise _wrong(config, field, f"has {len(array)} numbers for {len(names)} joints")
+    return np.broadcast_to(array, len(names)).copy()
+
+
+def _wrong(
+    config: PolicyFileConfig, field: str, problem: str, choices: list[str] | None = None
+) -> ConfigError:
+    return ConfigError(problem, source=config.described_in, field=field, choices=choices)

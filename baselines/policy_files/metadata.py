@@ -1,0 +1,66 @@
+"""What mjlab writes into the ONNX files that it exports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from poise.configs.errors import ConfigError
+
+#: terms that mjlab's tasks call by the name of another one: there they are relative
+RELATIVE = {"joint_pos": "joint_pos_rel", "joint_vel": "joint_vel"}
+NUMBERS = {"joint_stiffness": "stiffness", "joint_damping": "damping",
+           "default_joint_pos": "default"}  # fmt: skip
+
+
+def metadata_fields(metadata: dict[str, str], source: Path) -> dict[str, Any]:
+    """Fields of a `PolicyFileConfig` from the metadata of an ONNX file; none where it has none.
+
+    Raises ConfigError for numbers that are none, and lists of different lengths.
+    """
+    fields: dict[str, Any] = {}
+    if "joint_names" in metadata:
+        fields["joints"] = tuple(metadata["joint_names"].split(","))
+    for key, name in NUMBERS.items():
+        if key in metadata:
+            fields[name] = _numbers(metadata[key], ",", key, source)
+    if "action_scale" in metadata:
+        scale = _numbers(metadata["action_scale"], ",", "action_scale", source)
+        fields["action_scale"] = scale[0] if len(scale) == 1 else scale
+    if "observation_names" in metadata:
+        fields["observations"] = _terms(metadata, source)
+    return fields
+
+
+def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, Any]]:
+    names = metadata["observation_names"].split(",")
+    terms: list[dict[str, Any]] = [{"term": RELATIVE.get(name, name)} for name in names]
+    for key, name in (("scale", "scale"), ("history_length", "history"), ("clip", "clip")):
+        whole = f"observation_terms_{key}"
+        if whole not in metadata:
+            continue
+        entries = metadata[whole].split(",")
+        if len(entries) != len(names):
+            raise ConfigError(f"has {len(entries)} entries for {len(names)} observations",
+                              source=source, field=whole)  # fmt: skip
+        for term, entry in zip(terms, entries, strict=True):
+            term |= _term_field(name, _numbers(entry, ";", whole, source))
+    return terms
+
+
+def _term_field(name: str, values: tuple[float, ...]) -> dict[str, Any]:
+    """What a term's entry says; bounds that bound nothing say nothing."""
+    if name == "history":
+        return {name: max(1, round(values[0]))}
+    if name == "clip":
+        low, high = values[0], values[-1]
+        return {name: (low, high)} if -float("inf") < low and high < float("inf") else {}
+    return {name: values[0] if len(values) == 1 else values}
+
+
+def _numbers(text: str, between: str, field: str, source: Path) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(between))
+    except ValueError:
+        raise ConfigError(f"must be numbers, not {text[:60]!r}", source=source,
+                          field=field) from None  # fmt: skip

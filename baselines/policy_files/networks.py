@@ -1,0 +1,131 @@
+"""The network of a policy: numbers in, numbers out, with whatever it remembers in between."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from poise.baselines.allowance import is_script
+from poise.configs.errors import ConfigError
+from poise.configs.reading import read_bytes
+
+from .files import BYTES
+
+HOW = "needs the package onnxruntime: pip install 'poise[onnx]'"
+
+
+class Network(Protocol):
+    """What plays a policy."""
+
+    def reset(self) -> None:
+        """Forget the trial before."""
+
+    def act(self, observation: np.ndarray) -> np.ndarray:
+        """(na,) float64 of an observation (n,) float32; raises whatever its library raises."""
+
+
+def load_network(path: Path) -> Network:
+    """The network in an ONNX or a TorchScript file. TorchScript runs: ask `check_allowed` before.
+
+    Raises ConfigError naming the file: onnxruntime is missing, it cannot be read, or it has inputs
+    besides the observation that are no memory (``NAME_in`` with an output ``NAME_out``).
+    """
+    return ScriptNetwork(read_bytes(path, BYTES), path) if is_script(path) else OnnxNetwork(path)
+
+
+def onnx_session(path: Path) -> Any:
+    """onnxruntime's session of a file, on one thread: results do not depend on the machine's."""
+    try:
+        import onnxruntime
+    except ImportError:
+        raise ConfigError(HOW, source=path) from None
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 3
+    try:
+        return onnxruntime.InferenceSession(str(path), options, ["CPUExecutionProvider"])
+    except Exception as error:  # its classes are not public
+        raise ConfigError(f"cannot be read by onnxruntime ({error})", source=path) from None
+
+
+class OnnxNetwork:
+    """A network in ONNX, played by onnxruntime; a recurrent one starts from zeros."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self._session = onnx_session(path)
+        inputs = {each.name: each.shape for each in self._session.get_inputs()}
+        outputs = [each.name for each in self._session.get_outputs()]
+        self._memory = {name: _zeros(shape) for name, shape in inputs.items()
+                        if _after(name) in outputs}  # fmt: skip
+        others = [name for name in inputs if name not in self._memory]
+        if len(others) != 1:
+            raise ConfigError(f"must have one input, the observation, not {', '.join(inputs)}",
+                              source=path)  # fmt: skip
+        self._input = others[0]
+        self._outputs = [outputs[0], *map(_after, self._memory)]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return OnnxNetwork, (self.path,), {"_memory": self._memory}
+
+    def reset(self) -> None:
+        self._memory = {name: np.zeros_like(value) for name, value in self._memory.items()}
+
+    def act(self, observation: np.ndarray) -> np.ndarray:
+        given = {self._input: observation[None], **self._memory}
+        action, *memory = self._session.run(self._outputs, given)
+        self._memory = dict(zip(self._memory, memory, strict=True))
+        return np.asarray(action, dtype=float).ravel()
+
+
+def _after(name: str) -> str:
+    """The output that an input of this name is taken from in the next step."""
+    return name.removesuffix("_in") + "_out" if name.endswith("_in") else ""
+
+
+def _zeros(shape: list[Any]) -> np.ndarray:
+    return np.zeros([size if isinstance(size, int) else 1 for size in shape], dtype=np.float32)
+
+
+class ScriptNetwork:
+    """A network in TorchScript; one that remembers is loaded anew for every trial."""
+
+    def __init__(self, content: bytes, path: Path):
+        self.content, self.path = content, path
+        self.reset()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        import torch
+
+        buffer = io.BytesIO()
+        torch.jit.save(self._module, buffer)
+        return _with_module, (self.content, self.path, buffer.getvalue())
+
+    def reset(self) -> None:
+        self._module = _module(self.content, self.path)
+
+    def act(self, observation: np.ndarray) -> np.ndarray:
+        import torch
+
+        with torch.inference_mode():
+            action = self._module(torch.from_numpy(observation)[None])
+        return action.double().numpy().ravel()
+
+
+def _module(content: bytes, path: Path) -> Callable[..., Any]:
+    import torch
+
+    try:
+        return torch.jit.load(io.BytesIO(content), map_location="cpu").train(False)
+    except Exception as error:
+        raise ConfigError(f"is no TorchScript ({error})", source=path) from None
+
+
+def _with_module(content: bytes, path: Path, module: bytes) -> ScriptNetwork:
+    network = ScriptNetwork(content, path)
+    network._module = _module(module, path)
+    return network

