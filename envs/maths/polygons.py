@@ -33,7 +33,7 @@ def convex_hull(points: np.ndarray, n: int, line: float, out: np.ndarray) -> int
 
 
 @compiled
-def _turns_left(chain, size, line, x, y):
+def _turns_left(chain: np.ndarray, size: int, line: float, x: float, y: float) -> bool:
     """Whether the last corner of a chain lies to the right of the way to (x, y)."""
     ax, ay = chain[size - 2, 0], chain[size - 2, 1]
     bx, by = chain[size - 1, 0] - ax, chain[size - 1, 1] - ay
@@ -42,7 +42,7 @@ def _turns_left(chain, size, line, x, y):
 
 
 @compiled
-def find_nearest(polygon: np.ndarray, point: np.ndarray, out: np.ndarray):
+def find_nearest(polygon: np.ndarray, point: np.ndarray, out: np.ndarray) -> None:
     """The point of a convex counter-clockwise `polygon` (k, 2) nearest to `point` into `out`."""
     x, y = point[0], point[1]
     out[0], out[1] = x, y

@@ -6,14 +6,14 @@ from poise.envs.compiled.jit import compiled
 
 
 @compiled
-def copy(source, out):
+def copy(source: np.ndarray, out: np.ndarray) -> None:
     """`out[:] = source` of two vectors; NumPy's form compiles checks and their messages too."""
     for i in range(out.shape[0]):
         out[i] = source[i]
 
 
 @compiled
-def cross(a, b, out):
+def cross(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
     """out = a × b for arrays of three."""
     x = a[1] * b[2] - a[2] * b[1]
     y = a[2] * b[0] - a[0] * b[2]
@@ -40,7 +40,25 @@ def placed(ox: float, oy: float, cos: float, sin: float, x: float, y: float) -> 
 
 
 @compiled
-def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray):
+def rotated(
+    x: float, y: float, z: float, cos: float, sin: float, u: np.ndarray
+) -> tuple[float, float, float]:
+    """The vector `u` (3,) turned about the unit axis n = (x, y, z), by Rodrigues' formula:
+
+    u cos θ + (n × u) sin θ + n (n · u) (1 − cos θ)
+
+    An axis of zeros turns nothing, if cos θ = 1.
+    """
+    dot = (x * u[0] + y * u[1] + z * u[2]) * (1.0 - cos)
+    return (
+        cos * u[0] + sin * (y * u[2] - z * u[1]) + dot * x,
+        cos * u[1] + sin * (z * u[0] - x * u[2]) + dot * y,
+        cos * u[2] + sin * (x * u[1] - y * u[0]) + dot * z,
+    )
+
+
+@compiled
+def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> None:
     """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn from
     one to the other."""
     for a in range(3):
