@@ -11,8 +11,9 @@ from poise.baselines.in_place.lip_mpc import LIPMPC, LIPMPCConfig
 from poise.baselines.in_place.lqr_lip import LQRLIP, LQRLIPConfig
 from poise.baselines.in_place.macchietto09 import Macchietto09, Macchietto09Config
 from poise.baselines.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
-from poise.baselines.stepping.capture_step import CaptureStep, CaptureStepConfig
-from poise.baselines.stepping.ipm_step import IPMStep, IPMStepConfig
+from poise.baselines.stepping.capture_step import CaptureStep
+from poise.baselines.stepping.config import CaptureStepConfig, IPMStepConfig
+from poise.baselines.stepping.ipm_step import IPMStep
 from poise.baselines.walking.simbicon import Simbicon, SimbiconConfig
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.configs.errors import ConfigError, shown

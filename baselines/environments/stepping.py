@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.controller import told_by
+from poise.baselines.motions.offsets import STEPS
+from poise.baselines.stepping.blocks import StepMemory, SwingArrays
 from poise.baselines.stepping.controller import SteppingController
-from poise.baselines.stepping.swing import SwingArrays, time_left
-from poise.baselines.stepping.tick import StepMemory
+from poise.baselines.stepping.swing import time_left
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
 from poise.envs.balance.observation import Term
@@ -32,7 +33,7 @@ class StepSight(Block):
     """What a policy sees of the steps."""
 
     state: StateArrays
-    told: np.ndarray  # (7,) `Stepping.told`
+    told: np.ndarray  # (7,) `Stepping.entries`
     height: float  # h [m]
     omega: float  # [1/s]
     observation: np.ndarray  # (≥ 15,) of which the last are filled
@@ -80,13 +81,8 @@ class StepScales(ResidualScales):
 
     def entries(self) -> dict[str, float]:
         """Scale of each target that can be moved: those of the base class first."""
-        return {
-            **super().entries(),
-            "foothold_x": self.foothold,
-            "foothold_y": self.foothold,
-            "time": self.time,
-            "trigger": self.trigger,
-        }
+        scales = self.foothold, self.foothold, self.time, self.trigger
+        return {**super().entries(), **dict(zip(STEPS, scales, strict=True))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +181,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
         ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
         self.stepper = stepper  #: the controller that steps, of which `controller` may be a wrapper
-        self._offsets = stepper.shift.values  # one array is both
+        self._offsets = stepper.offsets.values  # one array is both
         self._residual = replace(self._residual, offsets=self._offsets)
 
     def _observation_terms(self, soles: list[str]) -> list[Term]:
@@ -205,7 +201,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
 
     def _observe(self) -> None:
         super()._observe()
-        told, sight = np.array(self.stepper.stepping().told()), self.scales
+        told, sight = np.array(self.stepper.stepping().entries()), self.scales
         observe_step(
             StepSight(
                 self.simulation.state_arrays, told, sight.height, sight.omega,

@@ -8,7 +8,7 @@ import numpy as np
 
 from poise.baselines.controller import BaseController, Targets
 from poise.baselines.in_place.pd import PDGains, joint_gains, motor_torques
-from poise.baselines.stepping.reach import Reach, sides
+from poise.baselines.stepping.cop_region import CopRegion, foot_signs
 from poise.configs.errors import ConfigError
 from poise.envs.maths.vectors import turn
 from poise.envs.physics.arrays import robot_arrays
@@ -93,8 +93,8 @@ class Simbicon(BaseController):
         self.period = self.config.period
         self.arrays = robot_arrays(robot)
         self.rate, self.moment = robot.omega, robot.units.moment
-        self.ankles = Reach(robot).middle
-        self.sides = sides(robot)
+        self.ankles = CopRegion(robot).middle
+        self.foot_sign = foot_signs(robot)
         self.legs = [_leg(robot, i) for i in range(2)]
         self.stiffness, self.damping = joint_gains(self.arrays, self.config.joints)
         self.reset()
@@ -159,7 +159,7 @@ class Simbicon(BaseController):
         d = (state.com[:2] - self._ankle(state, stance)[:2]) @ R / h
         v = state.com_vel[:2] @ R / (h * self.rate)
         forward = pose.swing_hip + c.sagittal.c_d * d[0] + c.sagittal.c_v * v[0]
-        left = self.sides[self.foot] * c.width + c.frontal.c_d * d[1] + c.frontal.c_v * v[1]
+        left = self.foot_sign[self.foot] * c.width + c.frontal.c_d * d[1] + c.frontal.c_v * v[1]
         return np.array([forward, left])
 
     def _hips(self, state: RobotState, pose: Pose, heading: np.ndarray, tau: np.ndarray) -> None:
