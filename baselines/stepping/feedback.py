@@ -21,6 +21,7 @@ import numpy as np
 
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
+from poise.envs.maths.vectors import along
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
@@ -93,15 +94,14 @@ def evaluate_feedback(
     for a in range(3):
         up_x += s.root_axes[0, a] * f.upright[a]
         up_y += s.root_axes[1, a] * f.upright[a]
-    x, y = s.capture_point[0] - stance[0], s.capture_point[1] - stance[1]
-    turn_x, turn_y = s.momentum[LY], -s.momentum[LX]  # where it turns the body to
+    x, y = along(cos, sin, s.capture_point[0] - stance[0], s.capture_point[1] - stance[1])
+    lean_x, lean_y = along(cos, sin, up_x, up_y)
+    turn_x, turn_y = along(cos, sin, s.momentum[LY], -s.momentum[LX])  # where it turns the body to
     signals[CONSTANT] = 1.0
-    signals[CAPTURE_AHEAD] = (cos * x + sin * y) / f.height
-    signals[CAPTURE_OUTWARD] = side * (cos * y - sin * x) / f.height
-    signals[LEAN_AHEAD] = cos * up_x + sin * up_y
-    signals[LEAN_OUTWARD] = side * (cos * up_y - sin * up_x)
-    signals[MOMENTUM_AHEAD] = f.momentum_unit * (cos * turn_x + sin * turn_y)
-    signals[MOMENTUM_OUTWARD] = f.momentum_unit * side * (cos * turn_y - sin * turn_x)
+    signals[CAPTURE_AHEAD], signals[CAPTURE_OUTWARD] = x / f.height, side * y / f.height
+    signals[LEAN_AHEAD], signals[LEAN_OUTWARD] = lean_x, side * lean_y
+    signals[MOMENTUM_AHEAD] = f.momentum_unit * turn_x
+    signals[MOMENTUM_OUTWARD] = f.momentum_unit * side * turn_y
     for i in range(f.gains.shape[0]):
         total = 0.0
         for k in range(signals.shape[0]):

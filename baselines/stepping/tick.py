@@ -119,18 +119,25 @@ def limit_load(t: CaptureTick, most: float) -> None:
 
 
 @compiled
+def replan_swing(t: CaptureTick) -> None:
+    """Plan the rest of the running step anew, and lead its foot there."""
+    m, w, q, r = t.memory, t.swing, t.search, t.recentring
+    q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
+    if r.stage[0] != SWINGING or not replan_recentring(q, r, w):
+        r.stage[0] = INACTIVE
+        replan_step(q, m.foot[0], w)
+    aim_swing(w, q.best[BEST_X], q.best[BEST_Y], w.time[0] + q.best[BEST_TIME])
+    w.time_offset[0] = q.best[BEST_OFFSET]
+
+
+@compiled
 def swing_tick(t: CaptureTick) -> None:
     """A tick in a step: first the foot gives its load away, then it swings."""
     s, m, g, w, q = t.state, t.memory, t.gains, t.swing, t.search
     foot, level = m.foot[0], m.level_frame
     stance = s.sole_point[1 - foot]
     if time_left(w) > FROZEN:
-        q.heading[0], q.heading[1] = level[0, 0], level[1, 0]
-        if t.recentring.stage[0] != SWINGING or not replan_recentring(q, t.recentring, w):
-            t.recentring.stage[0] = INACTIVE
-            replan_step(q, foot, w)
-        aim_swing(w, q.best[BEST_X], q.best[BEST_Y], w.time[0] + q.best[BEST_TIME])
-        w.time_offset[0] = q.best[BEST_OFFSET]
+        replan_swing(t)
     n = single_support_region(q.region, 1 - foot, stance, level[0, 0], level[1, 0], t.corners)
     stride_x, stride_y = w.foothold[0] - stance[0], w.foothold[1] - stance[1]
     guide_com(t, t.corners[:n], 0.0, stance[2], stride_x, stride_y)
@@ -168,6 +175,17 @@ def double_support_tick(t: CaptureTick) -> None:
 
 
 @compiled
+def standing_tick(t: CaptureTick) -> None:
+    """A tick before the first step: the QP with the feet in place, or a request to Python."""
+    if t.standing_kernel == 0:
+        t.to_python[0] = 1
+        return
+    call(t.standing_kernel, t.standing)
+    copy(t.standing.problem.workspace.tau, t.tau)
+    t.failures[0] = t.standing.memory.failures[0]
+
+
+@compiled
 def capture_tick(t: CaptureTick) -> None:
     """One tick of `CaptureStep`: `tau` holds torques, unless `to_python` says that Python must."""
     m = t.memory
@@ -176,12 +194,7 @@ def capture_tick(t: CaptureTick) -> None:
         if must_step(t):
             begin_step(t, False)
         elif m.steps[0] == 0:
-            if t.standing_kernel == 0:
-                t.to_python[0] = 1
-                return
-            call(t.standing_kernel, t.standing)
-            copy(t.standing.problem.workspace.tau, t.tau)
-            t.failures[0] = t.standing.memory.failures[0]
+            standing_tick(t)
             return
         elif recentring_step_due(t):
             begin_step(t, True)
