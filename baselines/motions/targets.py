@@ -7,7 +7,7 @@ import numpy as np
 from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy
+from poise.envs.maths.vectors import copy, rotated
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -83,7 +83,9 @@ def update_targets(
 
 
 @compiled
-def _root_reference(robot, cos, sin, samples, t):
+def _root_reference(
+    robot: RobotArrays, cos: float, sin: float, samples: np.ndarray, t: TargetArrays
+) -> None:
     """Root axes, and angular velocity and acceleration in body axes, from φ, φ̇, φ̈."""
     phi = samples[0]
     angle = np.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
@@ -91,13 +93,8 @@ def _root_reference(robot, cos, sin, samples, t):
     if angle > 1e-12:
         x, y, z = phi[0] / angle, phi[1] / angle, phi[2] / angle
     c, s = np.cos(angle), np.sin(angle)
-    v = 1.0 - c
-    for a in range(3):  # Rodrigues' formula on each standing axis, then the heading's yaw
-        u0, u1, u2 = robot.root_standing[0, a], robot.root_standing[1, a], robot.root_standing[2, a]
-        dot = (x * u0 + y * u1 + z * u2) * v
-        w0 = c * u0 + s * (y * u2 - z * u1) + dot * x
-        w1 = c * u1 + s * (z * u0 - x * u2) + dot * y
-        w2 = c * u2 + s * (x * u1 - y * u0) + dot * z
+    for a in range(3):  # each standing axis, then the heading's yaw
+        w0, w1, w2 = rotated(x, y, z, c, s, robot.root_standing[:, a])
         t.root_axes[0, a] = cos * w0 - sin * w1
         t.root_axes[1, a] = sin * w0 + cos * w1
         t.root_axes[2, a] = w2

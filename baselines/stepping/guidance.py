@@ -5,7 +5,7 @@ import numpy as np
 from poise.baselines.motions.offsets import COM_X, COM_Y, COM_Z, COP_X, COP_Y, LEAN_X, LEAN_Y
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.polygons import find_nearest
-from poise.envs.maths.vectors import copy, rotation_error
+from poise.envs.maths.vectors import copy, rotation_error, turned
 
 from .blocks import CaptureTick
 from .feedback import HEIGHT
@@ -25,7 +25,9 @@ def copy_reference(t: CaptureTick) -> None:
     cos, sin = np.cos(angle), np.sin(angle)
     if angle > 0.0:
         x, y = x / angle, y / angle
-    for a in range(3):  # each standing axis leans, then is turned to the heading
+    # Each standing axis leans, as by `rotated` about an axis in the plane, then is turned to the
+    # heading. The order of the operations decides about last bits, and with them about trials.
+    for a in range(3):
         for b in range(3):
             standing[b] = t.robot.root_standing[b, a]
         along = (1.0 - cos) * (x * standing[0] + y * standing[1])
@@ -59,8 +61,9 @@ def guide_com(
         rest_y += region[i, 1] / n
     if t.recentring.stage[0] == SHIFTING:
         rest_x, rest_y = t.recentring.capture_target[0], t.recentring.capture_target[1]
-    rest_x += cos * offsets[COM_X] - sin * offsets[COM_Y]
-    rest_y += sin * offsets[COM_X] + cos * offsets[COM_Y]
+    x, y = turned(cos, sin, offsets[COM_X], offsets[COM_Y])
+    rest_x += x
+    rest_y += y
     desired = t.vector
     desired[0] = s.capture_point[0] + g.gain * (s.capture_point[0] - rest_x)
     desired[1] = s.capture_point[1] + g.gain * (s.capture_point[1] - rest_y)

@@ -10,7 +10,7 @@ from poise.baselines.controller import BaseController, Targets
 from poise.baselines.in_place.pd import PDGains, joint_gains, motor_torques
 from poise.baselines.stepping.cop_region import CopRegion, foot_signs
 from poise.configs.errors import ConfigError
-from poise.envs.maths.vectors import turn
+from poise.envs.maths.vectors import rotation_between, turn
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -130,7 +130,7 @@ class Simbicon(BaseController):
         error = targets.q_ref[ankle] - state.q[ankle]
         tau[ankle] = self._pd(c.stance_ankle, error, state.qvel[6 + ankle])
         axes = state.J[6 * self.foot + 3 : 6 * self.foot + 6, 6:]
-        tilt = _rotation(heading, state.sole_axes[self.foot])
+        tilt = rotation_between(heading, state.sole_axes[self.foot])
         spin = state.J_v[6 * self.foot + 3 : 6 * self.foot + 6]
         tau[swing.ankle] = axes[:, swing.ankle].T @ self._pd(c.swing_ankle, -tilt, spin)
         self._hips(state, pose, heading, tau)
@@ -167,7 +167,7 @@ class Simbicon(BaseController):
         c, swing, stance = self.config, self.legs[self.foot], self.legs[1 - self.foot]
         axes = state.J[6 * self.foot + 3 : 6 * self.foot + 6, 6:]
         R = state.root_axes
-        trunk = _rotation(heading @ self.arrays.root_standing, R)  # from standing
+        trunk = rotation_between(heading @ self.arrays.root_standing, R)  # from standing
         spin = R @ state.qvel[3:6]
         upper = axes[:, swing.upper]
         thigh = trunk + upper @ (state.q - self.arrays.q_standing)[swing.upper]
@@ -236,8 +236,3 @@ def _leg(robot: Robot, sole: int) -> _Leg:
         ankle=own[depth >= 0.75] - 1,
         bend=np.sign(shortens),
     )
-
-
-def _rotation(reference: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """(3,) small rotation, world axes, that leads from `reference` (3, 3) to `axes`."""
-    return 0.5 * np.cross(reference, axes, axis=0).sum(axis=1)

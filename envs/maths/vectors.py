@@ -59,8 +59,13 @@ def rotated(
 
 @compiled
 def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> None:
-    """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn from
-    one to the other."""
+    """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn that
+    leads from `axes` to `wanted`.
+
+    The sine needs no division and is smooth everywhere. It equals the angle to first order, and
+    falls again beyond 90°. So it serves where frames stay near each other, as soles and trunks that
+    are kept level do. `rotation_vector` has the angle, for what may be turned far.
+    """
     for a in range(3):
         i, j = (a + 1) % 3, (a + 2) % 3
         total = 0.0
@@ -69,10 +74,16 @@ def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> Non
         out[a] = 0.5 * total
 
 
+def rotation_between(axes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """(3,) `rotation_error` of two frames (3, 3): sine times axis of the turn between them."""
+    out = np.empty(3)
+    rotation_error(np.array(axes), np.array(wanted), out)
+    return out
+
+
 def rotation_vector(R: np.ndarray) -> np.ndarray:
     """(3,) angle times axis of a rotation: φ with R = exp(skew(φ)), |φ| < π [rad]."""
-    sine_axis = np.empty(3)
-    rotation_error(np.eye(3), np.array(R), sine_axis)
+    sine_axis = rotation_between(np.eye(3), R)
     sine = float(np.linalg.norm(sine_axis))
     angle = np.arctan2(sine, 0.5 * (np.trace(R) - 1.0))
     return sine_axis if sine < 1e-9 else sine_axis * (angle / sine)
