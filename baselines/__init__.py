@@ -39,7 +39,8 @@ if TYPE_CHECKING:
     from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
     from poise.baselines.motions.motion import ReferenceMotion, load_motion
     from poise.baselines.registry import load_controller
-    from poise.baselines.stepping.capture_step import CaptureStep, CaptureStepConfig
+    from poise.baselines.stepping.capture_step import CaptureStep
+    from poise.baselines.stepping.config import CaptureStepConfig
     from poise.baselines.stepping.controller import SteppingController
     from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 else:
@@ -57,7 +58,8 @@ else:
             "environments.stepping": ("ResidualStepEnv", "StepScales"),
             "motions.motion": ("ReferenceMotion", "load_motion"),
             "registry": ("load_controller",),
-            "stepping.capture_step": ("CaptureStep", "CaptureStepConfig"),
+            "stepping.capture_step": ("CaptureStep",),
+            "stepping.config": ("CaptureStepConfig",),
             "stepping.controller": ("SteppingController",),
             "whole_body.momentum_qp": ("MomentumQP", "MomentumQPConfig"),
         },

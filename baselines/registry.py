@@ -14,8 +14,9 @@ from poise.baselines.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.policy_files.reading import is_policy, policy_config, policy_file_config
-from poise.baselines.stepping.capture_step import CaptureStep, CaptureStepConfig
-from poise.baselines.stepping.ipm_step import IPMStep, IPMStepConfig
+from poise.baselines.stepping.capture_step import CaptureStep
+from poise.baselines.stepping.config import CaptureStepConfig, IPMStepConfig
+from poise.baselines.stepping.ipm_step import IPMStep
 from poise.baselines.walking.simbicon import Simbicon, SimbiconConfig
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.configs.errors import ConfigError, shown

@@ -80,7 +80,8 @@ def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
     dict with string keys, Any, and dataclasses of these. An int is taken for a float; nothing else
     is converted. A number must be finite. ``field(metadata={"min": 0, "max": 1, "above": 0})``
     bounds a number (min and max inclusive, above exclusive), or each number of a tuple, list or
-    dict. A ValueError of ``__post_init__`` becomes a ConfigError.
+    dict. A ValueError of ``__post_init__`` becomes a ConfigError. A class variable ``RENAMED``
+    maps the old name of a field to its name: an error of the old one says the new one.
 
     Args:
         cls: the dataclass.
@@ -197,7 +198,12 @@ def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
             choices=fields,
         )
     prefix = f"{path}." if path else ""
+    renamed = getattr(cls, "RENAMED", {})
     for key in data:
+        if key in renamed and key not in fields:
+            raise ConfigError(
+                f"is now {shown(renamed[key])}", source=source, field=f"{prefix}{key}"
+            )
         if key not in fields:
             raise ConfigError(
                 "unknown field", source=source, field=f"{prefix}{key}", choices=fields

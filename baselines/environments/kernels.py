@@ -3,7 +3,8 @@
 import numpy as np
 
 from poise.baselines.controller import Targets
-from poise.baselines.stepping.tick import CaptureTick, capture_tick
+from poise.baselines.stepping.blocks import CaptureTick
+from poise.baselines.stepping.tick import capture_tick
 from poise.baselines.whole_body.contact_sets import contact_tick
 from poise.baselines.whole_body.momentum_qp import MomentumQP, Tick, accept, momentum_tick, solve
 from poise.envs.physics.kinematics import allocate_state
@@ -65,7 +66,7 @@ def _stepping() -> tuple[ResidualStepEnv, CaptureTick]:
 
 def contacts() -> None:
     """The momentum QP with contacts that change. What a reset needs, `planner` compiles as well."""
-    contact_tick.compile((_stepping()[1].both.numba_type,))
+    contact_tick.compile((_stepping()[1].on_both.numba_type,))
 
 
 def planner() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from poise.baselines.allowance import allowing, named
 from poise.baselines.controller import CompiledController, Controller, Targets, told_by
 from poise.baselines.motions.motion import ReferenceMotion, load_motion
+from poise.baselines.motions.offsets import MOMENTUM_X, MOMENTUM_Y, TARGETS
 from poise.baselines.motions.targets import Motion
 from poise.baselines.registry import load_controller
 from poise.baselines.warmup import prepare
@@ -51,18 +52,12 @@ class ResidualScales:
     momentum: float = field(default=0.0, metadata={"min": 0.0})  # L_ref x, y [m h² ω]
 
     def entries(self) -> dict[str, float]:
-        """Scale of each target that can be moved, in the order of `update_targets`."""
-        return {
-            "com_x": self.com,
-            "com_y": self.com,
-            "cop_x": self.cop,
-            "cop_y": self.cop,
-            "com_z": self.height,
-            "lean_x": self.lean,
-            "lean_y": self.lean,
-            "momentum_x": self.momentum,
-            "momentum_y": self.momentum,
-        }
+        """The scale of each target that can be moved, in the order of `motions/offsets.py`."""
+        scales = (
+            self.com, self.com, self.cop, self.cop, self.height,
+            self.lean, self.lean, self.momentum, self.momentum,
+        )  # fmt: skip
+        return dict(zip(TARGETS, scales, strict=True))
 
 
 @dataclass(frozen=True)
@@ -149,9 +144,7 @@ class ResidualBalanceEnv(BalanceEnv):
         # fraction of the way that the residual goes to the action in one policy step
         period = self.config.policy_period
         blend = 1.0 if lag.smoothing == 0.0 else -np.expm1(-period / lag.smoothing)
-        names = list(self.residual.entries())
-        carried = [names.index("momentum_x"), names.index("momentum_y")]
-        scale[carried] *= 10.0 * self.scales.momentum  # m h² ω
+        scale[MOMENTUM_X : MOMENTUM_Y + 1] *= 10.0 * self.scales.momentum  # m h² ω
         self._offsets = apart(len(scale))
         self._residual = Residual(
             moved=self._moved,

@@ -4,15 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.stepping.swing import SwingArrays
+from poise.baselines.stepping.blocks import StepMemory, SwingArrays
 from poise.baselines.stepping.swing import time_left as remaining_time
-from poise.baselines.stepping.tick import StepMemory
 from poise.envs.balance.observation import GROUND, SPACE, Terms, View
 from poise.envs.balance.terms import TERMS, put_local
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 
-# entries of what a controller tells of its steps, see `Stepping.told`
+# entries of what a controller tells of its steps, see `Stepping.entries`
 STEPS, FOOT, FOOTHOLD, PHASE, REMAINING, SINCE = 0, 1, 2, 4, 5, 6
 REPORTED = 7
 
@@ -22,7 +21,7 @@ class StepView(Block):
     """The block of a term about steps: what it reads, and the place that it fills."""
 
     seen: View
-    report: np.ndarray  # (7,) see `Stepping.told`
+    report: np.ndarray  # (7,) see `Stepping.entries`
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +35,7 @@ class StepReporter(Block):
 
 @compiled
 def report_steps(t: StepReporter):
-    """Fill `report` as `Stepping.told` does."""
+    """Fill `report` as `Stepping.entries` does."""
     m, w, report = t.memory, t.swing, t.report
     report[STEPS], report[FOOT], report[SINCE] = m.steps[0], -1.0, m.clock[0]
     report[PHASE], report[REMAINING] = 0.0, 0.0

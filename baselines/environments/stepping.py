@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.controller import told_by
+from poise.baselines.motions.offsets import STEPS
 from poise.baselines.stepping.controller import SteppingController
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
@@ -36,13 +37,8 @@ class StepScales(ResidualScales):
 
     def entries(self) -> dict[str, float]:
         """Scale of each target that can be moved: those of the base class first."""
-        return {
-            **super().entries(),
-            "foothold_x": self.foothold,
-            "foothold_y": self.foothold,
-            "time": self.time,
-            "trigger": self.trigger,
-        }
+        scales = self.foothold, self.foothold, self.time, self.trigger
+        return {**super().entries(), **dict(zip(STEPS, scales, strict=True))}
 
 
 class ResidualStepEnv(ResidualBalanceEnv):
@@ -103,7 +99,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
         ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
         self.stepper = stepper  #: the controller that steps, of which `controller` may be a wrapper
-        self._offsets = stepper.shift.values  # one array is both
+        self._offsets = stepper.offsets.values  # one array is both
         self._residual = replace(self._residual, offsets=self._offsets)
 
     def _view(self, kind: type[Block], out: np.ndarray) -> Block:
@@ -111,7 +107,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
         return StepView(view, self._step_report) if kind is StepView else view
 
     def _observe(self) -> None:
-        self._step_report[:] = self.stepper.stepping().told()
+        self._step_report[:] = self.stepper.stepping().entries()
         super()._observe()
 
     def _end_of_tick(self, tick: Any) -> StepEnd:

@@ -7,10 +7,21 @@ import numpy as np
 from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy
+from poise.envs.maths.vectors import copy, rotated
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
+from .offsets import (
+    COM_X,
+    COM_Y,
+    COM_Z,
+    COP_X,
+    COP_Y,
+    LEAN_X,
+    LEAN_Y,
+    MOMENTUM_X,
+    MOMENTUM_Y,
+)
 from .splines import evaluate
 
 
@@ -37,9 +48,10 @@ def update_targets(
     """Fill `t` for `time`: the motion's joints and CoM, moved by the residual.
 
     Heading frame: the motion's CoM is relative to the mean of the sole points, `com_offset` [m]
-    forward of it; p_ref lies under it. `residual` (9,) adds Δc_ref (x, y) and Δp_ref (x, y) [m],
-    the CoM's height [m], a lean of the root, a rotation about the axes x and y [rad],
-    and the angular momentum that the posture is to carry about x and y [N·m·s].
+    forward of it; p_ref lies under it. `residual` (≥ 9,), in the order of `offsets.py`, adds
+    Δc_ref (x, y) and Δp_ref (x, y) [m], the CoM's height [m], a lean of the root, a rotation about
+    the axes x and y [rad], and the angular momentum that the posture is to carry about x and y
+    [N·m·s].
     The root's reference is R = R_heading exp(φ) R_standing; its rate R_heading φ̇ is exact while φ
     keeps its axis, as it does in every motion that bows or leans.
     """
@@ -49,35 +61,31 @@ def update_targets(
     copy(samples[1], t.v_ref)
     copy(samples[2], t.a_ref)
     cos, sin = s.heading[0], s.heading[1]
-    samples[0, nj + 3] += residual[5]
-    samples[0, nj + 4] += residual[6]
+    samples[0, nj + 3] += residual[LEAN_X]
+    samples[0, nj + 4] += residual[LEAN_Y]
     _root_reference(robot, cos, sin, samples[:, nj + 3 : nj + 6], t)
     middle_x, middle_y = samples[0, nj] + com_offset, samples[0, nj + 1]
-    x, y = middle_x + residual[0], middle_y + residual[1]
+    x, y = middle_x + residual[COM_X], middle_y + residual[COM_Y]
     t.com[0] = s.origin[0] + cos * x - sin * y
     t.com[1] = s.origin[1] + sin * x + cos * y
-    t.com[2] = s.origin[2] + samples[0, nj + 2] + residual[4]
+    t.com[2] = s.origin[2] + samples[0, nj + 2] + residual[COM_Z]
     for r in range(2):
         out = t.com_vel if r == 0 else t.com_acc
         x, y = samples[1 + r, nj], samples[1 + r, nj + 1]
         out[0] = cos * x - sin * y
         out[1] = sin * x + cos * y
         out[2] = samples[1 + r, nj + 2]
-    t.angular_momentum[0] = cos * residual[7] - sin * residual[8]
-    t.angular_momentum[1] = sin * residual[7] + cos * residual[8]
-    x, y = middle_x + residual[2], middle_y + residual[3]
+    t.angular_momentum[0] = cos * residual[MOMENTUM_X] - sin * residual[MOMENTUM_Y]
+    t.angular_momentum[1] = sin * residual[MOMENTUM_X] + cos * residual[MOMENTUM_Y]
+    x, y = middle_x + residual[COP_X], middle_y + residual[COP_Y]
     t.cop[0] = s.origin[0] + cos * x - sin * y
     t.cop[1] = s.origin[1] + sin * x + cos * y
 
 
 @compiled
 def _root_reference(
-    robot: RobotArrays,
-    cos: float,
-    sin: float,
-    samples: np.ndarray,
-    t: TargetArrays,
-):
+    robot: RobotArrays, cos: float, sin: float, samples: np.ndarray, t: TargetArrays
+) -> None:
     """Root axes, and angular velocity and acceleration in body axes, from φ, φ̇, φ̈."""
     phi = samples[0]
     angle = np.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
@@ -85,13 +93,8 @@ def _root_reference(
     if angle > 1e-12:
         x, y, z = phi[0] / angle, phi[1] / angle, phi[2] / angle
     c, s = np.cos(angle), np.sin(angle)
-    v = 1.0 - c
-    for a in range(3):  # Rodrigues' formula on each standing axis, then the heading's yaw
-        u0, u1, u2 = robot.root_standing[0, a], robot.root_standing[1, a], robot.root_standing[2, a]
-        dot = (x * u0 + y * u1 + z * u2) * v
-        w0 = c * u0 + s * (y * u2 - z * u1) + dot * x
-        w1 = c * u1 + s * (z * u0 - x * u2) + dot * y
-        w2 = c * u2 + s * (x * u1 - y * u0) + dot * z
+    for a in range(3):  # each standing axis, then the heading's yaw
+        w0, w1, w2 = rotated(x, y, z, c, s, robot.root_standing[:, a])
         t.root_axes[0, a] = cos * w0 - sin * w1
         t.root_axes[1, a] = sin * w0 + cos * w1
         t.root_axes[2, a] = w2

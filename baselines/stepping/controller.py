@@ -1,21 +1,98 @@
-"""What a controller that steps is: how it can be moved, and where it is in its steps."""
+"""What a controller that steps is: how its choices can be moved, and where it is in its steps."""
+
+from typing import NamedTuple
+
+import numpy as np
 
 from poise.baselines.controller import BaseController
+from poise.baselines.motions.offsets import (
+    COM_X,
+    COM_Z,
+    COP_X,
+    FOOTHOLD_X,
+    LEAN_X,
+    NAMES,
+    TIME,
+    TRIGGER,
+)
+from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.memory import apart
 
-from .offsets import Stepping, StepShift
-from .planner import StepLimits
+from .config import StepLimits
+
+
+def _entry(first: int, doc: str) -> property:
+    def get(offsets: "StepOffsets") -> float:
+        return float(offsets.values[first])
+
+    def put(offsets: "StepOffsets", value: float) -> None:
+        offsets.values[first] = value
+
+    return property(get, put, doc=doc)
+
+
+def _pair(first: int, doc: str) -> property:
+    def get(offsets: "StepOffsets") -> np.ndarray:
+        return offsets.values[first : first + 2]
+
+    def put(offsets: "StepOffsets", value: np.ndarray) -> None:
+        offsets.values[first : first + 2] = value
+
+    return property(get, put, doc=doc)
+
+
+class StepOffsets(Copyable):
+    """What a policy adds to a stepping controller's choices, along the axes of the step's heading.
+
+    Zeros add nothing. The order of `values` is that of `motions/offsets.py`.
+    """
+
+    com = _pair(COM_X, "(2,) The place where the capture point is to rest [m].")
+    cop = _pair(COP_X, "(2,) The CoP [m].")
+    height = _entry(COM_Z, "The height of the CoM [m].")
+    lean = _pair(LEAN_X, "(2,) The lean of the root about x and y [rad].")
+    foothold = _pair(FOOTHOLD_X, "(2,) The foothold [m].")
+    time = _entry(TIME, "The time from lift-off to touchdown [s].")
+    trigger = _entry(TRIGGER, "How much further the capture point may leave before a step [m].")
+
+    def __init__(self) -> None:
+        self.values = apart(len(NAMES))  #: (13,) all of them, for compiled code
+
+    def clear(self) -> None:
+        """Set all to zero."""
+        self.values[:] = 0.0
+
+
+class Stepping(NamedTuple):
+    """Where a stepping controller is in its steps."""
+
+    steps: int  #: steps begun since the reset
+    foot: int  #: the foot that swings; −1: none
+    point: np.ndarray  #: (3,) where its sole is meant to be now [m]
+    foothold: np.ndarray  #: (2,) where it is to land [m]
+    phase: float  #: fraction of the swing that is over
+    remaining: float  #: time until touchdown [s]
+    since: float  #: time since the last touchdown [s]
+
+    def entries(self) -> list[float]:
+        """(7,) numbers, in the order in which the terms about steps read them."""
+        x, y = self.foothold
+        return [self.steps, self.foot, x, y, self.phase, self.remaining, self.since]
+
+
+STANDING = Stepping(0, -1, np.zeros(3), np.zeros(2), 0.0, 0.0, 0.0)
 
 
 class SteppingController(BaseController):
     """A controller that decides where its feet go, and lets a policy move what it decides."""
 
-    shift: StepShift  #: added to its own choices
+    offsets: StepOffsets  #: added to its own choices
 
     def stepping(self) -> Stepping:
-        """Where it is in its steps."""
+        """Where the controller is in its steps."""
         raise NotImplementedError
 
     @property
     def step_limits(self) -> StepLimits | None:
-        """The steps that it allows itself; None: it knows no limits."""
+        """The steps that the controller allows itself, or None if it knows no limits."""
         return None

@@ -1,7 +1,6 @@
 """Steps to where an inverted pendulum comes to rest upright, by its energy."""
 
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -9,21 +8,12 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.maths.pendulum import pendulum
 from poise.envs.robots.robot import Robot
 
-from .capture_step import CaptureStep, CaptureStepConfig
+from .blocks import Search
+from .capture_step import CaptureStep
+from .config import IPMStepConfig
+from .cop_region import CopRegion
 from .planner import StepPlanner
-from .reach import Reach
-from .search import Search, allowed, moved, put_foothold, to_local
-
-
-@dataclass(frozen=True)
-class IPMStepConfig(CaptureStepConfig):
-    """As `capture-step`, but of `foothold` only `outward` counts; `time_min` = `time_max` = T.
-
-    `arc`: share of the height that a rigid leg gains on its way up; 0 is the linear pendulum.
-    """
-
-    kind: Literal["ipm-step"] = "ipm-step"  # type: ignore[assignment]
-    arc: float = field(default=1.0, metadata={"min": 0.0, "max": 1.0})
+from .search import clip_to_limits, to_step_frame, to_world, with_offsets
 
 
 @compiled
@@ -39,30 +29,30 @@ def rest_distance(speed: float, omega: float, height: float, arc: float) -> floa
 
 
 @compiled
-def energy_law(q: Search):
-    """The foothold over which the pendulum stands still, see `EnergyPlanner`."""
+def energy_foothold(q: Search) -> None:
+    """The foothold over which the pendulum stands still and its cost, see `EnergyPlanner`."""
     s, foot, omega, t = q.state, q.foot[0], q.state.omega[0], q.time[0]
-    x, vx = pendulum(s.com[0], s.com_vel[0], q.p[0], omega, t)
-    y, vy = pendulum(s.com[1], s.com_vel[1], q.p[1], omega, t)
+    x, vx = pendulum(s.com[0], s.com_vel[0], q.cop[0], omega, t)
+    y, vy = pendulum(s.com[1], s.com_vel[1], q.cop[1], omega, t)
     speed = np.sqrt(vx * vx + vy * vy)
     away = rest_distance(speed, omega, q.height, q.arc) / max(speed, 1e-9)
-    x, y = to_local(q, x + away * vx, y + away * vy)
-    x -= q.reach.middle[foot, 0]
-    y += q.sides[foot] * q.outward - q.reach.middle[foot, 1]
-    x, y = moved(q, x, y)
-    near_x, near_y = allowed(q, x, y)
-    put_foothold(q, near_x, near_y)
-    q.left[0] = np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
+    x, y = to_step_frame(q, x + away * vx, y + away * vy)
+    x -= q.region.middle[foot, 0]
+    y += q.foot_sign[foot] * q.lateral_offset - q.region.middle[foot, 1]
+    x, y = with_offsets(q, x, y)
+    near_x, near_y = clip_to_limits(q, x, y)
+    q.foothold[0], q.foothold[1] = to_world(q, near_x, near_y)
+    q.cost[0] = np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
 
 
 class EnergyPlanner(StepPlanner):
-    """The foothold over which the pendulum stands still, from where it is at touchdown.
+    """Plans the foothold over which the pendulum stands still, from where it is at touchdown.
 
     Until then the CoP is taken to stay at p, where the stance sole brakes most; the cost is how
     far limits keep the foothold from the one wanted [m].
     """
 
-    law = staticmethod(energy_law)
+    foothold_rule = staticmethod(energy_foothold)
 
     def __init__(self, *arguments: Any, arc: float = 0.0):
         super().__init__(*arguments)  # those of a `StepPlanner`
@@ -79,11 +69,11 @@ class IPMStep(CaptureStep):
     def __init__(self, robot: Robot, config: IPMStepConfig | None = None):
         super().__init__(robot, config or IPMStepConfig())
 
-    def _planner(self, reach: Reach) -> StepPlanner:
+    def _planner(self, region: CopRegion) -> StepPlanner:
         config = self.config
         if not isinstance(config, IPMStepConfig):
             raise TypeError(f"config must be an IPMStepConfig, not {type(config).__name__}")
         return EnergyPlanner(
-            self.robot, reach, config.limits, config.foothold, config.feedback, config.falls,
+            self.robot, region, config.limits, config.foothold, config.feedback, config.falls,
             arc=config.arc,
         )  # fmt: skip

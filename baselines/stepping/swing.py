@@ -1,42 +1,33 @@
 """The way of a swing foot: C² from wherever it is to a foothold that may move on the way."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from poise.baselines.whole_body.tasks.sole_pose import SolePose, SolePoseBlock, SolePoseGains
 from poise.baselines.whole_body.tasks.task import BoundTask
-from poise.envs.compiled.block import Block
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
 from poise.envs.maths.pendulum import Units
 from poise.envs.physics.arrays import RobotArrays
 
-LANDING = 0.6  # share of a swing after which contact is touchdown, not the lift-off
+from .blocks import SwingArrays
+from .config import SwingTask
+
+LANDING = 0.6  # fraction of a swing after which contact is touchdown, not the lift-off
 FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
 
 
-@dataclass(frozen=True)
-class SwingTask:
-    """J_swing v̇ + J̇ v = a_ref + k (x_ref ⊖ x) + d (ẋ_ref − ẋ), k = `stiffness`, d = 2 ζ √k.
-
-    Units as in `whole_body/gains.py`: weights per g² and (g/h)², a stiffness of 1 is ω²,
-    lengths in h.
-    """
-
-    weight: float = field(default=1000.0, metadata={"above": 0.0})
-    turn_weight: float = field(default=100.0, metadata={"above": 0.0})
-    yaw_share: float = field(default=1.0, metadata={"min": 0.0})  # of it, about the vertical
-    stiffness: float = field(default=60.0, metadata={"min": 0.0})
-    damping_ratio: float = field(default=1.0, metadata={"min": 0.0})
-    clearance: float = field(default=0.06, metadata={"above": 0.0, "max": 0.5})  # [h]
-    lift: float = field(default=0.45, metadata={"above": 0.0, "max": 0.9})  # share of the time
-    landing_speed: float = field(default=0.1, metadata={"min": 0.0})  # downwards [h ω]
-
-
 @compiled
-def quintic(p0, v0, a0, p1, v1, a1, duration, t):
+def quintic(
+    p0: float,
+    v0: float,
+    a0: float,
+    p1: float,
+    v1: float,
+    a1: float,
+    duration: float,
+    t: float,
+) -> tuple[float, float, float]:
     """Position, velocity, acceleration at `t` of the polynomial of degree five that leads from
     (p0, v0, a0) to (p1, v1, a1) in `duration`: the way of least jerk [Flash85]."""
     T = max(duration, 1e-6)
@@ -52,55 +43,42 @@ def quintic(p0, v0, a0, p1, v1, a1, duration, t):
     return position, velocity / T, acceleration / (T * T)
 
 
-@dataclass(frozen=True, eq=False)
-class SwingArrays(Block):
-    """A `Swing` as compiled code reads and writes it."""
-
-    reference: np.ndarray  # (3, 3) position, velocity, acceleration [m, s]
-    foothold: np.ndarray  # (2,)
-    time: np.ndarray  # (1,) since it began [s]
-    duration: np.ndarray  # (1,)
-    ground: np.ndarray  # (1,) height of the ground [m]
-    shift: np.ndarray  # (1,) of the duration, by a policy [s]
-    apex: float  # above the ground [m]
-    lift: float  # share of the time
-    landing_speed: float  # [m/s]
-
-
 @compiled
-def start_swing(w: SwingArrays, point: np.ndarray, ground: float, duration: float):
-    """At rest at `point` (3,)."""
+def start_swing(w: SwingArrays, point: np.ndarray, ground: float, duration: float) -> None:
+    """Begin a swing of `duration` [s] at rest at `point` (3,) [m], above `ground` [m]."""
     for a in range(3):
         w.reference[0, a], w.reference[1, a], w.reference[2, a] = point[a], 0.0, 0.0
     w.foothold[0], w.foothold[1] = point[0], point[1]
-    w.time[0], w.duration[0], w.ground[0], w.shift[0] = 0.0, duration, ground, 0.0
+    w.time[0], w.duration[0], w.ground[0], w.time_offset[0] = 0.0, duration, ground, 0.0
 
 
 @compiled
 def time_left(w: SwingArrays) -> float:
-    """Until touchdown is planned [s]."""
+    """The time until touchdown is planned [s]."""
     return max(w.duration[0] - w.time[0], 0.0)
 
 
 @compiled
-def aim_swing(w: SwingArrays, x: float, y: float, duration: float):
-    """Lead to another foothold, or at another time, but for the last `FROZEN` seconds."""
+def aim_swing(w: SwingArrays, x: float, y: float, duration: float) -> None:
+    """Lead to the foothold (x, y) [m] in `duration` [s]; nothing in the last `FROZEN` seconds."""
     if time_left(w) > FROZEN:
         w.foothold[0], w.foothold[1] = x, y
         w.duration[0] = max(duration, w.time[0] + FROZEN)
 
 
 @compiled
-def _lead(reference, a, position, velocity, duration, dt):
-    """Axis `a` of the reference, `dt` further on its way to a place and a speed."""
+def _lead(
+    reference: np.ndarray, a: int, position: float, velocity: float, duration: float, dt: float
+) -> None:
+    """Move axis `a` of the reference `dt` further on its way to a place and a speed."""
     reference[0, a], reference[1, a], reference[2, a] = quintic(
         reference[0, a], reference[1, a], reference[2, a], position, velocity, 0.0, duration, dt
     )
 
 
 @compiled
-def advance_swing(w: SwingArrays, dt: float):
-    """`dt` [s] further: up to the apex, down to the ground, on at the landing speed."""
+def advance_swing(w: SwingArrays, dt: float) -> None:
+    """Go `dt` [s] further: up to the apex, down to the ground, on at the landing speed."""
     rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
     for a in range(2):
         if rest > dt:
@@ -118,10 +96,10 @@ def advance_swing(w: SwingArrays, dt: float):
 
 
 class Swing(Copyable):
-    """Reference of one swing foot, planned anew each tick from its own last value: C² always.
+    """The reference of one swing foot, planned anew each tick from its own last value: C² always.
 
-    Vertically it rises to the clearance in `lift` of the time, then comes down and, where the
-    ground is late, on at the landing speed.
+    Vertically it rises to the clearance in the fraction `lift` of the time. Then it comes down,
+    and goes on at the landing speed where the ground is late.
     """
 
     FROZEN = FROZEN
@@ -131,39 +109,46 @@ class Swing(Copyable):
         speed = task.landing_speed * height * units.omega
         self.task = task
         self.arrays = SwingArrays(
-            apart((3, 3)), apart(2), apart(1), apart(1), apart(1), apart(1),
-            task.clearance * height, task.lift, float(speed),
-        )  # fmt: skip
+            reference=apart((3, 3)),
+            foothold=apart(2),
+            time=apart(1),
+            duration=apart(1),
+            ground=apart(1),
+            time_offset=apart(1),
+            apex=task.clearance * height,
+            lift=task.lift,
+            landing_speed=float(speed),
+        )
         start_swing(self.arrays, np.array(point, dtype=float), float(point[2]), float(duration))
 
     @property
     def reference(self) -> np.ndarray:
-        """(3, 3) position, velocity and acceleration [m, s]."""
+        """(3, 3) Position, velocity and acceleration now [m, s]."""
         return self.arrays.reference
 
     @property
     def foothold(self) -> np.ndarray:
-        """(2,) where it is to land [m]."""
+        """(2,) The place where the sole is to land [m]."""
         return self.arrays.foothold
 
     @property
     def time(self) -> float:
-        """Since it began [s]."""
+        """The time since lift-off [s]."""
         return float(self.arrays.time[0])
 
     @property
     def duration(self) -> float:
-        """From lift-off to touchdown [s]."""
+        """The time from lift-off to touchdown [s]."""
         return float(self.arrays.duration[0])
 
     @property
     def landing_speed(self) -> float:
-        """[m/s]."""
+        """The speed downwards at which the foot meets the ground [m/s]."""
         return self.arrays.landing_speed
 
     @property
     def remaining(self) -> float:
-        """Seconds until touchdown is planned."""
+        """The time until touchdown is planned [s]."""
         return time_left(self.arrays)
 
     def aim(self, foothold: np.ndarray, duration: float | None = None) -> None:
@@ -172,20 +157,20 @@ class Swing(Copyable):
         aim_swing(self.arrays, float(foothold[0]), float(foothold[1]), float(duration))
 
     def advance(self, dt: float) -> np.ndarray:
-        """(3, 3) position, velocity and acceleration [m, s] after `dt` more seconds."""
+        """(3, 3) Position, velocity and acceleration [m, s] after `dt` more seconds."""
         advance_swing(self.arrays, dt)
         return self.reference.copy()
 
 
 def swing_gains(robot: RobotArrays, task: SwingTask) -> SolePoseGains:
-    """`task` for one robot."""
+    """The gains of `task` for one robot."""
     g, rate2 = robot.gravity, robot.gravity / robot.height_com
     k = task.stiffness * rate2
     d = 2.0 * task.damping_ratio * np.sqrt(k)
     turn = task.turn_weight / rate2**2
     return SolePoseGains(
         stiffness=float(k), damping=float(d), weight=float(task.weight / g**2),
-        turn_weight=float(turn), yaw_weight=float(task.yaw_share * turn), error=apart(3),
+        turn_weight=float(turn), yaw_weight=float(task.yaw_fraction * turn), error=apart(3),
     )  # fmt: skip
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from poise.baselines.controller import BaseController, Targets
 from poise.baselines.in_place.pd import PDGains, joint_gains, motor_torques
-from poise.baselines.stepping.reach import Reach, sides
+from poise.baselines.stepping.cop_region import CopRegion, foot_signs
 from poise.configs.errors import ConfigError
-from poise.envs.maths.vectors import turn
+from poise.envs.maths.vectors import rotation_between, turn
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -93,8 +93,8 @@ class Simbicon(BaseController):
         self.period = self.config.period
         self.arrays = robot_arrays(robot)
         self.rate, self.moment = robot.omega, robot.units.moment
-        self.ankles = Reach(robot).middle
-        self.sides = sides(robot)
+        self.ankles = CopRegion(robot).middle
+        self.foot_sign = foot_signs(robot)
         self.legs = [_leg(robot, i) for i in range(2)]
         self.stiffness, self.damping = joint_gains(self.arrays, self.config.joints)
         self.reset()
@@ -130,7 +130,7 @@ class Simbicon(BaseController):
         error = targets.q_ref[ankle] - state.q[ankle]
         tau[ankle] = self._pd(c.stance_ankle, error, state.qvel[6 + ankle])
         axes = state.J[6 * self.foot + 3 : 6 * self.foot + 6, 6:]
-        tilt = _rotation(heading, state.sole_axes[self.foot])
+        tilt = rotation_between(heading, state.sole_axes[self.foot])
         spin = state.J_v[6 * self.foot + 3 : 6 * self.foot + 6]
         tau[swing.ankle] = axes[:, swing.ankle].T @ self._pd(c.swing_ankle, -tilt, spin)
         self._hips(state, pose, heading, tau)
@@ -159,7 +159,7 @@ class Simbicon(BaseController):
         d = (state.com[:2] - self._ankle(state, stance)[:2]) @ R / h
         v = state.com_vel[:2] @ R / (h * self.rate)
         forward = pose.swing_hip + c.sagittal.c_d * d[0] + c.sagittal.c_v * v[0]
-        left = self.sides[self.foot] * c.width + c.frontal.c_d * d[1] + c.frontal.c_v * v[1]
+        left = self.foot_sign[self.foot] * c.width + c.frontal.c_d * d[1] + c.frontal.c_v * v[1]
         return np.array([forward, left])
 
     def _hips(self, state: RobotState, pose: Pose, heading: np.ndarray, tau: np.ndarray) -> None:
@@ -167,7 +167,7 @@ class Simbicon(BaseController):
         c, swing, stance = self.config, self.legs[self.foot], self.legs[1 - self.foot]
         axes = state.J[6 * self.foot + 3 : 6 * self.foot + 6, 6:]
         R = state.root_axes
-        trunk = _rotation(heading @ self.arrays.root_standing, R)  # from standing
+        trunk = rotation_between(heading @ self.arrays.root_standing, R)  # from standing
         spin = R @ state.qvel[3:6]
         upper = axes[:, swing.upper]
         thigh = trunk + upper @ (state.q - self.arrays.q_standing)[swing.upper]
@@ -236,8 +236,3 @@ def _leg(robot: Robot, sole: int) -> _Leg:
         ankle=own[depth >= 0.75] - 1,
         bend=np.sign(shortens),
     )
-
-
-def _rotation(reference: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """(3,) small rotation, world axes, that leads from `reference` (3, 3) to `axes`."""
-    return 0.5 * np.cross(reference, axes, axis=0).sum(axis=1)

@@ -4,7 +4,7 @@ import importlib
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numba.core import cgutils, types
@@ -14,6 +14,8 @@ from poise.configs.errors import PoiseError
 
 from .block import Block, BlockType
 from .jit import compiled
+
+B = TypeVar("B", bound=Block)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,22 +32,26 @@ class Erased(Block):
         object.__setattr__(self, "_type", BlockType("Erased", ()))
 
 
-class Address(int):
-    """Where the function `kernel` lies, compiled for blocks of the type `kind`.
+class Kernel(int, Generic[B]):
+    """The address of a compiled function that takes one block, a `B`, and returns nothing.
 
-    In another process it lies elsewhere: what is pickled is its name, and the type.
+    A block that holds the address says in its field what the function works on, as in
+    `Kernel[Search]`. `kernel` is the function and `kind` Numba's type of the block. The function
+    lies elsewhere in another process: its name and the type are what is pickled.
     """
 
     kernel: Any
     kind: BlockType
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Address":
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Kernel[B]":
         return self
 
-    def __copy__(self) -> "Address":
+    def __copy__(self) -> "Kernel[B]":
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
+        if not self:
+            return Kernel, (0,)
         function = self.kernel.py_func
         module, name = function.__module__, function.__qualname__
         if getattr(sys.modules.get(module), name, None) is not self.kernel:
@@ -53,23 +59,26 @@ class Address(int):
         return _address, (module, name, self.kind)
 
 
-def _address(module: str, name: str, kind: BlockType) -> Address:
+def _address(module: str, name: str, kind: BlockType) -> Kernel:
     """The address of a module's function, in this process."""
     return _compiled(getattr(importlib.import_module(module), name), kind)
 
 
-def _compiled(kernel: Any, kind: BlockType) -> Address:
+def _compiled(kernel: Any, kind: BlockType) -> Kernel:
     kernel.compile((kind,))
     result = kernel.overloads[kind,]
     if result.signature.return_type not in (types.none, types.float64):
         name, given = kernel.py_func.__qualname__, result.signature.return_type
         raise TypeError(f"{name} returns {given}: nothing or a float can be called by its address")
-    address = Address(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+    address: Kernel = Kernel(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
     address.kernel, address.kind = kernel, kind
     return address
 
 
-def address_of(kernel: Any, block: Block) -> Address:
+NO_KERNEL: Kernel = Kernel(0)  #: stands in a block that calls no function, or not yet
+
+
+def address_of(kernel: Any, block: B) -> Kernel[B]:
     """The address of the compiled function `kernel(block)`, for `call`, or `value_of` for a float.
 
     A function called by its address is compiled apart from its caller: neither waits for the
@@ -124,7 +133,7 @@ class Program(Block):
         return cls._linked(tuple(each and (address_of(*each), each[1]) for each in calls))
 
     @classmethod
-    def _linked(cls, calls: tuple[tuple[Address, Block] | None, ...]) -> "Program":
+    def _linked(cls, calls: tuple[tuple[Kernel, Block] | None, ...]) -> "Program":
         rows = [(int(call[0]), call[1].address) if call else (0, 0) for call in calls]
         program = cls(np.array(rows, dtype=np.int64).reshape(-1, 2))
         object.__setattr__(program, "_calls", calls)  # it keeps the blocks

@@ -74,6 +74,13 @@ def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float | np.ndarray) 
     return p + (xi - p) * np.exp(omega * t)
 
 
+@compiled
+def drifted_point(xi: np.ndarray, p: np.ndarray, omega: float, t: float) -> tuple[float, float]:
+    """`drifted` of points (≥ 2,), for kernels."""
+    growth = np.exp(omega * t)
+    return p[0] + (xi[0] - p[0]) * growth, p[1] + (xi[1] - p[1]) * growth
+
+
 def capture_distance(steps: float, reach: float, length: float, omega: float, time: float) -> float:
     """d_N = r + l a (1 − a^N)/(1 − a), a = e^(−ω T_s): how far the capture point may be from the
     stance foot to come to rest in N steps of length l and time T_s [Koolen12]."""

@@ -42,7 +42,7 @@ def _turns_left(chain: np.ndarray, size: int, line: float, x: float, y: float) -
 
 
 @compiled
-def find_nearest(polygon: np.ndarray, point: np.ndarray, out: np.ndarray):
+def find_nearest(polygon: np.ndarray, point: np.ndarray, out: np.ndarray) -> None:
     """The point of a convex counter-clockwise `polygon` (k, 2) nearest to `point` into `out`."""
     x, y = point[0], point[1]
     out[0], out[1] = x, y
@@ -52,8 +52,8 @@ def find_nearest(polygon: np.ndarray, point: np.ndarray, out: np.ndarray):
         ex, ey = polygon[(i + 1) % n, 0] - ax, polygon[(i + 1) % n, 1] - ay
         outside = outside or ex * (y - ay) - ey * (x - ax) < 0.0
         along = ((x - ax) * ex + (y - ay) * ey) / max(ex * ex + ey * ey, 1e-18)
-        share = min(max(along, 0.0), 1.0)
-        px, py = ax + share * ex, ay + share * ey
+        fraction = min(max(along, 0.0), 1.0)
+        px, py = ax + fraction * ex, ay + fraction * ey
         distance = (px - x) ** 2 + (py - y) ** 2
         if distance < least:
             least = distance
@@ -69,10 +69,10 @@ def nearest_inside(polygon: np.ndarray, point: np.ndarray) -> np.ndarray:
     return out
 
 
-def shrunk(polygon: np.ndarray, share: float) -> np.ndarray:
+def shrunk(polygon: np.ndarray, scale: float) -> np.ndarray:
     """`polygon` (k, 2) scaled about the mean of its vertices."""
     middle = polygon.mean(axis=0)
-    return middle + share * (polygon - middle)
+    return middle + scale * (polygon - middle)
 
 
 def clipped(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
@@ -88,8 +88,8 @@ def clipped(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarra
         if over[i] <= 0.0:
             kept.append(polygon[i])
         if (over[i] <= 0.0) != (over[j] <= 0.0):
-            share = over[i] / (over[i] - over[j])
-            kept.append(polygon[i] + share * (polygon[j] - polygon[i]))
+            fraction = over[i] / (over[i] - over[j])
+            kept.append(polygon[i] + fraction * (polygon[j] - polygon[i]))
     return np.array(kept)
 
 

@@ -6,14 +6,14 @@ from poise.envs.compiled.jit import compiled
 
 
 @compiled
-def copy(source: np.ndarray, out: np.ndarray):
+def copy(source: np.ndarray, out: np.ndarray) -> None:
     """`out[:] = source` of two vectors; NumPy's form compiles checks and their messages too."""
     for i in range(out.shape[0]):
         out[i] = source[i]
 
 
 @compiled
-def cross(a: np.ndarray, b: np.ndarray, out: np.ndarray):
+def cross(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
     """out = a × b for arrays of three."""
     x = a[1] * b[2] - a[2] * b[1]
     y = a[2] * b[0] - a[0] * b[2]
@@ -39,16 +39,33 @@ def placed(ox: float, oy: float, cos: float, sin: float, x: float, y: float) -> 
     return ox + cos * x - sin * y, oy + sin * x + cos * y
 
 
-# A turn from one frame to another has two errors. `turn_error` is the angle times the axis: it
-# grows up to half a turn, and is what tasks follow. `rotation_error` is the sine times the axis:
-# cheaper, the same for small angles, but falling beyond a quarter turn; the swing foot follows it,
-# whose turns are small.
+@compiled
+def rotated(
+    x: float, y: float, z: float, cos: float, sin: float, u: np.ndarray
+) -> tuple[float, float, float]:
+    """The vector `u` (3,) turned about the unit axis n = (x, y, z), by Rodrigues' formula:
+
+    u cos θ + (n × u) sin θ + n (n · u) (1 − cos θ)
+
+    An axis of zeros turns nothing, if cos θ = 1.
+    """
+    dot = (x * u[0] + y * u[1] + z * u[2]) * (1.0 - cos)
+    return (
+        cos * u[0] + sin * (y * u[2] - z * u[1]) + dot * x,
+        cos * u[1] + sin * (z * u[0] - x * u[2]) + dot * y,
+        cos * u[2] + sin * (x * u[1] - y * u[0]) + dot * z,
+    )
 
 
 @compiled
-def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray):
-    """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn from
-    one to the other."""
+def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> None:
+    """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn that
+    leads from `axes` to `wanted`.
+
+    The sine needs no division and is smooth everywhere. It equals the angle to first order, and
+    falls again beyond 90°. So it serves where frames stay near each other, as soles and trunks that
+    are kept level do. `turn_error`, `rotation_vector` have the angle, for what may be turned far.
+    """
     for a in range(3):
         i, j = (a + 1) % 3, (a + 2) % 3
         total = 0.0
@@ -73,10 +90,16 @@ def turn_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> float:
     return np.arctan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 1e-9 else 1.0
 
 
+def rotation_between(axes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """(3,) `rotation_error` of two frames (3, 3): sine times axis of the turn between them."""
+    out = np.empty(3)
+    rotation_error(np.array(axes), np.array(wanted), out)
+    return out
+
+
 def rotation_vector(R: np.ndarray) -> np.ndarray:
     """(3,) angle times axis of a rotation: φ with R = exp(skew(φ)), |φ| < π [rad]."""
-    sine_axis = np.empty(3)
-    rotation_error(np.eye(3), np.array(R), sine_axis)
+    sine_axis = rotation_between(np.eye(3), R)
     sine = float(np.linalg.norm(sine_axis))
     angle = np.arctan2(sine, 0.5 * (np.trace(R) - 1.0))
     return sine_axis if sine < 1e-9 else sine_axis * (angle / sine)

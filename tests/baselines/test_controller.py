@@ -170,7 +170,7 @@ def test_steps_are_moved_through_a_wrapper() -> None:
         action = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0])
         for _ in range(40):
             info = env.step(action)[4]
-        ends.append((env.data.qpos.copy(), info["steps"], env.stepper.shift.foothold[0]))
+        ends.append((env.data.qpos.copy(), info["steps"], env.stepper.offsets.foothold[0]))
     assert ends[0][1] == ends[1][1] >= 1 and ends[0][2] == ends[1][2] > 0.0
     assert np.array_equal(ends[0][0], ends[1][0])
     with pytest.raises(poise.ConfigError, match="does not step"):

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from poise.baselines.stepping.cop_region import DIRECTIONS, LOAD_FRACTIONS
+from poise.baselines.stepping.feedback import LATER_STEP
 from poise.baselines.stepping.planner import Plan
-from poise.baselines.stepping.reach import DIRECTIONS, SHARES
-from poise.baselines.stepping.recentring import LEANING, PRESSING
+from poise.baselines.stepping.recentring import LOADING, SHIFTING
 from poise.envs.maths.pendulum import drifted
 from poise.envs.maths.polygons import nearest_inside
 from poise.envs.maths.vectors import turn
@@ -63,17 +64,17 @@ def swing_rows(state, sole, reference, axes, task):
     linear = linear + d * (reference[1] - velocity[:3])
     wanted = np.concatenate([linear, k * error - d * velocity[3:]])
     weights = np.repeat([task.weight / g**2, task.turn_weight / (g / h) ** 2], 3)
-    weights[5] *= task.yaw_share
+    weights[5] *= task.yaw_fraction
     return state.J[rows], wanted - state.Jdot_v[rows], weights
 
 
-def beyond(reach, first, second, yaw, xi):
+def beyond(region, first, second, yaw, xi):
     """How far ξ lies outside what two soles reach: the worst of 48 directions."""
     ways, worst = DIRECTIONS @ turn(yaw).T, -np.inf
     for d, way in enumerate(ways):
         ends = [
-            reach.arrays.support[k, d] + share * (first @ way) + (1.0 - share) * (second @ way)
-            for k, share in enumerate(SHARES)
+            region.arrays.support[k, d] + share * (first @ way) + (1.0 - share) * (second @ way)
+            for k, share in enumerate(LOAD_FRACTIONS)
         ]
         worst = max(worst, xi @ way - max(ends))
     return worst
@@ -83,30 +84,31 @@ class ReadablePlanner:
     """`StepPlanner` with the law of the capture point."""
 
     def __init__(self, planner):
-        self.planner, self.reach, self.shift = planner, planner.reach, planner.shift
-        self.limits, self.choice, self.h = planner.limits, planner.choice, planner.h
+        self.planner, self.region, self.offsets = planner, planner.region, planner.offsets
+        self.limits, self.choice, self.h = planner.limits, planner.choice, planner.units.height
+        self.omega = planner.units.omega
         self.phase, self.gains = 0.0, planner.feedback.always
 
     def see(self, state, yaw):
         """Take the gains of where the body falls: each linear in the angle from the heading."""
         f, (ahead, left) = self.planner.feedback, turn(yaw).T @ state.com_vel[:2]
         self.gains = f.always.copy()
-        if f.stage[0] == 0.0 and len(f.angles):
+        if f.signals[LATER_STEP] == 0.0 and len(f.angles):
             angle = np.arctan2(abs(left), ahead)
             for i, k in np.ndindex(f.always.shape):
                 self.gains[i, k] += np.interp(angle, f.angles, f.added_at[:, i, k])
 
     def added(self, state, foot, yaw):
         """What is fed back: foothold ahead and outward, time, height."""
-        f, side, robot = self.planner.feedback, self.planner.sides[foot], state.robot
+        f, side, robot = self.planner.feedback, self.planner.foot_sign[foot], state.robot
         out = np.array([1.0, side])  # ahead, outward
         R = turn(yaw)
         capture = R.T @ (state.capture_point - state.sole_points[1 - foot, :2]) / self.h
         standing = robot.root_standing
         lean = R.T @ (state.root_axes @ standing.T @ [0.0, 0.0, 1.0])[:2]
         L = state.arrays.momentum[3:5]
-        spin = R.T @ [L[1], -L[0]] * self.planner.rate / (robot.mass * robot.gravity * self.h)
-        signals = [1.0, f.stage[0], self.phase, *out * capture, *out * lean, *out * spin]
+        spin = R.T @ [L[1], -L[0]] * self.omega / (robot.mass * robot.gravity * self.h)
+        signals = [1.0, f.signals[LATER_STEP], self.phase, *out * capture, *out * lean, *out * spin]
         return self.gains @ signals
 
     def plan(self, state, yaw):
@@ -114,7 +116,7 @@ class ReadablePlanner:
         low, high = self.limits.time_min, self.limits.time_max
         self.phase = 0.0
         self.see(state, yaw)
-        times = np.linspace(low, high, 8) / self.planner.rate
+        times = np.linspace(low, high, 8) / self.omega
         starts = [state.sole_points[foot, :2] for foot in range(2)]
         plans = [self.best(state, foot, yaw, times, starts[foot], 0.0) for foot in range(2)]
         best = min(plans, key=lambda plan: plan.cost)
@@ -122,11 +124,11 @@ class ReadablePlanner:
 
     def replan(self, state, foot, yaw, swing):
         """The best time and place of a running step."""
-        rate = self.planner.rate
+        rate = self.omega
         self.phase = swing.time / swing.duration
         low = max(self.limits.time_min / rate - swing.time, FROZEN)
         high = max(self.limits.time_max / rate - swing.time, low)
-        left = max(swing.remaining - swing.arrays.shift[0], FROZEN)
+        left = max(swing.remaining - swing.arrays.time_offset[0], FROZEN)
         times = np.append(np.linspace(low, high, 8), left)
         start = swing.reference[0, :2] + 0.5 * swing.reference[1, :2] * min(left, 0.1)
         best = self.best(state, foot, yaw, times, start, 0.02 * np.abs(times - left))
@@ -134,7 +136,7 @@ class ReadablePlanner:
 
     def shifted(self, state, yaw, plan, start):
         """It lands earlier or later, as feedback and a policy want."""
-        later = self.added(state, plan.foot, yaw)[2] + self.shift.time
+        later = self.added(state, plan.foot, yaw)[2] + self.offsets.time
         if later == 0.0:
             return plan
         time = max(plan.time + later, FROZEN)
@@ -145,34 +147,34 @@ class ReadablePlanner:
         """The cheapest of several times."""
         tried = [self.foothold(state, foot, yaw, time, start) for time in times]
         cost = np.array([left for _, left in tried]) + extra
-        cost = cost + self.choice.haste * times * self.h * self.planner.rate
+        cost = cost + self.choice.time_price * times * self.h * self.omega
         k = int(np.argmin(cost))
         return Plan(foot, tried[k][0], float(times[k]), float(cost[k]))
 
     def foothold(self, state, foot, yaw, time, start):
         """Foothold (2,) of a step, and how far ξ will then be outside both soles' reach."""
-        choice, h, R, side = self.choice, self.h, turn(yaw), self.planner.sides[foot]
+        choice, h, R, side = self.choice, self.h, turn(yaw), self.planner.foot_sign[foot]
         stance, xi = state.sole_points[1 - foot, :2], state.capture_point
-        p = nearest_inside(self.reach.under(1 - foot, stance, yaw), xi)
+        p = nearest_inside(self.region.one(1 - foot, stance, yaw), xi)
         end = drifted(xi, p, state.omega, time)
-        local = R.T @ (end - stance) - self.reach.middle[foot]
-        local[0] += choice.overshoot * h * np.tanh(local[0] / (0.1 * h))
-        local[1] += side * choice.outward * h
+        local = R.T @ (end - stance) - self.region.middle[foot]
+        local[0] += choice.sagittal_offset * h * np.tanh(local[0] / (0.1 * h))
+        local[1] += side * choice.lateral_offset * h
         ahead, outward, _, _ = self.added(state, foot, yaw)
-        local = local + self.shift.foothold + [ahead, side * outward]
+        local = local + self.offsets.foothold + [ahead, side * outward]
         local = self.allowed(local, R.T @ (start - stance), foot, time)
         foothold = stance + R @ local
         first, second = (foothold, stance) if foot == 0 else (stance, foothold)
-        outside = beyond(self.reach, first, second, yaw, end)
+        outside = beyond(self.region, first, second, yaw, end)
         return foothold, max(outside, -choice.margin * h)
 
     def allowed(self, local, start, foot, time):
         """What limits of place and speed leave of a foothold from the stance sole."""
-        limits, h, side = self.limits, self.h, self.planner.sides[foot]
+        limits, h, side = self.limits, self.h, self.planner.foot_sign[foot]
         x = np.clip(local[0], -limits.behind * h, limits.ahead * h)
         y = side * np.clip(side * local[1], limits.width_min * h, limits.width_max * h)
         gap = np.array([x, y]) - start
-        span = np.array([limits.speed, limits.side_speed]) * h * self.planner.rate * time
+        span = np.array([limits.speed, limits.side_speed]) * h * self.omega * time
         excess = max(float(np.linalg.norm(gap / span)), 1.0)
         return np.array([x, y]) - gap * (1.0 - 1.0 / excess)
 
@@ -187,35 +189,38 @@ def lean_matrix(lean):
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
 
 
-def guided(controller, state, targets, region, hips, ground, way, raised):
-    """What `copy_targets` and `guide` should put into the targets, by name; `raised`: fed back."""
-    c, h, shift = controller.config, controller.h, controller.shift
-    level, rate2 = controller.memory.level, controller.rate**2
+def guided(controller, state, targets, region, overreach, ground, stride, raised):
+    """What `copy_reference` and `guide_com` should put into the targets, by name; `raised` is fed
+    back."""
+    c, h, offsets = controller.config, controller.planner.units.height, controller.offsets
+    level, rate2 = controller.memory.level_frame, controller.planner.units.omega**2
     R, xi, p = level[:2, :2], state.capture_point, controller.sets.parameters
-    home = controller.home
-    rest = home.rest if home.stage[0] == LEANING else region.mean(axis=0)
-    wanted = xi + c.gain * (xi - rest - R @ shift.com)
-    if home.stage[0] == PRESSING:
+    r = controller.recentring
+    rest = r.capture_target if r.stage[0] == SHIFTING else region.mean(axis=0)
+    wanted = xi + c.gain * (xi - rest - R @ offsets.com)
+    if r.stage[0] == LOADING:
         away = wanted - xi
-        wanted = xi + away * min(1.0, c.home.press * h / max(float(np.linalg.norm(away)), 1e-9))
+        wanted = xi + away * min(
+            1.0, c.recentring.cop_distance * h / max(float(np.linalg.norm(away)), 1e-9)
+        )
     cop = nearest_inside(region, wanted)
     over = wanted - cop
-    cop = cop + over * min(1.0, hips * h / max(float(np.linalg.norm(over)), 1e-9))
-    cop = cop + R @ shift.cop
-    reach = np.sqrt(max((c.stretch * h) ** 2 - 0.25 * (way @ way), 0.0))
-    height = ground + min(h, reach) + shift.height
+    cop = cop + over * min(1.0, overreach * h / max(float(np.linalg.norm(over)), 1e-9))
+    cop = cop + R @ offsets.cop
+    reach = np.sqrt(max((c.leg_length * h) ** 2 - 0.25 * (stride @ stride), 0.0))
+    height = ground + min(h, reach) + offsets.height
     swinging = controller.swing is not None
     height += raised * swinging
     asked = p.stiffness[6:] * (targets.q_ref - state.q)
     asked = asked + p.damping[6:] * (targets.v_ref - state.qvel[6:])
     bound = c.joint_accel * rate2
-    axes = level @ lean_matrix(shift.lean) @ controller.qp.arrays.root_standing
+    axes = level @ lean_matrix(offsets.lean) @ controller.qp.arrays.root_standing
     error = state.root_axes.T @ rotation_error(state.root_axes, axes)
     turning = p.stiffness[3:6] * error - p.damping[3:6] * state.qvel[3:6]
     most = (c.swing_accel if swinging else c.root_accel) * rate2
     share = min(1.0, most / max(float(np.linalg.norm(turning)), 1e-9))
     return {
-        "com": np.append(state.com[:2], height - c.sink * h * swinging),
+        "com": np.append(state.com[:2], height - c.swing_com_drop * h * swinging),
         "com_vel": np.append(state.com_vel[:2], 0.0),
         "com_acc": np.append(state.omega**2 * (state.com[:2] - cop), 0.0),
         "cop": cop,

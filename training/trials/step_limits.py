@@ -10,9 +10,9 @@ import numpy as np
 
 from poise.baselines.controller import told_by
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.stepping.config import StepLimits
 from poise.baselines.stepping.controller import SteppingController
-from poise.baselines.stepping.planner import StepLimits
-from poise.baselines.stepping.reach import Reach
+from poise.baselines.stepping.cop_region import CopRegion
 from poise.envs.maths.pendulum import capture_distance, duration_factor
 from poise.envs.maths.polygons import ray_to_edge
 from poise.training.running.summary import Curves, Direction, Envelope, StepCurves
@@ -38,7 +38,7 @@ class NStepLimit:
     def __init__(self, limits: PushLimits, steps: StepLimits | None = None):
         self.limits, self.steps = limits, steps or StepLimits()
         standing = limits.standing
-        region = Reach(limits.robot, 1.0).both(standing.sole_points, standing.heading_yaw)
+        region = CopRegion(limits.robot, 1.0).both(standing.sole_points, standing.heading_yaw)
         self._region = region - standing.com[:2]
 
     @property

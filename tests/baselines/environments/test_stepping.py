@@ -8,8 +8,7 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
-from poise.baselines.stepping import offsets
-from poise.baselines.stepping.guidance import copy_targets, guide
+from poise.baselines.stepping.guidance import copy_reference, guide_com
 from poise.configs.errors import ConfigError
 from poise.envs.sensors.delayed import DelayedState
 from poise.envs.sensors.source import StateSource
@@ -71,17 +70,6 @@ def test_compiled_steps_are_those_of_python(controller):
         np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6)
 
 
-def test_entries_are_in_the_order_of_the_shift():
-    """What an action is called is where the controller reads it."""
-    names = list(StepScales().entries())
-    assert len(names) == offsets.SHIFTS
-    for name in ("com", "cop", "lean", "foothold"):
-        first = getattr(offsets, name.upper())
-        assert names[first : first + 2] == [f"{name}_x", f"{name}_y"]
-    for name, entry in (("HEIGHT", "com_z"), ("TIME", "time"), ("TRIGGER", "trigger")):
-        assert names[getattr(offsets, name)] == entry
-
-
 def test_threads_do_not_share_anything():
     """Four environments in two threads end where each ends alone."""
     first = ResidualStepEnv(robot(), duration=0.6, pushes=None)
@@ -113,7 +101,7 @@ def test_the_foothold_moves_by_what_is_added(env):
         return planner.footholds(state, plan.foot, 0.0, np.array([plan.time]), start)[0][0]
 
     before = foothold().copy()
-    env.controller.shift.foothold[:] = 0.04, 0.02
+    env.controller.offsets.foothold[:] = 0.04, 0.02
     np.testing.assert_allclose(foothold() - before, [0.04, 0.02], atol=1e-12)
 
 
@@ -121,12 +109,12 @@ def test_the_foothold_stays_within_the_limits_of_a_step(env):
     """However far it is pulled across: the feet keep their least width."""
     play(env, until=swinging)
     controller, state = env.controller, env.simulation.state
-    foot, side = controller.foot, controller.planner.sides[controller.foot]
-    controller.shift.foothold[1] = -1e20 * side
+    foot, side = controller.foot, controller.planner.foot_sign[controller.foot]
+    controller.offsets.foothold[1] = -1e20 * side
     start = state.sole_points[foot, :2]
     footholds, _ = controller.planner.footholds(state, foot, 0.0, np.array([9.0]), start)
     width = side * (footholds[0] - state.sole_points[1 - foot, :2])[1]
-    least = controller.config.limits.width_min * controller.h
+    least = controller.config.limits.width_min * controller.robot.height_com
     assert width == pytest.approx(least, abs=1e-9)
 
 
@@ -166,7 +154,7 @@ def test_targets_of_a_step_are_moved(env, name, index, part):
         vector = np.zeros(len(env.action_names))
         vector[env.action_names.index(name)] = value
         env.step_without_info(vector)
-        seen.append(np.array(getattr(env.controller._guided, part))[..., index].copy())
+        seen.append(np.array(getattr(env.controller._reference_out, part))[..., index].copy())
     assert np.abs(seen[1] - seen[0]).max() > 5e-3
 
 
@@ -177,11 +165,11 @@ def test_rest_after_a_step_is_moved(env):
     anywhere = 9.0 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     tick, seen = controller.tick(state, env.targets), []
     for shift in ([0.0, 0.0], [0.1, -0.05]):
-        controller.shift.com = shift
-        copy_targets(tick)
-        guide(tick, anywhere, 0.0, 0.0, 0.0, 0.0)
-        seen.append(tick.guided.com_acc[:2].copy())
-    R = controller.memory.level[:2, :2]
+        controller.offsets.com = shift
+        copy_reference(tick)
+        guide_com(tick, anywhere, 0.0, 0.0, 0.0, 0.0)
+        seen.append(tick.reference_out.com_acc[:2].copy())
+    R = controller.memory.level_frame[:2, :2]
     expected = state.omega**2 * controller.config.gain * R @ [0.1, -0.05]
     np.testing.assert_allclose(seen[1] - seen[0], expected, atol=1e-9)
 

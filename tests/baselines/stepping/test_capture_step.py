@@ -9,10 +9,12 @@ import pytest
 
 from poise.baselines.controller import WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.motions.offsets import COM_X, COM_Y, COM_Z, COP_X, COP_Y, LEAN_X, LEAN_Y
 from poise.baselines.registry import controller_config, load_controller
-from poise.baselines.stepping.capture_step import CaptureStep, CaptureStepConfig
-from poise.baselines.stepping.offsets import COM, COP, HEIGHT, LEAN
-from poise.baselines.stepping.recentring import LEANING
+from poise.baselines.stepping.capture_step import CaptureStep
+from poise.baselines.stepping.config import CaptureStepConfig
+from poise.baselines.stepping.feedback import PHASE
+from poise.baselines.stepping.recentring import SHIFTING
 from poise.configs.errors import ConfigError
 from poise.configs.schema import to_dict
 from tests.support import stepping_reference as readable
@@ -102,8 +104,8 @@ def watched(controller, impulse, direction, look, duration=1.5):
     [("capture-step", 0.0, 1.5), ("capture-step", 90.0, 1.5), ("feedback-step", 0.0, 4.0)],
 )
 def test_torques_do_not_jump_at_a_switch(name, direction, duration):
-    """From the tick before the first step on, torques change by at most `jump` of their limits; on
-    the way home too."""
+    """From the tick before the first step on, torques change by at most `torque_rate_limit` of
+    their limits; on the way back to the nominal stance too."""
     controller = load_controller(name, robot())
     ticks = watched(
         controller, 24.0, direction, lambda c, state, targets, tau: (c.steps, tau.copy()), duration
@@ -112,8 +114,8 @@ def test_torques_do_not_jump_at_a_switch(name, direction, duration):
     torques = np.array([tau for _, tau in ticks[first - 1 :]])
     changes = np.abs(np.diff(torques, axis=0)) / robot().torque_limit
     assert len(changes) > 50
-    assert controller.config.jump <= 0.6
-    assert changes.max() <= controller.config.jump + 1e-9
+    assert controller.config.torque_rate_limit <= 0.6
+    assert changes.max() <= controller.config.torque_rate_limit + 1e-9
 
 
 def test_a_foot_gives_its_load_away_before_it_lifts_off():
@@ -134,8 +136,8 @@ def test_a_foot_gives_its_load_away_before_it_lifts_off():
 def test_hips_that_are_used_up_bring_the_step_forward():
     """Angular momentum in the sense of the fall counts: with it the first step begins earlier."""
     begun = []
-    for spin in (0.0, 0.5):
-        settings = {**to_dict(controller_config("capture-step")), "spin": spin}
+    for gain in (0.0, 0.5):
+        settings = {**to_dict(controller_config("capture-step")), "momentum_gain": gain}
         controller = load_controller(settings, robot())
         begun.append(watched(controller, 24.0, 0.0, lambda c, *_: c.stepped, 0.6).index(True))
     assert begun[1] < begun[0]
@@ -153,47 +155,49 @@ def test_hips_that_are_used_up_bring_the_step_forward():
 def test_targets_are_those_of_the_readable_form(name, direction, monkeypatch):
     """What the QPs are asked for at every tick of a recovery, in a swing and after it."""
     controller, kinds = load_controller(name, robot()), set()
-    reach, stood, raised, left, stages = controller.reach, [], [0.0], [np.inf], [0]
+    regions, stood, raised, left, stages = controller.region, [], [0.0], [np.inf], [0]
     steps = [0]
     planner = readable.ReadablePlanner(controller.planner)
 
     def look(c, state, targets, tau):
         if not c.stepped:
             return
-        yaw, feet = np.arctan2(*c.memory.level[1::-1, 0]), state.sole_points
+        yaw, feet = np.arctan2(*c.memory.level_frame[1::-1, 0]), state.sole_points
         if c.swing is not None:
             if c.steps > steps[-1]:
                 planner.see(state, yaw)
             steps.append(c.steps)
             stood.clear()
             stance = 1 - c.foot
-            region, hips = reach.under(stance, feet[stance], yaw), 0.0
-            ground, way = feet[stance, 2], c.swing.foothold - feet[stance, :2]
+            region, overreach = regions.one(stance, feet[stance], yaw), 0.0
+            ground, stride = feet[stance, 2], c.swing.foothold - feet[stance, :2]
             if left[0] > readable.FROZEN:  # the last ticks keep what was fed back
-                planner.phase = c.planner.feedback.stage[1]
+                planner.phase = c.planner.feedback.signals[PHASE]
                 raised[0] = planner.added(state, c.foot, yaw)[3]
             left[0] = c.swing.remaining
         else:
-            if c.home.stage[0] == LEANING and stages[-1] != LEANING:
+            if c.recentring.stage[0] == SHIFTING and stages[-1] != SHIFTING:
                 stood.clear()  # another heading from now on
             stood.append(feet.copy())
             left[0] = np.inf
-            region, hips = reach.both(stood[0], yaw), c.config.hips
-            ground, way = feet[:, 2].mean(), feet[0, :2] - feet[1, :2]
+            region, overreach = regions.both(stood[0], yaw), c.config.cop_overreach
+            ground, stride = feet[:, 2].mean(), feet[0, :2] - feet[1, :2]
         kinds.add(c.swing is not None)
-        stages.append(int(c.home.stage[0]))
-        expected = readable.guided(c, state, targets, region, hips, ground, way, raised[0])
+        stages.append(int(c.recentring.stage[0]))
+        expected = readable.guided(c, state, targets, region, overreach, ground, stride, raised[0])
         for entry, value in expected.items():
-            np.testing.assert_allclose(getattr(c._guided, entry), value, rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(
+                getattr(c._reference_out, entry), value, rtol=1e-9, atol=1e-9
+            )
 
-    shift = controller.shift
-    moved = np.zeros(len(shift.values))
-    moved[[COM, COM + 1, COP, COP + 1, HEIGHT]] = 0.02, -0.01, 0.01, 0.005, -0.01
-    moved[[LEAN, LEAN + 1]] = 0.05, 0.08
-    monkeypatch.setattr(shift, "clear", lambda: np.copyto(shift.values, moved))  # by the reset
+    offsets = controller.offsets
+    added = np.zeros(len(offsets.values))
+    added[[COM_X, COM_Y, COP_X, COP_Y, COM_Z]] = 0.02, -0.01, 0.01, 0.005, -0.01
+    added[[LEAN_X, LEAN_Y]] = 0.05, 0.08
+    monkeypatch.setattr(offsets, "clear", lambda: np.copyto(offsets.values, added))  # by the reset
     watched(controller, 22.0, direction, look, duration=2.5)
     assert set(stages) == (set(range(4)) if name == "feedback-step" else {0})
-    assert kinds == {True, False} and np.array_equal(shift.values, moved)
+    assert kinds == {True, False} and np.array_equal(offsets.values, added)
 
 
 def test_a_copy_is_a_controller_of_its_own():

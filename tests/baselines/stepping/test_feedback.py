@@ -5,13 +5,18 @@ import numpy as np
 import pytest
 
 from poise.baselines.registry import load_controller
-from poise.baselines.stepping.feedback import (
+from poise.baselines.stepping import feedback
+from poise.baselines.stepping.config import (
     SIGNALS,
     FallFeedback,
     SignalGains,
     StepFeedback,
-    feed_back,
-    take_gains,
+)
+from poise.baselines.stepping.feedback import (
+    LATER_STEP,
+    PHASE,
+    evaluate_feedback,
+    schedule_gains,
 )
 from poise.baselines.stepping.feedback import feedback_arrays as arrays_of
 from poise.configs.errors import ConfigError
@@ -24,7 +29,7 @@ YAW = 0.7
 def signals(simulation, side=1.0, yaw=YAW):
     """What is read beside the second sole."""
     f, state = arrays_of(simulation.robot, StepFeedback(), {}), simulation.state
-    feed_back(f, state.arrays, state.sole_points[1], np.cos(yaw), np.sin(yaw), side)
+    evaluate_feedback(f, state.arrays, state.sole_points[1], np.cos(yaw), np.sin(yaw), side)
     return dict(zip(SIGNALS, f.signals.copy(), strict=True))
 
 
@@ -65,8 +70,8 @@ def test_spin_is_mujocos_angular_momentum():
     told = signals(simulation, side=-1.0)
     ahead = unit * (np.cos(YAW) * y - np.sin(YAW) * x)  # about the axis to the left
     right = unit * (np.cos(YAW) * x + np.sin(YAW) * y)  # about the axis ahead
-    assert told["spin_ahead"] == pytest.approx(ahead, rel=1e-6)
-    assert told["spin_outward"] == pytest.approx(right, rel=1e-6)
+    assert told["momentum_ahead"] == pytest.approx(ahead, rel=1e-6)
+    assert told["momentum_outward"] == pytest.approx(right, rel=1e-6)
     assert min(abs(ahead), abs(right)) > 1e-4
 
 
@@ -82,11 +87,11 @@ def test_the_other_foot_sees_the_mirror_image():
 @pytest.mark.parametrize("name", ["humanoid", "toddler"])
 def test_what_is_added_fits_the_robot(name):
     """Lengths in h, times in 1/ω; a row adds up its gains times the signals."""
-    r, row = robot(name), SignalGains(constant=0.1, again=0.2, phase=0.3, lean_ahead=1.0)
+    r, row = robot(name), SignalGains(constant=0.1, later_step=0.2, phase=0.3, lean_ahead=1.0)
     f = arrays_of(r, StepFeedback(row, row, row, row), {})
-    f.stage[:] = 1.0, 0.5
+    f.signals[[LATER_STEP, PHASE]] = 1.0, 0.5
     state = generic_state(name, seed=1).state
-    feed_back(f, state.arrays, state.sole_points[0], np.cos(YAW), np.sin(YAW), 1.0)
+    evaluate_feedback(f, state.arrays, state.sole_points[0], np.cos(YAW), np.sin(YAW), 1.0)
     expected = 0.1 + 0.2 + 0.15 + f.signals[SIGNALS.index("lean_ahead")]
     h = r.height_com
     units = np.array([h, h, np.sqrt(h / -r.model.opt.gravity[2]), h])
@@ -108,15 +113,24 @@ def test_gains_are_linear_between_the_angles_of_falls(angle, expected):
     f = arrays_of(r, StepFeedback(SignalGains(lean_ahead=1.0, phase=0.3)), falls)
     for side in (1.0, -1.0):
         speed = 0.7 * np.array([np.cos(np.radians(angle)), side * np.sin(np.radians(angle))])
-        f.stage[0] = 1.0
-        take_gains(f, *speed)
+        f.signals[LATER_STEP] = 1.0
+        schedule_gains(f, *speed)
         np.testing.assert_array_equal(f.gains, f.always)  # further steps
-        f.stage[0] = 0.0
-        take_gains(f, *speed)
+        f.signals[LATER_STEP] = 0.0
+        schedule_gains(f, *speed)
         gains = dict(zip(SIGNALS, f.gains[0] / r.height_com, strict=True))
         assert gains.pop("lean_ahead") == pytest.approx(expected, rel=1e-12)
         assert gains.pop("phase") == pytest.approx(0.3, rel=1e-12)
         assert not any(gains.values()) and not f.gains[1:].any()
+
+
+def test_each_signal_has_its_index():
+    """The kernels' names of the columns of K are those of the YAML files."""
+    for k, name in enumerate(SIGNALS):
+        assert getattr(feedback, name.upper()) == k
+    rows = StepFeedback(*(SignalGains(constant=value) for value in (1.0, 2.0, 3.0, 4.0)))
+    for name, value in (("ahead", 1.0), ("outward", 2.0), ("time", 3.0), ("height", 4.0)):
+        assert rows.matrix()[getattr(feedback, name.upper()), feedback.CONSTANT] == value
 
 
 @pytest.mark.parametrize(

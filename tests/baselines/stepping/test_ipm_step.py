@@ -5,10 +5,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from poise.baselines.registry import controller_config, load_controller
-from poise.baselines.stepping.feedback import SignalGains, StepFeedback
-from poise.baselines.stepping.ipm_step import EnergyPlanner, IPMStep, IPMStepConfig, rest_distance
-from poise.baselines.stepping.planner import Foothold, StepLimits
-from poise.baselines.stepping.reach import Reach
+from poise.baselines.stepping.config import (
+    FootholdChoice,
+    IPMStepConfig,
+    SignalGains,
+    StepFeedback,
+    StepLimits,
+)
+from poise.baselines.stepping.cop_region import CopRegion
+from poise.baselines.stepping.ipm_step import EnergyPlanner, IPMStep, rest_distance
 from poise.envs.maths.pendulum import drifted, pendulum
 from poise.envs.maths.polygons import nearest_inside
 from tests.baselines.stepping.test_capture_step import trial
@@ -54,23 +59,23 @@ def test_the_pendulum_moves_by_its_equation():
     np.testing.assert_allclose(position + velocity / OMEGA, xi, atol=1e-12)
 
 
-def planner(arc, outward=0.0, feedback=None, **limits):
+def planner(arc, lateral_offset=0.0, feedback=None, **limits):
     """A planner with wide limits."""
     wide = {"ahead": 9.0, "behind": 9.0, "width_min": 1e-3, "width_max": 9.0, "speed": 99.0}
     return EnergyPlanner(
-        robot(), Reach(robot()), StepLimits(**{**wide, "side_speed": 99.0, **limits}),
-        Foothold(outward=outward), feedback, arc=arc,
+        robot(), CopRegion(robot()), StepLimits(**{**wide, "side_speed": 99.0, **limits}),
+        FootholdChoice(lateral_offset=lateral_offset), feedback, arc=arc,
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("foot", [0, 1])
 def test_a_policy_and_the_configuration_move_footholds(foot):
-    """`outward` and feedback [h] to the foot's own side, the policy's shift along the heading."""
+    """`lateral_offset` and feedback [h] to the foot's own side, the policy's offset as it is."""
     state = generic_state().state.copy()
     times, yaw, start = np.array([0.3]), state.heading_yaw, state.sole_points[foot, :2]
     feedback = StepFeedback(ahead=SignalGains(0.03), outward=SignalGains(0.04))
-    plain, moved = planner(0.5), planner(0.5, outward=0.05, feedback=feedback)
-    moved.shift.foothold[:] = 0.02, -0.01
+    plain, moved = planner(0.5), planner(0.5, lateral_offset=0.05, feedback=feedback)
+    moved.offsets.foothold[:] = 0.02, -0.01
     (before,), _ = plain.footholds(state, foot, yaw, times, start)
     (after,), _ = moved.footholds(state, foot, yaw, times, start)
     side = 1.0 if foot == 0 else -1.0  # the left foot is the first
@@ -97,9 +102,9 @@ def test_without_limits_a_linear_pendulum_steps_onto_the_capture_point():
         plan = planner(arc)
         footholds, cut = plan.footholds(state, 0, yaw, times, start)
         cos, sin = state.heading
-        found[arc] = footholds + np.array([[cos, -sin], [sin, cos]]) @ plan.reach.middle[0]
+        found[arc] = footholds + np.array([[cos, -sin], [sin, cos]]) @ plan.region.middle[0]
         np.testing.assert_allclose(cut, 0.0, atol=1e-12)
-    under = plan.reach.under(1, state.sole_points[1], yaw)
+    under = plan.region.one(1, state.sole_points[1], yaw)
     p = nearest_inside(under, state.capture_point)
     for k, t in enumerate(times):
         xi = drifted(state.capture_point, p, state.omega, t)
@@ -121,8 +126,8 @@ def test_limits_hold_and_say_what_they_cost():
         free, _ = far.footholds(state, 0, yaw, times, start)
         cos, sin = state.heading
         local = (held[0] - state.sole_points[1, :2]) @ np.array([[cos, -sin], [sin, cos]])
-        assert abs(local[0]) <= 0.1 * narrow.h + 1e-9
-        assert 0.19 * narrow.h - 1e-9 <= local[1] <= 0.2 * narrow.h + 1e-9
+        assert abs(local[0]) <= 0.1 * narrow.units.height + 1e-9
+        assert 0.19 * narrow.units.height - 1e-9 <= local[1] <= 0.2 * narrow.units.height + 1e-9
         if velocity > 0.0:
             assert cost[0] == pytest.approx(np.linalg.norm(held[0] - free[0]))
 

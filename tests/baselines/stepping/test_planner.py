@@ -3,10 +3,18 @@
 import numpy as np
 import pytest
 
-from poise.baselines.stepping.feedback import FallFeedback, SignalGains, StepFeedback
-from poise.baselines.stepping.planner import Foothold, StepLimits, StepPlanner
-from poise.baselines.stepping.reach import Reach
-from poise.baselines.stepping.swing import Swing, SwingTask
+from poise.baselines.stepping.config import (
+    FallFeedback,
+    FootholdChoice,
+    SignalGains,
+    StepFeedback,
+    StepLimits,
+    SwingTask,
+)
+from poise.baselines.stepping.cop_region import CopRegion
+from poise.baselines.stepping.feedback import LATER_STEP
+from poise.baselines.stepping.planner import StepPlanner
+from poise.baselines.stepping.swing import Swing
 from tests.support.shared import generic_state, robot
 from tests.support.stepping_reference import ReadablePlanner
 
@@ -17,15 +25,15 @@ FEEDBACK = StepFeedback(
 )
 FALLS = {
     "back": FallFeedback(angle=150.0, ahead=SignalGains(0.1, lean_ahead=0.3)),
-    "ahead": FallFeedback(angle=20.0, outward=SignalGains(-0.1, spin_ahead=0.4)),
+    "ahead": FallFeedback(angle=20.0, outward=SignalGains(-0.1, momentum_ahead=0.4)),
     "side": FallFeedback(angle=80.0, time=SignalGains(0.3, phase=0.2, capture_outward=-0.3)),
 }
-CHOICE = Foothold(overshoot=0.07, outward=0.05, margin=0.03, haste=0.02)
+CHOICE = FootholdChoice(sagittal_offset=0.07, lateral_offset=0.05, margin=0.03, time_price=0.02)
 
 
 def planner(feedback=None, falls=None, **limits):
     """A planner whose step times cost something."""
-    return StepPlanner(robot(), Reach(robot()), StepLimits(**limits), CHOICE, feedback, falls)
+    return StepPlanner(robot(), CopRegion(robot()), StepLimits(**limits), CHOICE, feedback, falls)
 
 
 def falling(seed):
@@ -40,22 +48,22 @@ def agree(plan, expected):
     """All of two plans, to 1e-9."""
     assert plan.foot == expected.foot
     np.testing.assert_allclose(plan.foothold, expected.foothold, atol=1e-9)
-    numbers = [[p.time, p.cost, p.shift] for p in (plan, expected)]
+    numbers = [[p.time, p.cost, p.time_offset] for p in (plan, expected)]
     np.testing.assert_allclose(*numbers, atol=1e-9)
 
 
 @pytest.mark.parametrize("falls", [None, FALLS])
 @pytest.mark.parametrize("feedback", [None, FEEDBACK])
-@pytest.mark.parametrize("shift", [0.0, 0.06])
-def test_plan_is_that_of_the_readable_planner(shift, feedback, falls):
+@pytest.mark.parametrize("offset", [0.0, 0.06])
+def test_plan_is_that_of_the_readable_planner(offset, feedback, falls):
     """Foot, foothold, time and cost, also where feedback and a policy move both."""
     plans, feet = planner(feedback, falls), set()
-    plans.shift.foothold = [0.3 * shift, -0.5 * shift]
-    plans.shift.time = shift
+    plans.offsets.foothold = [0.3 * offset, -0.5 * offset]
+    plans.offsets.time = offset
     readable = ReadablePlanner(plans)
     for seed in range(12):
         state, yaw, _ = falling(seed)
-        plans.feedback.stage[0] = seed % 3 == 0  # the law of first steps is another one
+        plans.feedback.signals[LATER_STEP] = seed % 3 == 0  # the law of first steps is another one
         plan = plans.plan(state, yaw)
         agree(plan, readable.plan(state, yaw))
         feet.add(plan.foot)
@@ -63,17 +71,17 @@ def test_plan_is_that_of_the_readable_planner(shift, feedback, falls):
 
 
 @pytest.mark.parametrize("feedback", [None, FEEDBACK])
-@pytest.mark.parametrize("shift", [0.0, -0.05])
-def test_a_running_step_is_planned_as_by_the_readable_planner(shift, feedback):
+@pytest.mark.parametrize("offset", [0.0, -0.05])
+def test_a_running_step_is_planned_as_by_the_readable_planner(offset, feedback):
     """From where the foot is in its swing, with the time that is left."""
     plans = planner(feedback)
-    plans.shift.time = shift
+    plans.offsets.time = offset
     readable = ReadablePlanner(plans)
     for seed in range(8):
         state, yaw, rng = falling(seed)
         foot = seed % 2
         swing = Swing(state.sole_points[foot], 0.35, SwingTask(), robot().units)
-        swing.arrays.shift[0] = shift
+        swing.arrays.time_offset[0] = offset
         swing.aim(state.sole_points[foot, :2] + rng.uniform(-0.2, 0.2, 2))
         for _ in range(rng.integers(1, 60)):
             swing.advance(0.004)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from poise.baselines.stepping.swing import Swing, SwingTask, quintic
+from poise.baselines.stepping.config import SwingTask
+from poise.baselines.stepping.swing import Swing, quintic
 from poise.envs.maths.pendulum import Units
 from poise.envs.maths.vectors import rotation_error
 from poise.envs.physics.simulation import Simulation
@@ -136,7 +137,7 @@ def test_rows_are_those_of_the_readable_form():
     for sole in range(2):
         state = generic_state(seed=sole).state
         reference, axes = rng.normal(size=(3, 3)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        task = SwingTask(weight=3.0, turn_weight=2.0, yaw_share=0.4, damping_ratio=0.7)
+        task = SwingTask(weight=3.0, turn_weight=2.0, yaw_fraction=0.4, damping_ratio=0.7)
         found = swing_rows(state, sole, reference, axes, task)
         for part, expected in zip(
             found, readable.swing_rows(state, sole, reference, axes, task), strict=True
@@ -145,10 +146,10 @@ def test_rows_are_those_of_the_readable_form():
 
 
 def test_a_smaller_share_lets_the_sole_turn_about_the_vertical_only():
-    """`yaw_share` scales the sixth weight; all else stays."""
+    """`yaw_fraction` scales the sixth weight; all else stays."""
     state = generic_state().state
     reference, axes = np.zeros((3, 3)), state.sole_axes[0]
-    tasks = SwingTask(), SwingTask(yaw_share=0.3)
+    tasks = SwingTask(), SwingTask(yaw_fraction=0.3)
     whole, part = (swing_rows(state, 0, reference, axes, task) for task in tasks)
     np.testing.assert_allclose(part.weights / whole.weights, [1.0] * 5 + [0.3], rtol=1e-14)
     np.testing.assert_array_equal(part.b, whole.b)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from poise.baselines.stepping.planner import StepLimits
+from poise.baselines.stepping.config import StepLimits
 from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import load_robot
 from poise.training.evaluation.figures import controller_entry

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config, load_controller
-from poise.baselines.stepping.planner import StepLimits
+from poise.baselines.stepping.config import StepLimits
 from poise.envs.maths.pendulum import drifted, duration_factor
 from poise.training.evaluation import plots
 from poise.training.evaluation import run as evaluation

@@ -177,7 +177,7 @@ def test_controllers_that_step_stack_their_tasks_with_the_swing_foot():
     controller = CaptureStep(robot, CaptureStepConfig(step_qp=MomentumQPConfig(tasks={"arm": arm})))
     state = Simulation(robot).state
     block = controller.tick(state, Targets.standing(robot, state))
-    stacks = [chosen.problem.tasks for chosen in (block.first, block.second, block.both)]
+    stacks = [chosen.problem.tasks for chosen in (block.on_first, block.on_second, block.on_both)]
     assert [len(stack.b) for stack in stacks] == [9, 9, 3]
     with pytest.raises(ConfigError, match="tasks.arm: has no kernel"):
         without = MomentumQPConfig(tasks={"arm": FromPython(**EXAMPLES["orientation"])})

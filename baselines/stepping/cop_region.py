@@ -1,11 +1,8 @@
-"""Where a linear inverted pendulum can be stopped: capture regions and CoP reach [Koolen12]."""
-
-from dataclasses import dataclass
+"""Where soles can put the centre of pressure with the torques of their ankles [Koolen12]."""
 
 import mujoco
 import numpy as np
 
-from poise.envs.compiled.block import Block
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
@@ -13,13 +10,16 @@ from poise.envs.maths.polygons import clipped, convex_hull, stacked
 from poise.envs.maths.vectors import placed, turn, turned
 from poise.envs.robots.robot import Robot
 
+from .blocks import RegionArrays
+
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
-SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, at which the reach of two soles is sampled
-LINE = 1e-12  # [m] a corner of the reach that is nearer to the line of its neighbours is none
+# fractions of the load on the first sole, for which the region of two soles is computed
+LOAD_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+LINE = 1e-12  # [m] a corner that is nearer to the line of its neighbours is none
 
 
-def standing_feet(robot: Robot) -> np.ndarray:
+def nominal_feet(robot: Robot) -> np.ndarray:
     """(2, 3) middles of the soles in the standing posture, which faces along x [m]."""
     data = mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing_qpos
@@ -29,9 +29,9 @@ def standing_feet(robot: Robot) -> np.ndarray:
     return np.array(feet)
 
 
-def sides(robot: Robot) -> np.ndarray:
+def foot_signs(robot: Robot) -> np.ndarray:
     """(2,) 1 for the left foot, −1 for the right one, in the standing posture."""
-    feet = standing_feet(robot)
+    feet = nominal_feet(robot)
     sign = 1.0 if feet[0, 1] > feet[1, 1] else -1.0
     return np.array([sign, -sign])
 
@@ -64,40 +64,49 @@ def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.nd
     return np.reshape(normals, (-1, 2)), np.array(offsets), np.array(bounds)
 
 
-@dataclass(frozen=True, eq=False)
-class ReachArrays(Block):
-    """A `Reach` as compiled code reads it; ns soles, sole frames."""
-
-    alone: np.ndarray  # (ns, k, 2) corners of what each reaches alone [m]
-    corners: np.ndarray  # (ns,) int: how many of them count
-    middle: np.ndarray  # (ns, 2) their mean
-    sums: np.ndarray  # (5, n, 2) corners of what two reach, beside λ p_0 + (1 − λ) p_1
-    support: np.ndarray  # (5, 48) how far these go along each direction
-    directions: np.ndarray  # (48, 2)
-    shares: np.ndarray  # (5,) λ
-
-
 @compiled
-def distance_beyond(r, fx, fy, sx, sy, cos, sin, x, y):
-    """How far (x, y) lies outside what soles at f and s reach together [m]; < 0 inside.
+def distance_beyond(
+    r: RegionArrays,
+    fx: float,
+    fy: float,
+    sx: float,
+    sy: float,
+    cos: float,
+    sin: float,
+    x: float,
+    y: float,
+) -> float:
+    """How far (x, y) lies outside the region of two soles at (fx, fy) and (sx, sy), whose heading
+    is (cos, sin) [m]; < 0 inside.
 
-    Measured along 48 DIRECTIONS only, which lets corners reach some millimetres further.
+    It is measured along 48 DIRECTIONS only, which lets corners reach some millimetres further.
     """
     worst = -np.inf
     for d in range(r.directions.shape[0]):
         # the direction, turned
         dx, dy = turned(cos, sin, r.directions[d, 0], r.directions[d, 1])
         a, b = fx * dx + fy * dy, sx * dx + sy * dy
-        reach = -np.inf
-        for k in range(r.shares.shape[0]):
-            reach = max(reach, r.support[k, d] + r.shares[k] * a + (1.0 - r.shares[k]) * b)
-        worst = max(worst, x * dx + y * dy - reach)
+        edge = -np.inf
+        for k in range(r.load_fractions.shape[0]):
+            edge = max(
+                edge,
+                r.support[k, d] + r.load_fractions[k] * a + (1.0 - r.load_fractions[k]) * b,
+            )
+        worst = max(worst, x * dx + y * dy - edge)
     return worst
 
 
 @compiled
-def outside_reach(r, first, second, yaw, xi, out):
-    """`distance_beyond` of rows of `first`, `second`, `xi` into `out`; one row stands for all."""
+def distances_beyond(
+    r: RegionArrays,
+    first: np.ndarray,
+    second: np.ndarray,
+    yaw: float,
+    xi: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """`distance_beyond` for rows of `first`, `second` and `xi` (≥ 1, 2) into `out`; an array of one
+    row stands for as many as there are."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     for i in range(out.shape[0]):
         f, s, x = first[i % first.shape[0]], second[i % second.shape[0]], xi[i % xi.shape[0]]
@@ -105,8 +114,11 @@ def outside_reach(r, first, second, yaw, xi, out):
 
 
 @compiled
-def reach_of_one(r, sole, point, cos, sin, out):
-    """What a sole at `point` reaches alone into rows of `out` (≥ k, 2); how many they are."""
+def single_support_region(
+    r: RegionArrays, sole: int, point: np.ndarray, cos: float, sin: float, out: np.ndarray
+) -> int:
+    """The corners of what a sole at `point` (≥ 2,) reaches alone into rows of `out` (≥ k, 2) [m];
+    how many they are."""
     for i in range(r.corners[sole]):
         u, v = r.alone[sole, i, 0], r.alone[sole, i, 1]
         out[i, 0], out[i, 1] = placed(point[0], point[1], cos, sin, u, v)
@@ -114,15 +126,17 @@ def reach_of_one(r, sole, point, cos, sin, out):
 
 
 @compiled
-def reach_of_two(r, points, cos, sin, cloud, out):
-    """Hull of what two soles at `points` (2, ≥ 2) reach, for all shares of the load, into rows of
-    `out` (10 n + 1, 2); how many they are.
+def double_support_region(
+    r: RegionArrays, points: np.ndarray, cos: float, sin: float, cloud: np.ndarray, out: np.ndarray
+) -> int:
+    """The hull of what two soles at `points` (2, ≥ 2) reach under all fractions of the load, into
+    rows of `out` (10 n + 1, 2) [m]; how many corners it has.
 
     `cloud` (5 n, 2) is scratch.
     """
     n = 0
-    for k in range(r.shares.shape[0]):
-        a, b = r.shares[k], 1.0 - r.shares[k]
+    for k in range(r.load_fractions.shape[0]):
+        a, b = r.load_fractions[k], 1.0 - r.load_fractions[k]
         x, y = a * points[0, 0] + b * points[1, 0], a * points[0, 1] + b * points[1, 1]
         for i in range(r.sums.shape[1]):
             u, v = r.sums[k, i, 0], r.sums[k, i, 1]
@@ -131,35 +145,37 @@ def reach_of_two(r, points, cos, sin, cloud, out):
     return convex_hull(cloud, n, LINE, out)
 
 
-class Reach(Copyable):
-    """Where soles can put the centre of pressure, with the torques that their ankles have.
+class CopRegion(Copyable):
+    """Where soles can put the centre of pressure p with the torques that their ankles have.
 
-    Both soles together reach p = λ p_0 + (1 − λ) p_1, p_i what sole i reaches under its share of
-    the load: the less it carries, the further its ankles can move the pressure.
+    A sole under a load of λ m g reaches the p of its polygon with |N p − o| ≤ b/λ (`ankle_limits`).
+    Two soles reach p = λ p_0 + (1 − λ) p_1, with p_i what sole i reaches under its load: the less a
+    foot carries, the further its ankle can move the pressure. Only `fraction` of each polygon and
+    of each torque limit counts.
     """
 
-    def __init__(self, robot: Robot, share: float = 0.95):
-        self.polygons = [share * sole.polygon for sole in robot.soles]
+    def __init__(self, robot: Robot, fraction: float = 0.95):
+        self.polygons = [fraction * sole.polygon for sole in robot.soles]
         self.limits = [ankle_limits(robot, i) for i in range(len(robot.soles))]
-        self._share = share
+        self._fraction = fraction
         self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
         self.middle = [polygon.mean(axis=0) for polygon in self.alone]
         if len(robot.soles) == 2:
-            sums = [self._sum(load) for load in SHARES]
-            self.arrays = ReachArrays(
-                stacked(self.alone),
-                np.array([len(corners) for corners in self.alone]),
-                np.array(self.middle),
-                stacked(sums),
-                np.array([(corners @ DIRECTIONS.T).max(axis=0) for corners in sums]),
-                DIRECTIONS,
-                np.array(SHARES),
+            sums = [self._sum(load) for load in LOAD_FRACTIONS]
+            self.arrays = RegionArrays(
+                alone=stacked(self.alone),
+                corners=np.array([len(corners) for corners in self.alone]),
+                middle=np.array(self.middle),
+                sums=stacked(sums),
+                support=np.array([(corners @ DIRECTIONS.T).max(axis=0) for corners in sums]),
+                directions=DIRECTIONS,
+                load_fractions=np.array(LOAD_FRACTIONS),
             )
 
     def _under(self, sole: int, load: float) -> np.ndarray:
         polygon = self.polygons[sole]
         for normal, offset, bound in zip(*self.limits[sole], strict=True):
-            room = self._share * bound / max(load, 1e-3)
+            room = self._fraction * bound / max(load, 1e-3)
             polygon = clipped(polygon, normal, offset + room)
             polygon = clipped(polygon, -normal, room - offset)
         return polygon
@@ -168,25 +184,26 @@ class Reach(Copyable):
         first, second = load * self._under(0, load), (1.0 - load) * self._under(1, 1.0 - load)
         return (first[:, None] + second[None]).reshape(-1, 2)
 
-    def under(self, sole: int, point: np.ndarray, yaw: float) -> np.ndarray:
-        """(k, 2) what the sole at `point`, turned by `yaw`, reaches alone [m]."""
+    def one(self, sole: int, point: np.ndarray, yaw: float) -> np.ndarray:
+        """(k, 2) The region of the sole alone at `point` (≥ 2,), turned by `yaw` [m]."""
         return point[:2] + self.alone[sole] @ turn(yaw).T
 
     def both(self, points: np.ndarray, yaw: float) -> np.ndarray:
-        """(k, 2) hull of what two soles at `points` (2, ≥ 2) reach, for all shares of the load."""
+        """(k, 2) The region of two soles at `points` (2, ≥ 2), turned by `yaw` [m]."""
         r = self.arrays
         cloud = apart((r.sums.shape[0] * r.sums.shape[1], 2))
         out = apart((2 * len(cloud) + 1, 2))
-        return out[: reach_of_two(r, np.array(points), np.cos(yaw), np.sin(yaw), cloud, out)]
+        n = double_support_region(r, np.array(points), np.cos(yaw), np.sin(yaw), cloud, out)
+        return out[:n]
 
     def beyond(
         self, first: np.ndarray, second: np.ndarray, yaw: float, xi: np.ndarray
     ) -> np.ndarray:
-        """(n,) how far points `xi` (n, 2) lie outside what two soles reach together; < 0 inside.
+        """(n,) How far points `xi` (n, 2) lie outside the region of both soles [m]; < 0 inside.
 
-        Soles at `first` and `second`, (n, 2) or (2,); see `distance_beyond`.
+        The soles are at `first` and `second`, (n, 2) or (2,); see `distance_beyond`.
         """
         rows = [np.array(v, dtype=float, ndmin=2) for v in (first, second, xi)]
         out = np.empty(max(len(points) for points in rows))
-        outside_reach(self.arrays, rows[0], rows[1], yaw, rows[2], out)
+        distances_beyond(self.arrays, rows[0], rows[1], yaw, rows[2], out)
         return out if max(np.ndim(v) for v in (first, second, xi)) > 1 else out[0]

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial import ConvexHull
 
-from poise.baselines.stepping.reach import SHARES, Reach, ankle_limits
+from poise.baselines.stepping.cop_region import LOAD_FRACTIONS, CopRegion, ankle_limits
 from poise.envs.maths.pendulum import capture_distance, drifted
 from poise.envs.maths.polygons import clipped
 from poise.envs.maths.vectors import turn
@@ -71,10 +71,10 @@ def test_ankle_limits_are_the_torques_of_a_vertical_force():
 
 def test_reach_of_one_sole_ends_at_its_edge_or_at_its_ankle_torque():
     """Every corner lies in the sole, and within what the ankles hold."""
-    reach = Reach(robot(), 1.0)
+    region = CopRegion(robot(), 1.0)
     for i, sole in enumerate(robot().soles):
         normal, offset, bound = ankle_limits(robot(), i)
-        corners = reach.alone[i]
+        corners = region.alone[i]
         assert np.all(np.abs(corners) <= np.abs(sole.polygon).max(axis=0) + 1e-9)
         assert np.all(np.abs(corners @ normal.T - offset) <= bound + 1e-9)
         assert np.ptp(corners, axis=0).min() > 0.02
@@ -82,26 +82,26 @@ def test_reach_of_one_sole_ends_at_its_edge_or_at_its_ankle_torque():
 
 def test_two_soles_reach_further_than_one():
     """Each sole's own reach is inside; in the middle the ankles share the load and reach more."""
-    reach, feet = Reach(robot()), np.array([[0.0, 0.09], [0.0, -0.09]])
+    region, feet = CopRegion(robot()), np.array([[0.0, 0.09], [0.0, -0.09]])
     for i in range(2):
-        own = reach.under(i, feet[i], 0.0)
-        assert np.all(reach.beyond(feet[0], feet[1], 0.0, own) < 1e-9)
-    ahead = reach.alone[0][:, 0].max()
-    assert reach.both(feet, 0.0)[:, 0].max() > ahead + 0.02
+        own = region.one(i, feet[i], 0.0)
+        assert np.all(region.beyond(feet[0], feet[1], 0.0, own) < 1e-9)
+    ahead = region.alone[0][:, 0].max()
+    assert region.both(feet, 0.0)[:, 0].max() > ahead + 0.02
 
 
 def test_distance_beyond_the_reach_agrees_with_its_hull():
     """`beyond` is zero on the hull's corners, whatever the feet and the yaw."""
-    reach, rng = Reach(robot()), np.random.default_rng(1)
+    region, rng = CopRegion(robot()), np.random.default_rng(1)
     for _ in range(5):
         yaw = rng.uniform(-3, 3)
         feet = rng.uniform(-0.2, 0.2, (2, 2)) + np.array([[0.0, 0.2], [0.0, -0.2]])
         feet = feet @ turn(yaw).T
-        corners = reach.both(feet, yaw)
-        gaps = reach.beyond(feet[0], feet[1], yaw, corners)
+        corners = region.both(feet, yaw)
+        gaps = region.beyond(feet[0], feet[1], yaw, corners)
         assert np.all(gaps < 1e-9) and np.all(gaps > -0.01)
         far = feet.mean(axis=0) + np.array([5.0, 0.0])
-        assert reach.beyond(feet[0], feet[1], yaw, far) > 3.0
+        assert region.beyond(feet[0], feet[1], yaw, far) > 3.0
 
 
 def generic_feet(rng):
@@ -113,15 +113,15 @@ def generic_feet(rng):
 
 def test_reach_of_two_soles_is_the_hull_of_all_shares():
     """The corners that Qhull finds, no others: their mean is where the robot comes to rest."""
-    reach, rng = Reach(robot()), np.random.default_rng(5)
+    region, rng = CopRegion(robot()), np.random.default_rng(5)
     for _ in range(20):
         feet, yaw = generic_feet(rng)
         cloud = np.vstack([
             share * feet[0] + (1.0 - share) * feet[1] + sums @ turn(yaw).T
-            for share, sums in zip(SHARES, reach.arrays.sums, strict=True)
+            for share, sums in zip(LOAD_FRACTIONS, region.arrays.sums, strict=True)
         ])  # fmt: skip
         expected = cloud[ConvexHull(cloud).vertices]
-        corners = reach.both(feet, yaw)
+        corners = region.both(feet, yaw)
         order, other = np.lexsort(corners.T.round(9)), np.lexsort(expected.T.round(9))
         np.testing.assert_allclose(corners[order], expected[other], atol=1e-9)
         edges = np.roll(corners, -1, axis=0) - corners
@@ -131,9 +131,9 @@ def test_reach_of_two_soles_is_the_hull_of_all_shares():
 
 def test_distance_beyond_the_reach_is_that_of_the_readable_form():
     """At generic points, within and outside."""
-    reach, rng = Reach(robot()), np.random.default_rng(6)
+    region, rng = CopRegion(robot()), np.random.default_rng(6)
     for _ in range(20):
         feet, yaw = generic_feet(rng)
         xi = feet.mean(axis=0) + rng.uniform(-0.3, 0.3, 2)
-        found = reach.beyond(feet[0], feet[1], yaw, xi)
-        assert found == pytest.approx(readable.beyond(reach, *feet, yaw, xi), abs=1e-9)
+        found = region.beyond(feet[0], feet[1], yaw, xi)
+        assert found == pytest.approx(readable.beyond(region, *feet, yaw, xi), abs=1e-9)

@@ -1,0 +1,206 @@
+"""What the YAML files of the controllers that step say.
+
+Numbers have no units: lengths are in h, times in 1/ω and speeds in h ω, with
+h the height of the standing CoM and ω = √(g/h), unless a comment says otherwise.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+
+
+def _number(default: float, **bounds: float) -> Any:
+    """A field with this default and these bounds, see `poise.configs.schema.build`."""
+    return field(default=default, metadata=bounds)
+
+
+@dataclass(frozen=True)
+class StepLimits:
+    """Where a foot may be put, measured from the stance foot along the heading, and how fast."""
+
+    ahead: float = _number(0.75, min=0.0)
+    behind: float = _number(0.7, min=0.0)
+    width_min: float = _number(0.19, above=0.0)  # keeps legs from crossing, feet from touching
+    width_max: float = _number(0.75, above=0.0)
+    speed: float = _number(0.7, above=0.0)  # mean speed of a swing along the heading
+    side_speed: float = _number(0.5, above=0.0)  # and across it
+    time_min: float = _number(0.9, above=0.0)  # from lift-off to touchdown
+    time_max: float = _number(1.4, above=0.0)
+
+    def __post_init__(self) -> None:
+        if self.time_max < self.time_min:
+            raise ValueError(f"time_max: must be at least time_min, {self.time_min}")
+        if self.width_max < self.width_min:
+            raise ValueError(f"width_max: must be at least width_min, {self.width_min}")
+
+
+@dataclass(frozen=True)
+class FootholdChoice:
+    """Where a foothold lies from the capture point that it is to stop, and what a step costs."""
+
+    sagittal_offset: float = 0.04  # beyond ξ along the heading
+    lateral_offset: float = 0.08  # beyond ξ to the foot's own side, so that ξ ends between the feet
+    margin: float = _number(0.06, min=0.0)  # a ξ further inside the CoP region is no better
+    time_price: float = _number(0.04, min=0.0)  # cost of a step's time, in h per 1/ω
+
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "overshoot": "sagittal_offset", "outward": "lateral_offset", "haste": "time_price",
+    }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SignalGains:
+    """The gains of one choice of a step, one for each signal; no signal has a unit."""
+
+    constant: float = 0.0  # of 1
+    later_step: float = 0.0  # of 1 in all steps but the first
+    phase: float = 0.0  # of the fraction of the swing that is over
+    capture_ahead: float = 0.0  # of ξ from the stance sole, in h
+    capture_outward: float = 0.0
+    lean_ahead: float = 0.0  # of the horizontal part of the root's axis that stands at rest
+    lean_outward: float = 0.0
+    momentum_ahead: float = 0.0  # of ω L/(m g h), L the angular momentum that turns the body there
+    momentum_outward: float = 0.0
+
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "again": "later_step",
+        "spin_ahead": "momentum_ahead",
+        "spin_outward": "momentum_outward",
+    }
+
+
+SIGNALS = tuple(signal.name for signal in fields(SignalGains))
+
+
+@dataclass(frozen=True)
+class StepFeedback:
+    """The rows of K in Δ = K s: what lean and turn of the body add to the choices of a step.
+
+    `outward` is to the swinging foot's own side.
+    """
+
+    ahead: SignalGains = field(default_factory=SignalGains)  # foothold
+    outward: SignalGains = field(default_factory=SignalGains)  # foothold
+    time: SignalGains = field(default_factory=SignalGains)  # from lift-off to touchdown
+    height: SignalGains = field(default_factory=SignalGains)  # of the CoM in a swing
+
+    def matrix(self) -> np.ndarray:
+        """K (4, 9), without units."""
+        rows = (self.ahead, self.outward, self.time, self.height)
+        return np.array([[getattr(row, name) for name in SIGNALS] for row in rows])
+
+
+@dataclass(frozen=True)
+class FallFeedback(StepFeedback):
+    """What is added to K in the first step of a fall along `angle` [°], to either side.
+
+    Gains of `later_step` do nothing here, since that signal is 0 in a first step.
+    """
+
+    angle: float = field(kw_only=True, metadata={"min": 0.0, "max": 180.0})
+
+
+@dataclass(frozen=True)
+class RecentringConfig:
+    """When and how feet go back to the nominal stance, the one of standing."""
+
+    distance: float = _number(0.0, min=0.0)  # of a foot from its nominal place; 0: never
+    calm_speed: float = _number(0.1, min=0.0)  # the robot is calm while its CoM is slower
+    calm_tilt: float = _number(35.0, above=0.0, max=180.0)  # and its root is tilted less [°]
+    calm_time: float = _number(0.5, min=0.0)  # for which it must be calm
+    # ξ is brought so far from the middle of the stance sole's region, towards where the other foot
+    # goes; and besides this fraction of the other foot's way against it, since the leg that swings
+    # takes ξ along
+    capture_offset: float = _number(0.025, min=0.0)
+    counterbalance: float = _number(0.07, min=0.0)
+    arrival_radius: float = _number(0.02, above=0.0)  # ξ has arrived when it is this near
+    shift_time_max: float = _number(3.0, min=0.0)  # then the foot lifts off wherever ξ is
+    swing_time: float = _number(1.0, above=0.0)
+    margin: float = 0.015  # by which ξ is to be inside the region of both soles at touchdown
+    # most that the CoP is away from ξ after touchdown, so that the foot that has just landed is not
+    # relieved again
+    cop_distance: float = _number(0.05, min=0.0)
+
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "far": "distance", "calm": "calm_speed", "tilt": "calm_tilt", "after": "calm_time",
+        "lean": "capture_offset", "counter": "counterbalance", "near": "arrival_radius",
+        "patience": "shift_time_max", "time": "swing_time", "press": "cop_distance",
+    }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SwingTask:
+    """J_swing v̇ + J̇ v = a_ref + k (x_ref ⊖ x) + d (ẋ_ref − ẋ), k = `stiffness`, d = 2 ζ √k.
+
+    Units are those of `whole_body/tasks.py`: weights per g² and (g/h)², a stiffness of 1 is ω².
+    """
+
+    weight: float = _number(1000.0, above=0.0)
+    turn_weight: float = _number(100.0, above=0.0)
+    yaw_fraction: float = _number(1.0, min=0.0)  # of `turn_weight`, about the vertical
+    stiffness: float = _number(60.0, min=0.0)
+    damping_ratio: float = _number(1.0, min=0.0)  # ζ
+    clearance: float = _number(0.06, above=0.0, max=0.5)  # of the sole above the ground
+    lift: float = _number(0.45, above=0.0, max=0.9)  # fraction of the swing in which it rises
+    landing_speed: float = _number(0.1, min=0.0)  # downwards
+
+    RENAMED: ClassVar[Mapping[str, str]] = {"yaw_share": "yaw_fraction"}
+
+
+@dataclass(frozen=True)
+class CaptureStepConfig:
+    """Feet in place by `qp`; steps by `step_qp` and `swing` where the feet cannot hold."""
+
+    kind: Literal["capture-step"] = "capture-step"
+    # The first step begins when ξ's distance outside the CoP region of both soles, plus
+    # `momentum_gain` · ω L/(m g), is above `step_margin`; L is the angular momentum in the sense of
+    # the fall: hips that turn the trunk already have given what they can.
+    step_margin: float = 0.0
+    momentum_gain: float = _number(0.0, min=0.0)
+    restep_margin: float = 0.01  # further steps begin when ξ is this far outside
+    gain: float = _number(1.0, above=0.0)  # k of p = ξ + k (ξ − ξ_ref)
+    cop_overreach: float = _number(0.0, min=0.0)  # of p over its region: costs angular momentum
+    region_fraction: float = _number(0.95, above=0.0, max=1.0)  # of the CoP region that counts
+    leg_length: float = _number(0.96, above=0.0)  # at touchdown: sets the CoM's height
+    swing_com_drop: float = _number(0.0, min=0.0)  # the CoM is so much lower in a swing
+    load_time: float = _number(0.1, min=0.0)  # in which a foot takes up its load
+    unload_time: float = _number(0.04, min=0.0)  # in which a foot gives its load away
+    double_support_time: float = _number(0.15, min=0.0)  # least time between two steps
+    torque_rate_limit: float = _number(0.6, above=0.0)  # change in a tick, fraction of the limit
+    root_accel: float = _number(100.0, above=0.0)  # most that the posture asks of the root [ω²]
+    swing_accel: float = _number(100.0, above=0.0)  # the same in a swing [ω²]
+    joint_accel: float = _number(100.0, above=0.0)  # and of the joints [ω²]
+    limits: StepLimits = field(default_factory=StepLimits)
+    foothold: FootholdChoice = field(default_factory=FootholdChoice)
+    feedback: StepFeedback = field(default_factory=StepFeedback)
+    falls: dict[str, FallFeedback] = field(default_factory=dict)  # by direction of the fall
+    recentring: RecentringConfig = field(default_factory=RecentringConfig)
+    swing: SwingTask = field(default_factory=SwingTask)
+    qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+    step_qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "trigger": "step_margin", "spin": "momentum_gain", "again": "restep_margin",
+        "hips": "cop_overreach", "share": "region_fraction", "stretch": "leg_length",
+        "sink": "swing_com_drop", "ramp": "load_time", "unload": "unload_time",
+        "pause": "double_support_time", "jump": "torque_rate_limit", "home": "recentring",
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        if len({fall.angle for fall in self.falls.values()}) < len(self.falls):
+            raise ValueError("falls: angles must differ")
+
+
+@dataclass(frozen=True)
+class IPMStepConfig(CaptureStepConfig):
+    """As `capture-step`, with footholds by energy: of `foothold` only `lateral_offset` counts.
+
+    `time_min` = `time_max` = T.
+    """
+
+    kind: Literal["ipm-step"] = "ipm-step"  # type: ignore[assignment]
+    arc: float = _number(1.0, min=0.0, max=1.0)  # fraction of the height that a rigid leg gains
