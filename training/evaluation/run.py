@@ -92,7 +92,7 @@ class Run:
             self._announce(folder)
             names = tuple(folder.settings.controllers)
             agents = {name: self.agents.get(name) or self._load_again(name, folder)
-                       for name in names}  # fmt: skip
+                      for name in names}  # fmt: skip
             plan = Plan(self.suite, self.limits, self.settings.seed, names)
             _warm_up(agents.values())
             self._play(folder, plan)

@@ -13,7 +13,7 @@ from poise.configs.files import packaged
 from poise.configs.schema import build, read_yaml, to_dict
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
-from poise.training.trials import trial as trials
+from poise.training.trials import play as playing
 from poise.training.trials.agents import Agent
 from poise.training.trials.trial import Trial
 from poise.training.tuning.candidates import Candidate, TuningPushes, follow, play, worth
@@ -49,7 +49,7 @@ def test_a_fall_is_worth_less_than_standing(agent, monkeypatch):
     """A recovery counts fully, a fall by how long it took; a dragged foot is no recovery."""
     assert worth(agent, trial(5.0), in_place=True) == 1.0
     assert 0.03 < worth(agent, trial(40.0), in_place=True) < 0.15
-    monkeypatch.setattr(trials, "STEP_LENGTH", 1e-6)
+    monkeypatch.setattr(playing, "FOOT_DISPLACED", 1e-6)
     assert worth(agent, trial(5.0), in_place=True) == 0.6
     assert worth(agent, trial(5.0), in_place=False) == 1.0
 
