@@ -17,7 +17,7 @@ from tests.support.evaluations import InProcess, write_suite
 from tests.support.policies import linear, write_onnx, write_yaml
 from tests.support.shared import robot
 
-QUIET = {"kind": "quiet", "trials": 1, "duration": 1.2}
+QUIET = {"duration": 1.2, "quiet": {"trials": 1}}
 
 
 def policy(folder: Path, weights: np.ndarray) -> Path:

@@ -60,12 +60,6 @@ ALONE = {
 LATE = ("torch", "stable_baselines3")
 SELVES = ("self", "cls")
 
-#: rooms that still have functions with an argument without a type; to be emptied
-UNTYPED = (
-    "baselines/motions", "baselines/solvers", "baselines/whole_body", "envs/physics",
-    "envs/pushes", "training/benchmark", "training/learning",
-)  # fmt: skip
-
 
 def room_of(path: str) -> str:
     """The room of a file; `configs` is one, and of other top folders every file is."""
@@ -175,14 +169,8 @@ def untyped(path: str) -> list[str]:
 
 def test_every_argument_of_a_function_has_a_type() -> None:
     """Numba ignores the types, editors and readers of the kernels do not."""
-    found = {path: untyped(path) for path in sources() if room_of(path) not in UNTYPED}
+    found = {path: untyped(path) for path in sources()}
     assert {path: names for path, names in found.items() if names} == {}
-
-
-def test_rooms_without_untyped_arguments_leave_the_table() -> None:
-    """Each room of `UNTYPED` still has one."""
-    left = {room_of(path) for path in sources() if untyped(path)}
-    assert set(UNTYPED) - left == set()
 
 
 def test_rooms_are_small_and_say_what_is_in_them() -> None:

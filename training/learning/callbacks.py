@@ -15,6 +15,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.configs.files import write_atomic
+from poise.envs.balance.base import BalanceEnv
 from poise.envs.vector.batch import EnvBatch, replicate
 
 from .checkpoints import controller_fingerprint, save_checkpoint
@@ -123,7 +124,9 @@ class Checkpoints(BaseCallback):
             batch.reset(chunk)
             result: dict[int, tuple[bool, bool]] = {}
 
-            def at_end(i, env, result=result):
+            def at_end(
+                i: int, env: BalanceEnv, result: dict[int, tuple[bool, bool]] = result
+            ) -> None:
                 result.setdefault(i, (env.recovered and not env.fallen, env.fallen))
 
             while len(result) < size:

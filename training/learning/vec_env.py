@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
+import gymnasium
 import numpy as np
-from stable_baselines3.common.vec_env.base_vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.compiled.copies import Copyable
@@ -66,20 +67,22 @@ class ThreadedVecEnv(Copyable, VecEnv):
         """Stop the threads."""
         self.batch.close()
 
-    def get_attr(self, attr_name: str, indices=None) -> list[Any]:
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """An attribute of each environment."""
         return [getattr(self.batch.envs[i], attr_name) for i in self._get_indices(indices)]
 
-    def set_attr(self, attr_name: str, value: Any, indices=None) -> None:
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Set an attribute of each environment."""
         for i in self._get_indices(indices):
             setattr(self.batch.envs[i], attr_name, value)
 
-    def env_method(self, method_name: str, *args, indices=None, **kwargs) -> list[Any]:
+    def env_method(self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any) -> list[Any]:
         """Call a method of each environment."""
         envs = [self.batch.envs[i] for i in self._get_indices(indices)]
-        return [getattr(env, method_name)(*args, **kwargs) for env in envs]
+        return [getattr(env, method_name)(*args: Any, **kwargs) for env in envs]
 
-    def env_is_wrapped(self, wrapper_class, indices=None) -> list[bool]:
+    def env_is_wrapped(
+        self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None
+    ) -> list[bool]:
         """Environments here are bare."""
         return [False for _ in self._get_indices(indices)]
