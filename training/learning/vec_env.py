@@ -76,10 +76,12 @@ class ThreadedVecEnv(Copyable, VecEnv):
         for i in self._get_indices(indices):
             setattr(self.batch.envs[i], attr_name, value)
 
-    def env_method(self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any) -> list[Any]:
+    def env_method(
+        self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
+    ) -> list[Any]:
         """Call a method of each environment."""
         envs = [self.batch.envs[i] for i in self._get_indices(indices)]
-        return [getattr(env, method_name)(*args: Any, **kwargs) for env in envs]
+        return [getattr(env, method_name)(*args, **kwargs) for env in envs]
 
     def env_is_wrapped(
         self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None
