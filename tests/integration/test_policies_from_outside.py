@@ -85,13 +85,16 @@ def test_its_fingerprint_is_that_of_its_numbers(folder: Path) -> None:
 
 
 def test_nan_ends_the_command_in_one_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """With the file, how many numbers, and when; exit code 2."""
+    """With the file, how many numbers, and when; the trial is lost, and the exit code 1."""
     weights = linear(3, len(robot("compact").joint_names))
     weights[:, 3] = np.nan
     policy(folder, weights)
-    assert evaluate(folder) == 2
+    assert evaluate(folder) == 1
     error = capsys.readouterr().err.splitlines()[-1]
     assert f"{folder / 'policy.onnx'}: action: 1 of 25 numbers are not finite at 0.00 s" in error
+    summary = json.loads((folder.parent / "out" / "summary.json").read_text())
+    (entry,) = summary["controllers"].values()
+    assert entry["errors"] == 1 and entry["never_fell_rate"] == 0.0
 
 
 @pytest.mark.parametrize(

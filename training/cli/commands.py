@@ -1,5 +1,6 @@
 """The command `poise`. What is heavy (MuJoCo, Numba, torch) is imported by the sub-commands."""
 
+import csv
 import errno
 import os
 import select
@@ -237,10 +238,13 @@ def benchmark(
 
 
 def _raised(summary: "Summary", out: Path) -> int:
-    """The exit code: 1, with a line that says so, if a controller raised."""
+    """The exit code: 1, with a line that tells the first error, if a controller raised."""
     if failed := sum(entry["errors"] for entry in summary["controllers"].values()):
-        print(f"poise: a controller raised an error in {failed} trials; see the column error of "
-              f"{out / 'trials.csv'}", file=sys.stderr)  # fmt: skip
+        table = out / "trials.csv"
+        with table.open(newline="") as file:
+            first = next(filter(None, (row["error"] for row in csv.DictReader(file))), "unknown")
+        print(f"poise: a controller raised an error in {failed} trials, see the column error of "
+              f"{table}; the first one: {first}", file=sys.stderr)  # fmt: skip
     return 1 if failed else 0
 
 

@@ -62,6 +62,7 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
     """Counts of how trials ended, and medians of what was recorded."""
     standing = [outcome for outcome in outcomes if outcome.recovered]
     trials, fallen = len(outcomes), sum(outcome.fallen for outcome in outcomes)
+    stood = sum(not outcome.fallen and outcome.error is None for outcome in outcomes)
 
     def over(
         name: str, function: Callable[[list[float]], float], chosen: Sequence[Outcome] = outcomes
@@ -73,8 +74,8 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
     return {
         **rate([outcome.recovered for outcome in outcomes]),
         "fallen": fallen,
-        "never_fell_rate": 1.0 - fallen / trials,
-        "never_fell_ci95": wilson_interval(trials - fallen, trials),
+        "never_fell_rate": stood / trials,
+        "never_fell_ci95": wilson_interval(stood, trials),
         "recovered_with_step": sum(outcome.foot_displaced for outcome in standing),
         "recovered_in_place": sum(o.steps == 0 and not o.foot_displaced for o in standing),
         "steps_mean": over("steps", np.mean),
