@@ -31,7 +31,7 @@ def record(
     slow_motion: float = 1.0,
     size: tuple[int, int] = (640, 480),
     camera: Camera | str | int | None = None,
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Play one episode and write it as an MP4 (H.264, yuv420p) that browsers play.
 
     The file appears complete or not at all. Every n-th policy step is drawn, with n such that the

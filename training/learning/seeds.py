@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
 from poise.configs.errors import ConfigError
 from poise.configs.reading import is_file, read_json
 from poise.training.running.provenance import Circumstances
-from poise.training.statistics.seeds import SeedFigures
+
+if TYPE_CHECKING:  # it loads scipy
+    from poise.training.statistics.seeds import SeedFigures
 
 SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
 

@@ -200,11 +200,11 @@ class _Search:
         ]  # fmt: skip
         found = {job.number: values for job, values in crew.each(play, jobs)}
         values = [[found[k][agent] for k in range(len(units))] for agent in range(2)]
-        generation = self.generation
+        generation, tried = self.generation, [u.tolist() for u in units]
         self._take(units, values)
         return {
             "generation": generation,
-            "units": [u.tolist() for u in units],
+            "units": tried,
             "alone": values[0],
             "below": values[1],
             "limits": [limits.tolist() for limits in self.limits],
