@@ -22,7 +22,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, ParamSpec, TypeVar
+from typing import Generic, ParamSpec, TypeGuard, TypeVar
 
 from poise.configs.errors import ConfigError
 from poise.configs.schema import read_yaml
@@ -45,7 +45,7 @@ NOTHING = Allowance()
 _current: ContextVar[Allowance] = ContextVar("allowance", default=NOTHING)
 
 
-def is_outside(name: Any) -> bool:
+def is_outside(name: object) -> TypeGuard[str]:
     """Whether a name has the form ``module:Class``."""
     return isinstance(name, str) and name.isprintable() and NAME.fullmatch(name) is not None
 
@@ -108,7 +108,7 @@ def allows(*handed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     return decorate
 
 
-def named(*controllers: Any) -> list[str]:
+def named(*controllers: object) -> list[str]:
     """Names of classes from outside among what a user has typed or handed over as controllers.
 
     That is ``module:Class``, and what a mapping or a file of ``kind: outside`` names: the mapping
@@ -129,18 +129,18 @@ def named(*controllers: Any) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Carried(Generic[R]):
+class Carried(Generic[P, R]):
     """A function that may run what was allowed where it was made; other processes are sent it."""
 
-    function: Callable[..., R]
+    function: Callable[P, R]
     allowance: Allowance
 
-    def __call__(self, *arguments: Any, **options: Any) -> R:
+    def __call__(self, *arguments: P.args, **options: P.kwargs) -> R:
         with _opened(self.allowance.names, self.allowance.source):
             return self.function(*arguments, **options)
 
 
-def carried(function: Callable[..., R]) -> Carried[R]:
+def carried(function: Callable[P, R]) -> Carried[P, R]:
     """The function, taking what is allowed here to wherever it is called."""
     return Carried(function, _current.get())
 
@@ -155,7 +155,7 @@ def _opened(names: frozenset[str], source: str | None) -> Iterator[None]:
         _current.reset(token)
 
 
-def _file(path: Path) -> Mapping[str, Any] | None:
+def _file(path: Path) -> Mapping[str, object] | None:
     """The fields of a controller's file; of anything else nothing."""
     is_yaml = path.suffix in (".yaml", ".yml") and os.path.isfile(path)
     return read_yaml(path) if is_yaml else None

@@ -183,7 +183,7 @@ class CompiledController(BaseController):
 
     _same_tick = True  # whether `compiled_tick` is of the class that `torques` is of, or below it
 
-    def __init_subclass__(cls, **kwargs: Any) -> None:
+    def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
         if "torques" in vars(cls) or "compiled_tick" in vars(cls):
             cls._same_tick = "compiled_tick" in vars(cls)
@@ -201,7 +201,7 @@ class CompiledController(BaseController):
         """The arrays in which a tick leaves its results."""
         raise NotImplementedError
 
-    def gains(self) -> Any:
+    def gains(self) -> Block:
         """The block of gains that `compiled_tick` is bound to: it is bound anew to another one."""
         raise NotImplementedError
 

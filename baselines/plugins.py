@@ -40,7 +40,7 @@ class OutsideConfig:
     source: str = ""
 
 
-def outside_config(name: str, arguments: dict[str, Any] | None = None) -> OutsideConfig:
+def outside_config(name: str, arguments: dict[str, object] | None = None) -> OutsideConfig:
     """The configuration of a class from outside; raises ConfigError where there is none."""
     found = find_outside(name)
     try:
@@ -69,7 +69,7 @@ def find_outside(name: str) -> Any:
     return getattr(module, match["name"])
 
 
-def make_outside(name: str, robot: Robot, arguments: dict[str, Any] | None = None) -> Any:
+def make_outside(name: str, robot: Robot, arguments: dict[str, object] | None = None) -> object:
     """An instance for `robot`; raises ConfigError when it cannot be made."""
     try:
         return find_outside(name)(robot, **(arguments or {}))
@@ -105,7 +105,7 @@ class OutsideController(WrappedController):
             raise ConfigError(f"must be seconds, at most 1, not {self.inner.period!r}",
                               source=config.name, field="period")  # fmt: skip
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return _blank, (type(self), self.config.name), self.__getstate__()
 
     def another(self) -> BaseController:

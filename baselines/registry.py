@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from poise.baselines.in_place.capture_point import CapturePoint, CapturePointConfig
 from poise.baselines.in_place.jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
@@ -28,6 +27,13 @@ from .allowance import is_outside
 from .controller import Controller
 from .plugins import OutsideConfig, OutsideController, outside_config
 
+#: The configuration of a controller of this package, or of one from outside.
+ControllerConfig = (
+    MomentumQPConfig | PDConfig | StablePDConfig | JacobianTransposeConfig | Kudoh02Config
+    | Macchietto09Config | CapturePointConfig | LQRLIPConfig | LIPMPCConfig | OutsideConfig
+    | CaptureStepConfig | IPMStepConfig | SimbiconConfig | PolicyFileConfig
+)  # fmt: skip
+
 #: `kind` → its configuration and its controller, which takes (robot, configuration).
 KINDS: dict[str, tuple[type, type]] = {
     "momentum-qp": (MomentumQPConfig, MomentumQP),
@@ -47,7 +53,7 @@ KINDS: dict[str, tuple[type, type]] = {
 }
 
 
-def controller_config(controller: str | Path | Mapping[str, Any]) -> Any:
+def controller_config(controller: str | Path | Mapping[str, object]) -> ControllerConfig:
     """The configuration in a packaged file, a path or a mapping, of the class of its `kind`.
 
     ``module:Class`` is one from outside. An ONNX file, and a folder with one or with a
@@ -78,7 +84,9 @@ def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
     return config
 
 
-def load_controller(controller: Any, robot: Robot) -> Any:
+def load_controller(
+    controller: str | Path | Mapping[str, object] | ControllerConfig | Controller, robot: Robot
+) -> Controller:
     """A controller for `robot`: from a name, a path, a mapping or a configuration.
 
     Whatever has `period`, `reset` and `torques` (see `Controller`) is returned as it is.
@@ -99,7 +107,7 @@ def load_controller(controller: Any, robot: Robot) -> Any:
     )
 
 
-def _described(controller: str | Path | Mapping[str, Any]) -> Any:
+def _described(controller: str | Path | Mapping[str, object]) -> ControllerConfig:
     """What a name, a file or a mapping says; nothing from outside is looked up for it."""
     if isinstance(controller, Mapping):
         return _build(dict(controller), "controller")
@@ -111,7 +119,7 @@ def _described(controller: str | Path | Mapping[str, Any]) -> Any:
     return _build(read_yaml(path), str(path))
 
 
-def _build(data: dict[str, Any], source: str) -> Any:
+def _build(data: dict[str, object], source: str) -> ControllerConfig:
     """A configuration; `qp` may be the name of one of the momentum QP, or its mapping.
 
     `base` names a controller whose fields hold where `data` has none of its own; within `qp` and
@@ -125,7 +133,7 @@ def _build(data: dict[str, Any], source: str) -> Any:
         )
     if kind == "policy-file":
         return policy_file_config(data, Path(source))
-    if isinstance(data.get("qp"), str):
-        inner = resolve("controllers", data["qp"])
-        data = {**data, "qp": read_yaml(inner)}
+    inner = data.get("qp")
+    if isinstance(inner, str):
+        data = {**data, "qp": read_yaml(resolve("controllers", inner))}
     return build(KINDS[kind][0], data, source)

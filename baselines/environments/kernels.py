@@ -47,6 +47,7 @@ def steps() -> None:
     env.simulation.state.support_distance(np.zeros(2))
     # for its type alone: what is called by these addresses, other processes compile
     qp = env.controller
+    assert isinstance(qp, MomentumQP)  # by default
     problem = qp.assembly(env.simulation.state, env.targets)
     tick = Tick(problem, qp.memory, 0, 0)
     policy_tick.compile((env.bind(tick, 0).numba_type,))

@@ -13,9 +13,8 @@ from poise.baselines.controller import CompiledController, Controller, Targets, 
 from poise.baselines.motions.motion import ReferenceMotion, load_motion
 from poise.baselines.motions.offsets import MOMENTUM_X, MOMENTUM_Y, TARGETS
 from poise.baselines.motions.targets import Motion
-from poise.baselines.registry import load_controller
+from poise.baselines.registry import ControllerConfig, load_controller
 from poise.baselines.warmup import prepare
-from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.base import BalanceEnv, EnvConfig
@@ -123,7 +122,7 @@ class ResidualBalanceEnv(BalanceEnv):
         robot: str | Path | Robot = "humanoid",
         config: EnvConfig | str | Path | Mapping | None = None,
         *,
-        controller: str | Path | Mapping | MomentumQPConfig | Controller = "momentum-qp",
+        controller: str | Path | Mapping | ControllerConfig | Controller = "momentum-qp",
         motion: str | Path | ReferenceMotion = "standing",
         residual: ResidualScales | Mapping | None = None,
         smoothing: float = 0.0,
@@ -170,7 +169,7 @@ class ResidualBalanceEnv(BalanceEnv):
         )
 
     @property
-    def controller(self) -> Any:
+    def controller(self) -> Controller:
         """Whose targets the action moves; may be replaced between episodes.
 
         Raises ConfigError for one of another robot, or with a period that does not fit.
@@ -178,7 +177,7 @@ class ResidualBalanceEnv(BalanceEnv):
         return self._controller
 
     @controller.setter
-    def controller(self, controller: Any) -> None:
+    def controller(self, controller: Controller) -> None:
         told = told_by(controller, self.robot)
         made_for = told.robot
         if made_for.fingerprint != self.robot.fingerprint:  # compiled code trusts array sizes
@@ -196,7 +195,7 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _unbind(self) -> None:
         super()._unbind()
-        self._bound: tuple[PolicyStep, Any]  # what `_step` works on, the gains when it was made
+        self._bound: tuple[PolicyStep, Block]  # what `_step` works on, the gains when it was made
         self._inputs: TargetInputs | None = None
 
     def arguments(self) -> dict[str, Any]:
@@ -245,14 +244,15 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def compiled_step(self) -> CompiledStep | None:
         """The compiled policy step, for a controller with a compiled tick and solver; else None."""
-        if not self._compiled:
+        controller = self._controller
+        if not self._compiled or not isinstance(controller, CompiledController):
             return None
-        known, gains, world = self._step, self.controller.gains(), self.simulation.world()
+        known, gains, world = self._step, controller.gains(), self.simulation.world()
         if known is not None:
             bound, made_with = self._bound
             if bound.world is world and made_with is gains:
                 return known
-        address, tick = self.controller.compiled_tick(self.state_source.state, self.targets)
+        address, tick = controller.compiled_tick(self.state_source.state, self.targets)
         bound = self.bind(tick, address)
         self._bound = bound, gains
         self._step = CompiledStep(address_of(policy_tick, bound), bound, bound.ticks)
@@ -260,7 +260,9 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def bind(self, tick: Block, kernel: int) -> PolicyStep:
         """All that a step works on, with the controller's tick and the address of its kernel."""
-        found = self.controller.outputs()
+        controller = self._controller
+        assert isinstance(controller, CompiledController)  # only they have ticks
+        found = controller.outputs()
         return PolicyStep(
             inputs=self._target_inputs(),
             kernel=kernel,
@@ -277,7 +279,7 @@ class ResidualBalanceEnv(BalanceEnv):
             end=self._end_of_tick(tick),
         )
 
-    def _end_of_tick(self, tick: Any) -> StepEnd:
+    def _end_of_tick(self, tick: Block) -> StepEnd:
         """The end of a policy step of the controller whose compiled tick works on `tick`."""
         return self.step_end()
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.controller import told_by
+from poise.baselines.controller import Controller, told_by
 from poise.baselines.motions.offsets import STEPS
+from poise.baselines.registry import ControllerConfig
 from poise.baselines.stepping.controller import SteppingController
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
@@ -82,14 +83,14 @@ class ResidualStepEnv(ResidualBalanceEnv):
         robot: str | Path | Robot = "humanoid",
         config: EnvConfig | str | Path | Mapping | None = None,
         *,
-        controller: Any = "capture-step",
+        controller: str | Path | Mapping | ControllerConfig | Controller = "capture-step",
         **arguments: Any,
     ):
         self._step_report = apart(REPORTED)
         super().__init__(robot, config, controller=controller, **arguments)
 
     @ResidualBalanceEnv.controller.setter  # type: ignore[attr-defined]
-    def controller(self, controller: Any) -> None:
+    def controller(self, controller: Controller) -> None:
         """The controller whose targets and steps the action moves.
 
         Raises ConfigError as `ResidualBalanceEnv` does, and for one that does not step.
@@ -103,7 +104,8 @@ class ResidualStepEnv(ResidualBalanceEnv):
         self._residual = replace(self._residual, offsets=self._offsets)
 
     def _view(self, kind: type[Block], out: np.ndarray) -> Block:
-        view: Any = super()._view(View, out)
+        view = super()._view(View, out)
+        assert isinstance(view, View)
         return StepView(view, self._step_report) if kind is StepView else view
 
     def _observe(self) -> None:

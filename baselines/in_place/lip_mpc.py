@@ -1,7 +1,7 @@
 """Receding horizon on the linear inverted pendulum, CoP inside the support polygon [Wieber06]."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import osqp
@@ -72,7 +72,7 @@ class LIPMPC(Guided):
         )  # fmt: skip
         return solver
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         if self._used:
             raise PoiseError(
                 "lip-mpc cannot be copied within an episode, for OSQP does not tell what it "
@@ -80,7 +80,7 @@ class LIPMPC(Guided):
             )
         return {**super().__getstate__(), "_solver": None}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: dict[str, object]) -> None:
         vars(self).update(state)
         self._solver = self._new_solver()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -100,7 +99,7 @@ class PolicyFile(CompiledController):
         self._state: RobotState | None = None
         self._tick: PolicyTick | None = None
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         return {**super().__getstate__(), "_tick": None}  # it holds an address
 
     def _check_sizes(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build
@@ -69,12 +69,15 @@ class GymDeploy:
     policy_path: str = ""
 
 
-def is_deploy(data: dict[str, Any]) -> bool:
+T = TypeVar("T", LabAction, LabTerm, LabDeploy, GymDeploy)
+
+
+def is_deploy(data: dict[str, object]) -> bool:
     """Whether a YAML file is one of these."""
     return "kind" not in data and ("joint_ids_map" in data or "num_obs" in data)
 
 
-def deploy_fields(data: dict[str, Any], source: Path) -> dict[str, Any]:
+def deploy_fields(data: dict[str, object], source: Path) -> dict[str, object]:
     """Fields of a `PolicyFileConfig` from such a file; what it says besides is not looked at.
 
     Raises ConfigError for a missing field, a wrong type, and sizes that do not add up.
@@ -90,13 +93,13 @@ def deploy_fields(data: dict[str, Any], source: Path) -> dict[str, Any]:
     )
 
 
-def _known(kind: Any, data: dict[str, Any], source: Path, name: str = "") -> Any:
+def _known(kind: type[T], data: dict[str, object], source: Path, name: str = "") -> T:
     """The dataclass from what it has of the mapping."""
     known = {key: value for key, value in data.items() if key in kind.__dataclass_fields__}
     return build(kind, known, f"{source}: {name}" if name else source)
 
 
-def _lab_fields(lab: LabDeploy, source: Path) -> dict[str, Any]:
+def _lab_fields(lab: LabDeploy, source: Path) -> dict[str, object]:
     motors = lab.joint_ids_map
     _check_size("default_joint_pos", lab.default_joint_pos, len(motors), source)
     for name in ("stiffness", "damping"):
@@ -133,11 +136,14 @@ def _lab_action(lab: LabDeploy, source: Path) -> LabAction:
     return _known(LabAction, _mapping(described, f"actions.{name}", source), source, name)
 
 
-def _lab_terms(lab: LabDeploy, source: Path) -> tuple[list[dict[str, Any]], str, dict[str, float]]:
+def _lab_terms(
+    lab: LabDeploy, source: Path
+) -> tuple[list[dict[str, object]], str, dict[str, float]]:
     """The terms, how their histories lie, and the clock's period where one of them shows it."""
     described = dict(lab.observations)
     history = "frame" if described.pop("use_gym_history", False) else "term"
-    terms, phase = [], {}
+    terms: list[dict[str, object]] = []
+    phase: dict[str, float] = {}
     for name, entry in described.items():
         term = _known(LabTerm, _mapping(entry, f"observations.{name}", source), source, name)
         terms.append({"term": name, "clip": term.clip, "history": max(1, term.history_length),
@@ -147,7 +153,7 @@ def _lab_terms(lab: LabDeploy, source: Path) -> tuple[list[dict[str, Any]], str,
     return terms, history, phase
 
 
-def _gym_fields(gym: GymDeploy, source: Path) -> dict[str, Any]:
+def _gym_fields(gym: GymDeploy, source: Path) -> dict[str, object]:
     n = gym.num_actions
     for name in ("kps", "kds", "default_angles"):
         _check_size(name, getattr(gym, name), n, source)
@@ -172,7 +178,7 @@ def _gym_fields(gym: GymDeploy, source: Path) -> dict[str, Any]:
     }
 
 
-def _mapping(value: Any, name: str, source: Path) -> dict[str, Any]:
+def _mapping(value: object, name: str, source: Path) -> dict[str, object]:
     if not isinstance(value, dict):
         raise ConfigError("must be a mapping of fields", source=source, field=name)
     return value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from poise.configs.errors import ConfigError
 
@@ -13,12 +12,12 @@ NUMBERS = {"joint_stiffness": "stiffness", "joint_damping": "damping",
            "default_joint_pos": "default"}  # fmt: skip
 
 
-def metadata_fields(metadata: dict[str, str], source: Path) -> dict[str, Any]:
+def metadata_fields(metadata: dict[str, str], source: Path) -> dict[str, object]:
     """Fields of a `PolicyFileConfig` from the metadata of an ONNX file; none where it has none.
 
     Raises ConfigError for numbers that are none, and lists of different lengths.
     """
-    fields: dict[str, Any] = {}
+    fields: dict[str, object] = {}
     if "joint_names" in metadata:
         fields["joints"] = tuple(metadata["joint_names"].split(","))
     for key, name in NUMBERS.items():
@@ -32,9 +31,9 @@ def metadata_fields(metadata: dict[str, str], source: Path) -> dict[str, Any]:
     return fields
 
 
-def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, Any]]:
+def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, object]]:
     names = metadata["observation_names"].split(",")
-    terms: list[dict[str, Any]] = [{"term": RELATIVE.get(name, name)} for name in names]
+    terms: list[dict[str, object]] = [{"term": RELATIVE.get(name, name)} for name in names]
     for key, name in (("scale", "scale"), ("history_length", "history"), ("clip", "clip")):
         whole = f"observation_terms_{key}"
         if whole not in metadata:
@@ -48,7 +47,7 @@ def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, Any]]:
     return terms
 
 
-def _term_field(name: str, values: tuple[float, ...]) -> dict[str, Any]:
+def _term_field(name: str, values: tuple[float, ...]) -> dict[str, object]:
     """What a term's entry says; bounds that bound nothing say nothing."""
     if name == "history":
         return {name: max(1, round(values[0]))}

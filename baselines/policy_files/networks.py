@@ -69,7 +69,7 @@ class OnnxNetwork:
         self._input = others[0]
         self._outputs = [outputs[0], *map(_after, self._memory)]
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return OnnxNetwork, (self.path,), {"_memory": self._memory}
 
     def reset(self) -> None:
@@ -87,7 +87,7 @@ def _after(name: str) -> str:
     return name.removesuffix("_in") + "_out" if name.endswith("_in") else ""
 
 
-def _zeros(shape: list[Any]) -> np.ndarray:
+def _zeros(shape: list[object]) -> np.ndarray:
     return np.zeros([size if isinstance(size, int) else 1 for size in shape], dtype=np.float32)
 
 
@@ -98,7 +98,7 @@ class ScriptNetwork:
         self.content, self.path = content, path
         self.reset()
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         import torch
 
         buffer = io.BytesIO()

@@ -21,7 +21,7 @@ from .networks import onnx_session
 RIVALS = "rivals"  # folder of packaged policies of others, which are for one robot each
 
 
-def is_policy(name: Any) -> bool:
+def is_policy(name: object) -> bool:
     """Whether it names a policy from outside.
 
     That is a packaged one, an ONNX file, a folder with one or with what describes one, or a

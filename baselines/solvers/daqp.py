@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import Any
 
 import daqp
 import numpy as np
@@ -40,7 +39,7 @@ class DAQPSolver:
         self.options = options or DAQPOptions()
         self.reset()
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         if self._model is not None and self.options.warm_start:
             raise uncopyable("daqp")
         return {**vars(self), "_model": None, "_data": ()}

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict, dataclass, field
-from typing import Any
 
 import numpy as np
 import osqp
@@ -55,7 +54,7 @@ class OSQPSolver:
         self.options = options or OSQPOptions()
         self.reset()
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         if self._solver is not None:
             raise uncopyable("osqp")
         return vars(self).copy()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from importlib import import_module
-from typing import Any
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build
@@ -19,7 +18,7 @@ SOLVERS = {
 }
 
 
-def make_solver(name: str, **options: Any) -> Solver:
+def make_solver(name: str, **options: object) -> Solver:
     """A solver by its name; `options` are the fields of its options class.
 
     A whole float is taken for an int, 0 and 1 for a bool: configurations hold plain numbers.
@@ -37,7 +36,7 @@ def make_solver(name: str, **options: Any) -> Solver:
     return getattr(module, solver_class)(build(cls, plain, f"solver {name}"))
 
 
-def _like(default: Any, value: Any) -> Any:
+def _like(default: object, value: object) -> object:
     """The number in the type of the default, where that loses nothing."""
     if isinstance(default, bool) and not isinstance(value, bool) and value in (0, 1):
         return bool(value)

@@ -1,11 +1,11 @@
 """Feet in place as long as that holds; then steps to where the capture point can be stopped."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from poise.baselines.controller import CompiledController, Outputs, Targets
+from poise.baselines.solvers.problem import Solver
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets, contact_tick
 from poise.baselines.whole_body.momentum_qp import COMPILED_SOLVER, AroundQP, momentum_tick
@@ -125,7 +125,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         return self.qp.failures + self.sets.failures
 
     @property
-    def solver(self) -> Any:
+    def solver(self) -> Solver | None:
         """The solver of the QP with feet in place, or None where it is the compiled one."""
         return self.qp.solver
 
@@ -144,7 +144,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         """See `CompiledController`; other solvers are called from Python."""
         return super().compiled and self.qp.compiled
 
-    def gains(self) -> Any:
+    def gains(self) -> QPParameters:
         """See `CompiledController`."""
         return self.qp.parameters
 

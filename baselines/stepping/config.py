@@ -6,14 +6,14 @@ h the height of the standing CoM and ω = √(g/h), unless a comment says otherw
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 
 
-def _number(default: float, **bounds: float) -> Any:
+def _number(default: float, **bounds: float) -> float:
     """A field with this default and these bounds, see `poise.configs.schema.build`."""
     return field(default=default, metadata=bounds)
 

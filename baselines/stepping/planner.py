@@ -1,8 +1,8 @@
 """Which foot steps, where to and how fast: footholds from which the fall can be stopped."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,7 +38,8 @@ class StepPlanner(Copyable):
     search.
     """
 
-    foothold_rule: Any = staticmethod(capture_foothold)  #: finds the foothold of a foot and time
+    #: finds the foothold of a foot and time
+    foothold_rule: Callable[[Search], None] = staticmethod(capture_foothold)
     arc = 0.0
 
     def __init__(

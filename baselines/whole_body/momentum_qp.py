@@ -1,7 +1,7 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from poise.envs.robots.robot import Robot
 
 from .contacts.contact import BoundContact, Contact, bind_contacts, contact_arrays
 from .gains import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
-from .parameters import qp_parameters
+from .parameters import QPParameters, qp_parameters
 from .reduced_qp import Assembly, assemble
 from .stack import fill_from_python, make_stack
 from .tasks.task import BoundTask, Task, bind_tasks
@@ -137,7 +137,7 @@ class MomentumQP(CompiledController):
         kernels = all(bound.task.kernel is not None for bound in self.tasks.values())
         return super().compiled and self.solver is None and kernels
 
-    def gains(self) -> Any:
+    def gains(self) -> QPParameters:
         """The parameters in SI units; see `CompiledController`."""
         return self.parameters
 

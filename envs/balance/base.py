@@ -23,7 +23,7 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.simulation import Simulation, World
 from poise.envs.pushes.options import parse_pushes
-from poise.envs.pushes.push import push_info
+from poise.envs.pushes.push import PushInfo, push_info
 from poise.envs.robots.mirror import Mirror, mirror_robot
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensors.delayed import DelayedState
@@ -63,7 +63,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
     action_space: spaces.Box
     known_terms: ClassVar[Terms] = TERMS  #: of which `observation` chooses
 
-    def __init_subclass__(cls, **arguments: Any) -> None:
+    def __init_subclass__(cls, **arguments: object) -> None:
         super().__init_subclass__(**arguments)
         cls.__doc__ = filled(cls.__doc__, cls.known_terms)
 
@@ -75,8 +75,8 @@ class BalanceEnv(Copyable, gymnasium.Env):
         render_mode: str | None = None,
         width: int = 640,
         height: int = 480,
-        camera: Camera | Mapping[str, Any] | str | int | None = None,
-        **overrides: Any,
+        camera: Camera | Mapping[str, object] | str | int | None = None,
+        **overrides: object,
     ):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ConfigError(
@@ -109,10 +109,10 @@ class BalanceEnv(Copyable, gymnasium.Env):
         )
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
-        self._described: tuple[Any, list[dict[str, Any]]] = None, []  # pushes, their infos
+        self._described: tuple[object, list[PushInfo]] = None, []  # pushes, their infos
         self._renderer: SceneRenderer | None = None
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         if self._renderer is not None and self._renderer.viewer is not None:
             raise PoiseError("an environment whose window is open cannot be copied: close() first")
         return {**super().__getstate__(), "_renderer": None}  # the copy draws with one of its own
@@ -164,7 +164,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
 
     def _unbind(self) -> None:
         """Forget the blocks that compiled code works on: what they are made of has changed."""
-        self._step: Any = None  # of a policy step
+        self._step: CompiledStep | None = None  # of a policy step
         self._end: StepEnd | None = None
         self._end_of: World | None = None
 
@@ -326,7 +326,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
         return self.episode.observation.astype(np.float32), self.info()
 
     @staticmethod
-    def _numbers(value: Any, shape: tuple[int, ...], name: str) -> np.ndarray:
+    def _numbers(value: object, shape: tuple[int, ...], name: str) -> np.ndarray:
         numbers = finite_array(value, shape)
         if numbers is None:
             expected = f"{shape[0]} finite numbers" if shape else "a finite number"
@@ -417,7 +417,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
         """Reward terms, push and record of the episode so far."""
         return step_info(self)
 
-    def push_infos(self) -> list[dict[str, Any]]:
+    def push_infos(self) -> list[PushInfo]:
         """The descriptions of the episode's pushes for `info`, see `push_info`."""
         pushes, (known, infos) = self.simulation.pushes, self._described
         if known is not pushes:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
@@ -53,7 +52,7 @@ class EnvConfig:
     sensors: SensorConfig = field(default_factory=SensorConfig)
 
 
-def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: Any) -> EnvConfig:
+def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: object) -> EnvConfig:
     """An EnvConfig from a .yaml file, a mapping or an object; `overrides` win.
 
     Raises ConfigError naming the file, the field and the choices, UnknownArgument for an override

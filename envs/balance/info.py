@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 
@@ -29,6 +29,17 @@ def step_info(env: BalanceEnv) -> dict[str, Any]:
     }
 
 
+class InfoArrays(TypedDict):
+    """The entries of `step_info` of n environments, each (n,) but for the last one."""
+
+    reward_terms: dict[str, np.ndarray]
+    push: np.ndarray  # of lists
+    is_success: np.ndarray
+    solver_failures: np.ndarray
+    torque_saturation: np.ndarray
+    root_wrench: np.ndarray  # (n, 6)
+
+
 class InfoColumns(Copyable):
     """The entries of `step_info` of many `envs`, one array for each key.
 
@@ -38,10 +49,10 @@ class InfoColumns(Copyable):
     def __init__(self, envs: Sequence[BalanceEnv], record: EpisodeArrays):
         self.envs, self.record = envs, record
         self._quiet_steps = np.array([env.quiet_steps for env in envs])
-        self._pushes: list[Any] = [None] * len(envs)  # those described
+        self._pushes: list[object] = [None] * len(envs)  # those described
         self._descriptions = np.empty(len(envs), dtype=object)
 
-    def read(self) -> dict[str, Any]:
+    def read(self) -> InfoArrays:
         """The columns of the last step."""
         record, metrics = self.record, self.record.metrics
         for i, env in enumerate(self.envs):

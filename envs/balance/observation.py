@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.mirror import SIDES, Mirror
 
+F = TypeVar("F", bound=Callable[..., None])
 CLIP = 10.0  # of every entry of an observation
 
 
@@ -88,7 +89,8 @@ class Term:
     unit: str
     meaning: str
     image: Image
-    kernel: Any = None  # the compiled function that fills it; None: no observation, but an action
+    # the compiled function that fills it; None: no observation, but an action
+    kernel: Callable[..., None] | None = None
     view: type[Block] = View  # the block that the kernel works on
 
     @property
@@ -107,7 +109,7 @@ class TermKind:
     meaning: str
     image: Image
     default: bool
-    kernel: Any
+    kernel: Callable[..., None]
     view: type[Block]
 
     def of(self, names: Mapping[str, tuple[str, ...]]) -> Term:
@@ -133,7 +135,7 @@ class Terms(dict[str, TermKind]):
         meaning: str,
         image: Image,
         default: bool = True,
-    ) -> Callable[[Callable], Any]:
+    ) -> Callable[[F], F]:
         """A decorator: the function, compiled, is the term of its name.
 
         Args:
@@ -144,7 +146,7 @@ class Terms(dict[str, TermKind]):
             default: whether observations have the term if no list is given.
         """
 
-        def decorate(function: Callable) -> Any:
+        def decorate(function: F) -> F:
             kernel, name = compiled(function), function.__name__
             self[name] = TermKind(name, entries, unit, meaning, image, default, kernel, self.view)
             return kernel
@@ -209,9 +211,10 @@ def observer(
     terms: Iterable[Term], out: np.ndarray, view: Callable[[type[Block], np.ndarray], Block]
 ) -> Program:
     """The program that fills `out` (no,) with `terms`; `view(kind, out)` makes their blocks."""
-    calls: list[tuple[Any, Block]] = []
+    calls: list[tuple[Callable[..., None], Block]] = []
     first = 0
     for term in terms:
+        assert term.kernel is not None  # those of actions are not observed
         calls.append((term.kernel, view(term.view, out[first : first + term.size])))
         first += term.size
     return Program.of([*calls, (clip, Whole(out))])

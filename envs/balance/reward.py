@@ -4,8 +4,9 @@ A new term is one more function and its field of `RewardWeights`; with a weight 
 not computed. All that a term may read are the fields of `RewardView`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -121,7 +122,7 @@ def fall_cost(v: RewardView) -> float:
 When = Literal["no fall", "no divergence", "fall"]
 
 
-def _term(weight: float, kernel: Any, formula: str, when: When) -> Any:
+def _term(weight: float, kernel: Callable[[RewardView], float], formula: str, when: When) -> float:
     """A field of `RewardWeights`."""
     return field(default=weight, metadata={"kernel": kernel, "formula": formula, "when": when})
 

@@ -92,7 +92,8 @@ class TorqueBalanceEnv(BalanceEnv):
 
     def _bound(self) -> CompiledStep:
         world, known = self.simulation.world(), self._step
-        if known is None or known.block.world is not world:
+        bound = None if known is None else known.block
+        if known is None or not isinstance(bound, TorqueStep) or bound.world is not world:
             block = TorqueStep(
                 world=world,
                 estimate=self.state_source.estimate,

@@ -5,7 +5,6 @@ so a kernel reads and writes the simulation itself.
 """
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -79,7 +78,7 @@ class SimViews(Block):
     sensordata: np.ndarray
     warnings: np.ndarray  # (13,) int: each second one counts a kind of `mujoco.mjtWarning`
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         data = self.data  # type: ignore[attr-defined]
         return sim_views, (portable(data.model), portable(data))
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any
 
 import numpy as np
 
@@ -73,7 +72,7 @@ def to_impulse(
 
 
 def parse_pushes(
-    value: Any, robot: Robot, margin: Margin | None = None, source: str = "push"
+    value: object, robot: Robot, margin: Margin | None = None, source: str = "push"
 ) -> tuple[Push | Kick, ...]:
     """Pushes from one dictionary, one Push or Kick, or a list of them; [] means none.
 
@@ -96,7 +95,7 @@ def parse_pushes(
     )
 
 
-def _parse_one(item: Any, robot: Robot, margin: Margin | None, source: str) -> Push | Kick:
+def _parse_one(item: object, robot: Robot, margin: Margin | None, source: str) -> Push | Kick:
     if isinstance(item, (Push, Kick)):
         item = asdict(item)
     if not isinstance(item, Mapping):

@@ -6,7 +6,7 @@ J = ∫F dt [N·s]. Directions are degrees counter-clockwise from forward in the
 """
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -71,7 +71,19 @@ class Kick:
     direction: float = field(metadata={"min": -360.0, "max": 360.0})  # [deg], heading frame
 
 
-def push_info(push: Push | Kick, robot: Robot) -> dict[str, Any]:
+class PushInfo(TypedDict):
+    """A push or a kick, as `info` has it; see `push_info`."""
+
+    start: float
+    force: float
+    duration: float
+    body: str
+    direction: float
+    impulse: float
+    specific_impulse: float
+
+
+def push_info(push: Push | Kick, robot: Robot) -> PushInfo:
     """start, duration [s], (peak) force [N], body, direction [deg], J [N·s] and J/m [N·s/kg].
 
     A kick has no force and no duration; its J is the momentum that it gives the whole robot.

@@ -6,7 +6,6 @@ and generator: results do not depend on the number of threads.
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -68,7 +67,7 @@ class EnvBatch(Copyable):
         self._nothing = StepSchedule(NOTHING, self.threads)
         self._turns: tuple[list[CompiledStep], StepSchedule] = [], self._nothing  # of those steps
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         return {**super().__getstate__(), "_turns": ([], self._nothing)}  # they hold addresses
 
     @property
@@ -79,7 +78,7 @@ class EnvBatch(Copyable):
     def reset(
         self,
         seeds: Sequence[int | None],
-        options: Sequence[dict[str, Any] | None] | None = None,
+        options: Sequence[dict[str, object] | None] | None = None,
         mask: np.ndarray | None = None,
     ) -> np.ndarray:
         """Start episodes, each with its seed and options; returns the observations (n, no).
@@ -127,7 +126,8 @@ class EnvBatch(Copyable):
         record, everyone = self.episodes, range(len(self.envs))
         played: Sequence[int] = everyone
         restarted: list[int] = []
-        live: Any = slice(None)  # rows that are played: nearly always all, and a slice is cheap
+        # rows that are played: nearly always all, and a slice is cheap
+        live: np.ndarray | slice = slice(None)
         if restart is not None and restart.any():
             live, restarted = ~restart, np.flatnonzero(restart).tolist()
             played = np.flatnonzero(live).tolist()
@@ -166,7 +166,7 @@ class EnvBatch(Copyable):
         self._turns = found, StepSchedule(rows, self.threads)
         return self._turns[1]
 
-    def _set_actions(self, actions: np.ndarray, live: Any) -> None:
+    def _set_actions(self, actions: np.ndarray, live: np.ndarray | slice) -> None:
         """Set the actions of these rows at once, as `BalanceEnv.set_action` does."""
         record = self.episodes
         vectors = real_array(actions)
@@ -188,7 +188,7 @@ class EnvBatch(Copyable):
         self.envs[i].advance()
 
     def _restart(
-        self, i: int, seed: int | None = None, options: dict[str, Any] | None = None
+        self, i: int, seed: int | None = None, options: dict[str, object] | None = None
     ) -> None:
         self.envs[i].reset(seed=seed, options=options)
 

@@ -1,7 +1,6 @@
 """Policy steps that compiled code plays by their addresses, many of them in several threads."""
 
 import time
-from typing import Any
 
 import numpy as np
 
@@ -45,7 +44,7 @@ class StepSchedule:
         self.played = np.zeros(LINE * threads, dtype=np.int64)
         tell_of_fork(self)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         if len(self.steps):
             raise PoiseError("turns hold addresses: copy the environments that they are of")
         return StepSchedule, (NOTHING, len(self.turns))

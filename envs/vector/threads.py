@@ -5,14 +5,26 @@ import threading
 import weakref
 from collections.abc import Callable
 from queue import SimpleQueue
-from typing import Any
+from typing import Protocol, TypeAlias
 
 from poise.configs.errors import PoiseError
 
-_watchers: weakref.WeakSet[Any] = weakref.WeakSet()
+Raised: TypeAlias = SimpleQueue[BaseException | None]  # what the work of helpers has raised
+#: what a helper is asked: work, its number, where what it raised goes; None: to end
+Call: TypeAlias = tuple[Callable[[int], None], int, Raised | None] | None
 
 
-def tell_of_fork(watcher: Any) -> None:
+class Watcher(Protocol):
+    """Holds threads, which a forked process does not have."""
+
+    def forget_threads(self) -> None:
+        """Forget them: they are threads of another process."""
+
+
+_watchers: weakref.WeakSet[Watcher] = weakref.WeakSet()
+
+
+def tell_of_fork(watcher: Watcher) -> None:
     """Have `watcher.forget_threads()` called in a forked process: it has none but its own."""
     _watchers.add(watcher)
 
@@ -33,12 +45,12 @@ class ThreadTeam:
     """
 
     def __init__(self) -> None:
-        self._calls: list[SimpleQueue[Any]] = []
+        self._calls: list[SimpleQueue[Call]] = []
         self._threads: list[threading.Thread] = []
         self._end = weakref.finalize(self, _end, self._calls)
         tell_of_fork(self)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return ThreadTeam, ()
 
     def forget_threads(self) -> None:
@@ -51,7 +63,7 @@ class ThreadTeam:
 
         Raises what one of them raised, PoiseError if they have been closed or have died.
         """
-        done: SimpleQueue[BaseException | None] = SimpleQueue()
+        done: Raised = SimpleQueue()
         asked = range(1, helpers + 1)
         for k in asked:
             self.ask(work, k, done)
@@ -67,7 +79,7 @@ class ThreadTeam:
         self,
         work: Callable[[int], None],
         helper: int,
-        done: "SimpleQueue[BaseException | None] | None" = None,
+        done: Raised | None = None,
     ) -> None:
         """`work(helper)` in helper 1, 2…, once it is free; what it raised, or None, goes to `done`.
 
@@ -94,12 +106,12 @@ class ThreadTeam:
         self._end()
 
 
-def _serve(calls: "SimpleQueue[Any]") -> None:
+def _serve(calls: "SimpleQueue[Call]") -> None:
     while (call := calls.get()) is not None:
         work, number, done = call
         try:
             work(number)
-            error = None
+            error: BaseException | None = None
         except BaseException as caught:  # the thread that asked raises it
             error = caught
         if done is not None:
@@ -109,6 +121,6 @@ def _serve(calls: "SimpleQueue[Any]") -> None:
         del call, work, done, error  # nothing is kept until the next call
 
 
-def _end(calls: "list[SimpleQueue[Any]]") -> None:
+def _end(calls: "list[SimpleQueue[Call]]") -> None:
     for each in calls:
         each.put(None)

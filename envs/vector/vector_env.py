@@ -1,7 +1,7 @@
 """Gymnasium's vector environment over a batch: threads, no processes, no pickling."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from functools import partial
 from typing import Any
@@ -116,7 +116,7 @@ class BalanceVectorEnv(Copyable, VectorEnv):
         before the first reset.
         """
         batch = self.batch
-        infos: dict[str, Any] = {}
+        infos: dict[str, object] = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             final: list[dict[str, Any]] = [{} for _ in self.envs]
 
@@ -142,14 +142,14 @@ class BalanceVectorEnv(Copyable, VectorEnv):
             {**self._infos(), **infos},
         )
 
-    def _infos(self) -> dict[str, Any]:
+    def _infos(self) -> dict[str, object]:
         """`stack_infos` of what each environment's `info` says."""
         every = np.ones(self.num_envs, dtype=bool)
         if self._own_infos:  # of a subclass
             return stack_infos([env.info() for env in self.envs], every)
         columns = self._columns.read()
-        columns["reward_terms"] = _with_masks(columns["reward_terms"], every)
-        return _with_masks(columns, every)
+        terms = _with_masks(columns["reward_terms"], every)
+        return _with_masks({**columns, "reward_terms": terms}, every)
 
     def render(self) -> tuple[Any, ...]:
         """A frame of each environment, see `BalanceEnv.render`."""
@@ -174,7 +174,7 @@ class BalanceVectorEnv(Copyable, VectorEnv):
         """An attribute of each environment."""
         return self.call(name)
 
-    def set_attr(self, name: str, values: Any) -> None:
+    def set_attr(self, name: str, values: object) -> None:
         """Set an attribute: a list or tuple has a value for each environment, else all get it."""
         if not isinstance(values, (list, tuple)):
             values = [values] * self.num_envs
@@ -183,7 +183,7 @@ class BalanceVectorEnv(Copyable, VectorEnv):
         for env, value in zip(self.envs, values, strict=True):
             setattr(env, name, value)
 
-    def close_extras(self, **kwargs: Any) -> None:
+    def close_extras(self, **kwargs: object) -> None:
         """Close the environments and stop the threads."""
         self.batch.close()
 
@@ -199,19 +199,19 @@ def stack_infos(infos: Sequence[dict[str, Any]], mask: np.ndarray) -> dict[str, 
     return _stack([infos[i] for i in rows], rows, mask.copy())
 
 
-def _with_masks(columns: dict[str, Any], mask: np.ndarray) -> dict[str, Any]:
+def _with_masks(columns: Mapping[str, object], mask: np.ndarray) -> dict[str, object]:
     """The columns, each with the rows that it is reported for."""
-    marked = {}
+    marked: dict[str, object] = {}
     for key, column in columns.items():
         marked[key], marked[f"_{key}"] = column, mask
     return marked
 
 
-def _stack(infos: list[dict[str, Any]], rows: list[int], mask: np.ndarray) -> dict[str, Any]:
-    stacked: dict[str, Any] = {}
+def _stack(infos: list[dict[str, Any]], rows: list[int], mask: np.ndarray) -> dict[str, object]:
+    stacked: dict[str, object] = {}
     for key, example in infos[0].items():
         values = [info[key] for info in infos]
-        column: Any
+        column: dict[str, object] | np.ndarray
         if isinstance(example, dict):
             column = _stack(values, rows, mask)
         elif key != "final_obs" and isinstance(example, (int, float, np.number, np.ndarray)):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -22,7 +21,7 @@ class Camera:
     distance: float = field(default=4.7, metadata={"above": 0.0})  # over the CoM height
 
 
-def find_camera(camera: Any, model: mujoco.MjModel) -> Camera | int:
+def find_camera(camera: object, model: mujoco.MjModel) -> Camera | int:
     """A `Camera`, or the id of one of the model's.
 
     Args:
@@ -40,9 +39,9 @@ def find_camera(camera: Any, model: mujoco.MjModel) -> Camera | int:
     names = [model.camera(i).name or i for i in range(model.ncam)]
     if isinstance(camera, str) and camera in names:
         return names.index(camera)
-    whole = isinstance(camera, (int, np.integer)) and not isinstance(camera, bool)
-    if whole and 0 <= camera < model.ncam:
-        return int(camera)
+    if isinstance(camera, (int, np.integer)) and not isinstance(camera, bool):
+        if 0 <= camera < model.ncam:
+            return int(camera)
     raise ConfigError(f"the robot's model has no camera {shown(camera)}", field="camera",
                       choices=[None, *names])  # fmt: skip
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -48,7 +47,7 @@ class SceneRenderer:
         human: bool,
         width: int = 640,
         height: int = 480,
-        camera: Camera | Mapping[str, Any] | str | int | None = None,
+        camera: Camera | Mapping[str, object] | str | int | None = None,
     ):
         self.simulation = simulation
         self.camera = find_camera(camera, simulation.model)

@@ -7,7 +7,7 @@ import select
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TextIO
+from typing import TYPE_CHECKING, Annotated, Literal, TextIO
 
 import tyro
 
@@ -434,7 +434,7 @@ def list_names() -> None:
     print("also as controllers: policies, zero, a folder written by poise train, module:Class")
 
 
-COMMANDS: dict[str, Callable[..., Any]] = {
+COMMANDS: dict[str, Callable[..., object]] = {
     "demo": demo,
     "train": train,
     "evaluate": evaluate,

@@ -163,7 +163,7 @@ def read_settings(folder: Path) -> Settings:
     return build(Settings, data, str(path))
 
 
-def _difference(name: str, old: Any, new: Any) -> str:
+def _difference(name: str, old: object, new: object) -> str:
     """The difference in words."""
     if isinstance(old, dict) and isinstance(new, dict):
         keys = [k for k in {**old, **new} if old.get(k) != new.get(k)]

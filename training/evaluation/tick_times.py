@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
-from poise.baselines.controller import Controller, WrappedController
+from poise.baselines.controller import Controller, Targets, WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 from poise.training.trials.agents import Agent
 
@@ -24,10 +24,10 @@ class Clocked(WrappedController):
         super().__init__(controller, robot)
         self.seconds: list[float] = []
 
-    def torques(self, *arguments: Any) -> np.ndarray:
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         begun = time.perf_counter()
         try:
-            return self.inner.torques(*arguments)
+            return self.inner.torques(state, targets)
         finally:
             self.seconds.append(time.perf_counter() - begun)
 
@@ -69,7 +69,7 @@ class _Clock:
         except Exception:  # its trials say what it raised
             self.broken = True
         finally:
-            if isinstance(env, ResidualBalanceEnv):
+            if isinstance(env, ResidualBalanceEnv) and inner is not None:
                 env.controller = inner
 
     def _timed(self, act: Callable[[np.ndarray], np.ndarray]) -> Callable:

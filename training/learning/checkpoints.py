@@ -35,7 +35,7 @@ LEFT_OUT = ("ep_info_buffer", "ep_success_buffer", "lr_schedule")
 
 
 def save_checkpoint(
-    folder: Path, model: PPO, normalize: VecNormalize, config: TrainConfig, state: dict[str, Any]
+    folder: Path, model: PPO, normalize: VecNormalize, config: TrainConfig, state: dict[str, object]
 ) -> None:
     """Write the folder whole; raises PoiseError when the disk refuses."""
     new, old = _beside(folder, "new"), _beside(folder, "old")
@@ -117,7 +117,7 @@ def _load_into_wider(stored: Mapping[str, Tensor], model: PPO) -> bool:
     return True
 
 
-def check_robot(state: dict[str, Any], fingerprint: str, path: Path) -> None:
+def check_robot(state: dict[str, object], fingerprint: str, path: Path) -> None:
     """Raise ConfigError unless the policy was trained for the robot with this fingerprint."""
     if state.get("fingerprint") != fingerprint:
         raise ConfigError(
@@ -127,7 +127,7 @@ def check_robot(state: dict[str, Any], fingerprint: str, path: Path) -> None:
         )
 
 
-def check_controller(state: dict[str, Any], config: TrainConfig, path: Path) -> None:
+def check_controller(state: dict[str, object], config: TrainConfig, path: Path) -> None:
     """Raise ConfigError unless the controller still has the gains that the policy learned on."""
     if state.get("controller_fingerprint") != controller_fingerprint(config):
         raise ConfigError(

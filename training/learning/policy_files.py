@@ -109,7 +109,7 @@ def _member(archive: Archive, path: Path, part: str) -> Any:
     return value
 
 
-def _tensors(value: Any, path: Path) -> Iterator[torch.Tensor]:
+def _tensors(value: object, path: Path) -> Iterator[torch.Tensor]:
     """All tensors in mappings, lists and tuples of these."""
     waiting, seen = [value], 0
     while waiting:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -14,6 +14,7 @@ from poise.configs.errors import ConfigError
 
 from .checkpoints import STATE, find_checkpoint
 from .policy_files import read_state
+from .seeds import SeedSummary, evaluations
 
 if TYPE_CHECKING:
     from .train_seeds import SeedRun
@@ -78,13 +79,13 @@ class SeedProgress:
             self._bar.update(task, completed=steps, rate=text)
 
 
-def print_seeds(summary: Mapping[str, Any], console: Console) -> None:
+def print_seeds(summary: SeedSummary, console: Console) -> None:
     """A row per seed, and the interquartile mean over them."""
     table = Table(title="held-out pushes during training, recovered", title_justify="left")
     for name in ("seed", "at the start", "best", "at step", "fell", "mean |action|"):
         table.add_column(name, justify="right")
     for entry in summary["runs"]:
-        start, best = entry["start"], entry["best"]
+        start, best = evaluations(entry)
         table.add_row(
             str(entry["seed"]), f"{start['recovered']:.1%}", f"{best['recovered']:.1%}",
             f"{best['timesteps']:,.0f}", f"{best['fallen']:.1%}", f"{best['mean_abs_action']:.3f}",

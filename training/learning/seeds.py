@@ -4,12 +4,51 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict
 
 from poise.configs.errors import ConfigError
 from poise.configs.reading import is_file, read_json
+from poise.training.running.provenance import Circumstances
+
+if TYPE_CHECKING:  # it loads scipy
+    from poise.training.statistics.seeds import SeedFigures
 
 SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
+
+
+class Evaluation(TypedDict):
+    """A line of evaluations.csv: shares of the held-out pushes, and the mean |action|."""
+
+    timesteps: int
+    recovered: float
+    fallen: float
+    mean_abs_action: float
+    score: float
+
+
+class SeedEntry(TypedDict):
+    """A run of seeds.json: its first and its best evaluation, null as long as there is none."""
+
+    seed: int
+    folder: str
+    timesteps: int
+    finished: bool
+    start: Evaluation | None
+    best: Evaluation | None
+
+
+class SeedSummary(Circumstances):
+    """seeds.json of finished runs."""
+
+    runs: list[SeedEntry]
+    recovered: SeedFigures
+
+
+def evaluations(entry: SeedEntry) -> tuple[Evaluation, Evaluation]:
+    """The first and the best evaluation of a run that is finished."""
+    start, best = entry["start"], entry["best"]
+    assert start is not None and best is not None  # a run ends with one
+    return start, best
 
 
 def seed_folder(out: Path, seed: int) -> Path:
@@ -17,7 +56,7 @@ def seed_folder(out: Path, seed: int) -> Path:
     return out / f"seed-{seed}"
 
 
-def read_seeds(out: Path) -> list[dict[str, Any]]:
+def read_seeds(out: Path) -> list[SeedEntry]:
     """The runs of seeds.json; raises ConfigError naming the file."""
     path = out / SEEDS
     runs = read_json(path).get("runs")

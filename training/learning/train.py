@@ -102,7 +102,7 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
     def learning_rate(remaining: float) -> float:
         return ppo.final_learning_rate + remaining * (ppo.learning_rate - ppo.final_learning_rate)
 
-    policy: dict[str, Any] = {
+    policy: dict[str, object] = {
         "net_arch": list(ppo.net_arch),
         "activation_fn": torch.nn.Tanh,
         "log_std_init": ppo.log_std_init,

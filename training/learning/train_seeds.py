@@ -26,7 +26,7 @@ from .checkpoints import CONFIG, STATE, find_checkpoint
 from .config import TrainConfig
 from .policy_files import read_state
 from .seed_progress import SeedProgress, print_seeds
-from .seeds import SEEDS, read_seeds, seed_folder
+from .seeds import SEEDS, SeedEntry, SeedSummary, evaluations, read_seeds, seed_folder
 from .train import LAST, check_folder, check_pushes, train
 
 
@@ -50,7 +50,7 @@ def train_seeds(
     backend: str = "local",
     console: Console | None = None,
     allow: str | Iterable[str] = (),
-) -> dict[str, Any]:
+) -> SeedSummary:
     """Train one run per seed into `out`/seed-SEED; returns what seeds.json holds.
 
     Every run has the bits of `train` with its seed alone, whatever `workers` and `backend`. What a
@@ -95,7 +95,7 @@ def _train(
     crew: Crew,
     console: Console,
     started: float,
-) -> dict[str, Any]:
+) -> SeedSummary:
     """Train what is missing; writes seeds.json at the start, and whole at the end."""
     seeds = [run.config.seed for run in runs]
     write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
@@ -112,8 +112,9 @@ def _train(
     if failed:
         raise PoiseError(f"{'; '.join(failed)}; what is finished is kept, and --resume goes on")
     entries = [_entry(run) for run in runs]
-    recovered = seed_figures(np.array([[entry["best"]["recovered"]] for entry in entries]), seeds)
-    summary = {
+    rates = [[evaluations(entry)[1]["recovered"]] for entry in entries]
+    recovered = seed_figures(np.array(rates), seeds)
+    summary: SeedSummary = {
         "runs": entries,
         "recovered": recovered,
         **circumstances(started, crew.workers, crew.backend),
@@ -172,7 +173,7 @@ def _finished(run: SeedRun) -> bool:
     return _entry(run)["timesteps"] >= run.config.steps
 
 
-def _entry(run: SeedRun) -> dict[str, Any]:
+def _entry(run: SeedRun) -> SeedEntry:
     """The evaluations of a run at its start and at its best, for seeds.json."""
     checkpoint = find_checkpoint(run.folder / LAST)
     state: dict[str, Any] = read_state(checkpoint / STATE) if checkpoint else {"timesteps": 0}
@@ -189,8 +190,9 @@ def _entry(run: SeedRun) -> dict[str, Any]:
     }
 
 
-def _line(entry: dict[str, Any]) -> str:
+def _line(entry: SeedEntry) -> str:
+    start, best = evaluations(entry)
     return (
-        f"seed {entry['seed']}: recovered {entry['best']['recovered']:.1%} at its best, "
-        f"{entry['start']['recovered']:.1%} at the start"
+        f"seed {entry['seed']}: recovered {best['recovered']:.1%} at its best, "
+        f"{start['recovered']:.1%} at the start"
     )

@@ -41,7 +41,7 @@ class ThreadedVecEnv(Copyable, VecEnv):
 
     def step_wait(self):
         """Step all environments."""
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        infos: list[dict[str, object]] = [{} for _ in range(self.num_envs)]
 
         def at_end(i: int, env: BalanceEnv) -> None:
             infos[i] = {

@@ -9,10 +9,9 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 
@@ -35,7 +34,53 @@ PER_TRIAL = 25  # problems
 LIBRARIES = ("mujoco", "numpy", "numba", "scipy")
 
 
-def qp_of(tick: RecordedTick, controller: MomentumQP, form: Form) -> dict[str, Any]:
+class PushRecord(TypedDict):
+    """The pushes of all trials: the body, its duration [s], and the limit of the impulses."""
+
+    body: str
+    duration: float
+    limit: str
+
+
+class TrialRecord(TypedDict):
+    """A push (impulse [N·s]; direction [°]), how it ended, the ticks met and those solved."""
+
+    trial: int
+    seed: int
+    impulse: float
+    direction: float
+    end: str
+    ticks: int
+    solved: int
+
+
+class ProblemRecord(TypedDict):
+    """A file, its trial, the time after the push began [s], and the rows active at the solution."""
+
+    file: str
+    trial: int
+    time: float
+    active: int
+
+
+class Manifest(TypedDict):
+    """manifest.json; see `README` for the folder."""
+
+    form: Form
+    count: int
+    seed: int
+    robot: str
+    robot_fingerprint: str
+    joints: list[str]
+    controller: Mapping[str, object]
+    push: PushRecord
+    commit: str | None
+    versions: dict[str, str]
+    trials: list[TrialRecord]
+    problems: list[ProblemRecord]
+
+
+def qp_of(tick: RecordedTick, controller: MomentumQP, form: Form) -> dict[str, np.ndarray | None]:
     """The arrays of one file: those of `qpsolvers.Problem`, and how torques follow from x."""
     if form == "reduced":
         qp, T, offset = tick.reduced, tick.torque_matrix, tick.torque_offset
@@ -60,7 +105,7 @@ def qp_of(tick: RecordedTick, controller: MomentumQP, form: Form) -> dict[str, A
     }
 
 
-def problem_arrays(qp: QP) -> dict[str, Any]:
+def problem_arrays(qp: QP) -> dict[str, np.ndarray | None]:
     """P, q, G, h, A, b, lb, ub of `qpsolvers.Problem`; what there is none of is None.
 
     l == u becomes an equality; a row that picks one unknown becomes a bound of it; other rows
@@ -91,7 +136,7 @@ def write_qp_set(
     form: Form = "reduced",
     robot: str = "humanoid",
     controller: str = "momentum-qp",
-) -> dict[str, Any]:
+) -> Manifest:
     """Write a folder of `count` problems with manifest.json and README.md; returns the manifest.
 
     The same arguments give the same arrays. The folder appears when it is complete.
@@ -113,7 +158,7 @@ def write_qp_set(
     limits = load_limits(body)
     config = momentum_qp_config(controller)
     writer = MomentumQP(body, config)
-    manifest: dict[str, Any] = {
+    manifest: Manifest = {
         "form": form, "count": count, "seed": seed,
         "robot": body.name, "robot_fingerprint": body.fingerprint,
         "joints": [body.joint_names[i] for i in body.motor_dofs - 6],
@@ -141,7 +186,7 @@ def write_qp_set(
 
 
 def _write_problems(
-    folder: Path, manifest: dict[str, Any], trials: Iterator[Recovery], controller: MomentumQP
+    folder: Path, manifest: Manifest, trials: Iterator[Recovery], controller: MomentumQP
 ) -> None:
     count, form, problems = manifest["count"], manifest["form"], manifest["problems"]
     for number, trial in enumerate(trials):
@@ -149,9 +194,11 @@ def _write_problems(
             raise PoiseError(
                 f"{controller.robot.name}: its trials give no problems that are solved"
             )
-        push = {k: v for k, v in asdict(trial.push).items() if k in ("impulse", "direction")}
-        record = {"trial": number, "seed": trial.seed, **push, "end": trial.end,
-                  "ticks": trial.met, "solved": len(trial.ticks)}  # fmt: skip
+        record: TrialRecord = {
+            "trial": number, "seed": trial.seed,
+            "impulse": trial.push.impulse, "direction": trial.push.direction,
+            "end": trial.end, "ticks": trial.met, "solved": len(trial.ticks),
+        }  # fmt: skip
         manifest["trials"].append(record)
         wanted = min(PER_TRIAL, count - len(problems), len(trial.ticks))
         for i in np.linspace(0, len(trial.ticks) - 1, wanted).round().astype(int):
@@ -164,7 +211,7 @@ def _write_problems(
             return
 
 
-def npz(arrays: dict[str, Any]) -> bytes:
+def npz(arrays: Mapping[str, np.ndarray | None]) -> bytes:
     """The content of a compressed .npz file; None becomes the object array that qpsolvers reads."""
     content = io.BytesIO()
     plain: dict[str, Any] = {name: np.array(array) for name, array in arrays.items()}

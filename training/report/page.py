@@ -7,7 +7,6 @@ import re
 import shlex
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import jinja2
 from rich.console import Console
@@ -122,7 +121,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
 
 def _cases(
     results: Results, baseline: str, order: Sequence[str], films: bool, console: Console
-) -> tuple[list[dict[str, Any]], list[str]]:
+) -> tuple[list[dict[str, object]], list[str]]:
     """The trials shown, and what to say of those that are not."""
     cases = choose_exhibits(results, baseline, order)
     notes: list[str] = []
@@ -170,7 +169,7 @@ def _film(
     return None
 
 
-def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, Any]:
+def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, object]:
     """A case for the template."""
     record = case.record
     trial = results.trial(record)
@@ -252,5 +251,5 @@ def _summary_file(results: Results) -> Download:
     return download(SUMMARY, text, pack=len(text) > EMBEDDED)
 
 
-def _float(text: Any) -> float | None:
+def _float(text: str | None) -> float | None:
     return float(text) if text not in (None, "") else None

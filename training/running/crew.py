@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 
 from poise.baselines.allowance import carried
 from poise.configs.errors import ConfigError, PoiseError, shown
@@ -63,7 +63,7 @@ class Crew:
             self.workers = self.workers if self._given else cores
         return self
 
-    def __exit__(self, kind: type | None, *error: Any) -> None:
+    def __exit__(self, kind: type | None, *error: object) -> None:
         try:
             if self._pool is not None:
                 if kind is not None:
@@ -92,7 +92,9 @@ class Crew:
             return self._pool.each(carried(function), jobs)
         return self._with_joblib(carried(function), jobs)
 
-    def _with_joblib(self, function: Callable, jobs: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
+    def _with_joblib(
+        self, function: Callable[[Job], Result], jobs: Sequence[Job]
+    ) -> Iterator[tuple[Job, Result]]:
         """Who died of which job is not known here: all go on, until nothing is done between two."""
         left, done = dict(enumerate(jobs)), True
         while left:
@@ -108,7 +110,9 @@ class Crew:
                 tell(f"{DIED}: another one does its work again")
                 done = False
 
-    def _round(self, function: Callable, jobs: dict[int, Any]) -> Iterator[tuple[int, Any]]:
+    def _round(
+        self, function: Callable[[Job], Result], jobs: dict[int, Job]
+    ) -> Iterator[tuple[int, Result]]:
         """Numbers of jobs with results, as they are done."""
         import joblib
 
@@ -145,7 +149,7 @@ def _start_ray(workers: int) -> int:
     from ray.util.joblib import register_ray
 
     if not ray.is_initialized():
-        settings: dict[str, Any] = {"log_to_driver": False}
+        settings: dict[str, object] = {"log_to_driver": False}
         if "RAY_ADDRESS" not in os.environ:
             settings |= {"num_cpus": workers, "include_dashboard": False}
         ray.init(**settings)

@@ -24,7 +24,7 @@ def csv_text(rows: Sequence[Mapping[str, object]], columns: Sequence[str]) -> st
     return text.getvalue()
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """For JSON: plain lists and numbers, None for what is not finite."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return plain(dataclasses.asdict(value))

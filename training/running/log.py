@@ -8,11 +8,13 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Generic, TypeVar
 
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_file, parse_json, read_lines
+
+Key = TypeVar("Key")  # of a trial
 
 
 def read_log(path: Path) -> tuple[list[tuple[Any, Any]], int]:
@@ -31,13 +33,13 @@ def read_log(path: Path) -> tuple[list[tuple[Any, Any]], int]:
     return entries, damaged
 
 
-class TrialLog:
+class TrialLog(Generic[Key]):
     """Opens the file with the entries that it is to have, whole lines only, and appends to it.
 
     Raises PoiseError when the file cannot be written.
     """
 
-    def __init__(self, path: Path, entries: Mapping[Any, Any]):
+    def __init__(self, path: Path, entries: Mapping[Key, object]):
         self.path = path
         write_atomic(path, "".join(_line(key, value) for key, value in entries.items()))
         try:
@@ -45,7 +47,7 @@ class TrialLog:
         except OSError as error:
             raise self._error(error) from None
 
-    def append(self, key: Any, value: Any) -> None:
+    def append(self, key: Key, value: object) -> None:
         """Write an entry to the disk, whole or not at all; raises PoiseError."""
         line, size = _line(key, value).encode(), os.stat(self.path).st_size
         try:
@@ -68,5 +70,5 @@ class TrialLog:
         )
 
 
-def _line(key: Any, value: Any) -> str:
+def _line(key: object, value: object) -> str:
     return json.dumps([key, value]) + "\n"

@@ -19,7 +19,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from poise.configs.errors import PoiseError
 
@@ -72,7 +72,7 @@ class WorkerPool:
             worker.connection.close()
         self.workers.clear()
 
-    def _next(self, waiting: deque[Task]) -> tuple[Task, Any]:
+    def _next(self, waiting: deque[Task[Job, Result]]) -> tuple[Task[Job, Result], Result]:
         """The next task that is done, with its result."""
         while True:
             self._hand_out(waiting)
@@ -101,10 +101,10 @@ class WorkerPool:
             self.workers[-1].give(waiting.popleft())
 
 
-class Task:
+class Task(Generic[Job, Result]):
     """A job, and how many workers have died of it."""
 
-    def __init__(self, function: Callable, job: Any):
+    def __init__(self, function: Callable[[Job], Result], job: Job):
         self.function, self.job, self.deaths = function, job, 0
 
     def survive(self, death: str) -> None:

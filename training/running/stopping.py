@@ -21,8 +21,9 @@ from functools import partial
 from multiprocessing import resource_tracker
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TypeAlias
 
+Handler: TypeAlias = Callable[[int, FrameType | None], object]  # of a signal
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GRACE = 0.5  # [s] to unwind in
 ANEW = "the same command begins anew"
@@ -105,11 +106,11 @@ def uninterrupted() -> Iterator[None]:
 
 
 @contextmanager
-def _handled_by(handler: Any) -> Iterator[dict[int, Any]]:
+def _handled_by(handler: Handler) -> Iterator[dict[int, Handler]]:
     """`handler` in the place of Python's handlers of the signals, if this is the main thread."""
     main = threading.current_thread() is threading.main_thread()
     found = {number: signal.getsignal(number) for number in SIGNALS if main}
-    before: dict[int, Any] = {number: old for number, old in found.items() if callable(old)}
+    before: dict[int, Handler] = {number: old for number, old in found.items() if callable(old)}
     try:
         for number in before:
             signal.signal(number, handler)
@@ -124,7 +125,9 @@ def _raise(number: int, frame: FrameType | None) -> None:
     raise Stopped(signal.Signals(number).name)
 
 
-def _unraisable(otherwise: Callable[[Any], Any], lost: Any) -> None:
+def _unraisable(
+    otherwise: Callable[[sys.UnraisableHookArgs], object], lost: sys.UnraisableHookArgs
+) -> None:
     """A stop that is lost in a callback, of which Python would print a traceback."""
     if not isinstance(lost.exc_value, Stopped):
         otherwise(lost)

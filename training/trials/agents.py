@@ -41,7 +41,7 @@ class Agent:
     env: BalanceEnv
     act: Callable[[np.ndarray], np.ndarray]
     fingerprint: str
-    begin: Callable[[], Any] | None = None
+    begin: Callable[[], object] | None = None
 
 
 def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
@@ -87,7 +87,7 @@ def _idle(name: str, env: BalanceEnv, content: str) -> Agent:
     return Agent(name, env, lambda observation: action, _hash(content.encode()))
 
 
-def _policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Agent:
+def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
     from poise.training.learning.checkpoints import controller_fingerprint
     from poise.training.learning.policy import (
         load_policy,  # loads torch, which the other agents do without
@@ -124,7 +124,7 @@ def _is_controller(name: str, robot: Robot) -> bool:
     return hasattr(found if isinstance(found, type) else make_outside(name, robot), "torques")
 
 
-def _outside_policy(name: str, robot: Robot, overrides: dict[str, Any]) -> Agent:
+def _outside_policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
     """A policy from outside: `act(observation)` in the environment that it names, or makes."""
     policy = make_outside(name, robot)
     if not hasattr(policy, "act"):

@@ -1,7 +1,5 @@
 """Signals of a trial over time: CoM, CoP, capture point, angular momentum, torque, sway."""
 
-from typing import Any
-
 import numpy as np
 
 from poise.envs.balance.base import BalanceEnv
@@ -22,7 +20,7 @@ class Signals:
     """
 
     def __init__(self) -> None:
-        self._rows: list[tuple[Any, ...]] = []
+        self._rows: list[tuple[object, ...]] = []
         self._origin, self._axes = np.zeros(2), np.eye(2)
 
     def __call__(self, env: BalanceEnv) -> None:

@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from poise.configs.errors import ConfigError
 from poise.configs.reading import parse_json
@@ -87,9 +86,9 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None
 
 
-def _read_push(line: Mapping[str, str]) -> dict[str, Any]:
+def _read_push(line: Mapping[str, str]) -> dict[str, object]:
     texts = ("body", "profile")
-    data: dict[str, Any] = {
+    data: dict[str, object] = {
         key: line[key] if key in texts else float(line[key]) for key in PUSH_COLUMNS
     }
     data["point"] = [data.pop(key) for key in ("point_x", "point_y", "point_z")]

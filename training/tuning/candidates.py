@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from poise.envs.robots.robot import Robot, load_robot
 from poise.training.trials.agents import Agent
 from poise.training.trials.play import run_trial
 from poise.training.trials.trial import Trial
+
+if TYPE_CHECKING:  # it loads torch
+    from poise.training.learning.policy import Policy
 
 START = 0.5  # [s] of a push
 UNQUIET, FALLEN = 0.6, 0.3  # what a trial counts at most that is up but not quiet, or fell
@@ -65,7 +68,7 @@ class Candidate:
 
     number: int
     robot: str
-    controller: Mapping[str, Any]  # its configuration
+    controller: Mapping[str, object]  # its configuration
     seconds: float
     in_place: bool
     alone: tuple[Trial, ...]
@@ -119,7 +122,7 @@ def _robot(name: str) -> Robot:
 
 
 @lru_cache(maxsize=1)
-def _policy(name: str, robot: str) -> Any:
+def _policy(name: str, robot: str) -> "Policy":
     from poise.training.learning.policy import load_policy  # loads torch
 
     return load_policy(name, _robot(robot))

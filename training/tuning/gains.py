@@ -69,7 +69,7 @@ class Gains:
         values = _numbers(self.start)
         return np.array([gain.unit(values[gain.path]) for gain in self.gains])
 
-    def at(self, units: np.ndarray) -> dict[str, Any]:
+    def at(self, units: np.ndarray) -> dict[str, object]:
         """The controller's configuration at these coordinates."""
         data = deepcopy(self.start)
         for gain, unit in zip(self.gains, units, strict=True):
@@ -85,7 +85,7 @@ def _put(data: dict[str, Any], path: str, value: float) -> None:
     data[name] = float(f"{value:.5g}")
 
 
-def _numbers(data: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+def _numbers(data: Mapping[str, object], prefix: str = "") -> dict[str, float]:
     """All numbers of a configuration by their paths."""
     found: dict[str, float] = {}
     for name, value in data.items():

@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from rich.console import Console
@@ -64,7 +64,21 @@ class TuneConfig:
                 raise ValueError(f"gains.{path}: must be [low, high] with low < high")
 
 
-def tune_config(name_or_path: str | Path, **fields: Any) -> TuneConfig:
+class Generation(TypedDict):
+    """A line of the history: where the candidates were, and the `worth` of their trials.
+
+    `units` (candidates, gains); `alone` and `below` (candidates, trials), of no trials where none
+    were played; `limits` (2, directions) [N·s] after it.
+    """
+
+    generation: int
+    units: list[list[float]]
+    alone: list[list[float]]
+    below: list[list[float]]
+    limits: list[list[float]]
+
+
+def tune_config(name_or_path: str | Path, **fields: object) -> TuneConfig:
     """A packaged tuning configuration (`configs/tuning`) or a path to one; `base` names another.
 
     `fields` replace its own.
@@ -83,7 +97,7 @@ def tune(
     resume: bool = False,
     console: Console | None = None,
     allow: str | Iterable[str] = (),
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Search; returns the controller's configuration at the mean of the last candidates.
 
     Writes `out/gains.yaml`, that controller, after each generation, and `out/history.jsonl` with
@@ -116,7 +130,7 @@ def tune(
     return gains.at(search.mean)
 
 
-def _known(config: TuneConfig, out: Path, resume: bool) -> list[dict[str, Any]]:
+def _known(config: TuneConfig, out: Path, resume: bool) -> list[Generation]:
     """The generations that an earlier call has tried."""
     if not is_file(out / CONFIG):
         if resume:
@@ -165,7 +179,7 @@ class _Search:
         self.mean = gains.first()  #: what the search has found
         self.centres: list[np.ndarray] = []
 
-    def step(self, crew: Crew) -> dict[str, Any]:
+    def step(self, crew: Crew) -> Generation:
         """A generation; returns its line of the history."""
         config = self.config
         units = [np.asarray(u) for u in self.cma.ask()]
@@ -186,17 +200,17 @@ class _Search:
         ]  # fmt: skip
         found = {job.number: values for job, values in crew.each(play, jobs)}
         values = [[found[k][agent] for k in range(len(units))] for agent in range(2)]
-        row = {
-            "generation": self.generation,
-            "units": [u.tolist() for u in units],
+        generation, tried = self.generation, [u.tolist() for u in units]
+        self._take(units, values)
+        return {
+            "generation": generation,
+            "units": tried,
             "alone": values[0],
             "below": values[1],
+            "limits": [limits.tolist() for limits in self.limits],
         }
-        self._take(units, values)
-        row["limits"] = [limits.tolist() for limits in self.limits]
-        return row
 
-    def again(self, row: dict[str, Any], source: Path) -> None:
+    def again(self, row: Generation, source: Path) -> None:
         """A generation that has been played before."""
         units = [np.asarray(u) for u in self.cma.ask()]
         try:
@@ -211,7 +225,7 @@ class _Search:
             )
         self._take(units, values)
 
-    def _are_worths(self, values: Any) -> bool:
+    def _are_worths(self, values: list[list[float]]) -> bool:
         """True if these are values of all candidates and pushes, or of no pushes."""
         found, pushes = np.asarray(values, float), self.config.pushes
         trials = len(pushes.directions) * len(pushes.levels)
@@ -235,13 +249,13 @@ class _Search:
         self.scores = scores
         self.generation += 1
 
-    def words(self, row: dict[str, Any]) -> str:
+    def words(self, row: Generation) -> str:
         """A line for the terminal."""
         text = f"generation {self.generation} of {self.config.generations}"
         text += f": score {self.scores.mean():.2f}, best {self.scores.max():.2f}"
-        for name, limits in zip(("alone", "below"), self.limits, strict=True):
-            if row[name][0]:
-                who = "alone" if name == "alone" else f"under {self.config.policy}"
+        agents = ("alone", row["alone"]), (f"under {self.config.policy}", row["below"])
+        for (who, worths), limits in zip(agents, self.limits, strict=True):
+            if worths[0]:
                 text += f"; half recovered {who} at {limits.mean():.1f} N·s"
                 text += f" (worst {limits.min():.1f})"
         return text

@@ -1,8 +1,8 @@
 """Contacts of the momentum QP: points in contact, and the Jacobian of these and the soles."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from poise.envs.compiled.memory import apart
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
+
+B = TypeVar("B", bound=Block)
 
 
 class ContactRows(NamedTuple):
@@ -42,16 +44,16 @@ class ContactRowArrays(Block):
 
 
 @dataclass(frozen=True, eq=False)
-class PointTick(Block):
+class PointTick(Block, Generic[B]):
     """All that a contact's kernel works on."""
 
     state: StateArrays
-    contact: Any  # the contact's own block, made by `bind`
+    contact: B  # the contact's own block, made by `bind`
     rows: ContactRowArrays
 
 
 @dataclass(frozen=True)
-class Contact(OfKind):
+class Contact(OfKind, Generic[B]):
     """Base of contacts other than those of the feet: a point with a force that has a cone.
 
     A subclass is a frozen dataclass with a `kind` to be named by. `bind` makes the block that it
@@ -61,26 +63,26 @@ class Contact(OfKind):
 
     room: ClassVar[str] = str(__package__)
     cone_rows: ClassVar[int]  #: of `cone`
-    kernel: ClassVar[Any]  #: as `staticmethod(compiled function)`
+    kernel: ClassVar[Callable[..., None]]  #: as `staticmethod(compiled function)`
 
-    def bind(self, robot: Robot) -> Any:
+    def bind(self, robot: Robot) -> B:
         """The block of this contact for a robot."""
         raise NotImplementedError
 
-    def chain(self, block: Any) -> np.ndarray:
+    def chain(self, block: B) -> np.ndarray:
         """The degrees of freedom that move the point."""
         raise NotImplementedError
 
-    def rows(self, state: RobotState, block: Any) -> ContactRows:
+    def rows(self, state: RobotState, block: B) -> ContactRows:
         """Motion, cone and load in NumPy."""
         raise NotImplementedError
 
 
-class BoundContact(NamedTuple):
+class BoundContact(NamedTuple, Generic[B]):
     """A contact, and the block that it works on for one robot."""
 
-    contact: Contact
-    block: Any
+    contact: Contact[B]
+    block: B
 
     @property
     def chain(self) -> np.ndarray:

@@ -29,7 +29,7 @@ class PointContactBlock(Block):
 
 
 @compiled
-def fill_point(t: PointTick):
+def fill_point(t: PointTick[PointContactBlock]):
     """The rows of a point contact, see `PointContact`."""
     c, rows = t.contact, t.rows
     point = c.point
@@ -46,7 +46,7 @@ def fill_point(t: PointTick):
 
 
 @dataclass(frozen=True)
-class PointContact(Contact):
+class PointContact(Contact[PointContactBlock]):
     """J v̇ + J̇ v = −k_v J v and |f_1| + |f_2| ≤ μ f_n, f_n ≤ f_max: a point that does not move and
     transmits no moment, with ½ ω_f ‖f − f_des n‖² added to the objective.
 

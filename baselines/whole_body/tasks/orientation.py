@@ -38,7 +38,7 @@ class OrientationBlock(Block):
 
 
 @compiled
-def fill_orientation(t: TaskTick):
+def fill_orientation(t: TaskTick[OrientationBlock]):
     """The rows of an orientation task, see `Orientation`."""
     s, o, rows = t.state, t.task, t.rows
     point, R, error = o.point, s.body_axes[o.point.body], o.error
@@ -56,7 +56,7 @@ def fill_orientation(t: TaskTick):
 
 
 @dataclass(frozen=True)
-class Orientation(Task):
+class Orientation(Task[OrientationBlock]):
     """J_ω v̇ + J̇_ω v = k (R_ref ⊖ R) − d ω: a body keeps its axes R at R_ref.
 
     R_ref ⊖ R is the rotation vector of R_ref Rᵀ, ω the angular velocity, world axes; k is

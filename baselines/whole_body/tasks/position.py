@@ -34,7 +34,7 @@ class PositionBlock(Block):
 
 
 @compiled
-def fill_position(t: TaskTick):
+def fill_position(t: TaskTick[PositionBlock]):
     """The rows of a position task, see `Position`."""
     s, o, rows = t.state, t.task, t.rows
     point, reference = o.point, o.reference
@@ -56,7 +56,7 @@ def fill_position(t: TaskTick):
 
 
 @dataclass(frozen=True)
-class Position(Task):
+class Position(Task[PositionBlock]):
     """J v̇ + J̇ v = ẍ_ref + k (x_ref − x) + d (ẋ_ref − ẋ): a point of a body keeps to a place.
 
     k is `stiffness` ω², d = 2 ζ √k. x_ref is in the heading frame, whose origin is the mean of the

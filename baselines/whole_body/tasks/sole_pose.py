@@ -36,7 +36,7 @@ class SolePoseBlock(Block):
 
 
 @compiled
-def fill_sole_pose(t: TaskTick):
+def fill_sole_pose(t: TaskTick[SolePoseBlock]):
     """The rows of a sole's pose, see `SolePose`."""
     s, rows, gains = t.state, t.rows, t.task.gains
     sole, reference = t.task.sole, t.task.reference
@@ -56,7 +56,7 @@ def fill_sole_pose(t: TaskTick):
 
 
 @dataclass(frozen=True)
-class SolePose(Task):
+class SolePose(Task[SolePoseBlock]):
     """J_sole v̇ + J̇ v = a_ref + k (x_ref ⊖ x) + d (ẋ_ref − ẋ), linear part, then angular.
 
     The orientation's x_ref ⊖ x is ½ Σ aᵢ × bᵢ of the axes (see `rotation_error`), its reference is

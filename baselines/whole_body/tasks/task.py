@@ -1,8 +1,8 @@
 """Tasks of the momentum QP: rows of ½ Σ weights (A v̇ − b)² from gains without units."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from poise.envs.maths.pendulum import Units
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
+
+B = TypeVar("B", bound=Block)
 
 
 class Rows(NamedTuple):
@@ -33,16 +35,16 @@ class RowArrays(Block):
 
 
 @dataclass(frozen=True, eq=False)
-class TaskTick(Block):
+class TaskTick(Block, Generic[B]):
     """All that a task's kernel works on."""
 
     state: StateArrays
-    task: Any  # the task's own block, made by `bind`
+    task: B  # the task's own block, made by `bind`
     rows: RowArrays
 
 
 @dataclass(frozen=True)
-class Task(OfKind):
+class Task(OfKind, Generic[B]):
     """Base of tasks. A subclass is a frozen dataclass of gains, with a `kind` to be named by.
 
     Gains have no units (see `gains.py`). `bind` makes the block that the task works on: gains in
@@ -53,22 +55,22 @@ class Task(OfKind):
 
     room: ClassVar[str] = str(__package__)
     size: ClassVar[int]  #: rows
-    kernel: ClassVar[Any] = None  #: as `staticmethod(compiled function)`
+    kernel: ClassVar[Callable[..., None] | None] = None  #: as `staticmethod(compiled function)`
 
-    def bind(self, robot: Robot) -> Any:
+    def bind(self, robot: Robot) -> B:
         """The block of this task for a robot."""
         raise NotImplementedError
 
-    def rows(self, state: RobotState, block: Any) -> Rows:
+    def rows(self, state: RobotState, block: B) -> Rows:
         """`size` rows in v̇, in NumPy."""
         raise NotImplementedError
 
 
-class BoundTask(NamedTuple):
+class BoundTask(NamedTuple, Generic[B]):
     """A task, and the block that it works on for one robot."""
 
-    task: Task
-    block: Any
+    task: Task[B]
+    block: B
 
     def rows(self, state: RobotState) -> Rows:
         """The rows of a state."""
