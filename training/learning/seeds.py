@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.reading import is_file, read_json
 from poise.training.running.provenance import Circumstances
 
@@ -45,9 +45,10 @@ class SeedSummary(Circumstances):
 
 
 def evaluations(entry: SeedEntry) -> tuple[Evaluation, Evaluation]:
-    """The first and the best evaluation of a run that is finished."""
+    """The first and the best evaluation of a run that is finished; PoiseError if one is missing."""
     start, best = entry["start"], entry["best"]
-    assert start is not None and best is not None  # a run ends with one
+    if start is None or best is None:
+        raise PoiseError(f"{SEEDS}: a finished run has no evaluation")
     return start, best
 
 
