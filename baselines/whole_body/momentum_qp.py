@@ -1,14 +1,21 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from poise.baselines.controller import BaseController, CompiledController, Outputs, Targets
+from poise.baselines.controller import (
+    BaseController,
+    CompiledController,
+    Outputs,
+    TargetArrays,
+    Targets,
+)
 from poise.baselines.solvers import QP, Status, make_solver
 from poise.envs.compiled.calls import address_of
 from poise.envs.physics.arrays import robot_arrays
+from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
@@ -149,25 +156,26 @@ class MomentumQP(CompiledController):
     def assembly(self, state: RobotState, targets: Targets) -> Assembly:
         """The block that `assemble` fills the workspace from."""
         s, t, known = state.arrays, targets.arrays(), self._assembly
-        if (
-            known is None or known.state is not s or known.targets is not t
-            or known.parameters is not self.parameters
-        ):  # fmt: skip
-            ws = self.workspace
-            points = list(self.contacts.values())
-            known = self._assembly = Assembly(
-                robot=self.arrays,
-                state=s,
-                contacts=contact_arrays(
-                    s, points, ws.contact_accel, ws.force_weights, ws.force_des
-                ),
-                parameters=self.parameters,
-                targets=t,
-                period=self.period,
-                tasks=make_stack(self.tasks.values(), s, ws),
-                workspace=ws,
-            )
+        if known is None or known.state is not s:
+            known = self._new_assembly(s, t)
+        elif known.targets is not t or known.parameters is not self.parameters:
+            known = replace(known, targets=t, parameters=self.parameters)
+        self._assembly = known
         return known
+
+    def _new_assembly(self, s: StateArrays, t: TargetArrays) -> Assembly:
+        """The block for other state arrays, from which the contacts and tasks read too."""
+        ws, points = self.workspace, list(self.contacts.values())
+        return Assembly(
+            robot=self.arrays,
+            state=s,
+            contacts=contact_arrays(s, points, ws.contact_accel, ws.force_weights, ws.force_des),
+            parameters=self.parameters,
+            targets=t,
+            period=self.period,
+            tasks=make_stack(self.tasks.values(), s, ws),
+            workspace=ws,
+        )
 
     def tick(self, state: RobotState, targets: Targets) -> Tick:
         """The block that `momentum_tick` works on."""

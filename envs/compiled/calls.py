@@ -4,6 +4,7 @@ import importlib
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -64,6 +65,7 @@ def _address(module: str, name: str, kind: BlockType) -> Kernel:
     return _compiled(getattr(importlib.import_module(module), name), kind)
 
 
+@cache  # Numba looks for 20 µs whether it has compiled the function already
 def _compiled(kernel: Any, kind: BlockType) -> Kernel:
     kernel.compile((kind,))
     result = kernel.overloads[kind,]

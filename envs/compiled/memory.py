@@ -1,5 +1,7 @@
 """Memory that compiled code writes to."""
 
+import math
+
 import numpy as np
 
 GAP = 64  # 512 bytes: more than a vector loop handles at once
@@ -12,5 +14,5 @@ def apart(shape: int | tuple[int, ...], dtype: type = float) -> np.ndarray:
     few dozen numbers, as small arrays of one heap may, it adds up one by one instead: the last
     bit of a result would depend on where the arrays happen to lie.
     """
-    size = int(np.prod(shape))
+    size = math.prod(shape) if isinstance(shape, tuple) else shape
     return np.zeros(size + 2 * GAP, dtype=dtype)[GAP : GAP + size].reshape(shape)

@@ -252,3 +252,25 @@ def test_a_copy_is_a_controller_of_its_own(robot, duplicate):
     twin = duplicate(qp)
     qp.workspace.rows[:] = np.nan
     assert np.array_equal(twin.torques(state, targets), torques)
+
+
+def test_new_targets_keep_the_blocks_of_contacts_and_tasks(robot):
+    """They read from the state: targets made anew at each tick cost one block, not all of them."""
+    qp, simulation = controller(robot), Simulation(robot)
+    state = simulation.state
+    first = qp.assembly(state, Targets.standing(robot, state))
+    targets = Targets.standing(robot, state)
+    other = qp.assembly(state, targets)
+    assert other.targets is targets.arrays() and other is qp.assembly(state, targets)
+    assert other.contacts is first.contacts and other.tasks is first.tasks
+    moved = qp.assembly(state.copy(), targets)
+    assert moved.state is not state.arrays and moved.contacts is not first.contacts
+    assert moved.contacts.J is moved.state.J
+
+
+def test_parameters_replaced_between_ticks_are_those_of_the_next(robot):
+    qp, simulation = controller(robot), Simulation(robot)
+    targets = Targets.standing(robot, simulation.state)
+    qp.assembly(simulation.state, targets)
+    qp.parameters = replace(qp.parameters)
+    assert qp.assembly(simulation.state, targets).parameters is qp.parameters

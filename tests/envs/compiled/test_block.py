@@ -181,3 +181,21 @@ def test_an_unknown_member_is_a_typing_error():
 
     with pytest.raises(numba.TypingError, match="nothing"):
         wrong(outer())
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32, np.int64, np.int32, np.bool_, np.uint8])
+@pytest.mark.parametrize("shape", [(), (3,), (2, 1), (0, 3, 2)])
+@pytest.mark.parametrize("writeable", [True, False])
+def test_an_array_has_the_type_that_numba_gives_it(
+    dtype: type, shape: tuple[int, ...], writeable: bool
+) -> None:
+    array = np.zeros(shape, dtype=dtype)
+    array.flags.writeable = writeable
+    kind, _ = Inner(array, 1).numba_type.members["vector"]
+    assert kind is numba.typeof(array)
+
+
+def test_a_masked_array_is_refused() -> None:
+    """Compiled code would read what the mask hides."""
+    with pytest.raises(numba.core.errors.NumbaTypeError, match="MaskedArray"):
+        Inner(np.ma.zeros(3), 1)

@@ -102,3 +102,10 @@ def test_a_kernel_may_return_a_float() -> None:
     assert ask(int(address_of(half, block)), block.address) == 1.5
     with pytest.raises(TypeError, match="whole returns .*: nothing or a float"):
         address_of(whole, block)
+
+
+def test_a_kernel_is_looked_up_once_for_each_type() -> None:
+    """Blocks are made anew between ticks: an address that is known is not asked of Numba again."""
+    address = address_of(double, cell(1.0))
+    assert address_of(double, cell(2.0)) is address
+    assert address_of(increase, cell(1.0)) != address
