@@ -6,7 +6,15 @@ from poise.baselines.controller import Targets
 from poise.baselines.stepping.blocks import CaptureTick
 from poise.baselines.stepping.tick import capture_tick
 from poise.baselines.whole_body.contact_sets import contact_tick
-from poise.baselines.whole_body.momentum_qp import MomentumQP, Tick, accept, momentum_tick, solve
+from poise.baselines.whole_body.momentum_qp import (
+    MomentumQP,
+    MomentumQPConfig,
+    Tick,
+    accept,
+    momentum_tick,
+    solve,
+)
+from poise.configs.schema import build
 from poise.envs.physics.kinematics import allocate_state
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import load_robot
@@ -31,6 +39,25 @@ def assembly() -> None:
     """The momentum QP's problem."""
     qp, state, targets = _standing()
     qp.problem(state, targets)
+
+
+#: one of each packaged kind, on bodies that the humanoid has
+_EXAMPLES = {
+    "tasks": {
+        "trunk": {"kind": "orientation", "body": "torso"},
+        "hand": {"kind": "position", "body": "left_lower_arm"},
+    },
+    "contacts": {"hand": {"kind": "point", "body": "left_lower_arm", "normal": [0.0, 0.0, 1.0]}},
+}
+
+
+def rows() -> None:
+    """The rows of tasks and of contacts other than the feet."""
+    config = build(MomentumQPConfig, _EXAMPLES, "the packaged kinds")
+    qp = MomentumQP(load_robot("humanoid"), config)
+    env = ResidualBalanceEnv(controller=config, duration=0.1)
+    env.reset(seed=0)
+    qp.problem(env.simulation.state, env.targets)
 
 
 def solver() -> None:

@@ -13,6 +13,7 @@ from poise.baselines.controller import (
     Targets,
 )
 from poise.baselines.solvers import QP, Status, make_solver
+from poise.baselines.warmup import prepare
 from poise.envs.compiled.calls import address_of
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
@@ -74,6 +75,8 @@ class MomentumQP(CompiledController):
     def __init__(self, robot: Robot, config: MomentumQPConfig | None = None):
         self.robot = robot
         self.config = config or MomentumQPConfig()
+        if self.config.tasks or self.config.contacts:
+            prepare("rows")
         self.period = self.config.period
         self.arrays = robot_arrays(robot)
         self.parameters = qp_parameters(robot, self.arrays, self.config)
