@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -66,6 +66,8 @@ class ResultFolder:
         settings: of this result.
         overwrite: remove what an earlier result has left there.
         closed: whether no controllers can be added, because trials depend on who takes part.
+        ready: called with the settings of the whole folder before anything is written; what it
+            raises leaves the folder as it was.
 
     Raises:
         ConfigError: the folder holds something else, and `overwrite` is off; nothing is written.
@@ -73,20 +75,23 @@ class ResultFolder:
     """
 
     def __init__(
-        self, path: Path, settings: Settings, overwrite: bool = False, closed: bool = False
-    ):
+        self, path: Path, settings: Settings, overwrite: bool = False, closed: bool = False,
+        ready: Callable[[Settings], object] | None = None,
+    ):  # fmt: skip
         self.path, self.settings, self.damaged = path, settings, 0
         self.finished: dict[Key, Outcome] = {}
         if exists(path) and not is_folder(path):
             raise ConfigError("is not a folder", source=path, field="out")
         self._lock = FolderLock(path)
         try:
-            self._open(overwrite, closed)
+            self._open(overwrite, closed, ready)
         except BaseException:
             self._lock.release()
             raise
 
-    def _open(self, overwrite: bool, closed: bool) -> None:
+    def _open(
+        self, overwrite: bool, closed: bool, ready: Callable[[Settings], object] | None
+    ) -> None:
         path, settings = self.path, self.settings
         if overwrite:
             for name in (*FILES, REPORT):
@@ -97,6 +102,8 @@ class ResultFolder:
                 settings, controllers={**before.controllers, **settings.controllers}
             )
             self.finished, self.damaged = read_outcomes(path)
+        if ready is not None:
+            ready(self.settings)
         write_atomic(path / SETTINGS, to_yaml(self.settings))
         entries = {key: asdict(outcome) for key, outcome in self.finished.items()}
         self._log = TrialLog(path / LOG, entries)

@@ -85,14 +85,14 @@ class Run:
 
     def play(self, plots: bool = False, timed: bool = False) -> Summary:
         """Play what is missing and write the result; returns the summary."""
-        folder = ResultFolder(self.out, self.settings, self.overwrite, self.suite.paired)
+        folder = ResultFolder(self.out, self.settings, self.overwrite, self.suite.paired,
+                              self._load_others)  # fmt: skip
         keeps(self.out / LOG, f"the finished trials are kept in {self.out}; "
               "the same command goes on")  # fmt: skip
         with closing(folder):
             self._announce(folder)
             names = tuple(folder.settings.controllers)
-            agents = {name: self.agents.get(name) or self._load_again(name, folder)
-                      for name in names}  # fmt: skip
+            agents = {name: self.agents[name] for name in names}
             plan = Plan(self.suite, self.limits, self.settings.seed, names)
             _warm_up(agents.values())
             self._play(folder, plan)
@@ -153,16 +153,16 @@ class Run:
         if folder.finished:
             self.console.print(f"going on after {len(folder.finished)} finished trials")
 
-    def _load_again(self, name: str, folder: ResultFolder) -> Agent:
-        """A controller that the folder has besides; raises ConfigError if it has changed."""
-        with allowing(source=self.out / SETTINGS):
-            agent = self.stage.load(name, self.robot)
-        if agent.fingerprint != folder.settings.controllers[name]:
-            raise ConfigError(
-                f"holds trials of {shown(name)}, which has changed since: choose another folder",
-                source=self.out, field="controllers",
-            )  # fmt: skip
-        return agent
+    def _load_others(self, settings: Settings) -> None:
+        """Load what the folder has besides; raises ConfigError for one that has changed."""
+        for name in [each for each in settings.controllers if each not in self.agents]:
+            with allowing(source=self.out / SETTINGS):
+                self.agents[name] = self.stage.load(name, self.robot)
+            if self.agents[name].fingerprint != settings.controllers[name]:
+                raise ConfigError(
+                    f"holds trials of {shown(name)}, which has changed since: choose another "
+                    "folder", source=self.out, field="controllers",
+                )  # fmt: skip
 
     def _play(self, folder: ResultFolder, plan: Plan) -> None:
         """Play what is missing: the first stage, then what follows from it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -114,6 +114,8 @@ class Results:
 def load_results(folder: str | Path) -> Results:
     """Read the folder of a finished result of `evaluate` or `benchmark`.
 
+    Where controllers are being added, or this was stopped, it is that of those that are finished.
+
     Raises:
         ConfigError: no folder, no finished result, one of another format, or files that are cut
             off, do not parse or do not belong together.
@@ -127,9 +129,11 @@ def load_results(folder: str | Path) -> Results:
         why += "; the command that began it goes on" if is_file(folder / LOG) else ""
         raise ConfigError(why, source=folder)
     settings, summary = read_settings(folder), read_summary(folder / SUMMARY)
-    records = _records(folder / TRIALS)
+    added = settings.controllers.keys() - summary["controllers"].keys()  # not yet finished
+    records = tuple(r for r in _records(folder / TRIALS) if r.controller not in added)
     _check(folder, settings, summary, records)
-    return Results(folder, settings, summary, records)
+    marks = {name: mark for name, mark in settings.controllers.items() if name not in added}
+    return Results(folder, replace(settings, controllers=marks), summary, records)
 
 
 def _records(path: Path) -> tuple[Record, ...]:
@@ -159,7 +163,7 @@ def _record(line: Mapping[str, str], number: int, path: Path) -> Record:
 def _check(folder: Path, settings: Settings, summary: Summary, records: tuple[Record, ...]) -> None:
     """The three files must tell of one and the same."""
     entries = summary["controllers"]
-    if set(entries) != set(settings.controllers):
+    if not entries.keys() <= settings.controllers.keys():
         raise ConfigError(f"its controllers are not those of {SETTINGS}", source=folder / SUMMARY,
                           field="controllers")  # fmt: skip
     counts = dict.fromkeys(entries, 0)

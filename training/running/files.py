@@ -12,6 +12,7 @@ import numpy as np
 SETTINGS, LOG, TRIALS, SUMMARY = "settings.yaml", "trials.jsonl", "trials.csv", "summary.json"
 PLOTS = ("polar_envelope.png", "fall_probability.png")
 REPORT = "report.html"  # by `poise report`; not of the result, but gone with it
+OLD = ("trials.partial.jsonl",)  # of Poise before 0.3, which --overwrite removes
 FILES = (SUMMARY, SETTINGS, LOG, TRIALS, *PLOTS)
 
 

@@ -19,6 +19,7 @@ from poise.configs.errors import ConfigError
 from poise.training.cli import demo
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate, measured_limits
+from poise.training.results.read import load_results
 from poise.training.running.crew import Crew
 from poise.training.running.provenance import Circumstances
 from poise.training.running.summary import Summary
@@ -136,6 +137,30 @@ def test_a_finished_evaluation_is_not_played_again(
     evaluate(["zero"], envelope, out=tmp_path / "env")
     with pytest.raises(ConfigError, match="holds a result with other controllers"):
         evaluate(["momentum-qp"], envelope, out=tmp_path / "env")
+
+
+def test_a_finished_result_stays_readable_while_others_are_added(
+    tmp_path: Path, in_process: type[InProcess]
+) -> None:
+    """One that cannot be added changes nothing; a stop leaves what was finished, and goes on."""
+    suite, out, own = write_suite(tmp_path, RANDOM), tmp_path / "out", tmp_path / "own.yaml"
+    own.write_text("kind: pd\n")
+    before = evaluate([str(own)], suite, out=out, seed=1)
+    files = {path.name: path.read_bytes() for path in out.iterdir()}
+    own.write_text("kind: pd\nperiod: 0.002\n")
+    with pytest.raises(ConfigError, match="own.yaml', which has changed since"):
+        evaluate(["zero"], suite, out=out, seed=1)
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == files
+    own.write_text("kind: pd\n")
+    in_process.played, in_process.stop_after = 0, 2
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(["zero"], suite, out=out, seed=1)
+    results = load_results(out)
+    assert results.summary["controllers"].keys() == before["controllers"].keys() == {str(own)}
+    assert results.settings.controllers.keys() == {str(own)} and len(results.records) == 4
+    in_process.stop_after = None
+    evaluate(["zero"], suite, out=out, seed=1)
+    assert in_process.played == 4 and load_results(out).controllers == (str(own), "zero")
 
 
 def test_one_command_plays_what_the_other_has_suites_for(

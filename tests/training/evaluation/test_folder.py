@@ -178,3 +178,16 @@ def test_a_file_is_no_folder(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="is not a folder"):
         ResultFolder(tmp_path / "file", SETTINGS, overwrite=True)
     assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_what_is_not_ready_leaves_the_folder_as_it_was(tmp_path: Path) -> None:
+    """It is asked with all controllers, before anything is written, and the lock is given back."""
+    start(tmp_path).finish([], SUMMARY)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def refuse(settings: Settings) -> None:
+        raise ConfigError(f"not {', '.join(settings.controllers)}")
+
+    with pytest.raises(ConfigError, match="not pd, abe07"):
+        ResultFolder(tmp_path, replace(SETTINGS, controllers={"abe07": "2"}), ready=refuse)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
