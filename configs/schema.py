@@ -237,9 +237,9 @@ def _build_typed_dict(cls: Any, data: Any, source: str, path: str) -> dict[str, 
     if not isinstance(data, dict):
         raise ConfigError(f"must be a mapping, not {shown(data)}", source=source, field=path)
     prefix, values, hints = f"{path}." if path else "", dict(data), get_type_hints(cls)
-    for name in cls.__required_keys__ - data.keys():
+    for name in sorted(cls.__required_keys__ - data.keys()):
         raise ConfigError("is missing", source=source, field=f"{prefix}{name}")
-    for name in hints.keys() & data.keys():
+    for name in [name for name in hints if name in data]:
         values[name] = _build(hints[name], data[name], source, prefix + name, {})
     return values
 

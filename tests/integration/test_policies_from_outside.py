@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -76,10 +77,12 @@ def test_a_yaml_file_is_benchmarked(folder: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_its_fingerprint_is_that_of_its_numbers(folder: Path) -> None:
-    """Another network under the same name is another controller."""
+    """Another network under the same name is another controller; another folder is not."""
     body = robot("compact")
     before = load_agent(str(folder), body).fingerprint
     assert load_agent(str(folder), body).fingerprint == before
+    moved = Path(shutil.copytree(folder, folder.parent / "moved"))
+    assert load_agent(str(moved), body).fingerprint == before
     write_onnx(folder / "policy.onnx", linear(3, len(body.joint_names), seed=1))
     assert load_agent(str(folder), body).fingerprint != before
 

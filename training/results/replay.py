@@ -87,6 +87,8 @@ def replay(
     if video is not None:
         from poise.training.figures.video import record as film
 
+        if agent.begin is not None:  # it remembers the trial that has just been played
+            agent.begin()
         film(agent.env, agent.act, video, {"seed": again.seed, "options": again.options})
     return Replay(again, name, outcome, differences)
 

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,9 @@ from poise.baselines.allowance import is_outside
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.plugins import find_outside, make_outside, outside_config
+from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.reading import RIVALS, is_policy
-from poise.baselines.registry import controller_config
+from poise.baselines.registry import ControllerConfig, controller_config
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged
 from poise.configs.reading import is_file, is_folder
@@ -78,7 +79,15 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
             choices=(*names, *policies, NO_CONTROL),
         )
     config = controller_config(name)
-    return _idle(name, ResidualBalanceEnv(robot, controller=config, **overrides), to_yaml(config))
+    env = ResidualBalanceEnv(robot, controller=config, **overrides)
+    return _idle(name, env, to_yaml(_wherever(config)))
+
+
+def _wherever(config: ControllerConfig) -> ControllerConfig:
+    """The same for a policy's files in any folder: their digest tells them apart."""
+    if isinstance(config, PolicyFileConfig):
+        return replace(config, policy=Path(config.policy).name, described_in="")
+    return config
 
 
 def _idle(name: str, env: BalanceEnv, content: str) -> Agent:
