@@ -57,8 +57,8 @@ class TickClock:
     """Runs a controller's ticks on recorded states; its memory goes from tick to tick.
 
     State and targets of all ticks lie in the same arrays, as in an environment. Arrays of their own
-    would need a block for each tick, and the Python code that makes one, run just before the tick,
-    leaves the caches cold: 0.1 ms of it made a tick of 28 µs one of 38 µs, and 0.4 ms one of 45 µs.
+    would need a block for each tick, and the Python code that makes one just before the tick slows
+    it, by cold caches probably: 0.1 ms of it made a tick of 28 µs one of 38, 0.4 ms one of 45 µs.
     """
 
     def __init__(self, controller: MomentumQP):
