@@ -11,7 +11,7 @@ from numba.core import event
 
 from poise.configs.errors import ConfigError
 
-from .kernel_cache import drop_stale_kernels, kept_in, kernel_folder
+from .kernel_cache import compiled_once, drop_stale_kernels, kept_in, kernel_folder
 
 #: Sums may be reordered (SIMD) and products fused into them, but NaN and infinity keep their
 #: meaning: checks rely on them.
@@ -44,13 +44,14 @@ if CACHE is not None:
 def compiled(function: Callable) -> Any:
     """Numba's decorator: cached on disk, without the GIL, NumPy's rules for division by zero."""
     with kept_in(CACHE):
-        return numba.njit(
+        dispatcher = numba.njit(
             cache=CACHE is not None,
             nogil=True,
             no_cfunc_wrapper=True,  # of which nobody makes use; a twentieth of the compilation
             error_model="numpy",
             fastmath=_FLAGS,
         )(function)
+    return dispatcher if CACHE is None else compiled_once(dispatcher, CACHE)
 
 
 PATIENCE = 1.0  # [s] of compilation before the user is told

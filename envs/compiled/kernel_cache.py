@@ -2,17 +2,21 @@
 
 Numba's own cache tells processors and the file of the function apart. It knows neither the flags of
 `fastmath` nor the functions that were compiled into a kernel from other files, and processes that
-compile at the same time for different processors may take each other's code for their own.
+compile at the same time for different processors may take each other's code for their own. Nor does it
+keep two processes from compiling the same kernel, whose last bits may differ.
 """
 
 import contextlib
+import fcntl
 import hashlib
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import llvmlite.binding
 import numba
+from numba.core.compiler_lock import global_compiler_lock
 
 _ROOM = Path(__file__).resolve().parents[1]
 _PACKAGES = (_ROOM, _ROOM.parent / "baselines")
@@ -78,3 +82,44 @@ def kept_in(folder: Path | None) -> Iterator[None]:
         yield
     finally:
         numba.config.CACHE_DIR = before
+
+
+def compiled_once(dispatcher: Any, folder: Path) -> Any:
+    """Numba's `dispatcher`, which one process at a time compiles; the others wait and read it.
+
+    What a process compiles depends on the kernels that it has read or compiled before, which decide
+    about what is inlined. So two that compile the same kernel at once would go on with other last
+    bits, and those that come later with either.
+    """
+    lock, compile_ = folder / f"{_name(dispatcher.py_func)}.lock", dispatcher.compile
+
+    def compile_alone(signature: Any) -> Any:
+        with global_compiler_lock, _held(lock):  # in this order, or two threads wait for each other
+            return compile_(signature)
+
+    dispatcher.compile = compile_alone
+    return dispatcher
+
+
+def _name(function: Any) -> str:
+    return hashlib.sha256(f"{function.__module__}.{function.__qualname__}".encode()).hexdigest()
+
+
+_locks: set[Path] = set()  # that this process holds: a kernel may call itself
+
+
+@contextlib.contextmanager
+def _held(path: Path) -> Iterator[None]:
+    """Hold a lock, where the file system has such."""
+    if path in _locks:
+        yield
+        return
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):
+            file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+            stack.callback(os.close, file)
+            fcntl.flock(file, fcntl.LOCK_EX)
+            stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # a forked process has it open too
+        _locks.add(path)
+        stack.callback(_locks.discard, path)
+        yield

@@ -86,6 +86,24 @@ def test_the_flags_keep_nan_and_infinity() -> None:
     assert jit.fastmath({"POISE_FASTMATH": "0"}) == set()
 
 
+def test_one_process_compiles_and_the_others_wait_and_read(tmp_path: Path) -> None:
+    """Or the kernel that a process goes on with would not be the one that later ones read."""
+    code = PROBE.replace("x = 1.0", "input()\nx = 1.0", 1)  # all have imported what they need, then begin together
+    jobs = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}, cwd=Path(__file__).parents[3],
+        )
+        for _ in range(3)
+    ]  # fmt: skip
+    for job in jobs:
+        assert job.stdin is not None
+        job.stdin.write("\n")
+        job.stdin.flush()
+    read = [int(job.communicate()[0].split()[1]) for job in jobs]
+    assert sorted(read) == [0, 1, 1]
+
+
 def test_kernels_of_other_sources_are_dropped(tmp_path: Path) -> None:
     """A changed file of the package, wherever it is, outdates what was compiled from it."""
     package, folder = tmp_path / "package", tmp_path / "kernels"
