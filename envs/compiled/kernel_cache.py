@@ -2,8 +2,8 @@
 
 Numba's own cache tells processors and the file of the function apart. It knows neither the flags of
 `fastmath` nor the functions that were compiled into a kernel from other files, and processes that
-compile at the same time for different processors may take each other's code for their own. Nor does it
-keep two processes from compiling the same kernel, whose last bits may differ.
+compile at the same time for different processors may take each other's code for their own. Nor
+does it keep two processes from compiling the same kernel, whose last bits may differ.
 """
 
 import contextlib

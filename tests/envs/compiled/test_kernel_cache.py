@@ -88,7 +88,7 @@ def test_the_flags_keep_nan_and_infinity() -> None:
 
 def test_one_process_compiles_and_the_others_wait_and_read(tmp_path: Path) -> None:
     """Or the kernel that a process goes on with would not be the one that later ones read."""
-    code = PROBE.replace("x = 1.0", "input()\nx = 1.0", 1)  # all have imported what they need, then begin together
+    code = PROBE.replace("x = 1.0", "input()\nx = 1.0", 1)  # all import, then begin together
     jobs = [
         subprocess.Popen(
             [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
