@@ -16,6 +16,8 @@ from typing import Any
 
 import llvmlite.binding
 import numba
+from llvmlite.binding import Linkage
+from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 
 _ROOM = Path(__file__).resolve().parents[1]
@@ -85,20 +87,56 @@ def kept_in(folder: Path | None) -> Iterator[None]:
 
 
 def compiled_once(dispatcher: Any, folder: Path) -> Any:
-    """Numba's `dispatcher`, which one process at a time compiles; the others wait and read it.
+    """Numba's `dispatcher`, whose kernels have the same bits in the process that compiles them.
 
-    What a process compiles depends on the kernels that it has read or compiled before, which decide
-    about what is inlined. So two that compile the same kernel at once would go on with other last
-    bits, and those that come later with either.
+    One process at a time compiles a function; the others wait and read it.
     """
     lock, compile_ = folder / f"{_name(dispatcher.py_func)}.lock", dispatcher.compile
 
     def compile_alone(signature: Any) -> Any:
-        with global_compiler_lock, _held(lock):  # in this order, or two threads wait for each other
+        with global_compiler_lock, _held(lock), _own_copies():  # threads agree on this order
             return compile_(signature)
 
     dispatcher.compile = compile_alone
     return dispatcher
+
+
+@contextlib.contextmanager
+def _own_copies() -> Iterator[None]:
+    """Meanwhile a kernel that is compiled calls its own copies of the functions that it calls.
+
+    Numba links them as weak symbols, of which a process takes those that it has loaded first: in the
+    one that compiles, the functions compiled before, each optimized for itself; in one that reads
+    the kernel from the cache, the copies within, optimized with their caller. Last bits differ.
+    """
+    finish = CPUCodeLibrary._finalize_final_module
+
+    def finish_alone(library: Any) -> None:
+        if library._shared_module is None:  # it was not read from the cache
+            module = library._final_module
+            library._shared_module = _linkable(module)
+            for function in _defined(module, Linkage.linkonce_odr):
+                function.linkage = "internal"
+        finish(library)
+
+    CPUCodeLibrary._finalize_final_module = finish_alone
+    try:
+        yield
+    finally:
+        CPUCodeLibrary._finalize_final_module = finish
+
+
+def _defined(module: Any, linkage: Linkage) -> list[Any]:
+    """The functions that an LLVM module defines with this linkage."""
+    return [f for f in module.functions if not f.is_declaration and f.linkage == linkage]
+
+
+def _linkable(module: Any) -> Any:
+    """A copy that can be linked into several others, as `CPUCodeLibrary` makes it."""
+    copy = module.clone()
+    for function in _defined(copy, Linkage.external):
+        function.linkage = "linkonce_odr"
+    return copy
 
 
 def _name(function: Any) -> str:
