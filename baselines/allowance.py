@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Generic, ParamSpec, TypeGuard, TypeVar
 
 from poise.configs.errors import ConfigError
+from poise.configs.reading import whole_path
 from poise.configs.schema import read_yaml
 
 NAME = re.compile(r"(?P<place>[^:\s]+):(?P<name>[A-Za-z_]\w*)")
@@ -61,7 +62,7 @@ def check_allowed(name: str) -> None:
     That is ``module:Class``, or a file of TorchScript.
     """
     allowance = _current.get()
-    if _key(name) not in allowance.names:
+    if _key(name, allowance.source, "controller") not in allowance.names:
         raise ConfigError(
             f"wants to run code from outside, {name!r}: if you trust it, allow it by --allow "
             f"{shlex.quote(name)}, or poise.allowing({name!r}) in Python",
@@ -79,13 +80,18 @@ def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) 
         source: the file that is read inside, which errors then name.
 
     Raises:
-        ConfigError: a name of another form.
+        ConfigError: a name of another form, or that of a file that links lead to in a circle.
     """
     names = [names] if isinstance(names, str) else list(names)
     for name in names:
         if not is_outside(name) and not is_script(name):
-            raise ConfigError(f"{name!r} is not of the form module:Class", field="allow")
-    with _opened(frozenset(map(_key, names)), None if source is None else str(source)):
+            raise ConfigError(
+                f"{name!r} is not of the form module:Class or file.py:Class, nor a file of "
+                f"TorchScript ({', '.join(SCRIPTS)})",
+                field="allow",
+            )
+    keys = frozenset(_key(name, None, "allow") for name in names)
+    with _opened(keys, None if source is None else str(source)):
         yield
 
 
@@ -161,9 +167,11 @@ def _file(path: Path) -> Mapping[str, object] | None:
     return read_yaml(path) if is_yaml else None
 
 
-def _key(name: str) -> str:
+def _key(name: str, source: str | None, field: str) -> str:
     """What a name stands for: a file by its whole path, links followed."""
     if is_script(name):
-        return str(Path(name).resolve())
+        return str(whole_path(name, source, field))
     place, _, attribute = name.rpartition(":")
-    return f"{Path(place).resolve()}:{attribute}" if place.endswith(".py") else name
+    if not place.endswith(".py"):
+        return name
+    return f"{whole_path(place, source, field)}:{attribute}"

@@ -18,7 +18,7 @@ from typing import Any
 
 import yaml
 
-from .errors import ConfigError, PoiseError
+from .errors import ConfigError, PoiseError, shown
 from .yaml_loader import DEPTH, DIGITS, Loader
 
 MIB = 1 << 20
@@ -50,6 +50,23 @@ def exists(path: str | Path) -> bool:
         return Path(path).exists()
     except (OSError, ValueError):
         return False
+
+
+def whole_path(
+    path: str | Path, source: str | Path | None = None, field: str | None = None
+) -> Path:
+    """The absolute path, links followed, whether or not there is such a file.
+
+    Raises ConfigError, about `field` of `source`, for a name that no file can have and for links
+    that lead in a circle (from Python 3.13 on such a path is that of no file).
+    """
+    try:
+        return Path(path).resolve()
+    except ValueError:  # a NUL, half of a character
+        problem = "is no name of a file"
+    except (OSError, RuntimeError):
+        problem = "leads in a circle of links"
+    raise ConfigError(f"{problem}: {shown(str(path))}", source=source, field=field)
 
 
 @contextlib.contextmanager

@@ -109,8 +109,8 @@ def checked(hint: type[T], data: Any, source: str | Path) -> T:
 def to_dict(obj: Any, levels: int = DEPTH) -> Any:
     """A dataclass as plain dicts, lists, strings and numbers; the inverse of :func:`build`.
 
-    A field with ``metadata={"omit": "empty"}`` is left out where it is empty: what was written
-    before there was such a field, and hashes of it, stay as they are.
+    A field with ``metadata={"omit": "default"}`` is left out where it is its default: what was
+    written before there was such a field, and hashes of it, stay as they are.
 
     Raises ConfigError for more `levels` than a file may have, and an array of more entries.
     """
@@ -118,8 +118,8 @@ def to_dict(obj: Any, levels: int = DEPTH) -> Any:
         raise ConfigError(f"more than {DEPTH} levels")
     if dataclasses.is_dataclass(obj) and not isinstance(obj, type):
         fields = [f for f in dataclasses.fields(obj) if f.init]
-        names = [f.name for f in fields if "omit" not in f.metadata or getattr(obj, f.name)]
-        return {name: to_dict(getattr(obj, name), levels - 1) for name in names}
+        values = {f.name: getattr(obj, f.name) for f in fields if not _is_omitted(f, obj)}
+        return {name: to_dict(value, levels - 1) for name, value in values.items()}
     if isinstance(obj, dict):
         return {key: to_dict(value, levels - 1) for key, value in obj.items()}
     if isinstance(obj, (list, tuple)):
@@ -129,6 +129,15 @@ def to_dict(obj: Any, levels: int = DEPTH) -> Any:
             raise ConfigError(f"an array of more than {MOST_ENTRIES} entries")
         return obj.tolist()
     return str(obj) if isinstance(obj, Path) else obj
+
+
+def _is_omitted(field: dataclasses.Field[Any], obj: object) -> bool:
+    """Whether a field is to be left out of what :func:`to_dict` makes of an object."""
+    if field.metadata.get("omit") != "default":
+        return False
+    factory = field.default_factory
+    default = field.default if factory is dataclasses.MISSING else factory()
+    return bool(getattr(obj, field.name) == default)
 
 
 def to_yaml(obj: Any) -> str:

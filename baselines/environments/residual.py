@@ -287,9 +287,13 @@ class ResidualBalanceEnv(BalanceEnv):
         step = self.compiled_step()
         if step is not None:
             step.play()
-            self._told.check()
+            self.check()
         else:
             self._advance_in_python()
+
+    def check(self) -> None:
+        """See `BalanceEnv`; it is the controller's."""
+        self._told.check()
 
     def _advance_in_python(self) -> None:
         """Take the policy step of `policy_tick` with any controller, tick by tick."""

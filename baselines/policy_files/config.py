@@ -9,6 +9,12 @@ from typing import Literal
 PerJoint = float | tuple[float, ...] | dict[str, float]
 
 
+def _check_order(bounds: tuple[float, float], name: str) -> None:
+    low, high = bounds
+    if low > high:
+        raise ValueError(f"{name}: {low} is above {high}; the least value comes first")
+
+
 @dataclass(frozen=True)
 class ObservationTerm:
     """A part of the observation.
@@ -24,6 +30,10 @@ class ObservationTerm:
     scale: float | tuple[float, ...] = 1.0
     clip: tuple[float, float] | None = None
     history: int = field(default=1, metadata={"min": 1, "max": 1000})
+
+    def __post_init__(self) -> None:
+        if self.clip is not None:
+            _check_order(self.clip, "clip")
 
 
 @dataclass(frozen=True)
@@ -58,8 +68,8 @@ class PolicyFileConfig:
         hold: joints that the policy does not have are held in the standing posture, critically
             damped, with this natural frequency [rad/s].
         digest: SHA-256 of the policy's files, so that results tell versions apart; it is filled in,
-            as is
-        described_in: the file that says all this, for errors.
+            whatever the YAML file says.
+        described_in: the file that says all this, for errors; filled in likewise.
     """
 
     kind: Literal["policy-file"] = "policy-file"
@@ -82,3 +92,7 @@ class PolicyFileConfig:
     hold: float = field(default=15.0, metadata={"min": 0.0, "max": 200.0})
     digest: str = ""
     described_in: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        for i, bounds in enumerate(self.action_clip):
+            _check_order(bounds, f"action_clip[{i}]")

@@ -101,9 +101,12 @@ def _known(kind: type[T], data: dict[str, object], source: Path, name: str = "")
 
 def _lab_fields(lab: LabDeploy, source: Path) -> dict[str, object]:
     motors = lab.joint_ids_map
+    if not motors:
+        raise ConfigError("names no motor: one for each joint of the policy is needed",
+                          source=source, field="joint_ids_map")  # fmt: skip
     _check_size("default_joint_pos", lab.default_joint_pos, len(motors), source)
     for name in ("stiffness", "damping"):
-        if len(getattr(lab, name)) <= max(motors, default=0):
+        if len(getattr(lab, name)) <= max(motors):
             raise ConfigError(
                 f"has {len(getattr(lab, name))} numbers, joint_ids_map goes up to {max(motors)}",
                 source=source,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from poise.baselines.allowance import SCRIPTS, is_script
 from poise.configs.errors import ConfigError
-from poise.configs.reading import MIB, is_file, is_folder, read_bytes
+from poise.configs.reading import MIB, is_file, is_folder, read_bytes, whole_path
 
 BYTES = 64 * MIB  # of each file
 ONNX = (".onnx",)
@@ -43,13 +43,15 @@ def networks(folder: Path) -> list[Path]:
 
 
 def only_network(folder: Path, source: str | Path) -> Path:
-    """The one network in a folder; raises ConfigError where there is none, or several."""
+    """The one network in a folder, links followed.
+
+    Raises ConfigError where there is none, or several, or links lead in a circle.
+    """
     found = networks(folder)
+    if len(found) > 1:
+        found = [path for path in found if path.stem == "policy"] or found
     if len(found) == 1:
-        return found[0]
-    named = [path for path in found if path.stem == "policy"]
-    if len(named) == 1:
-        return named[0]
+        return whole_path(found[0], source, "policy")
     what = "several networks" if found else f"no network ({', '.join(ONNX + SCRIPTS)})"
     raise ConfigError(f"{what} in {folder}: say which", source=source, field="policy",
                       choices=[path.name for path in found] or None)  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from pathlib import Path
 
 from poise.configs.errors import ConfigError
@@ -15,7 +17,8 @@ NUMBERS = {"joint_stiffness": "stiffness", "joint_damping": "damping",
 def metadata_fields(metadata: dict[str, str], source: Path) -> dict[str, object]:
     """Fields of a `PolicyFileConfig` from the metadata of an ONNX file; none where it has none.
 
-    Raises ConfigError for numbers that are none, and lists of different lengths.
+    Raises ConfigError for numbers that are none, histories that are no numbers of steps, and lists
+    of different lengths.
     """
     fields: dict[str, object] = {}
     if "joint_names" in metadata:
@@ -43,18 +46,33 @@ def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, object]]:
             raise ConfigError(f"has {len(entries)} entries for {len(names)} observations",
                               source=source, field=whole)  # fmt: skip
         for term, entry in zip(terms, entries, strict=True):
-            term |= _term_field(name, _numbers(entry, ";", whole, source))
+            values = _numbers(entry, ";", whole, source)
+            if name == "history":
+                term[name] = _steps(values, whole, source)
+            elif name == "clip":
+                term[name] = _bounds(values, whole, source)
+            else:
+                term[name] = values[0] if len(values) == 1 else values
     return terms
 
 
-def _term_field(name: str, values: tuple[float, ...]) -> dict[str, object]:
-    """What a term's entry says; bounds that bound nothing say nothing."""
-    if name == "history":
-        return {name: max(1, round(values[0]))}
-    if name == "clip":
-        low, high = values[0], values[-1]
-        return {name: (low, high)} if -float("inf") < low and high < float("inf") else {}
-    return {name: values[0] if len(values) == 1 else values}
+def _steps(values: tuple[float, ...], field: str, source: Path) -> int:
+    """Policy steps of a history; 0 is a term without one, which shows this step alone."""
+    if len(values) != 1 or not values[0].is_integer() or values[0] < 0.0:
+        raise ConfigError(f"must be a whole number of steps, not {';'.join(map(str, values))}",
+                          source=source, field=field)  # fmt: skip
+    return max(1, int(values[0]))
+
+
+def _bounds(values: tuple[float, ...], field: str, source: Path) -> tuple[float, float] | None:
+    """Least and largest value, both finite; None where they bound nothing."""
+    if len(values) != 2:
+        raise ConfigError(f"must be two numbers, not {len(values)}", source=source, field=field)
+    low, high = values
+    if (low, high) == (-math.inf, math.inf):
+        return None
+    farthest = sys.float_info.max
+    return (-farthest if low == -math.inf else low, farthest if high == math.inf else high)
 
 
 def _numbers(text: str, between: str, field: str, source: Path) -> tuple[float, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -15,6 +16,7 @@ from poise.configs.reading import read_bytes
 
 from .files import BYTES
 
+MEMORY = 10_000_000  # numbers that a network may remember, of each kind
 HOW = "needs the package onnxruntime: pip install 'poise[onnx]'"
 
 
@@ -32,7 +34,8 @@ def load_network(path: Path) -> Network:
     """The network in an ONNX or a TorchScript file. TorchScript runs: ask `check_allowed` before.
 
     Raises ConfigError naming the file: onnxruntime is missing, it cannot be read, or it has inputs
-    besides the observation that are no memory (``NAME_in`` with an output ``NAME_out``).
+    besides the observation that are no memory (``NAME_in`` with an output ``NAME_out``), or its
+    memory is huge.
     """
     return ScriptNetwork(read_bytes(path, BYTES), path) if is_script(path) else OnnxNetwork(path)
 
@@ -60,7 +63,7 @@ class OnnxNetwork:
         self._session = onnx_session(path)
         inputs = {each.name: each.shape for each in self._session.get_inputs()}
         outputs = [each.name for each in self._session.get_outputs()]
-        self._memory = {name: _zeros(shape) for name, shape in inputs.items()
+        self._memory = {name: _zeros(shape, name, path) for name, shape in inputs.items()
                         if _after(name) in outputs}  # fmt: skip
         others = [name for name in inputs if name not in self._memory]
         if len(others) != 1:
@@ -87,8 +90,13 @@ def _after(name: str) -> str:
     return name.removesuffix("_in") + "_out" if name.endswith("_in") else ""
 
 
-def _zeros(shape: list[object]) -> np.ndarray:
-    return np.zeros([size if isinstance(size, int) else 1 for size in shape], dtype=np.float32)
+def _zeros(shape: list[object], name: str, path: Path) -> np.ndarray:
+    """The memory at the start; a size that is left open is 1."""
+    sizes = [size if isinstance(size, int) else 1 for size in shape]
+    if min(sizes, default=0) < 0 or math.prod(sizes) > MEMORY:
+        raise ConfigError(f"must be at most {MEMORY} numbers, not {' × '.join(map(str, sizes))}",
+                          source=path, field=name)  # fmt: skip
+    return np.zeros(sizes, dtype=np.float32)
 
 
 class ScriptNetwork:

@@ -9,7 +9,7 @@ from typing import Any
 from poise.baselines.allowance import check_allowed, is_script
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged, resolve
-from poise.configs.reading import is_file, is_folder, read_yaml
+from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
 from poise.configs.schema import build
 
 from .config import PolicyFileConfig
@@ -49,12 +49,12 @@ def policy_config(name: str | Path) -> PolicyFileConfig:
 def _in_folder(place: Path) -> PolicyFileConfig:
     described = description(place)
     if described is None:
-        return policy_file_config({"policy": str(only_network(place, place).resolve())}, place)
+        return policy_file_config({"policy": str(only_network(place, place))}, place)
     data = read_yaml(described)
     if is_deploy(data):
         data = {"deploy": described.name}
     if "policy" not in data and described.parent != place:  # params/ beside exported/
-        data["policy"] = str(only_network(place, described).resolve())
+        data["policy"] = str(only_network(place, described))
     return policy_file_config(data, described)
 
 
@@ -86,7 +86,7 @@ def policy_file_config(data: dict[str, Any], source: Path) -> PolicyFileConfig:
 
 def _network(name: str | None, folder: Path, source: Path) -> Path:
     """The policy's file, which the user must have allowed if it is code."""
-    path = (folder / name).resolve() if name else only_network(folder, source).resolve()
+    path = whole_path(folder / name, source, "policy") if name else only_network(folder, source)
     if not is_file(path):
         raise ConfigError(f"no such file: {path}", source=source, field="policy")
     digest(path, source)  # what is missing beside it is said before onnxruntime finds it

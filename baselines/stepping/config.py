@@ -136,7 +136,7 @@ class RecentringConfig:
 class SwingTask:
     """J_swing v̇ + J̇ v = a_ref + k (x_ref ⊖ x) + d (ẋ_ref − ẋ), k = `stiffness`, d = 2 ζ √k.
 
-    Units are those of `whole_body/tasks.py`: weights per g² and (g/h)², a stiffness of 1 is ω².
+    Units are those of `whole_body/gains.py`: weights per g² and (g/h)², a stiffness of 1 is ω².
     """
 
     weight: float = _number(1000.0, above=0.0)

@@ -54,8 +54,8 @@ class MomentumQPConfig:
     contact: SoleContact = field(default_factory=SoleContact)
     torque: TorqueLimit = field(default_factory=TorqueLimit)
     joint: JointLimit = field(default_factory=JointLimit)
-    tasks: dict[str, Task] = field(default_factory=dict, metadata={"omit": "empty"})
-    contacts: dict[str, Contact] = field(default_factory=dict, metadata={"omit": "empty"})
+    tasks: dict[str, Task] = field(default_factory=dict, metadata={"omit": "default"})
+    contacts: dict[str, Contact] = field(default_factory=dict, metadata={"omit": "default"})
 
 
 class MomentumQP(CompiledController):

@@ -281,6 +281,9 @@ class BalanceEnv(Copyable, gymnasium.Env):
         """Take the policy step of `episode.action`; the outcome is in `episode`."""
         raise NotImplementedError
 
+    def check(self) -> None:
+        """Raise what has gone wrong in the last compiled step: compiled code cannot raise."""
+
     def compiled_step(self) -> CompiledStep | None:
         """The compiled form of `advance`, if there is one; the same object while it can be used."""
         return None

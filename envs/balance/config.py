@@ -38,7 +38,11 @@ class SensorConfig:
 
 @dataclass(frozen=True)
 class EnvConfig:
-    """Everything about an environment that is not its robot or its controller."""
+    """Everything about an environment that is not its robot or its controller.
+
+    A field that came later is left out of files while it has its default, with which environments
+    are as they were before: fingerprints of policies hash these files.
+    """
 
     policy_period: float = field(default=0.02, metadata={"above": 0.0, "max": 1.0})  # [s]
     duration: float = field(default=6.0, metadata={"above": 0.0, "max": 1e6})  # of an episode [s]
@@ -48,8 +52,10 @@ class EnvConfig:
     noise: StartNoise = field(default_factory=StartNoise)
     fall: FallLimits = field(default_factory=FallLimits)
     reward: RewardWeights = field(default_factory=RewardWeights)
-    observation: ObservationConfig = field(default_factory=ObservationConfig)
-    sensors: SensorConfig = field(default_factory=SensorConfig)
+    observation: ObservationConfig = field(
+        default_factory=ObservationConfig, metadata={"omit": "default"}
+    )
+    sensors: SensorConfig = field(default_factory=SensorConfig, metadata={"omit": "default"})
 
 
 def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: object) -> EnvConfig:

@@ -123,8 +123,10 @@ When = Literal["no fall", "no divergence", "fall"]
 
 
 def _term(weight: float, kernel: Callable[[RewardView], float], formula: str, when: When) -> float:
-    """A field of `RewardWeights`."""
-    return field(default=weight, metadata={"kernel": kernel, "formula": formula, "when": when})
+    """A field of `RewardWeights`; a term that is off by default is left out of files while off."""
+    metadata = {"kernel": kernel, "formula": formula, "when": when}
+    off = {"omit": "default"} if weight == 0.0 else {}
+    return field(default=weight, metadata={**metadata, **off})
 
 
 @dataclass(frozen=True)

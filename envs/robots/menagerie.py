@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import importlib.util
 import os
 from collections.abc import Iterator
@@ -60,7 +61,8 @@ def find_model(file: str, source: str) -> Path:
 
 def _in_checkout(variable: str, file: str, source: str) -> Path:
     """The file in the folder that a variable of the environment names."""
-    checkout = Path(os.environ[variable]).expanduser()
+    # unlike Path's, os.path's leaves a ~ as it is where there is no such home
+    checkout = Path(os.path.expanduser(os.environ[variable]))
     if is_file(checkout / file):
         return checkout / file
     robots = sorted(path.parent.name for path in checkout.glob("*/*.xml"))
@@ -78,11 +80,11 @@ def _installed(file: str) -> Iterator[Path]:
     wheel = importlib.util.find_spec(WHEEL)
     for place in (wheel.submodule_search_locations or ()) if wheel else ():
         yield Path(place) / IN_WHEEL / file
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
     described = os.environ.get("ROBOT_DESCRIPTIONS_CACHE") or cache / "robot_descriptions"
     yield Path(described) / "mujoco_menagerie" / file
     downloads = os.environ.get("MENAGERIE_CACHE_DIR") or cache / "mujoco_menagerie"
     robot, _, rest = file.partition("/")
-    for folder in sorted(Path(downloads).glob(f"models/{robot}-*")):
+    for folder in sorted(Path(downloads).glob(f"models/{glob.escape(robot)}-*")):
         if is_file(folder / ".complete"):
             yield folder / rest

@@ -122,6 +122,7 @@ class EnvBatch(Copyable):
 
         The action of a restarted environment is not looked at; its reward is 0. Nothing else is
         reset. Raises ConfigError for actions (n, na) that are not valid; then nothing has moved.
+        Raises what one of the controllers raised, after all have played.
         """
         record, everyone = self.episodes, range(len(self.envs))
         played: Sequence[int] = everyone
@@ -144,6 +145,8 @@ class EnvBatch(Copyable):
             again = set(restarted)
             self._share(lambda i: self._restart(i) if i in again else self._play(i), everyone)
         self._report()
+        for i in played if turns is not None else ():
+            self.envs[i].check()
 
     def _report(self) -> None:
         """Copy what the records say; the record of a new episode is empty."""

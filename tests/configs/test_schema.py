@@ -360,7 +360,8 @@ class Ring(Shape):
 
 @dataclass(frozen=True)
 class Sketch:
-    shapes: dict[str, Shape] = field(default_factory=dict, metadata={"omit": "empty"})
+    shapes: dict[str, Shape] = field(default_factory=dict, metadata={"omit": "default"})
+    size: float = field(default=1.0, metadata={"omit": "default"})
     more: list[int] = field(default_factory=list)
 
 
@@ -380,9 +381,10 @@ def test_a_kind_chooses_the_class() -> None:
             build(Sketch, {"shapes": {"a": shape}}, "f.yaml")
 
 
-def test_an_empty_field_may_be_left_out() -> None:
-    """Only one that says so; with something in it, it is written."""
+def test_a_field_may_be_left_out_at_its_default() -> None:
+    """Only one that says so; with another value it is written, though that be empty or zero."""
     assert to_dict(Sketch()) == {"more": []}
+    assert to_dict(Sketch(size=0.0)) == {"size": 0.0, "more": []}
     assert list(to_dict(Sketch({"a": Disc(1.0)}))) == ["shapes", "more"]
 
 

@@ -411,6 +411,18 @@ def test_a_file_is_the_same_by_any_path(ground: Ground) -> None:
             check_allowed(f"{ground.module}_package/{ground.module}.py:Trap")
 
 
+@pytest.mark.parametrize("name", ["circle.py:Trap", "circle.pt"])
+def test_links_in_a_circle_are_no_file(ground: Ground, name: str) -> None:
+    """Neither what is allowed nor what a file names."""
+    link = Path(name.partition(":")[0])
+    link.symlink_to(link)
+    with pytest.raises(ConfigError, match="circle"):
+        with poise.allowing(name):
+            check_allowed(name.replace("circle", "other"))
+    with pytest.raises(ConfigError, match="circle"):
+        check_allowed(name)
+
+
 def test_an_allowed_policy_can_make_its_environment_later(ground: Ground) -> None:
     """What `load_policy` was allowed holds for `make_env`; not for another policy."""
     code = "from poise.baselines.whole_body.momentum_qp import MomentumQP\ndef make(robot):\n"

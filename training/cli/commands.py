@@ -27,7 +27,15 @@ Names = Annotated[
 ]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
-Allow = Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="MODULE:CLASS")]
+Allow = Annotated[
+    tuple[str, ...],
+    tyro.conf.UseAppendAction,
+    tyro.conf.arg(
+        metavar="NAME",
+        help="What may run though a file names it: module:Class or file.py:Class of a controller "
+        "or a policy, or a policy's file of TorchScript (.pt, .pth, .jit, .ts); repeatable.",
+    ),
+]
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -168,7 +176,6 @@ def evaluate(
             robot, else its ankle limit.
         write_limits: write the first controller's J50s to this file, for --limits.
         overwrite: replace what the folder holds.
-        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     from poise.training.evaluation.evaluate import evaluate, measured_limits
 
@@ -217,7 +224,6 @@ def benchmark(
             part, its number.
         overwrite: replace what the folder holds.
         report: write report.html at the end, as poise report does.
-        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     from poise.envs.viewing.gl import choose_gl_backend
 
@@ -307,7 +313,6 @@ def replay(
         controller: which of the evaluated ones; the last if not given.
         video: an MP4 file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
-        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     if video is not None:
         from poise.envs.viewing.gl import choose_gl_backend
@@ -338,7 +343,6 @@ def report(
         folder: written by poise evaluate or poise benchmark.
         out: file to write; report.html in the folder if not given.
         films: play the worst trials again, for pictures and plots over time (seconds for each).
-        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     from poise.envs.viewing.gl import choose_gl_backend
 
@@ -373,7 +377,6 @@ def tune(
         seed: of the search and its pushes.
         workers: number of processes.
         resume: go on with the search that the folder holds.
-        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
     from poise.baselines.allowance import named
     from poise.training.tuning.search import tune, tune_config
@@ -415,11 +418,12 @@ def qp_set(
 
 
 def list_names() -> None:
-    """List what can be named: robots, controllers, suites, training configurations, motions."""
+    """List what can be named: robots, environments, controllers, policies, suites and the like."""
     from poise.configs.files import packaged
 
     kinds = (
         "robots",
+        "envs",
         "controllers",
         "policies",
         "rivals",

@@ -20,6 +20,8 @@ from poise.training.learning.train_seeds import train_seeds
 from poise.training.running.crew import Backend
 from poise.training.running.terminal import terminal
 
+from .commands import Allow
+
 DEFAULT, ANY_ROBOT = "residual", "any-robot"
 HUMANOID = TrainConfig.robot  # whose bodies and limits DEFAULT names
 
@@ -39,7 +41,6 @@ class Command:
         backend: of runs with several seeds: local (processes of this machine), joblib (the same
             by joblib), ray (a cluster).
         workers: with several seeds, runs at a time; all cores if not given.
-        allow: a class from outside, module:Class, that may run though a file names it; repeatable.
     """
 
     settings: Annotated[TrainConfig, tyro.conf.arg(name="")]  # no prefix
@@ -49,9 +50,7 @@ class Command:
     seeds: tuple[int, ...] = ()
     backend: Backend = "local"
     workers: int | None = None
-    allow: Annotated[
-        tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="MODULE:CLASS")
-    ] = ()
+    allow: Allow = ()
 
 
 def run(args: Sequence[str]) -> None:

@@ -15,6 +15,7 @@ from rich.console import Console
 from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.files import write_atomic
+from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
 from poise.training.running.crew import Crew, check_backend
 from poise.training.running.folder_lock import FolderLock
@@ -71,7 +72,8 @@ def train_seeds(
         ConfigError: as `train`, before any run starts and anything is written.
         PoiseError: a run has failed, after the others are done; or a process has died.
     """
-    console, out, started = console or Console(quiet=True), Path(out).resolve(), time.perf_counter()
+    console, started = console or Console(quiet=True), time.perf_counter()
+    out = whole_path(out, field="out")
     check_backend(backend)
     if workers is not None and workers < 1:
         raise ConfigError(f"must be at least 1, not {workers}", field="workers")

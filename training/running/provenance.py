@@ -38,7 +38,7 @@ class Circumstances(TypedDict):
 def circumstances(started: float, workers: int, backend: str) -> Circumstances:
     """The origin of a result that this process makes; `started` is of `time.perf_counter`."""
     return {
-        "command": shlex.join(sys.argv),
+        "command": command(),
         "versions": versions(),
         "machine": machine(),
         "workers": workers,
@@ -46,6 +46,12 @@ def circumstances(started: float, workers: int, backend: str) -> Circumstances:
         "commit": commit(),
         "seconds": round(time.perf_counter() - started, 1),
     }
+
+
+def command() -> str:
+    """The command line, without the folder of the program, which is this machine's."""
+    program = Path(sys.argv[0]).name
+    return shlex.join(["poise" if program == "__main__.py" else program, *sys.argv[1:]])
 
 
 def versions(names: tuple[str, ...] = LIBRARIES) -> dict[str, str]:

@@ -13,7 +13,7 @@ class World:
 
     Attributes:
         friction: of floor and soles; None: the robot's own.
-        delay: of the sensors [s].
+        delay: of the sensors, besides that of the environment itself [s].
         mass_error: by which all masses differ from those that the controller knows.
     """
 

@@ -13,7 +13,8 @@ from .trial import World
 class Worlds:
     """The worlds of one agent, whose environment is the same in all of them.
 
-    The simulation and the state source of the environment are those of the world.
+    The simulation and the state source of the environment are those of the world. The delays of
+    world and environment (`sensors.delay`) add up.
     """
 
     def __init__(self, agent: Agent):
@@ -31,5 +32,6 @@ class Worlds:
                 perturbed_robot(env.robot, friction=world.friction, mass_error=world.mass_error)
             )
         if not known or world.delay > 0.0:
-            env.state_source = DelayedState(env.simulation, env.robot, world.delay)
+            delay = env.config.sensors.delay + world.delay
+            env.state_source = DelayedState(env.simulation, env.robot, delay)
         return self.agent

@@ -182,7 +182,7 @@ def test_a_copy_goes_on_alone(robot: Robot, own: Path, way: Any) -> None:
 
 
 def test_many_environments_have_a_policy_each(robot: Robot, own: Path) -> None:
-    """Played by two threads, each does as alone; what fails in one is raised."""
+    """Played by two threads, each does as alone; what fails in one is raised at once."""
     alone = make_env(robot, str(own))
     alone.reset(seed=4, options=SHAKY)
     expected = actions_here(alone, 5)
@@ -193,8 +193,25 @@ def test_many_environments_have_a_policy_each(robot: Robot, own: Path) -> None:
     np.testing.assert_array_equal(batch.envs[1].controller.action, expected[-1])
     batch.envs[2].controller.network = Faulty(0.0)
     with pytest.raises(PoiseError, match="not finite"):
-        for _ in range(2):  # it is known when the next step begins
-            batch.step(np.zeros((3, 4)))
+        batch.step(np.zeros((3, 4)))
+    batch.close()
+
+
+@pytest.mark.parametrize("restart", [False, True])
+def test_what_fails_in_the_last_step_is_raised(robot: Robot, own: Path, restart: bool) -> None:
+    """The reset that follows at once does not hide it; another one's reset does not, either."""
+    env = ResidualBalanceEnv(robot, controller=str(own), pushes=None, duration=0.06)
+    batch = EnvBatch(replicate(env, 2))
+    batch.reset([0, 1])
+    for _ in range(2):
+        batch.step(np.zeros((2, 4)))
+    batch.envs[1].controller.network = Faulty(0.0)
+    with pytest.raises(PoiseError, match="not finite at 0.04 s"):
+        if restart:
+            batch.advance(np.zeros((2, 4)), restart=np.array([True, False]))
+        else:
+            batch.step(np.zeros((2, 4)))
+    batch.reset([0, 1])
     batch.close()
 
 

@@ -118,3 +118,11 @@ def test_a_network_has_one_input(tmp_path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(ConfigError, match="two.onnx: must have one input.*obs, h_in"):
         load_network(path)
+
+
+@pytest.mark.parametrize("numbers", [10**8, 10**15, 2**62])
+def test_a_memory_has_bounds(tmp_path: Path, numbers: int) -> None:
+    """A file of a few bytes may ask for all of a machine's."""
+    path = write_recurrent(tmp_path / "huge.onnx", numbers)
+    with pytest.raises(ConfigError, match=rf"huge.onnx: h_in: at most .*not 1 × {numbers}$"):
+        load_network(path)

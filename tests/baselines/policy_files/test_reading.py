@@ -1,6 +1,7 @@
 """Policies are read from the files of other projects as they are, and what is wrong is named."""
 
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from tests.support.policies import gym_config, lab_deploy, linear, write_onnx, w
 from tests.support.shared import robot
 
 N = 7
+FARTHEST = sys.float_info.max
 METADATA = {
     "joint_names": "left_knee,waist_yaw,right_knee",
     "joint_stiffness": "40.179,14.251,40.179",
@@ -157,6 +159,12 @@ def data_elsewhere(folder: Path) -> Path:
     return folder
 
 
+def circle(folder: Path, name: str = "policy.onnx") -> Path:
+    """A link to itself."""
+    os.symlink(folder / name, folder / name)
+    return folder
+
+
 def two_networks(folder: Path) -> Path:
     for name in ("a", "b"):
         write_onnx(lab_folder(folder, "a.onnx") / f"{name}.onnx", linear(3, 2))
@@ -184,7 +192,8 @@ def metadata(**changes: str) -> Any:
     return lambda f: write_onnx(f / "policy.onnx", linear(15, 3), {**METADATA, **changes})
 
 
-TERM = {"history_length": 1}
+HISTORY = "observation_terms_history_length"
+LIMITS = "observation_terms_clip"
 BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
     "no data file": (no_data, ("policy.onnx needs the file 'policy.onnx.data' beside it",)),
     "data elsewhere": (data_elsewhere, ("has data in '../../etc/passwd', not beside it",)),
@@ -194,11 +203,20 @@ BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
                    ("deploy.yaml: policy: no network", ".onnx")),
     "no such network": (lambda f: bare(f, policy="lost.onnx"), ("policy: no such file", "lost")),
     "policy no text": (lambda f: bare(f, policy=3), ("own.yaml: policy: must be a path",)),
+    "no name of a file": (lambda f: bare(f, policy="a\0.onnx"), ("own.yaml: policy: is no name",)),
+    "links in a circle": (circle, ("policy: ", "policy.onnx")),
+    "a described circle": (lambda f: bare(circle(f, "o.onnx"), policy="o.onnx"), ("policy: ",)),
+    "least above largest": (lambda f: bare(f, observations=[{"term": "phase", "clip": [1, -1]}]),
+                            ("own.yaml: observations[0]: clip: 1.0 is above -1.0",)),
+    "least action above largest": (lambda f: bare(f, action_clip=[[-1, 1], [2, 1]]),
+                                   ("own.yaml: action_clip[1]: 2.0 is above 1.0",)),
     "nothing seen": (bare, ("own.yaml: observations: what the policy sees is not said",)),
     "no such deploy": (lambda f: bare(f, deploy="lost.yaml"), ("lost.yaml: cannot be read",)),
     "deploy of nobody": (lambda f: bare(f, deploy="own.yaml"), ("is no configuration of unitree",)),
     "short posture": (deploy(default_joint_pos=[0.0]),
                       ("deploy.yaml: default_joint_pos: has 1 numbers for 7 joints",)),
+    "no motors": (deploy(joint_ids_map=[], default_joint_pos=[], stiffness=[]),
+                  ("deploy.yaml: joint_ids_map: names no motor",)),
     "few motors": (deploy(stiffness=[1.0] * 3), ("stiffness: has 3 numbers", "goes up to 6")),
     "velocities": (deploy(actions={"JointVelocityAction": {}}),
                    ("actions: must be one of joint positions, not JointVelocityAction",)),
@@ -212,6 +230,17 @@ BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
     "metadata of words": (metadata(joint_damping="a,b"), ("joint_damping: must be numbers",)),
     "metadata of other lengths": (metadata(observation_terms_scale="1.000"),
                                   ("observation_terms_scale: has 1 entries for 3 observations",)),
+    **{
+        f"a history of {value}": (metadata(**{HISTORY: f"0,{value},1"}),
+                                  (f"{HISTORY}: must be a whole number of steps, not {value}",))
+        for value in ("nan", "inf", "2.5", "-1.0")
+    },
+    "a huge history": (metadata(**{HISTORY: "0,1e300,1"}),
+                       ("observations[1].history: must be at most 1000",)),
+    "bounds of nan": (metadata(**{LIMITS: "-inf;nan,-1;1,-inf;inf"}),
+                      ("observations[0].clip[1]: must be a finite number",)),
+    "one bound": (metadata(**{LIMITS: "-inf;inf,1,-inf;inf"}),
+                  (f"{LIMITS}: must be two numbers, not 1",)),
 }  # fmt: skip
 
 
@@ -224,6 +253,15 @@ def test_what_is_wrong_is_named(tmp_path: Path, case: str) -> None:
     text = str(error.value)
     assert all(part in text for part in parts), text
     assert str(tmp_path) in text and "\n" not in text
+
+
+def test_one_sided_bounds_hold(tmp_path: Path) -> None:
+    """The other side is as far as numbers go."""
+    path = write_onnx(
+        tmp_path / "p.onnx", linear(15, 3), {**METADATA, LIMITS: "-inf;2,-1;inf,-inf;inf"}
+    )
+    clips = [term.clip for term in read(path).observations]
+    assert clips == [(-FARTHEST, 2.0), (-1.0, FARTHEST), None]
 
 
 class Recording(torch.nn.Module):

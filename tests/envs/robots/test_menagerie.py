@@ -74,6 +74,30 @@ def test_a_checkout_is_named_by_the_environment(
         find_model(FILE, "own.yaml")
 
 
+def test_a_home_that_nobody_has(nothing: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither a checkout in it nor a machine without one is a traceback."""
+    monkeypatch.delenv("HOME")
+    monkeypatch.setattr("pwd.getpwuid", _nobody)
+    with pytest.raises(ConfigError, match="this machine has no own_robot/own.xml"):
+        find_model(FILE, "own.yaml")
+    monkeypatch.setenv(VARIABLES[0], "~nosuchuser/menagerie")
+    with pytest.raises(
+        ConfigError, match=f"own.yaml: .*{VARIABLES[0]}=~nosuchuser/.* is no folder"
+    ):
+        find_model(FILE, "own.yaml")
+
+
+def _nobody(number: int) -> None:
+    raise KeyError(number)
+
+
+@pytest.mark.parametrize("file", ["**/own.xml", "a\0/own.xml", "[/own.xml", "/own.xml"])
+def test_a_folder_of_a_strange_name_is_not_there(nothing: Path, file: str) -> None:
+    """Whatever a description of anybody asks for."""
+    with pytest.raises(ConfigError, match="this machine has no .*own.xml"):
+        find_model(file, "own.yaml")
+
+
 def test_what_packages_brought_is_found(nothing: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The wheel first, then downloads of robot_descriptions and of mujoco_menagerie."""
     cache = nothing / "home/.cache"

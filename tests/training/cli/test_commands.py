@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from poise.baselines.allowance import SCRIPTS
 from poise.configs.errors import ConfigError
-from poise.configs.files import resolve
+from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.schema import to_dict
 from poise.training.cli import commands
 from poise.training.cli import train as train_command
@@ -205,10 +206,23 @@ def test_ctrl_c_says_how_to_go_on(
 
 
 def test_list_names_what_is_packaged(capsys: pytest.CaptureFixture[str]) -> None:
-    """Robots, controllers and suites."""
+    """Every folder of configurations, whatever there is in it."""
     assert main(["list"]) == 0
     shown = capsys.readouterr().out
-    assert "humanoid" in shown and "momentum-qp" in shown and "envelope" in shown
+    folders = [each.name for each in packaged_folder(".").iterdir() if packaged(each.name)]
+    assert {"robots", "envs", "controllers", "suites"} < set(folders)
+    for kind in folders:
+        assert f"{kind}: {', '.join(packaged(kind))}\n" in shown
+
+
+@pytest.mark.parametrize("command", ["evaluate", "benchmark", "replay", "report", "tune", "train"])
+def test_help_says_what_may_be_allowed(capsys: pytest.CaptureFixture[str], command: str) -> None:
+    """Whatever `poise.allowing` takes."""
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "--allow NAME" in shown
+    assert "module:Class or file.py:Class" in shown and all(end in shown for end in SCRIPTS)
 
 
 def test_flags_of_train_replace_fields_of_the_file(tmp_path: Path) -> None:

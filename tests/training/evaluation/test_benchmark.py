@@ -17,6 +17,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.balance.config import StartNoise
 from poise.envs.pushes.push import Push
+from poise.envs.sensors.delayed import DelayedState
 from poise.training.cli.commands import main
 from poise.training.evaluation import run
 from poise.training.evaluation.evaluate import benchmark, default_controllers
@@ -77,6 +78,18 @@ def test_the_standard_case_is_that_of_an_evaluation() -> None:
     outcomes = [run_trial(worlds.enter(world), trial) for world in several]
     assert outcomes[0] == outcomes[-1] == expected
     assert all(outcome != expected for outcome in outcomes[1:-1])
+
+
+def test_delays_of_world_and_environment_add_up() -> None:
+    """Whichever else the world changes; an own delay stays where it has none."""
+    agent = load_agent("momentum-qp", robot(), duration=1.6, sensors={"delay": 0.01})
+    worlds = Worlds(agent)
+    for world, late in (
+        (World(delay=0.02), 0.03), (World(mass_error=0.1), 0.01), (World(friction=0.4), 0.01),
+        (World(delay=0.02, mass_error=0.1), 0.03), (World(), 0.01),
+    ):  # fmt: skip
+        source = worlds.enter(world).env.state_source
+        assert isinstance(source, DelayedState) and source.delay == pytest.approx(late)
 
 
 def test_the_summary_has_what_readers_rely_on(finished: Path) -> None:

@@ -71,7 +71,7 @@ def test_half_files_of_dead_processes_go(tmp_path: Path) -> None:
 
 
 def test_every_command_that_writes_to_a_folder_holds_it(tmp_path: Path) -> None:
-    """The second is refused, and writes nothing. (`benchmark`: benchmark/test_folder.py.)"""
+    """The second is refused, and writes nothing. (`benchmark`: evaluation/test_folder.py.)"""
     out = tmp_path / "out"
     search = TuneConfig(
         controller="momentum-qp", gains={"com.stiffness": (0.2, 12.0)},

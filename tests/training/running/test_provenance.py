@@ -36,6 +36,15 @@ def test_an_installed_package_has_no_commit(monkeypatch: pytest.MonkeyPatch) -> 
     assert provenance.commit() is None
 
 
+@pytest.mark.parametrize("program", ["/home/me/.venv/bin/poise", "/x/training/cli/__main__.py"])
+def test_the_command_has_no_folder_of_its_program(
+    monkeypatch: pytest.MonkeyPatch, program: str
+) -> None:
+    """Its arguments are as they were typed."""
+    monkeypatch.setattr("sys.argv", [program, "evaluate", "zero", "--out", "my out"])
+    assert provenance.command() == "poise evaluate zero --out 'my out'"
+
+
 def test_the_machine_is_named() -> None:
     """Processor and number of cores that may be used."""
     machine = provenance.machine()

@@ -165,3 +165,21 @@ def test_an_unknown_suite_or_body_is_refused(limits: PushLimits) -> None:
         load_suite("rndom")
     with pytest.raises(ConfigError, match="tail.*torso"):
         Plan(Suite(body="tail", quiet=Quiet()), limits, 0, ["a"])
+
+
+@pytest.mark.parametrize(
+    ("text", "now"),
+    [
+        ("kind: random\ntrials: 200\npushes: {magnitude: [0.5, 1.6]}\nduration: 6.0\n",
+         "random: {trials: 200, pushes: {magnitude: [0.5, 1.6]}}"),
+        ("kind: other\n", "random: {trials: 200}"),
+        ("kind: []\n", "random: {trials: 200}"),
+    ],
+)  # fmt: skip
+def test_a_suite_of_the_old_form_says_the_new_one(tmp_path: Path, text: str, now: str) -> None:
+    """A part is what its `kind` was; what parts share stays beside it."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as error:
+        load_suite(path)
+    assert str(error.value).startswith(f"{path}: kind: a suite names its parts now: {now} (choices")
