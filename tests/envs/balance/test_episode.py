@@ -243,7 +243,7 @@ def test_ticks_account_for_power_and_saturation():
     e = new_episode(1)
     tau = 0.5 * r.torque_limit
     tau[:3] = -r.torque_limit[:3]
-    record_tick(simulation.arrays, simulation.state_arrays, tau, 0.004, e)
+    record_tick(simulation.arrays, simulation.state_arrays.qvel, tau, 0.004, e)
     power = np.abs(tau * simulation.state.qvel[r.motor_dofs]).sum()
     assert e.metrics[episode.ENERGY] == pytest.approx(0.004 * power)
     assert e.metrics[episode.SATURATED] == pytest.approx(3 / r.model.nu)
