@@ -36,6 +36,8 @@ class PPOConfig:
     ent_coef: float = field(default=0.0, metadata={"min": 0.0})
     vf_coef: float = field(default=0.5, metadata={"min": 0.0})
     max_grad_norm: float = field(default=0.5, metadata={"above": 0.0})
+    # the update of a rollout ends where KL exceeds 1.5 times this; None: never
+    target_kl: float | None = field(default=None, metadata={"above": 0.0})
     net_arch: tuple[int, ...] = (128, 128)  # tanh
     log_std_init: float = -1.5
     log_std_final: float | None = None  # linear in time from log_std_init; None: learned

@@ -125,6 +125,7 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         ent_coef=ppo.ent_coef,
         vf_coef=ppo.vf_coef,
         max_grad_norm=ppo.max_grad_norm,
+        target_kl=ppo.target_kl,
         use_sde=ppo.use_sde,
         sde_sample_freq=ppo.sde_sample_freq,
         policy_kwargs=policy,
