@@ -1,8 +1,8 @@
 """Poise keeps a simulated humanoid on its feet while it is pushed.
 
 Importing it registers the environments ``poise/TorqueBalance-v0``, ``poise/PositionBalance-v0``,
-``poise/ResidualBalance-v0`` and ``poise/ResidualStep-v0`` with Gymnasium, and loads neither torch nor
-numba nor MuJoCo.
+``poise/ResidualBalance-v0`` and ``poise/ResidualStep-v0`` with Gymnasium, and loads neither torch
+nor numba nor MuJoCo.
 """
 
 from __future__ import annotations

@@ -64,7 +64,8 @@ def train(
     keeps(out / LAST, f"what is trained is kept in {out}; go on with --resume")
     start = None if checkpoint or config.start_from is None else locate_policy(config.start_from)
     torch.set_num_threads(1)
-    prepare()
+    if config.action in ("residual", "step"):  # else nothing of the controllers is called
+        prepare()
     with ExitStack() as stack:
         robot = load_robot(config.robot)
         normalize = _training_envs(config, robot)

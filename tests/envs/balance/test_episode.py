@@ -108,7 +108,7 @@ def test_little_angular_momentum_is_rewarded():
 
 
 def test_terms_of_the_velocity_tasks():
-    """Still, not turning, away from the joints' limits and without slipping, if they have weights."""
+    """Slow, not turning, away from joint limits, without slipping; if they have weights."""
     simulation, r = generic_state(), robot()
     s, omega = simulation.state_arrays, np.sqrt(9.81 / robot().height_com)
     unit = 0.2 * omega * r.height_com
