@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from poise.envs.balance.base import BalanceEnv
     from poise.envs.balance.config import EnvConfig
     from poise.envs.balance.observation import observation_table
-    from poise.envs.balance.reward import RewardWeights
     from poise.envs.balance.position import PositionBalanceEnv
-    from poise.envs.balance.termination import FallLimits
+    from poise.envs.balance.reward import RewardWeights
     from poise.envs.balance.servos import ServoConfig
+    from poise.envs.balance.termination import FallLimits
     from poise.envs.balance.torque import TorqueBalanceEnv
     from poise.envs.physics.simulation import Simulation
     from poise.envs.physics.state import RobotState

@@ -114,21 +114,18 @@ def momentum_small(v: RewardView) -> float:
 
 @compiled
 def velocity_small(v: RewardView) -> float:
-    velocity, unit = v.state.com_vel, v.scales.velocity
-    return np.exp(-(velocity[0] ** 2 + velocity[1] ** 2) / unit**2)
+    velocity = v.state.com_vel
+    return np.exp(-(velocity[0] ** 2 + velocity[1] ** 2) / v.scales.velocity**2)
 
 
 @compiled
 def turning_small(v: RewardView) -> float:
-    total = 0.0
-    for a in range(3, 6):
-        total += v.state.qvel[a] ** 2
-    return np.exp(-total / (0.5 * v.scales.omega) ** 2)
+    rate, unit = v.state.qvel[3:6], 0.5 * v.scales.omega
+    return np.exp(-(rate[0] ** 2 + rate[1] ** 2 + rate[2] ** 2) / unit**2)
 
 
 @compiled
 def joint_limit_cost(v: RewardView) -> float:
-    """Each joint's share of the last twentieth of its range at either end."""
     total, n = 0.0, v.q_ref.shape[0]
     for a in range(n):
         low, high, q = v.robot.q_min[a], v.robot.q_max[a], v.state.qpos[7 + a]
@@ -197,7 +194,7 @@ class RewardWeights:
     )
     joint_limits: float = _term(
         0.0, joint_limit_cost,
-        "−mean share of the last twentieth of a joint's range that it is in", "no divergence",
+        "−mean share of the last 5 % of a joint's range, at either end", "no divergence",
     )  # fmt: skip
     slip: float = _term(
         0.0, slip_cost,

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
 from poise.envs.physics.arrays import SimViews
-from poise.configs.errors import ConfigError
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 

@@ -80,7 +80,9 @@ def root_rate(v: View):
         v.out[a] = v.state.qvel[3 + a] / v.scales.omega
 
 
-@TERMS.add(SPACE, "0.2 ω h", "velocity of the root's origin, root axes", "root vector", default=False)
+@TERMS.add(
+    SPACE, "0.2 ω h", "velocity of the root's origin, root axes", "root vector", default=False
+)
 def root_vel(v: View):
     R, velocity, unit = v.state.root_axes, v.state.qvel, v.scales.velocity
     for a in range(3):
