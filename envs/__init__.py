@@ -16,12 +16,14 @@ __all__ = [
     "EnvConfig",
     "FallLimits",
     "Kick",
+    "PositionBalanceEnv",
     "Push",
     "PushSampler",
     "RewardWeights",
     "Robot",
     "RobotState",
     "SceneRenderer",
+    "ServoConfig",
     "Simulation",
     "StateSource",
     "TorqueBalanceEnv",
@@ -36,7 +38,9 @@ if TYPE_CHECKING:
     from poise.envs.balance.base import BalanceEnv
     from poise.envs.balance.config import EnvConfig
     from poise.envs.balance.observation import observation_table
+    from poise.envs.balance.position import PositionBalanceEnv
     from poise.envs.balance.reward import RewardWeights
+    from poise.envs.balance.servos import ServoConfig
     from poise.envs.balance.termination import FallLimits
     from poise.envs.balance.torque import TorqueBalanceEnv
     from poise.envs.physics.simulation import Simulation
@@ -59,7 +63,9 @@ else:
             "balance.base": ("BalanceEnv",),
             "balance.config": ("EnvConfig",),
             "balance.observation": ("observation_table",),
+            "balance.position": ("PositionBalanceEnv",),
             "balance.reward": ("RewardWeights",),
+            "balance.servos": ("ServoConfig",),
             "balance.termination": ("FallLimits",),
             "balance.torque": ("TorqueBalanceEnv",),
             "physics.simulation": ("Simulation",),

@@ -132,7 +132,7 @@ def policy_tick(step: PolicyStep):
         m = e.metrics
         m[ROOT_FORCE] = max(m[ROOT_FORCE], np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
         m[ROOT_MOMENT] = max(m[ROOT_MOMENT], np.sqrt(w[3] ** 2 + w[4] ** 2 + w[5] ** 2))
-    record_tick(robot, s, views.ctrl, step.substeps * robot.timestep, e)
+    record_tick(robot, s.qvel, views.ctrl, step.substeps * robot.timestep, e)
     simulate(world, step.substeps)
     run(step.estimate)
     e.ticks[0] += 1
@@ -156,4 +156,5 @@ class TickAccount(Block):
 @compiled
 def account_tick(r: TickAccount):
     """Account for the torques in `views.ctrl`."""
-    record_tick(r.world.robot, r.world.state, r.world.views.ctrl, r.period, r.episode)
+    world = r.world
+    record_tick(world.robot, world.state.qvel, world.views.ctrl, r.period, r.episode)

@@ -9,6 +9,7 @@ import numpy as np
 
 from poise.baselines.controller import CompiledController, Outputs, Targets
 from poise.configs.errors import ConfigError, PoiseError
+from poise.envs.balance.servos import pd_torque
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.callbacks import Callback, call_back
 from poise.envs.compiled.calls import address_of
@@ -55,9 +56,10 @@ def policy_tick(t: PolicyTick):
         call_back(t.ask)
     servos.ticks[0] += 1
     for a in range(servos.tau.shape[0]):
-        torque = servos.stiffness[a] * (servos.target[a] - s.qpos[7 + a])
-        torque -= servos.damping[a] * s.qvel[6 + a]
-        servos.tau[a] = min(max(torque, -servos.limit[a]), servos.limit[a])
+        servos.tau[a] = pd_torque(
+            servos.stiffness[a], servos.damping[a], servos.limit[a],
+            servos.target[a] - s.qpos[7 + a], s.qvel[6 + a],
+        )  # fmt: skip
 
 
 class PolicyFile(CompiledController):

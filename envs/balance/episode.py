@@ -84,13 +84,13 @@ def begin_episode(s: StateArrays, e: EpisodeArrays):
 
 @compiled
 def record_tick(
-    robot: RobotArrays, s: StateArrays, tau: np.ndarray, period: float, e: EpisodeArrays
+    robot: RobotArrays, qvel: np.ndarray, tau: np.ndarray, period: float, e: EpisodeArrays
 ):
-    """Account for one control tick with motor torques `tau` (nu,)."""
+    """Account for one control tick with motor torques `tau` (nu,) at speeds `qvel` (nv,)."""
     m = e.metrics
     power, saturated = 0.0, 0.0
     for i in range(tau.shape[0]):
-        power += abs(tau[i] * s.qvel[robot.motor_dofs[i]])
+        power += abs(tau[i] * qvel[robot.motor_dofs[i]])
         load = abs(tau[i]) / robot.torque_limit[i]
         m[PEAK_TORQUE] = max(m[PEAK_TORQUE], load)
         saturated += 1.0 if load > 0.999 else 0.0

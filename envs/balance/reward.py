@@ -113,6 +113,39 @@ def momentum_small(v: RewardView) -> float:
 
 
 @compiled
+def velocity_small(v: RewardView) -> float:
+    velocity = v.state.com_vel
+    return np.exp(-(velocity[0] ** 2 + velocity[1] ** 2) / v.scales.velocity**2)
+
+
+@compiled
+def turning_small(v: RewardView) -> float:
+    rate, unit = v.state.qvel[3:6], 0.5 * v.scales.omega
+    return np.exp(-(rate[0] ** 2 + rate[1] ** 2 + rate[2] ** 2) / unit**2)
+
+
+@compiled
+def joint_limit_cost(v: RewardView) -> float:
+    total, n = 0.0, v.q_ref.shape[0]
+    for a in range(n):
+        low, high, q = v.robot.q_min[a], v.robot.q_max[a], v.state.qpos[7 + a]
+        span = 0.05 * (high - low)
+        beyond = max(low + span - q, q - high + span)
+        if beyond > 0.0:  # not where there is no limit
+            total += min(beyond / span, 1.0) / n
+    return -total
+
+
+@compiled
+def slip_cost(v: RewardView) -> float:
+    s, total, n = v.state, 0.0, v.state.contacts.shape[0]
+    for i in range(n):
+        x, y = s.J_v[6 * i] / v.scales.velocity, s.J_v[6 * i + 1] / v.scales.velocity
+        total += s.contacts[i] * min(x * x + y * y, 1.0) / n
+    return -total
+
+
+@compiled
 def fall_cost(v: RewardView) -> float:
     return -1.0
 
@@ -155,6 +188,20 @@ class RewardWeights:
     angular_momentum: float = _term(
         0.0, momentum_small, "exp(−(|L| / 0.1 m h² ω)²), L about the CoM", "no fall"
     )
+    velocity: float = _term(
+        0.0, velocity_small, "exp(−(ċ_xy / 0.2 ω h)²), of the CoM along the ground", "no fall"
+    )
+    turning: float = _term(
+        0.0, turning_small, "exp(−(|ω_root| / 0.5 ω)²), angular velocity of the root", "no fall"
+    )
+    joint_limits: float = _term(
+        0.0, joint_limit_cost,
+        "−mean share of the last 5 % of a joint's range, at either end", "no divergence",
+    )  # fmt: skip
+    slip: float = _term(
+        0.0, slip_cost,
+        "−mean min((ṗ_xy / 0.2 ω h)², 1) of the soles, 0 of those in the air", "no divergence",
+    )  # fmt: skip
 
 
 REWARD_TERMS = tuple(RewardWeights.__dataclass_fields__)

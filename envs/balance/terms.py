@@ -80,6 +80,16 @@ def root_rate(v: View):
         v.out[a] = v.state.qvel[3 + a] / v.scales.omega
 
 
+@TERMS.add(
+    SPACE, "0.2 ω h", "velocity of the root's origin, root axes", "root vector", default=False
+)
+def root_vel(v: View):
+    R, velocity, unit = v.state.root_axes, v.state.qvel, v.scales.velocity
+    for a in range(3):
+        along_axis = R[0, a] * velocity[0] + R[1, a] * velocity[1] + R[2, a] * velocity[2]
+        v.out[a] = along_axis / unit
+
+
 @TERMS.add(("z",), "m g", "vertical force of the ground minus the weight", "vector")
 def load(v: View):
     v.out[0] = v.state.contact_wrench[2] / v.scales.weight - 1.0

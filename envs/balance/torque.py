@@ -36,7 +36,7 @@ def torque_step(step: TorqueStep):
     world, e, ctrl = step.world, step.episode, step.world.views.ctrl
     for i in range(ctrl.shape[0]):
         ctrl[i] = e.action[i] * step.torque_limit[i]
-    record_tick(world.robot, world.state, ctrl, step.substeps * world.robot.timestep, e)
+    record_tick(world.robot, world.state.qvel, ctrl, step.substeps * world.robot.timestep, e)
     simulate(world, step.substeps)
     run(step.estimate)
     end_step(step.end)

@@ -1,4 +1,4 @@
-"""A robot that differs from the one its controller knows: another friction, other masses."""
+"""A robot that differs from the described one: another friction, other masses, longer steps."""
 
 from __future__ import annotations
 
@@ -8,6 +8,18 @@ from dataclasses import replace
 import mujoco
 
 from .robot import Robot, fingerprint
+
+
+def coarser_robot(robot: Robot, timestep: float) -> Robot:
+    """A copy of `robot` that is simulated in physics steps of `timestep` [s]; all else is alike.
+
+    Raises ValueError for a step that is not in (0, 0.01].
+    """
+    if not 0.0 < timestep <= 0.01:
+        raise ValueError(f"timestep must be above 0 and at most 0.01 s, not {timestep}")
+    model = copy.copy(robot.model)
+    model.opt.timestep = timestep
+    return replace(robot, model=model, fingerprint=fingerprint(model, robot.standing_qpos))
 
 
 def perturbed_robot(

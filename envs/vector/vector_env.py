@@ -14,6 +14,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import option_mapping, seed_number, whole_number
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.info import InfoColumns
+from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.compiled.copies import Copyable
 
@@ -246,4 +247,6 @@ def make_vector_env(
     return BalanceVectorEnv(replicate(env_class(**arguments), num_envs), threads, autoreset_mode)
 
 
-torque_vector_env = partial(make_vector_env, TorqueBalanceEnv)  # for gymnasium.make_vec
+# for gymnasium.make_vec
+torque_vector_env = partial(make_vector_env, TorqueBalanceEnv)
+position_vector_env = partial(make_vector_env, PositionBalanceEnv)

@@ -1,7 +1,8 @@
 """Poise keeps a simulated humanoid on its feet while it is pushed.
 
-Importing it registers the environments ``poise/TorqueBalance-v0``, ``poise/ResidualBalance-v0`` and
-``poise/ResidualStep-v0`` with Gymnasium, and loads neither torch nor numba nor MuJoCo.
+Importing it registers the environments ``poise/TorqueBalance-v0``, ``poise/PositionBalance-v0``,
+``poise/ResidualBalance-v0`` and ``poise/ResidualStep-v0`` with Gymnasium, and loads neither torch
+nor numba nor MuJoCo.
 """
 
 from __future__ import annotations
@@ -42,6 +43,11 @@ register(
     "poise/TorqueBalance-v0",
     entry_point="poise.envs.balance.torque:TorqueBalanceEnv",
     vector_entry_point="poise.envs.vector.vector_env:torque_vector_env",
+)
+register(
+    "poise/PositionBalance-v0",
+    entry_point="poise.envs.balance.position:PositionBalanceEnv",
+    vector_entry_point="poise.envs.vector.vector_env:position_vector_env",
 )
 register(
     "poise/ResidualBalance-v0",

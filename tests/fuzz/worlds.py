@@ -9,12 +9,14 @@ import numpy as np
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.vector.vector_env import BalanceVectorEnv
 from tests.support.shared import robot
 
 CLASSES: dict[str, type[BalanceEnv]] = {
     "torque": TorqueBalanceEnv,
+    "position": PositionBalanceEnv,
     "residual": ResidualBalanceEnv,
     "step": ResidualStepEnv,
 }

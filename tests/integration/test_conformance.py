@@ -15,12 +15,14 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 import poise  # noqa: F401  (registers the environments)
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 
 IDS = {
     "poise/ResidualBalance-v0": ResidualBalanceEnv,
     "poise/ResidualStep-v0": ResidualStepEnv,
     "poise/TorqueBalance-v0": TorqueBalanceEnv,
+    "poise/PositionBalance-v0": PositionBalanceEnv,
 }
 EACH = pytest.mark.parametrize("name", IDS)
 PUSHES = {"magnitude": [0.1, 0.3], "unit": "specific_impulse", "start": [0.0, 0.1]}

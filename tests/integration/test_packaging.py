@@ -120,7 +120,13 @@ def test_import_poise_is_light() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["poise/TorqueBalance-v0", "poise/ResidualBalance-v0", "poise/ResidualStep-v0"]
+    "name",
+    [
+        "poise/TorqueBalance-v0",
+        "poise/PositionBalance-v0",
+        "poise/ResidualBalance-v0",
+        "poise/ResidualStep-v0",
+    ],
 )
 def test_registered_environments_exist(name: str) -> None:
     """The string entry point names a class, and Gymnasium adds no time limit of its own."""

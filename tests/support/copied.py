@@ -18,6 +18,7 @@ from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.registry import load_controller
 from poise.configs.files import packaged
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
@@ -189,6 +190,7 @@ KINDS: dict[str, tuple[Callable[[], Any], Callable[[Any], list[Any]]]] = {
     "torque": (lambda: _begin(env_of(TorqueBalanceEnv)), play_env),
     "residual": (lambda: _begin(env_of(ResidualBalanceEnv, smoothing=0.1, gate=0.02)), play_env),
     "step": (lambda: _begin(env_of(ResidualStepEnv, smoothing=0.1)), play_env),
+    "position": (lambda: _begin(env_of(PositionBalanceEnv)), play_env),
     "late torque": (lambda: _late(env_of(TorqueBalanceEnv)), play_env),
     "late residual": (lambda: _late(env_of(ResidualBalanceEnv)), play_env),
     "late step": (lambda: _late(env_of(ResidualStepEnv)), play_env),

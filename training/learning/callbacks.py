@@ -16,6 +16,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.configs.files import write_atomic
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.robots.robot import Robot
 from poise.envs.vector.batch import EnvBatch, replicate
 
 from .checkpoints import controller_fingerprint, save_checkpoint
@@ -53,10 +54,17 @@ class Checkpoints(BaseCallback):
     model: PPO
 
     def __init__(
-        self, config: TrainConfig, last: Path, best: Path, table: Path, state: dict[str, Any]
+        self,
+        config: TrainConfig,
+        robot: Robot,
+        last: Path,
+        best: Path,
+        table: Path,
+        state: dict[str, Any],
     ):
         super().__init__()
-        self.config, self.last, self.best, self.table = config, last, best, table
+        self.config, self.robot = config, robot  # as it is described, whatever it is trained on
+        self.last, self.best, self.table = last, best, table
         self.rows: list[dict[str, float]] = list(state.get("evaluations", []))
         self._next = state.get("next_evaluation", 0)
         scores = [row["score"] for row in self.rows if row["timesteps"] > 0]
@@ -66,9 +74,8 @@ class Checkpoints(BaseCallback):
     def _on_training_start(self) -> None:
         evaluation = self.config.evaluation
         pushes = evaluation.pushes or self.config.env.pushes
-        robot = self.training_env.get_attr("robot")[0]
         count = min(evaluation.trials, 32)
-        first = self.config.make_env(robot, pushes=pushes)
+        first = self.config.make_env(self.robot, pushes=pushes)
         self._batch = EnvBatch(replicate(first, count), self.config.threads)
         if self.num_timesteps == 0:
             self._evaluate()  # the controller alone: what the policy must beat
@@ -152,7 +159,7 @@ class Checkpoints(BaseCallback):
         return env
 
     def _save(self, folder: Path) -> None:
-        robot = self.training_env.get_attr("robot")[0]
+        robot = self.robot
         inputs, outputs = self.model.observation_space.shape, self.model.action_space.shape
         assert inputs and outputs  # both spaces are boxes
         state = {

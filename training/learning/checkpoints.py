@@ -139,7 +139,7 @@ def check_controller(state: dict[str, object], config: TrainConfig, path: Path) 
 
 def controller_fingerprint(config: TrainConfig) -> str:
     """Hash of the configuration of the controller below the policy; empty if there is none."""
-    if config.action == "torque":
+    if config.action in ("torque", "position"):
         return ""
     return hashlib.sha256(to_yaml(controller_config(config.controller)).encode()).hexdigest()
 

@@ -10,6 +10,8 @@ from poise.baselines.registry import controller_config
 from poise.configs.files import resolve
 from poise.configs.schema import build, on_base, read_yaml
 from poise.envs.balance.base import BalanceEnv, EnvConfig
+from poise.envs.balance.position import PositionBalanceEnv
+from poise.envs.balance.servos import ServoConfig
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.pushes.sampler import PushSampler
 from poise.envs.robots.robot import Robot
@@ -34,6 +36,8 @@ class PPOConfig:
     ent_coef: float = field(default=0.0, metadata={"min": 0.0})
     vf_coef: float = field(default=0.5, metadata={"min": 0.0})
     max_grad_norm: float = field(default=0.5, metadata={"above": 0.0})
+    # the update of a rollout ends where KL exceeds 1.5 times this; None: never
+    target_kl: float | None = field(default=None, metadata={"above": 0.0})
     net_arch: tuple[int, ...] = (128, 128)  # tanh
     log_std_init: float = -1.5
     log_std_final: float | None = None  # linear in time from log_std_init; None: learned
@@ -76,12 +80,13 @@ class TrainConfig:
     """A policy that moves a controller's targets, its steps too, or gives the torques itself.
 
     With `action` "step" the environment is `poise/ResidualStep-v0`, and `step_residual` is what an
-    action adds instead of `residual`. With "torque" it is `poise/TorqueBalance-v0`, and controller,
-    motion, both residuals, smoothing and gate are not used.
+    action adds instead of `residual`. With "torque" it is `poise/TorqueBalance-v0`, with "position"
+    `poise/PositionBalance-v0` with these `servos`; then controller, motion, both residuals,
+    smoothing and gate are not used.
     """
 
     robot: str = "humanoid"
-    action: Literal["residual", "step", "torque"] = "residual"
+    action: Literal["residual", "step", "torque", "position"] = "residual"
     controller: str = "momentum-qp"
     motion: str = "standing"
     seed: int = field(default=0, metadata={"min": 0, "max": MOST_SEED})
@@ -91,6 +96,9 @@ class TrainConfig:
     env: EnvConfig = field(default_factory=EnvConfig)
     residual: ResidualScales = field(default_factory=ResidualScales)
     step_residual: StepScales = field(default_factory=StepScales)
+    servos: ServoConfig = field(default_factory=ServoConfig)
+    # of the training episodes [s]; None: the robot's. What is trained plays in the robot's own
+    physics_step: float | None = field(default=None, metadata={"above": 0.0, "max": 0.01})
     smoothing: float = field(default=0.0, metadata={"min": 0.0})  # of the action [s]
     gate: float = field(default=0.0, metadata={"min": 0.0})  # of the residual [m]
     ppo: PPOConfig = field(default_factory=PPOConfig)
@@ -105,6 +113,9 @@ class TrainConfig:
         """
         if self.action == "torque":
             return TorqueBalanceEnv(robot or self.robot, self.env, **overrides)
+        if self.action == "position":
+            arguments = {"servos": self.servos, **overrides}
+            return PositionBalanceEnv(robot or self.robot, self.env, **arguments)
         steps = self.action == "step"
         if "controller" not in overrides:  # an environment takes a name for what the user says
             overrides["controller"] = controller_config(self.controller)

@@ -18,6 +18,8 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.schema import build, read_yaml, to_yaml
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.robots.variants import coarser_robot
 from poise.envs.vector.batch import replicate
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
@@ -62,26 +64,28 @@ def train(
     keeps(out / LAST, f"what is trained is kept in {out}; go on with --resume")
     start = None if checkpoint or config.start_from is None else locate_policy(config.start_from)
     torch.set_num_threads(1)
-    prepare()
+    if config.action in ("residual", "step"):  # else nothing of the controllers is called
+        prepare()
     with ExitStack() as stack:
-        normalize = _training_envs(config)
+        robot = load_robot(config.robot)
+        normalize = _training_envs(config, robot)
         stack.callback(normalize.close)
         model = make_model(config, normalize)
         normalize.seed(_env_seed(config.seed))
         state: dict[str, Any] = {}
-        fingerprint = normalize.get_attr("robot")[0].fingerprint
         stack.enter_context(FolderLock(out))
         checkpoint = check_folder(config, out, resume)  # another run may have ended since
         if start is not None:
-            restore(start, model, normalize, fingerprint, wider=True)
+            restore(start, model, normalize, robot.fingerprint, wider=True)
         if checkpoint is not None:
-            state = restore(checkpoint, model, normalize, fingerprint)
+            state = restore(checkpoint, model, normalize, robot.fingerprint)
             check_controller(state, config, checkpoint / STATE)
             model.num_timesteps = state["timesteps"]
             _reseed(model, normalize, config.seed + model.num_timesteps)
         write_atomic(out / CONFIG, to_yaml(config))
         model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
-        checkpoints = Checkpoints(config, out / LAST, out / BEST, out / "evaluations.csv", state)
+        table = out / "evaluations.csv"
+        checkpoints = Checkpoints(config, robot, out / LAST, out / BEST, table, state)
         stack.callback(checkpoints.close)
         schedules = [CurriculumCallback(config), ExplorationCallback(config)]
         callbacks = [Throughput(), *schedules, checkpoints]
@@ -122,6 +126,7 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         ent_coef=ppo.ent_coef,
         vf_coef=ppo.vf_coef,
         max_grad_norm=ppo.max_grad_norm,
+        target_kl=ppo.target_kl,
         use_sde=ppo.use_sde,
         sde_sample_freq=ppo.sde_sample_freq,
         policy_kwargs=policy,
@@ -137,8 +142,11 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
     return model
 
 
-def _training_envs(config: TrainConfig) -> VecNormalize:
-    env = config.make_env()
+def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormalize:
+    robot = robot or load_robot(config.robot)
+    if config.physics_step is not None:
+        robot = coarser_robot(robot, config.physics_step)
+    env = config.make_env(robot)
     check_pushes(config, env)
     moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
     vec = ThreadedVecEnv(replicate(env, config.ppo.n_envs), config.threads)

@@ -20,6 +20,7 @@ from poise.configs.files import packaged
 from poise.configs.reading import is_file, is_folder
 from poise.configs.schema import to_dict, to_yaml
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.robots.robot import Robot
 
@@ -119,11 +120,15 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
 
 
 # fields of a training configuration that do not change how its policy plays
-TRAINING = ("seed", "steps", "threads", "start_from", "ppo", "curriculum", "evaluation")
+TRAINING = (
+    *("seed", "steps", "threads", "physics_step", "start_from"),
+    *("ppo", "curriculum", "evaluation"),
+)
 ENVIRONMENTS = {
     "residual": ResidualBalanceEnv,
     "step": ResidualStepEnv,
     "torque": TorqueBalanceEnv,
+    "position": PositionBalanceEnv,
 }
 
 

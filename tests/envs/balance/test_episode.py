@@ -107,6 +107,31 @@ def test_little_angular_momentum_is_rewarded():
     assert e.reward_terms[REWARD_TERMS.index("angular_momentum")] == pytest.approx(expected)
 
 
+def test_terms_of_the_velocity_tasks():
+    """Slow, not turning, away from joint limits, without slipping; if they have weights."""
+    simulation, r = generic_state(), robot()
+    s, omega = simulation.state_arrays, np.sqrt(9.81 / robot().height_com)
+    unit = 0.2 * omega * r.height_com
+    s.com_vel[:] = 0.3 * unit, -0.4 * unit, 5.0
+    s.qvel[3:6] = 0.1 * omega, -0.2 * omega, 0.3 * omega
+    low, high = r.joint_range.T
+    s.qpos[7:] = 0.5 * (low + high)
+    s.qpos[7], s.qpos[8], s.qpos[9] = high[0] - 0.02 * (high - low)[0], low[1] - 1.0, low[2]
+    s.qpos[9] += 0.051 * (high - low)[2]
+    s.contacts[:] = 1.0, 0.0
+    s.J_v[:3], s.J_v[6:8] = (0.6 * unit, 0.2 * unit, 9.0), (unit, unit)
+    weights = {"velocity": 2.0, "turning": 3.0, "joint_limits": 4.0, "slip": 5.0}
+    _, e = play(simulation, weights=RewardWeights(**weights))
+    terms = dict(zip(REWARD_TERMS, e.reward_terms, strict=True))
+    assert terms["velocity"] == pytest.approx(2.0 * np.exp(-0.25))
+    assert terms["turning"] == pytest.approx(3.0 * np.exp(-0.14 / 0.25))
+    assert terms["joint_limits"] == pytest.approx(-4.0 * (0.6 + 1.0) / len(low))
+    assert terms["slip"] == pytest.approx(-5.0 * 0.4 / 2)
+    s.J_v[:2] = 2.0 * unit  # counts as 1
+    _, e = play(simulation, weights=RewardWeights(slip=5.0))
+    assert e.reward_terms[REWARD_TERMS.index("slip")] == pytest.approx(-2.5)
+
+
 def test_a_fall_costs_its_weight_and_earns_nothing():
     """In the step of the fall the positive terms are zero."""
     simulation = generic_state()
@@ -243,7 +268,7 @@ def test_ticks_account_for_power_and_saturation():
     e = new_episode(1)
     tau = 0.5 * r.torque_limit
     tau[:3] = -r.torque_limit[:3]
-    record_tick(simulation.arrays, simulation.state_arrays, tau, 0.004, e)
+    record_tick(simulation.arrays, simulation.state_arrays.qvel, tau, 0.004, e)
     power = np.abs(tau * simulation.state.qvel[r.motor_dofs]).sum()
     assert e.metrics[episode.ENERGY] == pytest.approx(0.004 * power)
     assert e.metrics[episode.SATURATED] == pytest.approx(3 / r.model.nu)

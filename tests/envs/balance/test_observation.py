@@ -96,6 +96,8 @@ def test_every_term_is_what_its_name_says(name):
         "last_action": action,
     }
     assert list(terms) == list(expected)
+    terms |= observed(simulation, q_ref, v_ref, action, ["root_vel"])
+    expected["root_vel"] = state.root_axes.T @ state.qvel[:3] / (0.2 * omega * h)
     for term, value in expected.items():
         np.testing.assert_allclose(terms[term], np.clip(value, -10, 10), atol=1e-9, err_msg=term)
         if term != "contacts":

@@ -9,6 +9,7 @@ import pytest
 from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
 from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
 from poise.configs.errors import ConfigError
+from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.terms import TERMS
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.robots.mirror import SIDES, mirror_robot
@@ -31,6 +32,7 @@ def even():
 
 ENVS = {
     "torque": TorqueBalanceEnv,
+    "position": PositionBalanceEnv,
     "residual": partial(ResidualBalanceEnv, residual=ResidualScales(**BODY)),
     "step": partial(ResidualStepEnv, residual=StepScales(trigger=0.03, **BODY)),
 }

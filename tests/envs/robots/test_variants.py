@@ -10,7 +10,7 @@ import pytest
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.ground import contact_friction
 from poise.envs.robots.robot import Robot, load_robot
-from poise.envs.robots.variants import perturbed_robot
+from poise.envs.robots.variants import coarser_robot, perturbed_robot
 from tests.support.shared import robot
 from tests.support.small_biped import BOX_FOOT, motors, write_biped
 
@@ -82,3 +82,17 @@ def test_what_cannot_be_is_refused(change: dict[str, float]) -> None:
     """No friction at all, or no mass."""
     with pytest.raises(ValueError, match=next(iter(change))):
         perturbed_robot(robot(), **change)
+
+
+def test_longer_physics_steps() -> None:
+    """The same robot in steps of another length, which its fingerprint tells."""
+    coarse = coarser_robot(robot(), 0.005)
+    assert coarse.model.opt.timestep == 0.005 and robot().model.opt.timestep == 0.002
+    assert coarse.fingerprint != robot().fingerprint
+    assert coarser_robot(robot(), 0.002).fingerprint == robot().fingerprint
+    simulation = Simulation(coarse)
+    simulation.step(np.zeros(coarse.model.nu), 3)
+    assert simulation.time == pytest.approx(0.015)
+    for timestep in (0.0, 0.011, np.nan):
+        with pytest.raises(ValueError, match="timestep must be"):
+            coarser_robot(robot(), timestep)

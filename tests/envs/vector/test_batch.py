@@ -6,6 +6,7 @@ import pytest
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.configs.errors import ConfigError
+from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.vector.batch import EnvBatch
 from poise.envs.vector.scheduler import MANY
@@ -48,7 +49,9 @@ def test_the_number_of_threads_changes_nothing():
     assert len(ends) >= 3
 
 
-@pytest.mark.parametrize("kind", [ResidualBalanceEnv, ResidualStepEnv, TorqueBalanceEnv])
+@pytest.mark.parametrize(
+    "kind", [ResidualBalanceEnv, ResidualStepEnv, TorqueBalanceEnv, PositionBalanceEnv]
+)
 def test_nor_where_steps_are_shared_out_tick_by_tick(kind):
     """As they are with many environments for each thread."""
     n = 2 * MANY + 1

@@ -1,0 +1,138 @@
+"""`poise/PositionBalance-v0`: the action is targets of joint positions, which servos reach for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from poise.configs.errors import ConfigError, shown
+from poise.configs.schema import build, to_dict
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import CompiledStep, Program, address_of, run
+from poise.envs.compiled.jit import compiled
+from poise.envs.physics.kinematics import update_state
+from poise.envs.physics.simulation import World, advance
+from poise.envs.robots.mirror import Mirror
+from poise.envs.robots.robot import Robot
+
+from .base import BalanceEnv, EnvConfig
+from .episode import EpisodeArrays, StepEnd, end_step, record_tick
+from .servos import ServoConfig, Servos, aim, drive, make_servos
+
+
+@dataclass(frozen=True, eq=False)
+class PositionStep(Block):
+    """All that a policy step works on."""
+
+    world: World
+    estimate: Program  # of the state source
+    servos: Servos
+    substeps: int  # physics steps
+    episode: EpisodeArrays
+    end: StepEnd
+
+
+@compiled
+def position_step(step: PositionStep):
+    """Take a policy step: new targets, then `substeps` physics steps with torques of their own."""
+    world, e, views = step.world, step.episode, step.world.views
+    aim(step.servos, e.action)
+    for _ in range(step.substeps):
+        drive(step.servos, views)
+        record_tick(world.robot, views.qvel, views.ctrl, world.robot.timestep, e)
+        advance(world.robot, views, world.pushes, world.clock)
+        run(world.sensors)
+    update_state(world.robot, views, world.state)
+    run(step.estimate)
+    end_step(step.end)
+
+
+class PositionBalanceEnv(BalanceEnv):
+    """Keep a pushed robot on its feet by targets of its joints' positions.
+
+    Action: Box(−1, 1, (nu,)): how far the target of each motor lies from its holding one, over
+    `reach`. A servo drives each motor, in every physics step, within the motor's limit τ_max:
+
+        q* = q_hold + reach · a,    τ = clip(K (q* − q) − D q̇, ± τ_max)
+
+    q_hold = q_standing + τ_hold / K, so that action 0 stands; `env.servos` has the numbers, and
+    `action_names` are the motors. Targets are new every policy step (`policy_period`, 20 ms). A
+    servo measures its own joint: it is never late, whatever `sensors` say.
+
+    Observation: <observation>
+
+    It does not know the push. The reference is the standing posture at rest.
+
+    <rewards>
+
+    <start>
+
+    Arguments: `robot` (a name, a .yaml file or a `Robot`), `config` (an `EnvConfig`, a .yaml file
+    or a mapping), `servos` (a `ServoConfig` or a mapping: how K, D and reach are chosen),
+    <arguments>
+
+    Version history: v0, first release.
+    """
+
+    def __init__(
+        self,
+        robot: str | Path | Robot = "humanoid",
+        config: EnvConfig | str | Path | Mapping | None = None,
+        *,
+        servos: ServoConfig | Mapping | None = None,
+        render_mode: str | None = None,
+        **overrides: Any,
+    ):
+        super().__init__(robot, config, render_mode=render_mode, **overrides)
+        self.servo_config = _servo_config(servos)
+        self.servos = make_servos(self.robot, self.servo_config)
+        self._still = np.zeros(len(self.robot.joint_names))
+
+    def arguments(self) -> dict[str, Any]:
+        """The arguments that make another environment like this one; the robot is shared."""
+        return {**super().arguments(), "servos": self.servo_config}
+
+    def _action_names(self) -> tuple[str, ...]:
+        model = self.robot.model
+        return tuple(model.actuator(i).name for i in range(model.nu))
+
+    def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
+        return parts["motors"]
+
+    def _references(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.arrays.q_standing, self._still
+
+    def advance(self) -> None:
+        self._bound().play()
+
+    def compiled_step(self) -> CompiledStep | None:
+        """The compiled policy step; the same object while it can be used again."""
+        return self._bound()
+
+    def _bound(self) -> CompiledStep:
+        world, known = self.simulation.world(), self._step
+        bound = None if known is None else known.block
+        if known is None or not isinstance(bound, PositionStep) or bound.world is not world:
+            block = PositionStep(
+                world=world,
+                estimate=self.state_source.estimate,
+                servos=self.servos,
+                substeps=self.substeps,
+                episode=self.episode,
+                end=self.step_end(),
+            )
+            known = self._step = CompiledStep(address_of(position_step, block), block)
+        return known
+
+
+def _servo_config(servos: ServoConfig | Mapping | None) -> ServoConfig:
+    """Raises ConfigError naming the field that is wrong."""
+    fields = {} if servos is None else to_dict(servos)
+    if not isinstance(fields, Mapping):
+        raise ConfigError(
+            f"must be a ServoConfig or a mapping, not {shown(servos)}",
+            source="environment", field="servos", choices=ServoConfig.__dataclass_fields__,
+        )  # fmt: skip
+    return build(ServoConfig, fields, "servos")

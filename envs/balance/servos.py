@@ -1,0 +1,161 @@
+"""Position servos of a robot's motors: gains, the posture that they hold, and their torques."""
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from poise.configs.errors import ConfigError
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import apart
+from poise.envs.physics.arrays import SimViews
+from poise.envs.robots.description import match_names
+from poise.envs.robots.robot import Robot
+
+POSITIVE, NOT_NEGATIVE = {"above": 0.0}, {"min": 0.0}
+
+
+@dataclass(frozen=True)
+class ServoConfig:
+    """The gains of the servos, τ = K (q* − q) − D q̇, and what an action moves.
+
+    By default K is the motor's limit over `deflection`. A joint of the legs has at least `carry`
+    times what holds half of the body upright above it, ½ m g h sin β: h the height of the CoM over
+    the joint, β the angle of its axis from the vertical. D = 2 `damping_ratio` √(K I), with
+    I = 1/(M⁻¹)_jj, the inertia that the joint feels when all others are free. Mappings are from
+    joint names, or patterns such as ``*_ankle_y``, and win.
+    """
+
+    deflection: float = field(default=0.3, metadata=POSITIVE)  # [rad]
+    carry: float = field(default=2.0, metadata=NOT_NEGATIVE)
+    damping_ratio: float = field(default=1.0, metadata=NOT_NEGATIVE)
+    stiffness: dict[str, float] = field(default_factory=dict, metadata=POSITIVE)  # [N·m/rad]
+    damping: dict[str, float] = field(default_factory=dict, metadata=NOT_NEGATIVE)  # [N·m·s/rad]
+    # how far an action of 1 moves the target [rad]
+    reach: dict[str, float] = field(default_factory=lambda: {"*": 1.0}, metadata=POSITIVE)
+
+
+@dataclass(frozen=True, eq=False)
+class Servos(Block):
+    """A servo for each motor (nu)."""
+
+    dofs: np.ndarray  # (nu,) int: degree of freedom in qvel; one more in qpos
+    stiffness: np.ndarray  # (nu,) [N·m/rad]
+    damping: np.ndarray  # (nu,) [N·m·s/rad]
+    limit: np.ndarray  # (nu,) [N·m]
+    hold: np.ndarray  # (nu,) target of action zero [rad]
+    reach: np.ndarray  # (nu,) [rad]
+    target: np.ndarray  # (nu,) q* [rad]
+
+
+@compiled
+def pd_torque(
+    stiffness: float, damping: float, limit: float, error: float, velocity: float
+) -> float:
+    """τ = K e − D q̇ within ± the limit, of the error e = q* − q [rad]."""
+    torque = stiffness * error
+    torque -= damping * velocity
+    return min(max(torque, -limit), limit)
+
+
+@compiled
+def aim(servos: Servos, action: np.ndarray):
+    """q* = hold + reach · action (nu,)."""
+    for i in range(servos.target.shape[0]):
+        servos.target[i] = servos.hold[i] + servos.reach[i] * action[i]
+
+
+@compiled
+def drive(servos: Servos, views: SimViews):
+    """The servos' torques in `views.ctrl`, by the true positions and velocities of the joints."""
+    for i in range(servos.target.shape[0]):
+        dof = servos.dofs[i]
+        views.ctrl[i] = pd_torque(
+            servos.stiffness[i], servos.damping[i], servos.limit[i],
+            servos.target[i] - views.qpos[dof + 1], views.qvel[dof],
+        )  # fmt: skip
+
+
+def make_servos(robot: Robot, config: ServoConfig) -> Servos:
+    """The servos of `robot`, whose targets hold its standing posture until they are moved.
+
+    Raises ConfigError for a joint or pattern that no motor drives, or a motor without `reach`.
+    """
+    dofs = np.array(robot.motor_dofs, dtype=np.int64)
+    names = [robot.joint_names[dof - 6] for dof in dofs]
+    data = _standing(robot)
+    stiffness = np.maximum(robot.torque_limit / config.deflection, _carrying(robot, data, config))
+    _replace(stiffness, config.stiffness, names, "servos.stiffness")
+    inertia = _free_inertia(robot, data)
+    damping = 2.0 * config.damping_ratio * np.sqrt(stiffness * inertia)
+    _replace(damping, config.damping, names, "servos.damping")
+    reach = np.full(len(names), np.nan)
+    _replace(reach, config.reach, names, "servos.reach")
+    if np.isnan(reach).any():
+        raise ConfigError(
+            f"none for {', '.join(np.array(names)[np.isnan(reach)])}", field="servos.reach"
+        )
+    hold = robot.standing_qpos[dofs + 1] + holding_torques(robot) / stiffness
+    return Servos(
+        dofs, stiffness, damping, np.array(robot.torque_limit), hold, reach, apart(len(names))
+    )
+
+
+def holding_torques(robot: Robot) -> np.ndarray:
+    """(nu,) torques [N·m] that hold the standing posture at rest, each sole loaded below the CoM.
+
+    τ = g(q) − τ_passive − Σ J_iᵀ f_i: the ground carries the weight at two points, one for each
+    foot, at the CoM's place forward and the soles' places to the side.
+    """
+    model, data = robot.model, _standing(robot)
+    com = data.subtree_com[robot.root_body_id]
+    soles = [
+        data.xpos[sole.body_id] + data.xmat[sole.body_id].reshape(3, 3) @ sole.position
+        for sole in robot.soles
+    ]
+    share = np.clip((com[1] - soles[0][1]) / (soles[1][1] - soles[0][1]), 0.0, 1.0)
+    torques = data.qfrc_bias - data.qfrc_passive
+    jacobian = np.zeros((3, model.nv))
+    for sole, place, part in zip(robot.soles, soles, (1.0 - share, share), strict=True):
+        point = np.array([com[0], place[1], 0.0])
+        mujoco.mj_jac(model, data, jacobian, None, point, sole.body_id)
+        torques = torques - jacobian[2] * part * robot.units.force
+    limit = robot.torque_limit
+    return np.clip(torques[robot.motor_dofs], -limit, limit)
+
+
+def _standing(robot: Robot) -> mujoco.MjData:
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_forward(robot.model, data)
+    return data
+
+
+def _free_inertia(robot: Robot, data: mujoco.MjData) -> np.ndarray:
+    """(nu,) 1/(M⁻¹)_jj of the driven joints [kg·m²]."""
+    inverse = np.zeros((robot.model.nv, robot.model.nv))
+    mujoco.mj_solveM(robot.model, data, inverse, np.eye(robot.model.nv))
+    return 1.0 / np.diag(inverse)[robot.motor_dofs]
+
+
+def _carrying(robot: Robot, data: mujoco.MjData, config: ServoConfig) -> np.ndarray:
+    """(nu,) the least stiffness of joints between root and soles, 0 of others [N·m/rad]."""
+    model, least = robot.model, np.zeros(robot.model.nv)
+    com = data.subtree_com[robot.root_body_id]
+    for sole in robot.soles:
+        body = sole.body_id
+        while body != robot.root_body_id:
+            first = model.body_jntadr[body]
+            for joint in range(first, first + model.body_jntnum[body]):
+                lever = max(com[2] - data.xanchor[joint, 2], 0.0)
+                lever *= np.linalg.norm(data.xaxis[joint, :2])
+                least[model.jnt_dofadr[joint]] = 0.5 * config.carry * robot.units.force * lever
+            body = model.body_parentid[body]
+    return least[robot.motor_dofs]
+
+
+def _replace(values: np.ndarray, by: dict[str, float], names: list[str], field: str) -> None:
+    """Write what `by` has for these joints into `values`."""
+    for name, value in match_names(by, names, "environment", field).items():
+        values[names.index(name)] = value
