@@ -42,6 +42,8 @@ class FeedbackArrays(Block):
     upright: np.ndarray  # (3,) the vertical at rest, in the root's axes
     height: float  # h [m]
     momentum_unit: float  # ω/(m g h) [1/(N·m·s)]
+    pivot: np.ndarray  # (3, 2) of a plan, in a swing, on both feet: momentum [m/(N·m·s)], lean [m]
+    lateral_fraction: float  # of these across the heading
     signals: np.ndarray  # (9,) s; kernels that plan set LATER_STEP and PHASE
     added: np.ndarray  # (4,) Δ [m, m, s, m]
 
@@ -91,6 +93,7 @@ class Search(Block):
     margin: float  # [m]
     time_price: float  # [m/s]
     arc: float  # of an `EnergyPlanner`
+    capture_point: np.ndarray  # (2,) ξ, and what turn and lean of the body add to it [m]
     corners: np.ndarray  # (k, 2) scratch: what the stance sole reaches [m]
     cop: np.ndarray  # (2,) the point of it that is nearest to ξ [m]
     start: np.ndarray  # (2,) where the foot is [m]

@@ -117,7 +117,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
 
     def _planner(self, region: CopRegion) -> StepPlanner:
         c = self.config
-        return StepPlanner(self.robot, region, c.limits, c.foothold, c.feedback, c.falls)
+        return StepPlanner(self.robot, region, c.limits, c.foothold, c.feedback, c.falls, c.pivot)
 
     @property
     def failures(self) -> int:

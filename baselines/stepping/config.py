@@ -105,6 +105,33 @@ class FallFeedback(StepFeedback):
 
 
 @dataclass(frozen=True)
+class PivotGains:
+    """What turn and lean of the body add to a point, by r = `momentum` ω L/(m g) + `lean` h e.
+
+    e is the horizontal part of the root's axis that stands at rest, L the angular momentum that
+    turns the body along r. No gain has a unit.
+    """
+
+    momentum: float = 0.0
+    lean: float = 0.0
+
+
+@dataclass(frozen=True)
+class PivotConfig:
+    """A trunk that is righted before the fall is stopped [Maus10]; gains of zero are without it.
+
+    With c̈ = ω² (c − p + r) the force of the ground passes the CoM at r behind: towards a point
+    above it, a virtual pivot, which takes turn and lean of the trunk back. The fall goes on for it,
+    so that steps are planned for ξ + r.
+    """
+
+    plan: PivotGains = field(default_factory=PivotGains)  # of the ξ that steps and CoP follow
+    swing: PivotGains = field(default_factory=PivotGains)  # of c̈ on one foot
+    stance: PivotGains = field(default_factory=PivotGains)  # and on both
+    lateral_fraction: float = _number(1.0, min=0.0)  # of r that counts across the heading
+
+
+@dataclass(frozen=True)
 class RecentringConfig:
     """When and how feet go back to the nominal stance, the one of standing."""
 
@@ -178,6 +205,7 @@ class CaptureStepConfig:
     foothold: FootholdChoice = field(default_factory=FootholdChoice)
     feedback: StepFeedback = field(default_factory=StepFeedback)
     falls: dict[str, FallFeedback] = field(default_factory=dict)  # by direction of the fall
+    pivot: PivotConfig = field(default_factory=PivotConfig)
     recentring: RecentringConfig = field(default_factory=RecentringConfig)
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)

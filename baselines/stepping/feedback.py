@@ -21,13 +21,13 @@ import numpy as np
 
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import apart
-from poise.envs.maths.vectors import along
+from poise.envs.maths.vectors import along, turned
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
 
 from .blocks import FeedbackArrays
-from .config import SIGNALS, FallFeedback, StepFeedback
+from .config import SIGNALS, FallFeedback, PivotConfig, StepFeedback
 
 # rows of K
 AHEAD, OUTWARD, TIME, HEIGHT = range(4)
@@ -36,11 +36,15 @@ AHEAD, OUTWARD, TIME, HEIGHT = range(4)
     CONSTANT, LATER_STEP, PHASE, CAPTURE_AHEAD, CAPTURE_OUTWARD,
     LEAN_AHEAD, LEAN_OUTWARD, MOMENTUM_AHEAD, MOMENTUM_OUTWARD,
 ) = range(9)  # fmt: skip
+PLAN, SWING, STANCE = range(3)  # rows of the pivot's gains
 LX, LY = 3, 4  # of the centroidal momentum [P; L]
 
 
 def feedback_arrays(
-    robot: Robot, always: StepFeedback, falls: Mapping[str, FallFeedback]
+    robot: Robot,
+    always: StepFeedback,
+    falls: Mapping[str, FallFeedback],
+    pivot: PivotConfig,
 ) -> FeedbackArrays:
     """K for one robot: gains that hold always, and those that `falls` add in a first step."""
     h, omega = robot.height_com, robot.omega
@@ -51,6 +55,9 @@ def feedback_arrays(
     law[:] = gains[:] = units[:, None] * always.matrix()
     for k, fall in enumerate(rising):
         angles[k], added_at[k] = np.radians(fall.angle), units[:, None] * fall.matrix()
+    unit, rows = h * omega / robot.units.moment, apart((3, 2))
+    for k, row in enumerate((pivot.plan, pivot.swing, pivot.stance)):
+        rows[k] = row.momentum * unit, row.lean * h
     return FeedbackArrays(
         always=law,
         angles=angles,
@@ -59,6 +66,8 @@ def feedback_arrays(
         upright=robot_arrays(robot).root_standing[2].copy(),
         height=float(h),
         momentum_unit=float(omega / robot.units.moment),
+        pivot=rows,
+        lateral_fraction=pivot.lateral_fraction,
         signals=apart(len(SIGNALS)),
         added=apart(4),
     )
@@ -85,15 +94,37 @@ def schedule_gains(f: FeedbackArrays, ahead: float, left: float) -> None:
 
 
 @compiled
+def lean(f: FeedbackArrays, s: StateArrays) -> tuple[float, float]:
+    """e, the horizontal part of the root's axis that stands at rest."""
+    x, y = 0.0, 0.0
+    for a in range(3):
+        x += s.root_axes[0, a] * f.upright[a]
+        y += s.root_axes[1, a] * f.upright[a]
+    return x, y
+
+
+@compiled
+def pivot_offset(
+    f: FeedbackArrays, s: StateArrays, row: int, cos: float, sin: float
+) -> tuple[float, float]:
+    """r of a row of `pivot` [m], see `PivotConfig`; of a step along a heading."""
+    turn, tilt = f.pivot[row, 0], f.pivot[row, 1]
+    if turn == 0.0 and tilt == 0.0:
+        return 0.0, 0.0
+    x, y = lean(f, s)
+    x, y = tilt * x + turn * s.momentum[LY], tilt * y - turn * s.momentum[LX]
+    ahead, left = along(cos, sin, x, y)
+    return turned(cos, sin, ahead, f.lateral_fraction * left)
+
+
+@compiled
 def evaluate_feedback(
     f: FeedbackArrays, s: StateArrays, stance: np.ndarray, cos: float, sin: float, side: float
 ) -> None:
     """Δ = K s of a step beside the sole at `stance` (3,) along a heading; `side` is 1 for the left
     foot. The signals `later_step` and `phase` are those of the last plan."""
-    signals, up_x, up_y = f.signals, 0.0, 0.0
-    for a in range(3):
-        up_x += s.root_axes[0, a] * f.upright[a]
-        up_y += s.root_axes[1, a] * f.upright[a]
+    signals = f.signals
+    up_x, up_y = lean(f, s)
     x, y = along(cos, sin, s.capture_point[0] - stance[0], s.capture_point[1] - stance[1])
     lean_x, lean_y = along(cos, sin, up_x, up_y)
     turn_x, turn_y = along(cos, sin, s.momentum[LY], -s.momentum[LX])  # where it turns the body to

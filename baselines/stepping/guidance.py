@@ -8,8 +8,9 @@ from poise.envs.maths.polygons import find_nearest
 from poise.envs.maths.vectors import copy, rotation_error, turned
 
 from .blocks import CaptureTick
-from .feedback import HEIGHT
+from .feedback import HEIGHT, STANCE, SWING, pivot_offset
 from .recentring import LOADING, SHIFTING, limit_cop_distance
+from .search import set_capture_point
 
 
 @compiled
@@ -48,7 +49,7 @@ def guide_com(
     stride_x: float,
     stride_y: float,
 ) -> None:
-    """References of CoM and CoP: c̈_ref = ω² (c − p) with p = ξ + k (ξ − ξ_ref).
+    """References of CoM and CoP: c̈_ref = ω² (c − p + r) with p = ξ + k (ξ − ξ_ref).
 
     p stays within `overreach` [m] of the CoP `region` (n, 2), whose middle is ξ_ref. The height
     over the `ground` [m] is what legs reach with the feet a stride (x, y) apart [m].
@@ -64,9 +65,10 @@ def guide_com(
     x, y = turned(cos, sin, offsets[COM_X], offsets[COM_Y])
     rest_x += x
     rest_y += y
-    desired = t.vector
-    desired[0] = s.capture_point[0] + g.gain * (s.capture_point[0] - rest_x)
-    desired[1] = s.capture_point[1] + g.gain * (s.capture_point[1] - rest_y)
+    desired, xi = t.vector, t.search.capture_point
+    set_capture_point(t.search)
+    desired[0] = xi[0] + g.gain * (xi[0] - rest_x)
+    desired[1] = xi[1] + g.gain * (xi[1] - rest_y)
     if t.recentring.stage[0] == LOADING:
         limit_cop_distance(t, rest_x, rest_y, desired)
     find_nearest(region, desired, p)
@@ -77,6 +79,10 @@ def guide_com(
     for a in range(2):
         own.com[a], own.com_vel[a], own.cop[a] = s.com[a], s.com_vel[a], p[a]
         own.com_acc[a] = s.omega[0] * s.omega[0] * (s.com[a] - p[a])
+    row = SWING if t.memory.swinging[0] else STANCE
+    x, y = pivot_offset(t.search.feedback, s, row, cos, sin)
+    own.com_acc[0] += s.omega[0] * s.omega[0] * x
+    own.com_acc[1] += s.omega[0] * s.omega[0] * y
     half = 0.25 * (stride_x * stride_x + stride_y * stride_y)
     leg_height = np.sqrt(max(g.leg_length * g.leg_length - half, 0.0))
     own.com[2] = ground + min(t.robot.height_com, leg_height) + offsets[COM_Z]

@@ -75,5 +75,6 @@ class IPMStep(CaptureStep):
             raise TypeError(f"config must be an IPMStepConfig, not {type(config).__name__}")
         return EnergyPlanner(
             self.robot, region, config.limits, config.foothold, config.feedback, config.falls,
+            config.pivot,
             arc=config.arc,
         )  # fmt: skip

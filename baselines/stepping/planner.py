@@ -13,7 +13,7 @@ from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .blocks import Search
-from .config import FallFeedback, FootholdChoice, StepFeedback, StepLimits
+from .config import FallFeedback, FootholdChoice, PivotConfig, StepFeedback, StepLimits
 from .controller import StepOffsets
 from .cop_region import CopRegion, foot_signs
 from .feedback import feedback_arrays
@@ -50,12 +50,15 @@ class StepPlanner(Copyable):
         choice: FootholdChoice,
         feedback: StepFeedback | None = None,
         falls: Mapping[str, FallFeedback] | None = None,
+        pivot: PivotConfig | None = None,
     ):
         self.region, self.limits, self.choice = region, limits, choice
         self.units = robot.units
         self.foot_sign = foot_signs(robot)
         self.offsets = StepOffsets()  #: what a policy adds
-        self.feedback = feedback_arrays(robot, feedback or StepFeedback(), falls or {})
+        self.feedback = feedback_arrays(
+            robot, feedback or StepFeedback(), falls or {}, pivot or PivotConfig()
+        )
         self._search: Search | None = None
 
     def search(self, state: RobotState) -> Search:
@@ -90,6 +93,7 @@ class StepPlanner(Copyable):
             margin=choice.margin * h,
             time_price=choice.time_price * h * omega,
             arc=float(self.arc),
+            capture_point=apart(2),
             corners=apart(region.alone.shape[1:]),
             cop=apart(2),
             start=apart(2),

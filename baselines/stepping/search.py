@@ -20,11 +20,28 @@ from .blocks import (
     SwingArrays,
 )
 from .cop_region import distance_beyond, single_support_region
-from .feedback import AHEAD, OUTWARD, PHASE, TIME, evaluate_feedback, schedule_gains
+from .feedback import (
+    AHEAD,
+    OUTWARD,
+    PHASE,
+    PLAN,
+    TIME,
+    evaluate_feedback,
+    pivot_offset,
+    schedule_gains,
+)
 from .swing import FROZEN, time_left
 
 TIMES = 8  # step times that are weighed against each other
 CHANGE_PRICE = 0.02  # [m/s] of another step time while the foot swings
+
+
+@compiled
+def set_capture_point(q: Search) -> None:
+    """Set the capture point that steps and CoP follow: ξ + r, see `PivotConfig`."""
+    x, y = pivot_offset(q.feedback, q.state, PLAN, q.heading[0], q.heading[1])
+    q.capture_point[0] = q.state.capture_point[0] + x
+    q.capture_point[1] = q.state.capture_point[1] + y
 
 
 @compiled
@@ -34,7 +51,8 @@ def set_foot(q: Search, foot: int) -> None:
     stance, cos, sin = q.state.sole_point[1 - foot], q.heading[0], q.heading[1]
     evaluate_feedback(q.feedback, q.state, stance, cos, sin, q.foot_sign[foot])
     n = single_support_region(q.region, 1 - foot, stance, cos, sin, q.corners)
-    find_nearest(q.corners[:n], q.state.capture_point, q.cop)
+    set_capture_point(q)
+    find_nearest(q.corners[:n], q.capture_point, q.cop)
 
 
 @compiled
@@ -91,7 +109,7 @@ def clip_to_limits(q: Search, x: float, y: float) -> tuple[float, float]:
 @compiled
 def end_capture_point(q: Search) -> tuple[float, float]:
     """ξ(T) = p + (ξ − p) e^(ωT): the capture point at touchdown [m]."""
-    return drifted_point(q.state.capture_point, q.cop, q.state.omega[0], q.time[0])
+    return drifted_point(q.capture_point, q.cop, q.state.omega[0], q.time[0])
 
 
 @compiled

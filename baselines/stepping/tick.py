@@ -27,7 +27,7 @@ from .recentring import (
     slipped_foot,
     stop_recentring,
 )
-from .search import plan_step, replan_step
+from .search import plan_step, replan_step, set_capture_point
 from .swing import (
     FROZEN,
     LANDING,
@@ -54,6 +54,10 @@ def must_step(t: CaptureTick) -> bool:
     if stepped:
         cos, sin = m.level_frame[0, 0], m.level_frame[1, 0]
     x, y = s.capture_point[0], s.capture_point[1]
+    if stepped:
+        t.search.heading[0], t.search.heading[1] = cos, sin
+        set_capture_point(t.search)
+        x, y = t.search.capture_point[0], t.search.capture_point[1]
     outside = distance_beyond(
         t.search.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
     )

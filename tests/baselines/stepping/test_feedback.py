@@ -9,21 +9,29 @@ from poise.baselines.stepping import feedback
 from poise.baselines.stepping.config import (
     SIGNALS,
     FallFeedback,
+    PivotConfig,
+    PivotGains,
     SignalGains,
     StepFeedback,
 )
 from poise.baselines.stepping.feedback import (
     LATER_STEP,
     PHASE,
+    SWING,
     evaluate_feedback,
+    pivot_offset,
     schedule_gains,
 )
-from poise.baselines.stepping.feedback import feedback_arrays as arrays_of
 from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation
 from tests.support.shared import generic_state, robot
 
 YAW = 0.7
+
+
+def arrays_of(robot, always, falls, pivot=None):
+    """The gains of one robot, without a pivot unless one is given."""
+    return feedback.feedback_arrays(robot, always, falls, pivot or PivotConfig())
 
 
 def signals(simulation, side=1.0, yaw=YAW):
@@ -148,3 +156,40 @@ def test_falls_that_are_wrong(falls, words):
         load_controller({"kind": "capture-step", "falls": falls}, robot())
     for word in words:
         assert word in str(error.value)
+
+
+def test_the_force_passes_the_com_where_it_rights_the_trunk():
+    """r = k ω L/(m g) + k' h e along the heading, by MuJoCo's L and the root's axes."""
+    simulation = generic_state(seed=4)
+    r, state, data = simulation.robot, simulation.state, simulation.data
+    mujoco.mj_subtreeVel(r.model, data)
+    x, y, _ = data.subtree_angmom[0]
+    h = r.height_com
+    omega = np.sqrt(-r.model.opt.gravity[2] / h)
+    upright = robot().standing_qpos[3:7], np.zeros(3)
+    mujoco.mju_rotVecQuat(upright[1], np.array([0.0, 0.0, 1.0]), upright[0] * [1, -1, -1, -1])
+    e = np.zeros(3)  # the root's axis that is vertical at rest, now
+    mujoco.mju_rotVecQuat(e, upright[1], data.qpos[3:7])
+    gains = PivotGains(momentum=0.8, lean=-0.3)
+    f = arrays_of(r, StepFeedback(), {}, PivotConfig(swing=gains, lateral_fraction=0.5))
+    found = pivot_offset(f, state.arrays, SWING, np.cos(YAW), np.sin(YAW))
+    turning = 0.8 * omega / (r.mass * -r.model.opt.gravity[2]) * np.array([y, -x])
+    wanted = turning - 0.3 * h * e[:2]
+    ahead = np.array([np.cos(YAW), np.sin(YAW)])
+    left = np.array([-np.sin(YAW), np.cos(YAW)])
+    expected = (wanted @ ahead) * ahead + 0.5 * (wanted @ left) * left
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    assert np.all(np.abs(expected) > 1e-4)
+
+
+def test_such_a_force_takes_the_turn_back():
+    """c̈ = ω² (c − p + r) at a constant height makes L̇ = −k ω L about the horizontal axes."""
+    r = robot()
+    h = r.height_com
+    weight, omega, k = r.mass * 9.81, np.sqrt(9.81 / h), 0.7
+    L = np.array([3.0, -5.0, 0.0])
+    offset = k * omega / weight * np.array([L[1], -L[0], 0.0])
+    p = np.array([0.1, 0.05, -h])  # of the CoP from the CoM
+    force = r.mass * omega**2 * (offset - p)
+    force[2] = weight
+    np.testing.assert_allclose(np.cross(p, force)[:2], -k * omega * L[:2], atol=1e-9)
