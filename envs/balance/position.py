@@ -135,4 +135,4 @@ def _servo_config(servos: ServoConfig | Mapping | None) -> ServoConfig:
             f"must be a ServoConfig or a mapping, not {shown(servos)}",
             source="environment", field="servos", choices=ServoConfig.__dataclass_fields__,
         )  # fmt: skip
-    return build(ServoConfig, fields, "servos")
+    return build(ServoConfig, dict(fields), "servos")

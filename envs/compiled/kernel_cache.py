@@ -105,9 +105,10 @@ def compiled_once(dispatcher: Any, folder: Path) -> Any:
 def _own_copies() -> Iterator[None]:
     """Meanwhile a kernel that is compiled calls its own copies of the functions that it calls.
 
-    Numba links them as weak symbols, of which a process takes those that it has loaded first: in the
-    one that compiles, the functions compiled before, each optimized for itself; in one that reads
-    the kernel from the cache, the copies within, optimized with their caller. Last bits differ.
+    Numba links them as weak symbols, of which a process takes those that it has loaded first. In
+    the one that compiles, these are the functions compiled before, each optimized for itself; in
+    one that reads the kernel from the cache, the copies within, optimized with their caller. Last
+    bits differ.
     """
     finish = CPUCodeLibrary._finalize_final_module
 

@@ -1,8 +1,6 @@
 """Compile the kernels once, in processes of their own.
 
-A kernel that a process compiled itself may differ in the last bits from the same kernel read from
-the cache (other functions were at hand to be inlined). After `fill_cache` every process reads the
-same compiled code, so results do not depend on which process came first.
+Several at once are done sooner than one, and a user is told once that this takes a while.
 """
 
 import subprocess

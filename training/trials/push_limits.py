@@ -35,7 +35,7 @@ class PushLimits:
     """
 
     def __init__(self, robot: Robot, table: LimitTable | None = None):
-        prepare()  # what this process compiles itself has other last bits than what others read
+        prepare()  # several kernels at once, before this process compiles one after the other
         self.robot, self.table = robot, table
         self.scale = "ankle limit" if table is None else "baseline J50"
         self.omega = robot.omega

@@ -104,6 +104,19 @@ def test_one_process_compiles_and_the_others_wait_and_read(tmp_path: Path) -> No
     assert sorted(read) == [0, 1, 1]
 
 
+def test_the_process_that_compiles_goes_on_with_the_bits_of_those_that_read(tmp_path: Path) -> None:
+    """Every quantity of a tick, whose kernel calls others that do not fit into it."""
+    code = "from tests.envs.compiled.test_copies import begun; print(begun('state')[1])"
+    seen = [
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}, cwd=Path(__file__).parents[3],
+        ).stdout
+        for _ in range(2)
+    ]  # fmt: skip
+    assert seen[0] == seen[1]
+
+
 def test_kernels_of_other_sources_are_dropped(tmp_path: Path) -> None:
     """A changed file of the package, wherever it is, outdates what was compiled from it."""
     package, folder = tmp_path / "package", tmp_path / "kernels"
