@@ -205,7 +205,7 @@ class CaptureStepConfig:
     foothold: FootholdChoice = field(default_factory=FootholdChoice)
     feedback: StepFeedback = field(default_factory=StepFeedback)
     falls: dict[str, FallFeedback] = field(default_factory=dict)  # by direction of the fall
-    pivot: PivotConfig = field(default_factory=PivotConfig)
+    pivot: PivotConfig = field(default_factory=PivotConfig, metadata={"omit": "default"})
     recentring: RecentringConfig = field(default_factory=RecentringConfig)
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)

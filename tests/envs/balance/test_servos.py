@@ -20,12 +20,12 @@ def of(values, joint):
 def test_the_law(name):
     """τ = clip(K (q* − q) − D q̇, ± limit), q* = hold + reach · a, at generic points."""
     simulation, r = generic_state(name), robot(name)
-    servos = make_servos(r, ServoConfig(reach={"*": 0.2}))
+    servos = make_servos(r, ServoConfig(reach={"*": 0.4}))
     q, v = simulation.state.qpos[r.motor_dofs + 1], simulation.state.qvel[r.motor_dofs]
     action = np.random.default_rng(2).uniform(-1.0, 1.0, r.model.nu)
     aim(servos, action)
     drive(servos, simulation.views)
-    wanted = servos.stiffness * (servos.hold + 0.2 * action - q) - servos.damping * v
+    wanted = servos.stiffness * (servos.hold + 0.4 * action - q) - servos.damping * v
     expected = np.clip(wanted, -r.torque_limit, r.torque_limit)
     np.testing.assert_allclose(simulation.data.ctrl, expected, rtol=1e-12, atol=1e-9)
     full = abs(expected) == r.torque_limit
