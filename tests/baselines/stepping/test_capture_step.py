@@ -17,6 +17,7 @@ from poise.baselines.stepping.feedback import PHASE
 from poise.baselines.stepping.recentring import SHIFTING
 from poise.configs.errors import ConfigError
 from poise.configs.schema import to_dict
+from poise.envs.robots.menagerie import WHEEL
 from tests.support import stepping_reference as readable
 from tests.support.shared import robot
 
@@ -63,6 +64,20 @@ def test_steps_recover_what_feet_in_place_do_not(name, impulse, direction):
     assert fallen
     fallen, env = trial(name, impulse, direction, seed=1, duration=6.0)
     assert not fallen and env.recovered and env.controller.steps >= 1
+
+
+@pytest.mark.parametrize("direction", [0.0, 90.0, 180.0])
+def test_pushes_are_walked_off_on_the_g1(direction):
+    """Pushes of 0.9 N·s/kg, far above what gains of another robot survive there."""
+    pytest.importorskip(WHEEL, reason="its model is not installed: pip install 'poise[robots]'")
+    g1 = robot("unitree_g1")
+    env = ResidualBalanceEnv(g1, controller="walk-off-g1", pushes=None, duration=6.0)
+    push = {"impulse": 0.9 * g1.mass, "direction": direction, "start": 0.2, "duration": 0.1}
+    env.reset(seed=0, options={"push": push})
+    over = fallen = False
+    while not (over or fallen):
+        _, fallen, over = env.step_without_info(np.zeros(4))
+    assert env.recovered and env.controller.steps >= 2
 
 
 def test_feet_do_not_cross():
