@@ -10,7 +10,7 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.copies import Copyable
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
@@ -85,7 +85,7 @@ class Targets(Copyable):
     def __post_init__(self):
         for item in fields(self):
             given = np.asarray(getattr(self, item.name), dtype=float)
-            array = apart(given.shape)
+            array = guarded_zeros(given.shape)
             array[...] = given
             setattr(self, item.name, array)
         self._arrays: tuple[np.ndarray, ...] = ()

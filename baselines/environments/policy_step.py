@@ -18,7 +18,7 @@ from poise.envs.balance.episode import (
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Erased, Program, call, run
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy
+from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.simulation import World, simulate
@@ -139,7 +139,7 @@ def policy_tick(step: PolicyStep):
     if e.ticks[0] < step.ticks:
         return
     e.ticks[0] = 0
-    copy(w, e.root_wrench)
+    copy_into(w, e.root_wrench)
     e.metrics[FAILURES] = step.failures[0]
     end_step(step.end)
 

@@ -22,7 +22,7 @@ from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, StepEn
 from poise.envs.balance.observation import Term, mirror_terms
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Erased, address_of
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
@@ -144,7 +144,7 @@ class ResidualBalanceEnv(BalanceEnv):
         period = self.config.policy_period
         blend = 1.0 if lag.smoothing == 0.0 else -np.expm1(-period / lag.smoothing)
         scale[MOMENTUM_X : MOMENTUM_Y + 1] *= 10.0 * self.scales.momentum  # m h² ω
-        self._offsets = apart(len(scale))
+        self._offsets = guarded_zeros(len(scale))
         self._residual = Residual(
             moved=self._moved,
             scale=scale[self._moved],
@@ -165,7 +165,7 @@ class ResidualBalanceEnv(BalanceEnv):
         self._targets = self.targets.arrays()
         columns = self.motion.coeffs.shape[2]
         self._motion = Motion(
-            self.motion.knots, self.motion.coeffs, self.motion.loop, apart((3, columns))
+            self.motion.knots, self.motion.coeffs, self.motion.loop, guarded_zeros((3, columns))
         )
 
     @property

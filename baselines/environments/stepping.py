@@ -18,7 +18,7 @@ from poise.envs.balance.episode import StepEnd
 from poise.envs.balance.observation import View
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
@@ -86,7 +86,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
         controller: str | Path | Mapping | ControllerConfig | Controller = "capture-step",
         **arguments: Any,
     ):
-        self._step_report = apart(REPORTED)
+        self._step_report = guarded_zeros(REPORTED)
         super().__init__(robot, config, controller=controller, **arguments)
 
     @ResidualBalanceEnv.controller.setter  # type: ignore[attr-defined]

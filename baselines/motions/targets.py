@@ -7,7 +7,7 @@ import numpy as np
 from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy, rotated
+from poise.envs.maths.vectors import copy_into, rotated
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -57,9 +57,9 @@ def update_targets(
     """
     nj, samples = t.q_ref.shape[0], motion.samples
     evaluate(motion.knots, motion.coeffs, motion.loop, time, samples[0], samples[1], samples[2])
-    copy(samples[0], t.q_ref)
-    copy(samples[1], t.v_ref)
-    copy(samples[2], t.a_ref)
+    copy_into(samples[0], t.q_ref)
+    copy_into(samples[1], t.v_ref)
+    copy_into(samples[2], t.a_ref)
     cos, sin = s.heading[0], s.heading[1]
     samples[0, nj + 3] += residual[LEAN_X]
     samples[0, nj + 4] += residual[LEAN_Y]

@@ -14,7 +14,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.callbacks import Callback, call_back
 from poise.envs.compiled.calls import address_of
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
@@ -94,9 +94,9 @@ class PolicyFile(CompiledController):
         limit[self.arrays.motor_dofs - 6] = self.arrays.torque_limit
         self._servos = Servos(
             self.joints.stiffness, self.joints.damping, limit, self.joints.target.copy(),
-            apart(nj), apart(1, dtype=np.int64), every,
+            guarded_zeros(nj), guarded_zeros(1, dtype=np.int64), every,
         )  # fmt: skip
-        self._failures, self._no_wrench = apart(1, dtype=np.int64), apart(6)
+        self._failures, self._no_wrench = guarded_zeros(1, dtype=np.int64), guarded_zeros(6)
         self._callback = Callback(self._ask)
         self._state: RobotState | None = None
         self._tick: PolicyTick | None = None

@@ -12,7 +12,7 @@ from poise.baselines.whole_body.momentum_qp import COMPILED_SOLVER, AroundQP, mo
 from poise.baselines.whole_body.parameters import QPParameters
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.calls import NO_KERNEL, Kernel, address_of
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
@@ -68,16 +68,16 @@ def allocate_step_memory(region: RegionArrays) -> StepMemory:
     """The memory of a controller that has not stepped."""
     corners, whole = region.sums.shape[0] * region.sums.shape[1], np.int64
     return StepMemory(
-        steps=apart(1, whole),
-        recovering=apart(1, whole),
-        foot=apart(1, whole),
-        swinging=apart(1, whole),
-        level_frame=apart((3, 3)),
-        clock=apart(1),
-        load=apart(1),
-        load_fraction=apart(1),
-        region=apart((2 * corners + 1, 2)),
-        corners=apart(1, whole),
+        steps=guarded_zeros(1, whole),
+        recovering=guarded_zeros(1, whole),
+        foot=guarded_zeros(1, whole),
+        swinging=guarded_zeros(1, whole),
+        level_frame=guarded_zeros((3, 3)),
+        clock=guarded_zeros(1),
+        load=guarded_zeros(1),
+        load_fraction=guarded_zeros(1),
+        region=guarded_zeros((2 * corners + 1, 2)),
+        corners=guarded_zeros(1, whole),
     )
 
 
@@ -108,8 +108,10 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         self._swing = Swing(np.zeros(3), 0.0, self.config.swing, robot.units)
         self.recentring = recentring_arrays(robot, self.config.recentring)
         self.memory = allocate_step_memory(self.region.arrays)
-        self.tau = apart(len(self.qp.parameters.torque_limit))  #: (nv−6,) of the last tick [N·m]
-        self._failures = apart(1, dtype=np.int64)
+        self.tau = guarded_zeros(
+            len(self.qp.parameters.torque_limit)
+        )  #: (nv−6,) of the last tick [N·m]
+        self._failures = guarded_zeros(1, dtype=np.int64)
         self._motors = self.qp.arrays.motor_dofs - 6
         self._reference_out: Targets | None = None
         self._tick: CaptureTick | None = None
@@ -241,11 +243,11 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             standing=self.qp.tick(state, targets),
             tau=self.tau,
             failures=self._failures,
-            to_python=apart(1, dtype=np.int64),
-            corners=apart(region.alone.shape[1:]),
-            cloud=apart((len(self.memory.region) // 2, 2)),
-            pair=apart(2),
-            vector=apart(3),
+            to_python=guarded_zeros(1, dtype=np.int64),
+            corners=guarded_zeros(region.alone.shape[1:]),
+            cloud=guarded_zeros((len(self.memory.region) // 2, 2)),
+            pair=guarded_zeros(2),
+            vector=guarded_zeros(3),
             standing_kernel=NO_KERNEL,
             contact_kernel=NO_KERNEL,
         )

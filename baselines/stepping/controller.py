@@ -16,7 +16,7 @@ from poise.baselines.motions.offsets import (
     TRIGGER,
 )
 from poise.envs.compiled.copies import Copyable
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 
 from .config import StepLimits
 
@@ -56,7 +56,7 @@ class StepOffsets(Copyable):
     trigger = _entry(TRIGGER, "How much further the capture point may leave before a step [m].")
 
     def __init__(self) -> None:
-        self.values = apart(len(NAMES))  #: (13,) all of them, for compiled code
+        self.values = guarded_zeros(len(NAMES))  #: (13,) all of them, for compiled code
 
     def clear(self) -> None:
         """Set all to zero."""

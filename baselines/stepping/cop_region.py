@@ -5,7 +5,7 @@ import numpy as np
 
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.polygons import clipped, convex_hull, stacked
 from poise.envs.maths.vectors import placed, turn, turned
 from poise.envs.robots.robot import Robot
@@ -191,8 +191,8 @@ class CopRegion(Copyable):
     def both(self, points: np.ndarray, yaw: float) -> np.ndarray:
         """(k, 2) The region of two soles at `points` (2, ≥ 2), turned by `yaw` [m]."""
         r = self.arrays
-        cloud = apart((r.sums.shape[0] * r.sums.shape[1], 2))
-        out = apart((2 * len(cloud) + 1, 2))
+        cloud = guarded_zeros((r.sums.shape[0] * r.sums.shape[1], 2))
+        out = guarded_zeros((2 * len(cloud) + 1, 2))
         n = double_support_region(r, np.array(points), np.cos(yaw), np.sin(yaw), cloud, out)
         return out[:n]
 

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.vectors import along, turned
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
@@ -50,12 +50,12 @@ def feedback_arrays(
     h, omega = robot.height_com, robot.omega
     units = np.array([h, h, 1.0 / omega, h])
     rising, size = sorted(falls.values(), key=lambda fall: fall.angle), (4, len(SIGNALS))
-    law, gains, angles = apart(size), apart(size), apart(len(rising))
-    added_at = apart((len(rising), *size))
+    law, gains, angles = guarded_zeros(size), guarded_zeros(size), guarded_zeros(len(rising))
+    added_at = guarded_zeros((len(rising), *size))
     law[:] = gains[:] = units[:, None] * always.matrix()
     for k, fall in enumerate(rising):
         angles[k], added_at[k] = np.radians(fall.angle), units[:, None] * fall.matrix()
-    unit, rows = h * omega / robot.units.moment, apart((3, 2))
+    unit, rows = h * omega / robot.units.moment, guarded_zeros((3, 2))
     for k, row in enumerate((pivot.plan, pivot.swing, pivot.stance)):
         rows[k] = row.momentum * unit, row.lean * h
     return FeedbackArrays(
@@ -68,8 +68,8 @@ def feedback_arrays(
         momentum_unit=float(omega / robot.units.moment),
         pivot=rows,
         lateral_fraction=pivot.lateral_fraction,
-        signals=apart(len(SIGNALS)),
-        added=apart(4),
+        signals=guarded_zeros(len(SIGNALS)),
+        added=guarded_zeros(4),
     )
 
 

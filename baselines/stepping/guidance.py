@@ -5,7 +5,7 @@ import numpy as np
 from poise.baselines.motions.offsets import COM_X, COM_Y, COM_Z, COP_X, COP_Y, LEAN_X, LEAN_Y
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.polygons import find_nearest
-from poise.envs.maths.vectors import copy, rotation_error, turned
+from poise.envs.maths.vectors import copy_into, rotation_error, turned
 
 from .blocks import CaptureTick
 from .feedback import HEIGHT, STANCE, SWING, pivot_offset
@@ -18,9 +18,9 @@ def copy_reference(t: CaptureTick) -> None:
     """Copy the joints' and the momentum's references, and set the root's: upright at rest along
     the heading of the step, but for the lean that a policy adds."""
     given, own, level, standing = t.reference_in, t.reference_out, t.memory.level_frame, t.vector
-    copy(given.q_ref, own.q_ref)
-    copy(given.v_ref, own.v_ref)
-    copy(given.angular_momentum, own.angular_momentum)
+    copy_into(given.q_ref, own.q_ref)
+    copy_into(given.v_ref, own.v_ref)
+    copy_into(given.angular_momentum, own.angular_momentum)
     x, y = t.offsets[LEAN_X], t.offsets[LEAN_Y]
     angle = np.sqrt(x * x + y * y)
     cos, sin = np.cos(angle), np.sin(angle)

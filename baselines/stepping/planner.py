@@ -8,7 +8,7 @@ import numpy as np
 
 from poise.envs.compiled.calls import NO_KERNEL, address_of
 from poise.envs.compiled.copies import Copyable
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
@@ -77,7 +77,7 @@ class StepPlanner(Copyable):
             region=region,
             offsets=self.offsets.values,
             feedback=self.feedback,
-            heading=apart(2),
+            heading=guarded_zeros(2),
             foot_sign=self.foot_sign,
             height=h,
             ahead=limits.ahead * h,
@@ -93,16 +93,16 @@ class StepPlanner(Copyable):
             margin=choice.margin * h,
             time_price=choice.time_price * h * omega,
             arc=float(self.arc),
-            capture_point=apart(2),
-            corners=apart(region.alone.shape[1:]),
-            cop=apart(2),
-            start=apart(2),
-            foot=apart(1, dtype=np.int64),
-            time=apart(1),
-            foothold=apart(2),
-            cost=apart(1),
-            best=apart(5),
-            best_foot=apart(1, dtype=np.int64),
+            capture_point=guarded_zeros(2),
+            corners=guarded_zeros(region.alone.shape[1:]),
+            cop=guarded_zeros(2),
+            start=guarded_zeros(2),
+            foot=guarded_zeros(1, dtype=np.int64),
+            time=guarded_zeros(1),
+            foothold=guarded_zeros(2),
+            cost=guarded_zeros(1),
+            best=guarded_zeros(5),
+            best_foot=guarded_zeros(1, dtype=np.int64),
             foothold_rule=NO_KERNEL,
         )
 

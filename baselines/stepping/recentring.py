@@ -10,7 +10,7 @@ import numpy as np
 
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.vectors import along
 from poise.envs.robots.robot import Robot
 
@@ -65,12 +65,12 @@ def recentring_arrays(robot: Robot, config: RecentringConfig) -> Recentring:
         margin=c.margin * h,
         cop_distance=c.cop_distance * h,
         nominal=(feet[0] - feet[1])[:2].copy(),
-        stage=apart(1, dtype=np.int64),
-        foot=apart(1, dtype=np.int64),
-        homing=apart(1, dtype=np.int64),
-        slip_time=apart(2),
-        timer=apart(1),
-        capture_target=apart(2),
+        stage=guarded_zeros(1, dtype=np.int64),
+        foot=guarded_zeros(1, dtype=np.int64),
+        homing=guarded_zeros(1, dtype=np.int64),
+        slip_time=guarded_zeros(2),
+        timer=guarded_zeros(1),
+        capture_target=guarded_zeros(2),
     )
 
 

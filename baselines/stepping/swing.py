@@ -6,7 +6,7 @@ from poise.baselines.whole_body.tasks.sole_pose import SolePose, SolePoseBlock, 
 from poise.baselines.whole_body.tasks.task import BoundTask
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.pendulum import Units
 from poise.envs.physics.arrays import RobotArrays
 
@@ -109,12 +109,12 @@ class Swing(Copyable):
         speed = task.landing_speed * height * units.omega
         self.task = task
         self.arrays = SwingArrays(
-            reference=apart((3, 3)),
-            foothold=apart(2),
-            time=apart(1),
-            duration=apart(1),
-            ground=apart(1),
-            time_offset=apart(1),
+            reference=guarded_zeros((3, 3)),
+            foothold=guarded_zeros(2),
+            time=guarded_zeros(1),
+            duration=guarded_zeros(1),
+            ground=guarded_zeros(1),
+            time_offset=guarded_zeros(1),
             apex=task.clearance * height,
             lift=task.lift,
             landing_speed=float(speed),
@@ -170,7 +170,7 @@ def swing_gains(robot: RobotArrays, task: SwingTask) -> SolePoseGains:
     turn = task.turn_weight / rate2**2
     return SolePoseGains(
         stiffness=float(k), damping=float(d), weight=float(task.weight / g**2),
-        turn_weight=float(turn), yaw_weight=float(task.yaw_fraction * turn), error=apart(3),
+        turn_weight=float(turn), yaw_weight=float(task.yaw_fraction * turn), error=guarded_zeros(3),
     )  # fmt: skip
 
 

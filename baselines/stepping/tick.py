@@ -9,7 +9,7 @@ from poise.baselines.motions.offsets import TRIGGER
 from poise.baselines.whole_body.contact_sets import ContactTick
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy
+from poise.envs.maths.vectors import copy_into
 
 from .blocks import BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, CaptureTick
 from .cop_region import distance_beyond, double_support_region, single_support_region
@@ -75,8 +75,8 @@ def begin_step(t: CaptureTick, to_nominal: bool) -> None:
     wrenches = t.on_both.problem.workspace.wrenches
     if m.steps[0] == 0:
         before = t.standing.problem.workspace
-        copy(before.tau, t.on_both.applied)
-        copy(before.tau, t.on_both.memory.torques)
+        copy_into(before.tau, t.on_both.applied)
+        copy_into(before.tau, t.on_both.memory.torques)
         t.on_both.follows[0] = 1
         wrenches = before.wrenches
     if m.recovering[0] == 0:
@@ -110,7 +110,7 @@ def has_landed(t: CaptureTick) -> bool:
 def solve_contacts(t: CaptureTick, contacts: ContactTick) -> None:
     """Torques with these soles in contact."""
     call(t.contact_kernel, contacts)
-    copy(contacts.problem.workspace.tau, t.tau)
+    copy_into(contacts.problem.workspace.tau, t.tau)
 
 
 @compiled
@@ -181,7 +181,7 @@ def standing_tick(t: CaptureTick) -> None:
         t.to_python[0] = 1
         return
     call(t.standing_kernel, t.standing)
-    copy(t.standing.problem.workspace.tau, t.tau)
+    copy_into(t.standing.problem.workspace.tau, t.tau)
     t.failures[0] = t.standing.memory.failures[0]
 
 

@@ -16,8 +16,8 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import address_of, call
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
-from poise.envs.maths.vectors import copy
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays, robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
@@ -60,11 +60,11 @@ def pick_soles(source: StateArrays, pick: np.ndarray, own: StateArrays):
     for i in range(nc):
         sole = pick[i]
         for r in range(6):
-            copy(source.J[6 * sole + r], own.J[6 * i + r])
+            copy_into(source.J[6 * sole + r], own.J[6 * i + r])
             own.J_v[6 * i + r] = source.J_v[6 * sole + r]
             own.Jdot_v[6 * i + r] = source.Jdot_v[6 * sole + r]
         for a in range(3):
-            copy(source.sole_axes[sole, a], own.sole_axes[i, a])
+            copy_into(source.sole_axes[sole, a], own.sole_axes[i, a])
             own.sole_point[i, a] = source.sole_point[sole, a]
             own.origin[a] += source.sole_point[sole, a]
         own.contacts[i] = source.contacts[sole]
@@ -92,7 +92,7 @@ def assemble_contacts(t: ContactTick):
     if t.limited[0]:
         for i in range(cone.shape[0]):
             row = (i + 1) * cone.shape[1] - 1
-            copy(ws.E[6 * i + 2], ws.C[row])
+            copy_into(ws.E[6 * i + 2], ws.C[row])
             ws.u[row] = t.load_limits[i] - ws.w0[6 * i + 2]
     if t.follows[0]:
         bound_torques(t, True)
@@ -152,10 +152,14 @@ class ContactSet(Copyable):
         )
         nv, nc = len(arrays.q_standing) + 6, len(soles)
         self._own = {
-            "J": apart((6 * nc, nv)), "J_v": apart(6 * nc), "Jdot_v": apart(6 * nc),
-            "sole_point": apart((nc, 3)), "sole_axes": apart((nc, 3, 3)), "origin": apart(3),
-            "contacts": apart(nc),
-        }  # fmt: skip
+            "J": guarded_zeros((6 * nc, nv)),
+            "J_v": guarded_zeros(6 * nc),
+            "Jdot_v": guarded_zeros(6 * nc),
+            "sole_point": guarded_zeros((nc, 3)),
+            "sole_axes": guarded_zeros((nc, 3, 3)),
+            "origin": guarded_zeros(3),
+            "contacts": guarded_zeros(nc),
+        }
         self._bound_to: tuple[object, ...] = ()
 
     def state(self, s: StateArrays) -> StateArrays:
@@ -187,7 +191,8 @@ class ContactSet(Copyable):
             )  # fmt: skip
             self.block = ContactTick(
                 source=s, pick=self.pick, problem=problem, memory=sets.memory,
-                load_limits=apart(len(self.soles)), limited=apart(1, dtype=np.int64),
+                load_limits=guarded_zeros(len(self.soles)),
+                limited=guarded_zeros(1, dtype=np.int64),
                 applied=sets.applied, jump=sets.jump, follows=sets.follows, chosen=sets.chosen,
                 index=self.index, assemble=address_of(assemble, problem),
                 solve=address_of(solve, ws),
@@ -225,9 +230,11 @@ class ContactSets(Copyable):
         self.memory = allocate_memory(parameters.torque_limit)
         limit = parameters.torque_limit
         self.jump = np.where(limit > 0.0, jump * limit, np.inf)
-        self.applied = apart(len(limit))  # torques of the last tick, if
-        self.follows = apart(1, dtype=np.int64)  # there was one
-        self.chosen = apart(1, dtype=np.int64)  # index of the subset of the last tick, −1: none
+        self.applied = guarded_zeros(len(limit))  # torques of the last tick, if
+        self.follows = guarded_zeros(1, dtype=np.int64)  # there was one
+        self.chosen = guarded_zeros(
+            1, dtype=np.int64
+        )  # index of the subset of the last tick, −1: none
         self.chosen[0] = -1
         self._motor_joints = self.arrays.motor_dofs - 6
 

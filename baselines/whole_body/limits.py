@@ -3,7 +3,7 @@
 import numpy as np
 
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy
+from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -60,7 +60,7 @@ def _torque_limits(p: QPParameters, ws: Workspace):
     """Fill |τ₀ + T x| ≤ τ_max."""
     first = ws.first_torque
     for a in range(ws.tau0.shape[0]):
-        copy(ws.T[a], ws.C[first + a])
+        copy_into(ws.T[a], ws.C[first + a])
         ws.l[first + a] = -p.torque_limit[a] - ws.tau0[a]
         ws.u[first + a] = p.torque_limit[a] - ws.tau0[a]
 
@@ -70,7 +70,7 @@ def _joint_limits(robot: RobotArrays, s: StateArrays, p: QPParameters, ws: Works
     """Keep joint accelerations v̇₀ + V x within `braking_bounds`."""
     first = ws.first_joint
     for a in range(ws.tau0.shape[0]):
-        copy(ws.V[6 + a], ws.C[first + a])
+        copy_into(ws.V[6 + a], ws.C[first + a])
         low, high = braking_bounds(
             s.qpos[7 + a], s.qvel[6 + a], robot.q_min[a], robot.q_max[a],
             p.brake_accel, p.brake_horizon, p.brake_floor,

@@ -12,7 +12,7 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 
 DEPENDENT = 1e-6  # pivot, relative to the first, below which a row of J follows from the others
@@ -41,7 +41,7 @@ def allocate_null_space(robot: RobotArrays, points: Sequence[np.ndarray] = ()) -
     held = np.unique(np.concatenate([*chains, *points]))
     nh, steps = len(held), min(k, len(held))
     width, basis_width = (-(-columns // 8) * 8 for columns in (k, nh - steps + 1))
-    zeros = apart
+    zeros = guarded_zeros
     return NullSpace(
         held=held,
         free=np.setdiff1d(np.arange(nv), held),

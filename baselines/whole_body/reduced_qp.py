@@ -20,7 +20,7 @@ from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import run
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy
+from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
@@ -74,7 +74,7 @@ def _update_contacts(s: StateArrays, c: ContactArrays):
     """Fill J of the soles and the points, and the rows of the points; without points J is s.J."""
     if c.positions.shape[0] > 0:
         for r in range(s.J.shape[0]):
-            copy(s.J[r], c.J[r])
+            copy_into(s.J[r], c.J[r])
         run(c.fill)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 
@@ -35,7 +35,7 @@ def make_stack(
     tasks = tuple(tasks)
     k = sum(task.size for task, _ in tasks) + further
     nv, n = len(state.qvel), len(workspace.g)
-    A, b, weights, calls, first = apart((k, nv)), apart(k), apart(k), [], 0
+    A, b, weights, calls, first = guarded_zeros((k, nv)), guarded_zeros(k), guarded_zeros(k), [], 0
     for task, block in tasks:
         own = slice(first, first + task.size)
         tick = TaskTick(state, block, RowArrays(A[own], b[own], weights[own]))
@@ -43,7 +43,12 @@ def make_stack(
             calls.append((task.kernel, tick))
         first = own.stop
     return TaskStack(
-        A=A, b=b, weights=weights, AV=apart((k, n)), weighted=apart((k, n)), fill=Program.of(calls)
+        A=A,
+        b=b,
+        weights=weights,
+        AV=guarded_zeros((k, n)),
+        weighted=guarded_zeros((k, n)),
+        fill=Program.of(calls),
     )
 
 

@@ -9,8 +9,8 @@ from poise.baselines.solvers.scaled_rows import INFEASIBLE
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
-from poise.envs.maths.vectors import copy
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.kinematics import StateArrays
 
 from .parameters import QPParameters
@@ -33,10 +33,10 @@ class Memory(Block):
 def allocate_memory(torque_limit: np.ndarray) -> Memory:
     """Return an empty memory for joints with `torque_limit` (nj,) [N·m]."""
     return Memory(
-        torques=apart(len(torque_limit)),
+        torques=guarded_zeros(len(torque_limit)),
         damping=torque_limit / FALLBACK_SPEED,
-        streak=apart(1, dtype=np.int64),
-        failures=apart(1, dtype=np.int64),
+        streak=guarded_zeros(1, dtype=np.int64),
+        failures=guarded_zeros(1, dtype=np.int64),
     )
 
 
@@ -76,7 +76,7 @@ def accept(s: StateArrays, p: QPParameters, ws: Workspace, memory: Memory):
     if ws.status[0] == 0:
         recover(p, ws)
         if np.all(np.isfinite(ws.tau)):
-            copy(ws.tau, memory.torques)
+            copy_into(ws.tau, memory.torques)
             memory.streak[0] = 0
             return
     memory.streak[0] += 1

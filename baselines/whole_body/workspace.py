@@ -8,7 +8,7 @@ import numpy as np
 
 from poise.baselines.solvers.dual_active_set import iscratch_size, scratch_size
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 
 from .null_space import NullSpace, allocate_null_space
@@ -145,7 +145,7 @@ def allocate_workspace(
     """
     space = allocate_null_space(robot, point_chains)
     lay = lay_out(robot, space, cone_rows, soft_root, len(point_chains), point_rows)
-    n, m, r, k, nj, z = lay.n, lay.m, lay.r, lay.k, lay.nj, apart
+    n, m, r, k, nj, z = lay.n, lay.m, lay.r, lay.k, lay.nj, guarded_zeros
     rows, offsets, wanted, weights, values = z((r, n)), z(r), z(r), z(r), z(r)
     V, B, E, T = lay.parts
     for i in range(3 * len(point_chains)):  # the forces of points are unknowns themselves

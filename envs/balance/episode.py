@@ -7,7 +7,7 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, support_distance, update_support
 
@@ -53,17 +53,17 @@ class EpisodeArrays(Block):
 def allocate_episode(actions: int, observations: int, terms: int, nc: int) -> EpisodeArrays:
     """Zeroed storage: as many entries of each as named, and `nc` soles."""
     return EpisodeArrays(
-        action=apart(actions),
-        last_action=apart(actions),
-        observation=apart(observations),
-        reward=apart(1),
-        reward_terms=apart(terms),
-        metrics=apart(METRICS),
-        root_wrench=apart(6),
-        sole_start=apart((nc, 2)),
-        steps=apart(1, dtype=np.int64),
-        running=apart(1, dtype=np.int64),
-        ticks=apart(1, dtype=np.int64),
+        action=guarded_zeros(actions),
+        last_action=guarded_zeros(actions),
+        observation=guarded_zeros(observations),
+        reward=guarded_zeros(1),
+        reward_terms=guarded_zeros(terms),
+        metrics=guarded_zeros(METRICS),
+        root_wrench=guarded_zeros(6),
+        sole_start=guarded_zeros((nc, 2)),
+        steps=guarded_zeros(1, dtype=np.int64),
+        running=guarded_zeros(1, dtype=np.int64),
+        ticks=guarded_zeros(1, dtype=np.int64),
     )
 
 

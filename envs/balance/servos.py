@@ -8,7 +8,7 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import SimViews
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
@@ -98,7 +98,13 @@ def make_servos(robot: Robot, config: ServoConfig) -> Servos:
         )
     hold = robot.standing_qpos[dofs + 1] + holding_torques(robot) / stiffness
     return Servos(
-        dofs, stiffness, damping, np.array(robot.torque_limit), hold, reach, apart(len(names))
+        dofs,
+        stiffness,
+        damping,
+        np.array(robot.torque_limit),
+        hold,
+        reach,
+        guarded_zeros(len(names)),
     )
 
 

@@ -6,7 +6,7 @@ from poise.envs.compiled.jit import compiled
 
 
 @compiled
-def copy(source: np.ndarray, out: np.ndarray) -> None:
+def copy_into(source: np.ndarray, out: np.ndarray) -> None:
     """`out[:] = source` of two vectors; NumPy's form compiles checks and their messages too."""
     for i in range(out.shape[0]):
         out[i] = source[i]

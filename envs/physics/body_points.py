@@ -9,7 +9,7 @@ import numpy as np
 from poise.configs.errors import ConfigError, shown
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
 from .arrays import dof_chain
@@ -45,10 +45,10 @@ def body_point(robot: Robot, body: str, offset: tuple[float, float, float]) -> B
         body=moving[body],
         offset=np.array(offset, dtype=float),
         chain=np.array(dof_chain(model, moving[body]), dtype=np.int64),
-        position=apart(3),
-        J=apart((6, nv)),
-        J_v=apart(6),
-        Jdot_v=apart(6),
+        position=guarded_zeros(3),
+        J=guarded_zeros((6, nv)),
+        J_v=guarded_zeros(6),
+        Jdot_v=guarded_zeros(6),
     )
 
 

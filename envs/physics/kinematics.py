@@ -12,10 +12,10 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import GAP, apart
+from poise.envs.compiled.memory import GAP, guarded_zeros
 from poise.envs.maths.pendulum import compiled_rate
 from poise.envs.maths.polygons import convex_hull
-from poise.envs.maths.vectors import copy
+from poise.envs.maths.vectors import copy_into
 from poise.envs.robots.soles import MAX_VERTICES
 
 from .arrays import RobotArrays, SimViews
@@ -60,7 +60,7 @@ class StateArrays(Block):
 
 def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
     """Zeroed storage for `nv` degrees of freedom, `nc` soles and `nb` bodies, the world's too."""
-    zeros = apart
+    zeros = guarded_zeros
     return StateArrays(
         qpos=zeros(nv + 1),
         qvel=zeros(nv),
@@ -108,8 +108,8 @@ def update_state(robot: RobotArrays, views: SimViews, s: StateArrays):
 @compiled
 def _dynamics(robot: RobotArrays, views: SimViews, s: StateArrays):
     nv = s.M.shape[0]
-    copy(views.qpos, s.qpos)
-    copy(views.qvel, s.qvel)
+    copy_into(views.qpos, s.qpos)
+    copy_into(views.qvel, s.qvel)
     for i in range(nv):
         start = robot.M_rowadr[i]
         for k in range(robot.M_rownnz[i]):
@@ -249,7 +249,7 @@ def _bodies(robot: RobotArrays, views: SimViews, s: StateArrays):
         for a in range(6):
             s.dof_axes[d, a] = views.cdof[d, a]
             s.dof_axes_dot[d, a] = views.cdof_dot[d, a]
-    copy(views.subtree_com[robot.tree_body], s.tree_com)
+    copy_into(views.subtree_com[robot.tree_body], s.tree_com)
 
 
 AIRBORNE = 0.02  # [h]: a sole without contact that is this far above the lowest one is in the air

@@ -10,7 +10,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1, mj_step2
 from poise.envs.pushes.push import Kick, Push
 from poise.envs.pushes.table import TABLE_COLUMNS, apply_kicks, apply_pushes, pack
@@ -78,10 +78,10 @@ class Simulation(Copyable):
         self.arrays = robot_arrays(robot)
         self.views = sim_views(robot.model, self.data)
         self.state_arrays = allocate_state(robot.model.nv, len(robot.soles), robot.model.nbody)
-        self.clock = apart(1, dtype=np.int64)
-        self._count = apart(1, dtype=np.int64)
+        self.clock = guarded_zeros(1, dtype=np.int64)
+        self._count = guarded_zeros(1, dtype=np.int64)
         self.pushes: tuple[Push | Kick, ...] = ()
-        self.push_table = apart((SOME_PUSHES, TABLE_COLUMNS))
+        self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
         self._world: World | None = None
         self.sensors = Program.of(())
         self.reset()
@@ -145,7 +145,7 @@ class Simulation(Copyable):
         self.pushes = tuple(pushes)
         table = pack(self.pushes, self.robot, self.state.heading_yaw)
         if len(table) > len(self.push_table):  # seldom: compiled code is bound to the table
-            self.push_table = apart((2 * len(table), TABLE_COLUMNS))
+            self.push_table = guarded_zeros((2 * len(table), TABLE_COLUMNS))
         self.push_table[:] = 0.0
         self.push_table[: len(table)] = table
 

@@ -10,9 +10,9 @@ from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1
-from poise.envs.maths.vectors import copy
+from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, update_state
 from poise.envs.physics.simulation import Simulation
@@ -53,13 +53,13 @@ def allocate_delay(true: Simulation, known: Simulation, rows: int) -> Delay:
         known_robot=known.arrays,
         known_views=known.views,
         known_state=known.state_arrays,
-        next=apart(1, dtype=np.int64),
-        qpos=apart((rows, len(s.qpos))),
-        qvel=apart((rows, len(s.qvel))),
-        contact_wrench=apart((rows, 6)),
-        cop=apart((rows, 2)),
-        contacts=apart((rows, len(s.contacts))),
-        other_contacts=apart((rows, 1)),
+        next=guarded_zeros(1, dtype=np.int64),
+        qpos=guarded_zeros((rows, len(s.qpos))),
+        qvel=guarded_zeros((rows, len(s.qvel))),
+        contact_wrench=guarded_zeros((rows, 6)),
+        cop=guarded_zeros((rows, 2)),
+        contacts=guarded_zeros((rows, len(s.contacts))),
+        other_contacts=guarded_zeros((rows, 1)),
     )
 
 
@@ -68,12 +68,12 @@ def measure(d: Delay):
     """Write the true positions, velocities and ground contacts over the oldest measurement."""
     s, k = d.state, d.next[0]
     update_state(d.robot, d.views, s)
-    copy(s.qpos, d.qpos[k])
-    copy(s.qvel, d.qvel[k])
-    copy(s.contact_wrench, d.contact_wrench[k])
-    copy(s.cop, d.cop[k])
-    copy(s.contacts, d.contacts[k])
-    copy(s.other_contacts, d.other_contacts[k])
+    copy_into(s.qpos, d.qpos[k])
+    copy_into(s.qvel, d.qvel[k])
+    copy_into(s.contact_wrench, d.contact_wrench[k])
+    copy_into(s.cop, d.cop[k])
+    copy_into(s.contacts, d.contacts[k])
+    copy_into(s.other_contacts, d.other_contacts[k])
     d.next[0] = (k + 1) % d.qpos.shape[0]
 
 
@@ -81,14 +81,14 @@ def measure(d: Delay):
 def believe_oldest(d: Delay):
     """The state that the known robot would have with the oldest measurement."""
     s, k = d.known_state, d.next[0]
-    copy(d.qpos[k], d.known_views.qpos)
-    copy(d.qvel[k], d.known_views.qvel)
+    copy_into(d.qpos[k], d.known_views.qpos)
+    copy_into(d.qvel[k], d.known_views.qvel)
     mj_step1(d.known_views.model_address, d.known_views.data_address)
     update_state(d.known_robot, d.known_views, s)
-    copy(d.contact_wrench[k], s.contact_wrench)
-    copy(d.cop[k], s.cop)
-    copy(d.contacts[k], s.contacts)
-    copy(d.other_contacts[k], s.other_contacts)
+    copy_into(d.contact_wrench[k], s.contact_wrench)
+    copy_into(d.cop[k], s.cop)
+    copy_into(d.contacts[k], s.contacts)
+    copy_into(d.other_contacts[k], s.other_contacts)
 
 
 class DelayedState(StateSource):

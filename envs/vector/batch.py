@@ -15,7 +15,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.episode import FALLEN, EpisodeArrays
 from poise.envs.compiled.calls import CompiledStep
 from poise.envs.compiled.copies import Copyable
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 
 from .scheduler import NOTHING, StepSchedule
 from .threads import ThreadTeam
@@ -51,7 +51,7 @@ class EnvBatch(Copyable):
         self.threads = 1 if first.render_mode == "human" else max(1, min(threads, n))
         # the environments' own records become rows of these, so that nothing is gathered by hand
         self.episodes = EpisodeArrays(
-            *(apart((n, *array.shape)) for array in first.episode.members())
+            *(guarded_zeros((n, *array.shape)) for array in first.episode.members())
         )
         for i, env in enumerate(self.envs):
             rows = [array[i] for array in self.episodes.members()]

@@ -4,13 +4,13 @@ import numpy as np
 
 from poise.baselines.stepping.swing import swing_gains, swing_task
 from poise.baselines.whole_body.tasks.task import RowArrays, Rows, TaskTick
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 
 
 def filled(bound, state):
     """The rows that a task's kernel fills for a state."""
     k = bound.task.size
-    arrays = RowArrays(apart((k, len(state.qvel))), apart(k), apart(k))
+    arrays = RowArrays(guarded_zeros((k, len(state.qvel))), guarded_zeros(k), guarded_zeros(k))
     bound.task.kernel(TaskTick(state.arrays, bound.block, arrays))
     return Rows(arrays.A, arrays.b, arrays.weights)
 

@@ -10,7 +10,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -135,11 +135,11 @@ def contact_arrays(
     """
     soles, nv = state.J.shape
     ends = np.cumsum([0, *(each.contact.cone_rows for each in points)])
-    J = apart((soles + 3 * len(points), nv)) if points else state.J
+    J = guarded_zeros((soles + 3 * len(points), nv)) if points else state.J
     positions, cone, bound = (
-        apart((len(points), 3)),
-        apart((int(ends[-1]), 3)),
-        apart(int(ends[-1])),
+        guarded_zeros((len(points), 3)),
+        guarded_zeros((int(ends[-1]), 3)),
+        guarded_zeros(int(ends[-1])),
     )
     calls = []
     for i, (contact, block) in enumerate(points):

@@ -7,7 +7,7 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy
+from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.body_points import BodyPoint, body_point, point_motion, update_point
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
@@ -39,9 +39,9 @@ def fill_point(t: PointTick[PointContactBlock]):
         rows.accel[a] = -c.damping * point.J_v[a] - point.Jdot_v[a]
         rows.weights[a] = c.force_weight
         rows.force[a] = c.force[0] * c.normal[a]
-        copy(point.J[a], rows.J[a])
+        copy_into(point.J[a], rows.J[a])
     for r in range(5):
-        copy(c.cone[r], rows.cone[r])
+        copy_into(c.cone[r], rows.cone[r])
         rows.bound[r] = c.largest[0] if r == 4 else 0.0
 
 

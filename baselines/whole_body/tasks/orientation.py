@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.compiled.memory import apart
-from poise.envs.maths.vectors import copy, turn_error, turned
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.maths.vectors import copy_into, turn_error, turned
 from poise.envs.physics.body_points import (
     BodyPoint,
     body_point,
@@ -52,7 +52,7 @@ def fill_orientation(t: TaskTick[OrientationBlock]):
         turn = R[a, 0] * error[0] + R[a, 1] * error[1] + R[a, 2] * error[2]
         rows.b[a] = gain * turn - o.d * point.J_v[3 + a] - point.Jdot_v[3 + a]
         rows.weights[a] = o.weight
-        copy(point.J[3 + a], rows.A[a])
+        copy_into(point.J[3 + a], rows.A[a])
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Orientation(Task[OrientationBlock]):
         return OrientationBlock(
             point=point, axes=standing_frame(robot, point)[1], turns=self.frame == "heading",
             k=k, d=d, weight=float(self.weight / units.omega**4),
-            wanted=apart((3, 3)), error=apart(3),
+            wanted=guarded_zeros((3, 3)), error=guarded_zeros(3),
         )  # fmt: skip
 
     def rows(self, state: RobotState, block: OrientationBlock) -> Rows:

@@ -7,7 +7,7 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy, placed
+from poise.envs.maths.vectors import copy_into, placed
 from poise.envs.physics.body_points import (
     BodyPoint,
     body_point,
@@ -46,7 +46,7 @@ def fill_position(t: TaskTick[PositionBlock]):
     for a in range(3):
         rows.b[a] = -o.k * point.position[a] - o.d * point.J_v[a] - point.Jdot_v[a]
         rows.weights[a] = o.weight
-        copy(point.J[a], rows.A[a])
+        copy_into(point.J[a], rows.A[a])
     x, y = placed(ox, oy, cos, sin, reference[0, 0], reference[0, 1])
     vx, vy = placed(0.0, 0.0, cos, sin, reference[1, 0], reference[1, 1])
     ax, ay = placed(0.0, 0.0, cos, sin, reference[2, 0], reference[2, 1])

@@ -7,7 +7,7 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy, rotation_error
+from poise.envs.maths.vectors import copy_into, rotation_error
 from poise.envs.physics.state import RobotState
 
 from .task import Rows, Task, TaskTick
@@ -52,7 +52,7 @@ def fill_sole_pose(t: TaskTick[SolePoseBlock]):
         rows.weights[a], rows.weights[3 + a] = gains.weight, gains.turn_weight
     rows.weights[5] = gains.yaw_weight
     for r in range(6):
-        copy(s.J[6 * sole + r], rows.A[r])
+        copy_into(s.J[6 * sole + r], rows.A[r])
 
 
 @dataclass(frozen=True)

@@ -124,5 +124,7 @@ def test_a_network_has_one_input(tmp_path: Path) -> None:
 def test_a_memory_has_bounds(tmp_path: Path, numbers: int) -> None:
     """A file of a few bytes may ask for all of a machine's."""
     path = write_recurrent(tmp_path / "huge.onnx", numbers)
-    with pytest.raises(ConfigError, match=rf"huge.onnx: h_in: must be at most .*not 1 × {numbers}$"):
+    with pytest.raises(
+        ConfigError, match=rf"huge.onnx: h_in: must be at most .*not 1 × {numbers}$"
+    ):
         load_network(path)

@@ -322,7 +322,7 @@ def test_kernels_without_a_name_are_not_pickled():
 
 
 def test_a_copy_keeps_the_room_around_its_arrays():
-    """Or sums in its compiled code might be added up in another order, see `apart`."""
+    """Or sums in its compiled code might be added up in another order, see `guarded_zeros`."""
     for kind in (TorqueBalanceEnv, ResidualBalanceEnv):
         env = env_of(kind)
         for make in WAYS.values():

@@ -140,7 +140,10 @@ def test_parts_are_played_one_after_the_other(limits: PushLimits) -> None:
     ("fields", "message"),
     [
         ({"randm": {}}, "randm: unknown field.*choices: .*random, sequence, quiet"),
-        ({"kind": "random", "trials": 3}, "kind: a suite names its parts now: random: .trials: 3.*choices: .*random"),
+        (
+            {"kind": "random", "trials": 3},
+            "kind: a suite names its parts now: random: .trials: 3.*choices: .*random",
+        ),
         ({"duration": 3.0}, "needs one part or more: envelope, grid"),
         ({"random": {"trials": 0}}, "random.trials.*at least 1"),
         ({"random": {"pushes": {"magnitude": [1, 2], "unit": "delta_v"}}}, "pushes"),

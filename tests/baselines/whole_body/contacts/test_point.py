@@ -18,7 +18,7 @@ from poise.baselines.whole_body.contacts.contact import (
 from poise.baselines.whole_body.contacts.point import PointContact, force_cone
 from poise.baselines.whole_body.formulation import build, torques_of, unknowns
 from poise.configs.errors import ConfigError
-from poise.envs.compiled.memory import apart
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import random_state, robot_named
 from tests.support.wall import HAND, contact_described, reaching, robot_at_a_wall, wall_force
@@ -69,7 +69,13 @@ def test_the_kernel_fills_the_rows_that_NumPy_has():
         simulation = Simulation(robot)
         state = simulation.reset(*random_state(robot, np.random.default_rng(seed)))
         arrays = ContactRowArrays(
-            apart(3), apart((3, nv)), apart(3), apart((5, 3)), apart(5), apart(3), apart(3)
+            guarded_zeros(3),
+            guarded_zeros((3, nv)),
+            guarded_zeros(3),
+            guarded_zeros((5, 3)),
+            guarded_zeros(5),
+            guarded_zeros(3),
+            guarded_zeros(3),
         )
         config.kernel(PointTick(state.arrays, contact.block, arrays))
         expected = contact.rows(state)
