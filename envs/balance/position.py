@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build, to_dict
 from poise.envs.compiled.block import Block
@@ -14,12 +12,12 @@ from poise.envs.compiled.calls import CompiledStep, Program, address_of, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.kinematics import update_state
 from poise.envs.physics.simulation import World, advance
-from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 
-from .base import BalanceEnv, EnvConfig
+from .base import EnvConfig
 from .episode import EpisodeArrays, StepEnd, end_step, record_tick
 from .servos import ServoConfig, Servos, aim, drive, make_servos
+from .torque import MotorBalanceEnv
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +47,7 @@ def position_step(step: PositionStep):
     end_step(step.end)
 
 
-class PositionBalanceEnv(BalanceEnv):
+class PositionBalanceEnv(MotorBalanceEnv):
     """Keep a pushed robot on its feet by targets of its joints' positions.
 
     Action: Box(−1, 1, (nu,)): how far the target of each motor lies from its holding one, over
@@ -88,43 +86,21 @@ class PositionBalanceEnv(BalanceEnv):
         super().__init__(robot, config, render_mode=render_mode, **overrides)
         self.servo_config = _servo_config(servos)
         self.servos = make_servos(self.robot, self.servo_config)
-        self._still = np.zeros(len(self.robot.joint_names))
 
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; the robot is shared."""
         return {**super().arguments(), "servos": self.servo_config}
 
-    def _action_names(self) -> tuple[str, ...]:
-        model = self.robot.model
-        return tuple(model.actuator(i).name for i in range(model.nu))
-
-    def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
-        return parts["motors"]
-
-    def _references(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.arrays.q_standing, self._still
-
-    def advance(self) -> None:
-        self._bound().play()
-
-    def compiled_step(self) -> CompiledStep | None:
-        """The compiled policy step; the same object while it can be used again."""
-        return self._bound()
-
-    def _bound(self) -> CompiledStep:
-        world, known = self.simulation.world(), self._step
-        bound = None if known is None else known.block
-        if known is None or not isinstance(bound, PositionStep) or bound.world is not world:
-            block = PositionStep(
-                world=world,
-                estimate=self.state_source.estimate,
-                servos=self.servos,
-                substeps=self.substeps,
-                episode=self.episode,
-                end=self.step_end(),
-            )
-            known = self._step = CompiledStep(address_of(position_step, block), block)
-        return known
+    def _make_step(self, world: World) -> CompiledStep:
+        block = PositionStep(
+            world=world,
+            estimate=self.state_source.estimate,
+            servos=self.servos,
+            substeps=self.substeps,
+            episode=self.episode,
+            end=self.step_end(),
+        )
+        return CompiledStep(address_of(position_step, block), block)
 
 
 def _servo_config(servos: ServoConfig | Mapping | None) -> ServoConfig:

@@ -42,7 +42,37 @@ def torque_step(step: TorqueStep):
     end_step(step.end)
 
 
-class TorqueBalanceEnv(BalanceEnv):
+class MotorBalanceEnv(BalanceEnv):
+    """What environments have in common whose action is a number for each motor (nu,).
+
+    The reference is the standing posture at rest. A subclass says by `_make_step` what is compiled.
+    """
+
+    def _action_names(self) -> tuple[str, ...]:
+        model = self.robot.model
+        return tuple(model.actuator(i).name for i in range(model.nu))
+
+    def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
+        return parts["motors"]
+
+    def _references(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.arrays.q_standing, np.zeros(len(self.robot.joint_names))
+
+    def _make_step(self, world: World) -> CompiledStep:
+        raise NotImplementedError
+
+    def advance(self) -> None:
+        self.compiled_step().play()
+
+    def compiled_step(self) -> CompiledStep:
+        """The compiled policy step; the same object while it can be used again."""
+        world, known = self.simulation.world(), self._step
+        if known is None or getattr(known.block, "world", None) is not world:
+            known = self._step = self._make_step(world)
+        return known
+
+
+class TorqueBalanceEnv(MotorBalanceEnv):
     """Keep a pushed robot on its feet by joint torques.
 
     Action: Box(−1, 1, (nu,)): the torque of each motor over its limit, held for one policy step
@@ -71,36 +101,14 @@ class TorqueBalanceEnv(BalanceEnv):
         **overrides: Any,
     ):
         super().__init__(robot, config, render_mode=render_mode, **overrides)
-        self._still = np.zeros(len(self.robot.joint_names))
 
-    def _action_names(self) -> tuple[str, ...]:
-        model = self.robot.model
-        return tuple(model.actuator(i).name for i in range(model.nu))
-
-    def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
-        return parts["motors"]
-
-    def _references(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.arrays.q_standing, self._still
-
-    def advance(self) -> None:
-        self._bound().play()
-
-    def compiled_step(self) -> CompiledStep | None:
-        """The compiled policy step; the same object while it can be used again."""
-        return self._bound()
-
-    def _bound(self) -> CompiledStep:
-        world, known = self.simulation.world(), self._step
-        bound = None if known is None else known.block
-        if known is None or not isinstance(bound, TorqueStep) or bound.world is not world:
-            block = TorqueStep(
-                world=world,
-                estimate=self.state_source.estimate,
-                torque_limit=self.arrays.torque_limit,
-                substeps=self.substeps,
-                episode=self.episode,
-                end=self.step_end(),
-            )
-            known = self._step = CompiledStep(address_of(torque_step, block), block)
-        return known
+    def _make_step(self, world: World) -> CompiledStep:
+        block = TorqueStep(
+            world=world,
+            estimate=self.state_source.estimate,
+            torque_limit=self.arrays.torque_limit,
+            substeps=self.substeps,
+            episode=self.episode,
+            end=self.step_end(),
+        )
+        return CompiledStep(address_of(torque_step, block), block)
