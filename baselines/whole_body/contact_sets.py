@@ -232,9 +232,8 @@ class ContactSets(Copyable):
         self.jump = np.where(limit > 0.0, jump * limit, np.inf)
         self.applied = guarded_zeros(len(limit))  # torques of the last tick, if
         self.follows = guarded_zeros(1, dtype=np.int64)  # there was one
-        self.chosen = guarded_zeros(
-            1, dtype=np.int64
-        )  # index of the subset of the last tick, −1: none
+        # index of the subset of the last tick, −1: none
+        self.chosen = guarded_zeros(1, dtype=np.int64)
         self.chosen[0] = -1
         self._motor_joints = self.arrays.motor_dofs - 6
 

@@ -17,6 +17,7 @@ from poise.baselines.stepping.config import (
 from poise.baselines.stepping.feedback import (
     LATER_STEP,
     PHASE,
+    STANCE,
     SWING,
     evaluate_feedback,
     pivot_offset,
@@ -184,12 +185,16 @@ def test_the_force_passes_the_com_where_it_rights_the_trunk():
 
 def test_such_a_force_takes_the_turn_back():
     """c̈ = ω² (c − p + r) at a constant height makes L̇ = −k ω L about the horizontal axes."""
-    r = robot()
-    h = r.height_com
-    weight, omega, k = r.mass * 9.81, np.sqrt(9.81 / h), 0.7
-    L = np.array([3.0, -5.0, 0.0])
-    offset = k * omega / weight * np.array([L[1], -L[0], 0.0])
+    simulation, k = generic_state(seed=4), 0.7
+    r, state = simulation.robot, simulation.state
+    h, weight = r.height_com, r.mass * 9.81
+    omega = np.sqrt(9.81 / h)
+    pivot = PivotConfig(stance=PivotGains(momentum=k))
+    f = arrays_of(r, StepFeedback(), {}, pivot)
+    x, y = pivot_offset(f, state.arrays, STANCE, np.cos(YAW), np.sin(YAW))
     p = np.array([0.1, 0.05, -h])  # of the CoP from the CoM
-    force = r.mass * omega**2 * (offset - p)
+    force = r.mass * omega**2 * (np.array([x, y, 0.0]) - p)
     force[2] = weight
-    np.testing.assert_allclose(np.cross(p, force)[:2], -k * omega * L[:2], atol=1e-9)
+    L = state.angular_momentum[:2]
+    np.testing.assert_allclose(np.cross(p, force)[:2], -k * omega * L, atol=1e-9)
+    assert np.all(np.abs(L) > 1e-2)

@@ -74,7 +74,7 @@ def test_push_bodies_come_from_the_description(robot: Robot) -> None:
 def test_kernels_are_compiled_before_the_first_is_used(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With a cold cache the margins, and all that this process plays, would have other bits."""
+    """Several at once, rather than by this process one after the other."""
     order: list[str] = []
     simulate = push_limits.Simulation
     monkeypatch.setattr(push_limits, "prepare", lambda: order.append("compiled"))
