@@ -52,17 +52,23 @@ class Residual(Block):
 
 
 @compiled
-def gate_opening(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> float:
-    """1 − exp(−(d/gate)²), d the capture point's distance from that of the reference [m]."""
-    if r.gate == 0.0:
-        return 1.0
+def capture_error(s: StateArrays, motion: Motion, com_offset: float) -> float:
+    """d², d the capture point's distance from that of the reference [m]."""
     nj = motion.samples.shape[1] - 6
     x = motion.samples[0, nj] + com_offset + motion.samples[1, nj] / s.omega[0]
     y = motion.samples[0, nj + 1] + motion.samples[1, nj + 1] / s.omega[0]
     cos, sin = s.heading[0], s.heading[1]
     dx = s.capture_point[0] - s.origin[0] - (cos * x - sin * y)
     dy = s.capture_point[1] - s.origin[1] - (sin * x + cos * y)
-    return -np.expm1(-(dx * dx + dy * dy) / (r.gate * r.gate))
+    return dx * dx + dy * dy
+
+
+@compiled
+def gate_opening(r: Residual, s: StateArrays, motion: Motion, com_offset: float) -> float:
+    """1 − exp(−(d/gate)²), d the capture point's distance from that of the reference [m]."""
+    if r.gate == 0.0:
+        return 1.0
+    return -np.expm1(-capture_error(s, motion, com_offset) / (r.gate * r.gate))
 
 
 @compiled
@@ -135,11 +141,18 @@ def policy_tick(step: PolicyStep):
     record_tick(robot, s.qvel, views.ctrl, step.substeps * robot.timestep, e)
     simulate(world, step.substeps)
     run(step.estimate)
+    end_tick(step)
+
+
+@compiled
+def end_tick(step: PolicyStep):
+    """Count the tick; the last one ends the policy step."""
+    e = step.episode
     e.ticks[0] += 1
     if e.ticks[0] < step.ticks:
         return
     e.ticks[0] = 0
-    copy_into(w, e.root_wrench)
+    copy_into(step.root_wrench, e.root_wrench)
     e.metrics[FAILURES] = step.failures[0]
     end_step(step.end)
 

@@ -67,7 +67,7 @@ class _Lag:
     gate: float = field(metadata={"min": 0.0})  # d₀ [m]
 
 
-def _action_term(name: str) -> Term:
+def action_term(name: str) -> Term:
     """The term that tells a mirror what the action `name` is."""
     if name[-2:] not in ("_x", "_y", "_z"):
         return Term(name, (name,), "1", "", "number")
@@ -116,6 +116,7 @@ class ResidualBalanceEnv(BalanceEnv):
     """
 
     scales_class: type[ResidualScales] = ResidualScales  #: whose fields `residual` has
+    only_targets = True  #: the action moves targets and nothing else
 
     def __init__(
         self,
@@ -135,7 +136,7 @@ class ResidualBalanceEnv(BalanceEnv):
         self.residual = build(self.scales_class, given, "residual")
         scale = np.array(list(self.residual.entries().values()))
         self._moved = np.flatnonzero(scale)
-        if len(self._moved) == 0:
+        if self.only_targets and len(self._moved) == 0:
             raise ConfigError("at least one scale must be above 0", field="residual")
         super().__init__(robot, config, render_mode=render_mode, **overrides)
         lag = build(_Lag, to_dict({"smoothing": smoothing, "gate": gate}), "environment")
@@ -217,7 +218,7 @@ class ResidualBalanceEnv(BalanceEnv):
         return tuple(names[i] for i in self._moved)
 
     def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
-        return mirror_terms([_action_term(name) for name in self.action_names], {})
+        return mirror_terms([action_term(name) for name in self.action_names], {})
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref
@@ -255,8 +256,12 @@ class ResidualBalanceEnv(BalanceEnv):
         address, tick = controller.compiled_tick(self.state_source.state, self.targets)
         bound = self.bind(tick, address)
         self._bound = bound, gains
-        self._step = CompiledStep(address_of(policy_tick, bound), bound, bound.ticks)
+        self._step = self._stepping(bound)
         return self._step
+
+    def _stepping(self, bound: PolicyStep) -> CompiledStep:
+        """The compiled policy step that works on `bound`."""
+        return CompiledStep(address_of(policy_tick, bound), bound, bound.ticks)
 
     def bind(self, tick: Block, kernel: int) -> PolicyStep:
         """All that a step works on, with the controller's tick and the address of its kernel."""

@@ -84,7 +84,7 @@ class PositionBalanceEnv(MotorBalanceEnv):
         **overrides: Any,
     ):
         super().__init__(robot, config, render_mode=render_mode, **overrides)
-        self.servo_config = _servo_config(servos)
+        self.servo_config = servo_config(servos)
         self.servos = make_servos(self.robot, self.servo_config)
 
     def arguments(self) -> dict[str, Any]:
@@ -103,7 +103,7 @@ class PositionBalanceEnv(MotorBalanceEnv):
         return CompiledStep(address_of(position_step, block), block)
 
 
-def _servo_config(servos: ServoConfig | Mapping | None) -> ServoConfig:
+def servo_config(servos: ServoConfig | Mapping | None) -> ServoConfig:
     """Raises ConfigError naming the field that is wrong."""
     fields = {} if servos is None else to_dict(servos)
     if not isinstance(fields, Mapping):

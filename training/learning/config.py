@@ -4,8 +4,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from poise.baselines.environments.hand_over import HandOverConfig
 from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
 from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
+from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import controller_config
 from poise.configs.files import resolve
 from poise.configs.schema import build, on_base, read_yaml
@@ -38,7 +40,9 @@ class PPOConfig:
     max_grad_norm: float = field(default=0.5, metadata={"above": 0.0})
     # the update of a rollout ends where KL exceeds 1.5 times this; None: never
     target_kl: float | None = field(default=None, metadata={"above": 0.0})
-    net_arch: tuple[int, ...] = (128, 128)  # tanh
+    net_arch: tuple[int, ...] = (128, 128)  # of the actor, and of the critic unless it has its own
+    critic_arch: tuple[int, ...] | None = field(default=None, metadata={"omit": "default"})
+    activation: Literal["tanh", "elu"] = field(default="tanh", metadata={"omit": "default"})
     log_std_init: float = -1.5
     log_std_final: float | None = None  # linear in time from log_std_init; None: learned
     use_sde: bool = False  # exploration that is smooth in the state
@@ -52,8 +56,9 @@ class PPOConfig:
             raise ValueError("n_envs × n_steps must be at least 2")
         if self.n_envs * self.n_steps > MOST_STEPS:
             raise ValueError(f"n_envs × n_steps must be at most {MOST_STEPS}")
-        if len(self.net_arch) > 16 or not all(1 <= width <= 4096 for width in self.net_arch):
-            raise ValueError("net_arch: at most 16 widths from 1 to 4096")
+        for name, widths in (("net_arch", self.net_arch), ("critic_arch", self.critic_arch or ())):
+            if len(widths) > 16 or not all(1 <= width <= 4096 for width in widths):
+                raise ValueError(f"{name}: at most 16 widths from 1 to 4096")
 
 
 @dataclass(frozen=True)
@@ -80,23 +85,26 @@ class TrainConfig:
     """A policy that moves a controller's targets, its steps too, or gives the torques itself.
 
     With `action` "step" the environment is `poise/ResidualStep-v0`, and `step_residual` is what an
-    action adds instead of `residual`. With "torque" it is `poise/TorqueBalance-v0`, with "position"
-    `poise/PositionBalance-v0` with these `servos`; then controller, motion, both residuals,
-    smoothing and gate are not used.
+    action adds instead of `residual`; with "whole" it is `poise/ResidualWhole-v0`, with these
+    `servos` and `hand_over` and no `residual`. With "torque" it is `poise/TorqueBalance-v0`, with
+    "position" `poise/PositionBalance-v0` with these `servos`; then controller, motion, both
+    residuals, smoothing and gate are not used.
     """
 
     robot: str = "humanoid"
-    action: Literal["residual", "step", "torque", "position"] = "residual"
+    action: Literal["residual", "step", "whole", "torque", "position"] = "residual"
     controller: str = "momentum-qp"
     motion: str = "standing"
     seed: int = field(default=0, metadata={"min": 0, "max": MOST_SEED})
     steps: int = field(default=3_000_000, metadata={"min": 1})  # [environment steps]
     threads: int = field(default=2, metadata={"min": 1})
-    start_from: str | None = None  # a policy whose weights and statistics are the first ones
+    # a policy whose weights and statistics are the first ones; or one from outside, see `imported`
+    start_from: str | None = None
     env: EnvConfig = field(default_factory=EnvConfig)
     residual: ResidualScales = field(default_factory=ResidualScales)
     step_residual: StepScales = field(default_factory=StepScales)
     servos: ServoConfig = field(default_factory=ServoConfig)
+    hand_over: HandOverConfig = field(default_factory=HandOverConfig, metadata={"omit": "default"})
     # of the training episodes [s]; None: the robot's. What is trained plays in the robot's own
     physics_step: float | None = field(default=None, metadata={"above": 0.0, "max": 0.01})
     smoothing: float = field(default=0.0, metadata={"min": 0.0})  # of the action [s]
@@ -116,18 +124,16 @@ class TrainConfig:
         if self.action == "position":
             arguments = {"servos": self.servos, **overrides}
             return PositionBalanceEnv(robot or self.robot, self.env, **arguments)
-        steps = self.action == "step"
         if "controller" not in overrides:  # an environment takes a name for what the user says
             overrides["controller"] = controller_config(self.controller)
-        arguments = {
-            "motion": self.motion,
-            "residual": self.step_residual if steps else self.residual,
-            "smoothing": self.smoothing,
-            "gate": self.gate,
-            **overrides,
+        kinds: dict[str, tuple[type[ResidualBalanceEnv], dict[str, Any]]] = {
+            "residual": (ResidualBalanceEnv, {"residual": self.residual}),
+            "step": (ResidualStepEnv, {"residual": self.step_residual}),
+            "whole": (ResidualWholeEnv, {"servos": self.servos, "hand_over": self.hand_over}),
         }
-        kind = ResidualStepEnv if steps else ResidualBalanceEnv
-        return kind(robot or self.robot, self.env, **arguments)
+        kind, own = kinds[self.action]
+        common = {"motion": self.motion, "smoothing": self.smoothing, "gate": self.gate}
+        return kind(robot or self.robot, self.env, **{**common, **own, **overrides})
 
 
 def train_config(name_or_path: str | Path) -> TrainConfig:

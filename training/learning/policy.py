@@ -34,10 +34,19 @@ SHIPPED = "residual"
 ACTOR = "mlp_extractor.policy_net."  # SB3's name of the actor's hidden layers
 
 
-class Policy(Copyable):
-    """The mean of a Gaussian actor: a = clip(W₃ tanh(W₂ tanh(W₁ ô + b₁) + b₂) + b₃, −1, 1).
+def elu(x: np.ndarray) -> np.ndarray:
+    """x above 0, eˣ − 1 below."""
+    return np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0)))
 
-    ô = clip((o − mean)/√(var + ε), ±clip) is the normalised observation. `config` is the run's
+
+ACTIVATIONS = {"tanh": np.tanh, "elu": elu}
+
+
+class Policy(Copyable):
+    """The mean of a Gaussian actor: a = clip(W₃ f(W₂ f(W₁ ô + b₁) + b₂) + b₃, −1, 1).
+
+    ô = clip((o − mean)/√(var + ε), ±clip) is the normalised observation, f the activation, tanh or
+    ELU, after each of the hidden layers, of which there may be any number. `config` is the run's
     configuration, `state` what its state.json says (steps, robot, evaluations). With `mirrors` a
     is the mean of it and of its mirror image, see `symmetry.py`.
     """
@@ -58,6 +67,7 @@ class Policy(Copyable):
         self.layers = layers
         self._mean, self._scale = mean, 1.0 / np.sqrt(var + epsilon)
         self._clip = clip
+        self._activation = ACTIVATIONS[config.ppo.activation]
         self._make_env = carried(config.make_env)
 
     def act(self, observation: np.ndarray) -> np.ndarray:
@@ -101,7 +111,7 @@ class Policy(Copyable):
         x = np.clip((observation - self._mean) * self._scale, -self._clip, self._clip)
         x = x[..., None, :]
         for weight, bias in self.layers[:-1]:
-            x = np.tanh(x @ weight + bias)
+            x = self._activation(x @ weight + bias)
         weight, bias = self.layers[-1]
         return (x @ weight + bias)[..., 0, :]
 

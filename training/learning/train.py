@@ -13,6 +13,8 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.baselines.allowance import allows
+from poise.baselines.policy_files.config import PolicyFileConfig
+from poise.baselines.policy_files.reading import is_policy, policy_config
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
@@ -27,6 +29,7 @@ from poise.training.running.stopping import keeps
 from .callbacks import Checkpoints, Progress, Throughput
 from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
+from .imported import import_policy
 from .policy import locate_policy
 from .schedules import CurriculumCallback, ExplorationCallback
 from .symmetry import MirroredMeanStd, MirroredPolicy
@@ -62,9 +65,9 @@ def train(
     out = Path(out)
     checkpoint = check_folder(config, out, resume)
     keeps(out / LAST, f"what is trained is kept in {out}; go on with --resume")
-    start = None if checkpoint or config.start_from is None else locate_policy(config.start_from)
+    start = None if checkpoint else first_policy(config.start_from)
     torch.set_num_threads(1)
-    if config.action in ("residual", "step"):  # else nothing of the controllers is called
+    if config.action not in ("torque", "position"):  # else nothing of the controllers is called
         prepare()
     with ExitStack() as stack:
         robot = load_robot(config.robot)
@@ -75,8 +78,10 @@ def train(
         state: dict[str, Any] = {}
         stack.enter_context(FolderLock(out))
         checkpoint = check_folder(config, out, resume)  # another run may have ended since
-        if start is not None:
+        if isinstance(start, Path):
             restore(start, model, normalize, robot.fingerprint, wider=True)
+        elif start is not None:
+            import_policy(start, model, normalize)
         if checkpoint is not None:
             state = restore(checkpoint, model, normalize, robot.fingerprint)
             check_controller(state, config, checkpoint / STATE)
@@ -99,6 +104,13 @@ def train(
     return out / BEST
 
 
+def first_policy(name: str | None) -> Path | PolicyFileConfig | None:
+    """Where a new run begins: a policy folder, a policy from outside, or neither."""
+    if name is None:
+        return None
+    return policy_config(name) if is_policy(name) else locate_policy(name)
+
+
 def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
     """PPO whose first policy is the controller alone: the mean's last layer is zero."""
     ppo = config.ppo
@@ -106,9 +118,10 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
     def learning_rate(remaining: float) -> float:
         return ppo.final_learning_rate + remaining * (ppo.learning_rate - ppo.final_learning_rate)
 
+    actor, critic = list(ppo.net_arch), list(ppo.critic_arch or ppo.net_arch)
     policy: dict[str, object] = {
-        "net_arch": list(ppo.net_arch),
-        "activation_fn": torch.nn.Tanh,
+        "net_arch": actor if actor == critic else {"pi": actor, "vf": critic},
+        "activation_fn": torch.nn.ELU if ppo.activation == "elu" else torch.nn.Tanh,
         "log_std_init": ppo.log_std_init,
     }
     if ppo.symmetric:

@@ -11,6 +11,7 @@ import numpy as np
 from poise.baselines.allowance import is_outside
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.plugins import find_outside, make_outside, outside_config
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.reading import RIVALS, is_policy
@@ -127,6 +128,7 @@ TRAINING = (
 ENVIRONMENTS = {
     "residual": ResidualBalanceEnv,
     "step": ResidualStepEnv,
+    "whole": ResidualWholeEnv,
     "torque": TorqueBalanceEnv,
     "position": PositionBalanceEnv,
 }

@@ -1,0 +1,143 @@
+"""When joint servos take over from a controller, and when it takes back: see `ResidualWholeEnv`."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from poise.envs.balance.episode import record_tick
+from poise.envs.balance.servos import Servos, aim, pd_torque
+from poise.envs.balance.termination import uprightness
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.callbacks import call_back
+from poise.envs.compiled.calls import call, run
+from poise.envs.compiled.jit import compiled
+from poise.envs.physics.kinematics import update_state
+from poise.envs.physics.simulation import advance
+
+from .policy_step import PolicyStep, capture_error, end_tick, policy_tick, set_offsets, set_targets
+
+OPEN, CALM, SHARE, TOOK = range(4)  # entries of `HandOver.memory`
+
+
+@dataclass(frozen=True)
+class HandOverConfig:
+    """When the servos may take over, and when the controller takes back.
+
+    The servos may take over from the moment when the capture point is `opens` from the reference's.
+    They may no longer when the robot was calm for `calm_time`: the capture point nearer than
+    `closes`, both feet on the ground, the root's tilt below `tilt`, the CoM slower than `speed` and
+    all joints together than `joint_speed` (root mean square).
+    """
+
+    opens: float = field(default=0.06, metadata={"above": 0.0})  # [m]
+    closes: float = field(default=0.04, metadata={"above": 0.0})  # [m]
+    tilt: float = field(default=0.2, metadata={"above": 0.0})  # [rad]
+    speed: float = field(default=0.1, metadata={"above": 0.0})  # [m/s]
+    joint_speed: float = field(default=0.4, metadata={"above": 0.0})  # [rad/s]
+    calm_time: float = field(default=0.2, metadata={"above": 0.0})  # [s]
+
+    def __post_init__(self) -> None:
+        if self.closes > self.opens:
+            raise ValueError(f"closes: {self.closes} m is above opens, {self.opens} m")
+
+
+@dataclass(frozen=True, eq=False)
+class HandOver(Block):
+    """The limits of `HandOverConfig`, and what is remembered of the episode."""
+
+    opens: float  # squared [m²]
+    closes: float  # squared [m²]
+    cos_tilt: float
+    speed: float  # squared [m²/s²]
+    joint_speed: float  # mean square [rad²/s²]
+    calm_steps: float  # policy steps
+    memory: np.ndarray  # (4,) may take over, calm steps in a row, share of the servos, took over
+    begin: int  # address of the callback that begins a new trial of the controller
+
+
+@dataclass(frozen=True, eq=False)
+class WholeStep(Block):
+    """All that a policy step works on."""
+
+    base: PolicyStep  # the controller's
+    servos: Servos
+    hand: HandOver
+
+
+@compiled
+def is_calm(h: HandOver, step: PolicyStep, distance: float) -> bool:
+    """Whether the robot is calm now, `distance` the squared one of the capture point [m²]."""
+    s = step.inputs.state
+    if distance > h.closes or uprightness(step.inputs.robot, s) < h.cos_tilt:
+        return False
+    for i in range(s.contacts.shape[0]):
+        if not s.contacts[i]:
+            return False
+    speed, total, nj = 0.0, 0.0, s.qvel.shape[0] - 6
+    for a in range(3):
+        speed += s.com_vel[a] ** 2
+    for j in range(nj):
+        total += s.qvel[6 + j] ** 2 / nj
+    return speed < h.speed and total < h.joint_speed
+
+
+@compiled
+def share_of_servos(h: HandOver, step: PolicyStep):
+    """Decide at the start of a policy step which share of the torques is the servos'."""
+    a, m, action = step.inputs, h.memory, step.episode.action
+    distance = capture_error(a.state, a.motion, a.com_offset)
+    m[CALM] = m[CALM] + 1.0 if is_calm(h, step, distance) else 0.0
+    if distance > h.opens:
+        m[OPEN] = 1.0
+    elif m[CALM] >= h.calm_steps:
+        m[OPEN] = 0.0
+    wanted = 2.0 * action[action.shape[0] - 1]
+    m[SHARE] = m[OPEN] * min(max(wanted, 0.0), 1.0)
+    if m[SHARE] > 0.0:
+        m[TOOK] = 1.0
+    elif m[TOOK] > 0.0:
+        m[TOOK] = 0.0
+        call_back(h.begin)
+
+
+@compiled
+def blend_torques(step: WholeStep):
+    """`views.ctrl`: (1 − w) times the controller's torques, in `step.base.tau`, w the servos'."""
+    base, servos, w = step.base, step.servos, step.hand.memory[SHARE]
+    views = base.world.views
+    for i in range(views.ctrl.shape[0]):
+        dof = servos.dofs[i]
+        torque = pd_torque(
+            servos.stiffness[i], servos.damping[i], servos.limit[i],
+            servos.target[i] - views.qpos[dof + 1], views.qvel[dof],
+        )  # fmt: skip
+        views.ctrl[i] = w * torque
+        if w < 1.0:
+            views.ctrl[i] += (1.0 - w) * base.tau[dof - 6]
+
+
+@compiled
+def whole_tick(step: WholeStep):
+    """The control tick of `policy_tick`, of which the servos may have a share."""
+    base, hand, e = step.base, step.hand, step.base.episode
+    if e.ticks[0] == 0:
+        share_of_servos(hand, base)
+        first = base.inputs.residual.moved.shape[0]
+        aim(step.servos, e.action[first:-1])
+    if hand.memory[SHARE] == 0.0:
+        policy_tick(base)
+        return
+    a, world = base.inputs, base.world
+    if e.ticks[0] == 0:
+        set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
+    if hand.memory[SHARE] < 1.0:
+        set_targets(a)
+        call(base.kernel, base.tick)
+    for _ in range(base.substeps):
+        blend_torques(step)
+        record_tick(world.robot, world.views.qvel, world.views.ctrl, world.robot.timestep, e)
+        advance(world.robot, world.views, world.pushes, world.clock)
+        run(world.sensors)
+    update_state(world.robot, world.views, world.state)
+    run(base.estimate)
+    end_tick(base)

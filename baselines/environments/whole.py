@@ -1,0 +1,160 @@
+"""`poise/ResidualWhole-v0`: joint servos that the action moves take over from a controller."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from poise.baselines.controller import CompiledController, Controller
+from poise.baselines.registry import ControllerConfig
+from poise.configs.errors import ConfigError
+from poise.configs.schema import build, to_dict
+from poise.envs.balance.config import EnvConfig
+from poise.envs.balance.position import servo_config
+from poise.envs.balance.servos import ServoConfig, make_servos
+from poise.envs.compiled.callbacks import Callback
+from poise.envs.compiled.calls import CompiledStep, address_of
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.balance.observation import Term, mirror_terms
+from poise.envs.robots.mirror import Mirror
+from poise.envs.robots.robot import Robot
+from poise.envs.vector.vector_env import make_vector_env
+
+from .hand_over import SHARE, HandOver, HandOverConfig, WholeStep, whole_tick
+from .policy_step import PolicyStep
+from .residual import ResidualBalanceEnv, ResidualScales, action_term
+
+
+@dataclass(frozen=True)
+class WholeScales(ResidualScales):
+    """The offsets of the controller's targets that an action of 1 gives; by default none."""
+
+    com: float = field(default=0.0, metadata={"min": 0.0})  # Δc_ref x, y [m]
+    cop: float = field(default=0.0, metadata={"min": 0.0})  # Δp_ref x, y [m]
+
+
+class ResidualWholeEnv(ResidualBalanceEnv):
+    """Keep a pushed robot on its feet by joint servos that take over from a controller.
+
+    Action: Box(−1, 1, (nu + 1,)): a target for each motor's servo, and `authority`, the last entry.
+    The torques are the controller's τ_c and the servos', within the motors' limits:
+
+        w = clip(2 authority, 0, 1) where the servos may take over, else 0
+        q* = q_hold + reach · a,    τ = (1 − w) τ_c + w clip(K (q* − q) − D q̇, ± τ_max)
+
+    Zero is the controller alone, bit for bit; so is any action near rest. The servos may take over
+    from the moment when the capture point leaves the reference's by `hand_over.opens`, and until
+    the robot was calm for `hand_over.calm_time` (`HandOverConfig`); the controller then begins
+    anew, as at the start of an episode, wherever the feet stand. A scale above 0 in `residual`
+    puts entries that move the controller's targets before all others, see `ResidualBalanceEnv`.
+
+    Observation: <observation>
+
+    It does not know the push. The reference is that of `motion`.
+
+    <rewards>
+
+    <start>
+
+    Arguments: those of `ResidualBalanceEnv`; `residual` is a `WholeScales`, `servos` a
+    `ServoConfig` or a mapping, `hand_over` a `HandOverConfig` or a mapping. The controller must
+    have a compiled tick and no soft root: else ConfigError.
+
+    Version history: v0, first release.
+    """
+
+    scales_class = WholeScales
+    only_targets = False
+
+    def __init__(
+        self,
+        robot: str | Path | Robot = "humanoid",
+        config: EnvConfig | str | Path | Mapping | None = None,
+        *,
+        controller: str | Path | Mapping | ControllerConfig | Controller = "momentum-qp",
+        servos: ServoConfig | Mapping | None = None,
+        hand_over: HandOverConfig | Mapping | None = None,
+        **arguments: Any,
+    ):
+        given = {} if hand_over is None else to_dict(hand_over)
+        self.hand_over = build(HandOverConfig, given, "hand_over")
+        self.servo_config = servo_config(servos)
+        self._memory = guarded_zeros(4)
+        self._callback = Callback(self._begin_anew)
+        super().__init__(robot, config, controller=controller, **arguments)
+        self.servos = make_servos(self.robot, self.servo_config)
+
+    @ResidualBalanceEnv.controller.setter  # type: ignore[attr-defined]
+    def controller(self, controller: Controller) -> None:
+        """The controller that servos take over from.
+
+        Raises ConfigError as `ResidualBalanceEnv` does, and for one that cannot be handed over.
+        """
+        ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
+        if not self._compiled or not isinstance(controller, CompiledController):
+            raise ConfigError("has no compiled tick, from which servos could take over",
+                              field="controller")  # fmt: skip
+        if controller.outputs().soft_root:
+            raise ConfigError("has a soft root, from which servos cannot take over",
+                              field="controller")  # fmt: skip
+
+    @property
+    def authority(self) -> float:
+        """The servos' share w of the torques in the last policy step."""
+        return float(self._memory[SHARE])
+
+    def arguments(self) -> dict[str, Any]:
+        """The arguments that make another environment like this one; robot and motion are shared.
+
+        Raises ConfigError as `ResidualBalanceEnv` does.
+        """
+        own = {"servos": self.servo_config, "hand_over": self.hand_over}
+        return {**super().arguments(), **own}
+
+    def _action_names(self) -> tuple[str, ...]:
+        model = self.robot.model
+        motors = (model.actuator(i).name for i in range(model.nu))
+        return (*super()._action_names(), *motors, "authority")
+
+    def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
+        targets = [action_term(name) for name in super()._action_names()]
+        motors = Term("motors", self.action_names[len(targets) : -1], "1", "", "motors")
+        return mirror_terms([*targets, motors, action_term("authority")], parts)
+
+    def _begin(self) -> None:
+        super()._begin()
+        self._memory[:] = 0.0
+        self._callback.error = None
+
+    def _begin_anew(self) -> None:
+        """The controller's new trial; the failures of the episode's ticks stay counted."""
+        controller = self.controller
+        failures = controller.failures
+        controller.reset(self.state_source.state)
+        controller.outputs().failures[0] = failures
+
+    def check(self) -> None:
+        """See `BalanceEnv`; of the controller, and of its new beginning."""
+        super().check()
+        self._callback.check()
+
+    def _stepping(self, bound: PolicyStep) -> CompiledStep:
+        h = self.hand_over
+        hand = HandOver(
+            opens=h.opens**2,
+            closes=h.closes**2,
+            cos_tilt=float(np.cos(h.tilt)),
+            speed=h.speed**2,
+            joint_speed=h.joint_speed**2,
+            calm_steps=float(np.ceil(h.calm_time / self.config.policy_period - 1e-9)),
+            memory=self._memory,
+            begin=self._callback.address,
+        )
+        step = WholeStep(bound, self.servos, hand)
+        return CompiledStep(address_of(whole_tick, step), step, bound.ticks)
+
+
+vector_env = partial(make_vector_env, ResidualWholeEnv)  # for gymnasium.make_vec
