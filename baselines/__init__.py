@@ -19,9 +19,11 @@ __all__ = [
     "ResidualBalanceEnv",
     "ResidualScales",
     "ResidualStepEnv",
+    "ResidualWholeEnv",
     "StepScales",
     "SteppingController",
     "Targets",
+    "WholeScales",
     "WrappedController",
     "load_controller",
     "load_motion",
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     )
     from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
     from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
+    from poise.baselines.environments.whole import ResidualWholeEnv, WholeScales
     from poise.baselines.motions.motion import ReferenceMotion, load_motion
     from poise.baselines.registry import load_controller
     from poise.baselines.stepping.capture_step import CaptureStep
@@ -56,6 +59,7 @@ else:
             ),
             "environments.residual": ("ResidualBalanceEnv", "ResidualScales"),
             "environments.stepping": ("ResidualStepEnv", "StepScales"),
+            "environments.whole": ("ResidualWholeEnv", "WholeScales"),
             "motions.motion": ("ReferenceMotion", "load_motion"),
             "registry": ("load_controller",),
             "stepping.capture_step": ("CaptureStep",),

@@ -20,7 +20,7 @@ import poise  # noqa: F401  registers the environments
 
 IDS = (
     "poise/TorqueBalance-v0", "poise/PositionBalance-v0",
-    "poise/ResidualBalance-v0", "poise/ResidualStep-v0",
+    "poise/ResidualBalance-v0", "poise/ResidualStep-v0", "poise/ResidualWhole-v0",
 )  # fmt: skip
 KINDS = ("random", "bang-bang", "drop", "spin")
 WARM, GROWTH = 0.1, 20.0  # share of the steps before memory counts; [MiB] that it may grow

@@ -15,6 +15,7 @@ import numpy as np
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import load_controller
 from poise.configs.files import packaged
 from poise.envs.balance.base import BalanceEnv
@@ -45,6 +46,10 @@ def _drive(env: Any, steps: int, seed: int) -> list[Any]:
         action = 0.3 * rng.uniform(-1.0, 1.0, env.action_space.shape)
         seen += list(env.step(action.astype(np.float32)))
     return [*seen, bare.simulation.data.qpos.copy(), bare.simulation.time]
+
+
+#: servos take over in the first step
+AT_ONCE = {"opens": 1e-3, "closes": 1e-4}
 
 
 def _begin(env: Any) -> Any:
@@ -190,6 +195,7 @@ KINDS: dict[str, tuple[Callable[[], Any], Callable[[Any], list[Any]]]] = {
     "torque": (lambda: _begin(env_of(TorqueBalanceEnv)), play_env),
     "residual": (lambda: _begin(env_of(ResidualBalanceEnv, smoothing=0.1, gate=0.02)), play_env),
     "step": (lambda: _begin(env_of(ResidualStepEnv, smoothing=0.1)), play_env),
+    "whole": (lambda: _begin(env_of(ResidualWholeEnv, hand_over=AT_ONCE)), play_env),
     "position": (lambda: _begin(env_of(PositionBalanceEnv)), play_env),
     "late torque": (lambda: _late(env_of(TorqueBalanceEnv)), play_env),
     "late residual": (lambda: _late(env_of(ResidualBalanceEnv)), play_env),

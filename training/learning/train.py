@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.baselines.allowance import allows
@@ -147,12 +148,36 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         device="cpu",
         stats_window_size=500,
     )
+    if ppo.actor_rate < 1.0:
+        slow_actor(model.policy, ppo.actor_rate)
     head = model.policy.action_net
     assert isinstance(head, torch.nn.Linear)
     with torch.no_grad():
         head.weight.zero_()
         head.bias.zero_()
     return model
+
+
+def slow_actor(policy: ActorCriticPolicy, rate: float) -> None:
+    """Let every step of the optimizer move the actor by `rate` of what it would, the critic by all.
+
+    With Adam that is a learning rate of its own; the optimizer stays one that SB3 can load.
+    """
+    actor = [p for name, p in policy.named_parameters() if "value" not in name]
+    before = [torch.empty_like(parameter) for parameter in actor]
+
+    @torch.no_grad()
+    def remember(*_: object) -> None:
+        for old, parameter in zip(before, actor, strict=True):
+            old.copy_(parameter)
+
+    @torch.no_grad()
+    def shorten(*_: object) -> None:
+        for old, parameter in zip(before, actor, strict=True):
+            parameter.copy_(torch.lerp(old, parameter, rate))
+
+    policy.optimizer.register_step_pre_hook(remember)
+    policy.optimizer.register_step_post_hook(shorten)
 
 
 def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormalize:

@@ -8,6 +8,7 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
 from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
+from poise.baselines.environments.whole import ResidualWholeEnv, WholeScales
 from poise.configs.errors import ConfigError
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.terms import TERMS
@@ -35,6 +36,7 @@ ENVS = {
     "position": PositionBalanceEnv,
     "residual": partial(ResidualBalanceEnv, residual=ResidualScales(**BODY)),
     "step": partial(ResidualStepEnv, residual=StepScales(trigger=0.03, **BODY)),
+    "whole": partial(ResidualWholeEnv, residual=WholeScales(com=0.1, cop=0.05, **BODY)),
 }
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.configs.errors import ConfigError
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
@@ -50,7 +51,8 @@ def test_the_number_of_threads_changes_nothing():
 
 
 @pytest.mark.parametrize(
-    "kind", [ResidualBalanceEnv, ResidualStepEnv, TorqueBalanceEnv, PositionBalanceEnv]
+    "kind",
+    [ResidualBalanceEnv, ResidualStepEnv, ResidualWholeEnv, TorqueBalanceEnv, PositionBalanceEnv],
 )
 def test_nor_where_steps_are_shared_out_tick_by_tick(kind):
     """As they are with many environments for each thread."""
