@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,25 @@ def write_onnx(
     ]
     return _write(path, nodes, {"W": W}, [("obs", W.shape[0])], [("actions", W.shape[1])],
                   metadata, outside)  # fmt: skip
+
+
+def write_layers(path: Path, sizes: list[int], seed: int = 0) -> Path:
+    """A policy as mjlab writes them: (o − mean)/std, then layers with ELU between them."""
+    rng, weights = np.random.default_rng(seed), {}
+    weights["mean"] = rng.normal(0.0, 0.3, (1, sizes[0])).astype(np.float32)
+    weights["std"] = rng.uniform(0.5, 2.0, (1, sizes[0])).astype(np.float32)
+    nodes = [
+        helper.make_node("Sub", ["obs", "mean"], ["centred"]),
+        helper.make_node("Div", ["centred", "std"], ["x0"]),
+    ]
+    for i, (inputs, outputs) in enumerate(pairwise(sizes)):
+        last = i == len(sizes) - 2
+        weights[f"W{i}"] = linear(outputs, inputs, 0.4, seed + 1 + i)
+        weights[f"b{i}"] = rng.normal(0.0, 0.2, outputs).astype(np.float32)
+        layer = [f"x{i}", f"W{i}", f"b{i}"], ["actions" if last else f"y{i}"]
+        nodes.append(helper.make_node("Gemm", *layer, transB=1))
+        nodes += [] if last else [helper.make_node("Elu", [f"y{i}"], [f"x{i + 1}"])]
+    return _write(path, nodes, weights, [("obs", sizes[0])], [("actions", sizes[-1])])
 
 
 def write_recurrent(path: Path, n: int) -> Path:

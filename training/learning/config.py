@@ -32,10 +32,8 @@ class PPOConfig:
     n_epochs: int = field(default=8, metadata={"min": 1})
     learning_rate: float = field(default=3e-4, metadata={"above": 0.0})
     final_learning_rate: float = field(default=5e-5, metadata={"min": 0.0})  # linear in time
-    # the actor's learning rate over the critic's, which is that: for an actor that need not begin anew
-    actor_rate: float = field(
-        default=1.0, metadata={"above": 0.0, "max": 1.0, "omit": "default"}
-    )
+    # of the actor, times `learning_rate`: small for one that does not begin anew
+    actor_rate: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0, "omit": "default"})
     gamma: float = field(default=0.99, metadata={"above": 0.0, "max": 1.0})
     gae_lambda: float = field(default=0.95, metadata={"min": 0.0, "max": 1.0})
     clip_range: float = field(default=0.2, metadata={"above": 0.0})

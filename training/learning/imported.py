@@ -163,8 +163,8 @@ def import_policy(config: PolicyFileConfig, model: PPO, normalize: VecNormalize)
     linear.append(model.policy.action_net)
     shapes = [tuple(layer.weight.shape) for layer in linear]
     if shapes != [weight.shape for weight in weights]:
-        raise ConfigError(f"must be {[len(bias) for bias in biases[:-1]]} to start from {path.name}",
-                          field="ppo.net_arch")  # fmt: skip
+        sizes = [len(bias) for bias in biases[:-1]]
+        raise ConfigError(f"must be {sizes} to start from {path.name}", field="ppo.net_arch")
     with torch.no_grad():
         for layer, weight, bias in zip(linear, weights, biases, strict=True):
             layer.weight.copy_(torch.as_tensor(weight))

@@ -15,7 +15,8 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from poise.baselines.allowance import allows
 from poise.baselines.policy_files.config import PolicyFileConfig
-from poise.baselines.policy_files.reading import is_policy, policy_config
+from poise.baselines.policy_files.reading import is_policy
+from poise.baselines.registry import controller_config
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
@@ -109,7 +110,13 @@ def first_policy(name: str | None) -> Path | PolicyFileConfig | None:
     """Where a new run begins: a policy folder, a policy from outside, or neither."""
     if name is None:
         return None
-    return policy_config(name) if is_policy(name) else locate_policy(name)
+    if not is_policy(name) and Path(name).suffix not in (".yaml", ".yml"):
+        return locate_policy(name)
+    config = controller_config(name)
+    if not isinstance(config, PolicyFileConfig):
+        raise ConfigError("is a controller, no policy: nothing can be learned from there",
+                          source=name, field="start_from")  # fmt: skip
+    return config
 
 
 def make_model(config: TrainConfig, env: VecNormalize) -> PPO:

@@ -1,0 +1,168 @@
+"""A policy from outside as the first weights: it does what it did, where servos are moved."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from poise.baselines.policy_files.controller import PolicyFile
+from poise.baselines.policy_files.reading import policy_config
+from poise.configs.errors import ConfigError
+from poise.configs.schema import build
+from poise.envs.balance.config import ObservationConfig
+from poise.envs.balance.servos import ServoConfig
+from poise.training.learning.config import TrainConfig
+from poise.training.learning.policy import load_policy
+from poise.training.learning.train import (
+    _training_envs,
+    first_policy,
+    import_policy,
+    make_model,
+    train,
+)
+from tests.support.policies import write_layers, write_onnx, write_yaml
+from tests.support.shared import robot, tiny_config
+
+TERMS = ("root_vel", "root_rate", "gravity", "joint_pos", "joint_vel", "last_action", "com")
+HIDDEN = (12, 9)
+
+
+def policy(folder: Path, network: Path | None = None, **changes: Any) -> Path:
+    """A policy of all joints but one, in an order of its own; it moves all of these but two."""
+    names = [name for name in robot().joint_names if name != "abdomen_z"]
+    order = np.random.default_rng(5).permutation(len(names))
+    n, moved = len(names), [int(i) for i in order[:-2]]
+    inputs = 3 + 3 + 3 + 3 + n + n + len(moved)
+    network = network or write_layers(folder / "policy.onnx", [inputs, *HIDDEN, len(moved)])
+    fields = {
+        "kind": "policy-file",
+        "policy": network.name,
+        "joints": [names[i] for i in order],
+        "default": [0.01 * i for i in range(n)],
+        "action_joints": moved,
+        "action_scale": [0.1 + 0.01 * i for i in range(len(moved))],
+        "action_offset": [-0.02 * i for i in range(len(moved))],
+        "command": [0.4, 0.1, -0.2],
+        "observations": [
+            {"term": "base_lin_vel", "scale": 2.0},
+            {"term": "base_ang_vel", "scale": [0.2, 0.3, 0.4]},
+            {"term": "projected_gravity"},
+            {"term": "velocity_commands", "scale": 3.0},
+            {"term": "joint_pos_rel"},
+            {"term": "joint_vel", "scale": 0.05},
+            {"term": "last_action"},
+        ],
+    }
+    return write_yaml(folder / "policy.yaml", **{**fields, **changes})
+
+
+def config(start: Path | None, action: str = "whole", **changes: Any) -> TrainConfig:
+    """A run that takes seconds and starts from a policy."""
+    tiny = tiny_config(action=action, start_from=None if start is None else str(start), **changes)
+    ppo = replace(tiny.ppo, net_arch=HIDDEN, critic_arch=(7,), activation="elu", actor_rate=0.1)
+    return replace(
+        tiny,
+        ppo=ppo,
+        servos=build(ServoConfig, {"reach": {"*": 30.0}}, "test"),  # no action is cut off
+        env=replace(tiny.env, observation=ObservationConfig(TERMS)),
+    )
+
+
+def imported(chosen: TrainConfig) -> tuple[Any, Any]:
+    """The model whose actor is the policy, and the environments."""
+    normalize = _training_envs(chosen)
+    model, start = make_model(chosen, normalize), first_policy(chosen.start_from)
+    import_policy(start, model, normalize)
+    return model, normalize
+
+
+@pytest.mark.parametrize("action", ["whole", "position"])
+def test_it_does_what_the_policy_does(action: str, tmp_path: Path) -> None:
+    """The same targets in the same states, after the same action; other motors are held."""
+    model, normalize = imported(config(policy(tmp_path), action))
+    env = normalize.venv.batch.envs[0]
+    player = PolicyFile(env.robot, policy_config(tmp_path / "policy.yaml"))
+    joints, servos, rng = player.joints, env.servos, np.random.default_rng(1)
+    env.reset(seed=2, options={"push": []})
+    player.reset(env.simulation.state)
+    motors = [list(servos.dofs - 6).index(joint) for joint in joints.moved]
+    others = [i for i in range(len(servos.dofs)) if i not in motors]
+    for _ in range(5):
+        before = rng.uniform(-0.002, 0.002, env.action_space.shape)
+        if action == "whole":
+            before[-1] = 0.0
+        env.step_without_info(before)
+        targets = (servos.hold + servos.reach * before[: len(servos.hold)])[motors]
+        player.action[:] = (targets - joints.offset) / joints.scale
+        player._state = env.simulation.state
+        player._ask()
+        seen = normalize.normalize_obs(env.episode.observation)
+        assert abs(seen).max() < 10.0  # none is cut off
+        found, _ = model.predict(seen, deterministic=True)
+        moved = (servos.hold + servos.reach * found[: len(servos.hold)])[motors]
+        np.testing.assert_allclose(moved, player._servos.target[joints.moved], atol=2e-5)
+        assert np.ptp(moved) > 0.1
+        assert np.all(found[others] == 0.0) and (action != "whole" or found[-1] == 1.0)
+
+
+def test_a_run_starts_from_it(tmp_path: Path) -> None:
+    """Statistics stay those of the policy; what is trained is loaded and acts as in training."""
+    chosen, out = config(policy(tmp_path)), tmp_path / "run"
+    _, normalize = imported(chosen)
+    train(chosen, out, progress=False)
+    with np.load(out / "last" / "vecnormalize.npz") as stored:
+        np.testing.assert_allclose(stored["obs_mean"], normalize.obs_rms.mean, atol=1e-6)
+        np.testing.assert_allclose(stored["obs_var"], normalize.obs_rms.var, rtol=1e-6)
+    trained = load_policy(out / "last")
+    env = trained.make_env()
+    env.reset(seed=0)
+    seen = env.episode.observation.copy()
+    action = trained.act(seen)
+    assert action.shape == env.action_space.shape and abs(action[-1] - 1.0) < 0.1
+
+
+def test_a_slow_actor_moves_by_its_share() -> None:
+    """A step of the optimizer moves the actor by a tenth of Adam's first, the critic by all."""
+    chosen = config(None)
+    model = make_model(chosen, _training_envs(chosen))
+    before = {name: p.detach().clone() for name, p in model.policy.named_parameters()}
+    for parameter in model.policy.parameters():
+        parameter.grad = parameter.detach() * 0.0 + 1.0
+    rate = model.policy.optimizer.param_groups[0]["lr"]
+    model.policy.optimizer.step()
+    for name, parameter in model.policy.named_parameters():
+        moved = (before[name] - parameter.detach()).abs().max().item()
+        assert moved == pytest.approx(rate if "value" in name else 0.1 * rate, rel=1e-2), name
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"observations": [{"term": "phase"}]}, r"observations\[0\].*does not tell phase"),
+        ({"observations": [{"term": "joint_vel", "history": 2}]}, "a history or limits"),
+        ({"observations": [{"term": "joint_vel", "clip": [-1.0, 1.0]}]}, "a history or limits"),
+    ],
+)
+def test_what_cannot_be_imported_is_said(changes: dict, named: str, tmp_path: Path) -> None:
+    """One line names the file, the term and why."""
+    with pytest.raises(ConfigError, match=named):
+        imported(config(policy(tmp_path, **changes)))
+
+
+def test_another_network_is_refused(tmp_path: Path) -> None:
+    """One that is no chain of layers with ELU, and one of other sizes than `net_arch`."""
+    start = policy(tmp_path, write_onnx(tmp_path / "tanh.onnx", np.zeros((5, 14), np.float32)))
+    with pytest.raises(ConfigError, match=r"tanh.onnx: is no chain of layers.*MatMul, Tanh"):
+        imported(config(start))
+    chosen = config(policy(tmp_path / "other"))
+    small = replace(chosen, ppo=replace(chosen.ppo, net_arch=(12, 8)))
+    with pytest.raises(ConfigError, match=r"ppo.net_arch: must be \[12, 9\]"):
+        imported(small)
+
+
+def test_only_servos_can_start_from_it(tmp_path: Path) -> None:
+    """An action of targets or torques has no joints to aim."""
+    with pytest.raises(ConfigError, match=r"action: must be position or whole"):
+        imported(config(policy(tmp_path), "torque"))
