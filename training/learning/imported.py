@@ -22,6 +22,8 @@ from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
 
+from .symmetry import MirroredMeanStd
+
 FIRM = 1e12  # observations that the imported statistics count for: they stay as they are
 AUTHORITY = 1.0  # of the imported policy: it takes over wherever it may
 
@@ -149,14 +151,9 @@ def import_policy(config: PolicyFileConfig, model: PPO, normalize: VecNormalize)
         raise ConfigError("must be position or whole to start from joint targets", field="action")
     joints, layers = joint_servos(env.robot, config), read_layers(path)
     affine = inputs_from(env, config, joints)
-    known = affine.index >= 0
     _import_statistics(affine, layers, normalize)
     weights, biases = list(layers.weights), list(layers.biases)
-    constant = (affine.offset - layers.mean) / layers.scale
-    biases[0] = biases[0] + weights[0][:, ~known] @ constant[~known]
-    first = np.zeros((len(biases[0]), env.episode.observation.size))
-    first[:, affine.index[known]] = weights[0][:, known]
-    weights[0] = first
+    weights[0], biases[0] = _inputs(affine, layers, normalize)
     weights[-1], biases[-1] = _outputs(env, joints, weights[-1], biases[-1])
     actor = model.policy.mlp_extractor.policy_net
     linear = [layer for layer in actor if isinstance(layer, torch.nn.Linear)]
@@ -169,6 +166,22 @@ def import_policy(config: PolicyFileConfig, model: PPO, normalize: VecNormalize)
         for layer, weight, bias in zip(linear, weights, biases, strict=True):
             layer.weight.copy_(torch.as_tensor(weight))
             layer.bias.copy_(torch.as_tensor(bias))
+
+
+def _inputs(
+    affine: Affine, layers: Layers, normalize: VecNormalize
+) -> tuple[np.ndarray, np.ndarray]:
+    """The first layer, for observations that are normalised by the statistics of `normalize`."""
+    known, moments = affine.index >= 0, normalize.obs_rms
+    mean, scale = np.zeros(len(known)), np.zeros(len(known))
+    mean[known] = moments.mean[affine.index[known]]
+    scale[known] = np.sqrt(moments.var + normalize.epsilon)[affine.index[known]]
+    weight, bias = layers.weights[0], layers.biases[0]
+    bias = bias + weight @ ((affine.gain * mean + affine.offset - layers.mean) / layers.scale)
+    columns = weight * (affine.gain * scale / layers.scale)
+    first = np.zeros((len(bias), len(moments.mean)))
+    first[:, affine.index[known]] = columns[:, known]
+    return first, bias
 
 
 def _outputs(
@@ -188,10 +201,15 @@ def _outputs(
 
 
 def _import_statistics(affine: Affine, layers: Layers, normalize: VecNormalize) -> None:
-    """Means and variances with which (o − mean)/√var is the policy's normalised input."""
+    """Means and variances with which (o − mean)/√var is the policy's normalised input.
+
+    Those of a symmetric policy are alike on both sides.
+    """
     known, moments = affine.index >= 0, normalize.obs_rms
     index = affine.index[known]
     mean, var = np.zeros(moments.mean.shape), np.ones(moments.mean.shape)
     mean[index] = ((layers.mean - affine.offset) / affine.gain)[known]
     var[index] = (layers.scale / affine.gain)[known] ** 2
+    if isinstance(moments, MirroredMeanStd):
+        mean, var = moments.alike(mean, var)
     moments.mean, moments.var, moments.count = mean, var - normalize.epsilon, FIRM

@@ -70,6 +70,12 @@ class MirroredMeanStd(RunningMeanStd):
         super().__init__(shape=mirror.order.shape)
         self.mirror = mirror
 
+    def alike(self, mean: np.ndarray, var: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Means and variances (no,) of which half are of the mirror images."""
+        other = self.mirror(mean)
+        spread = 0.25 * (mean - other) ** 2
+        return 0.5 * (mean + other), 0.5 * (var + var[self.mirror.order]) + spread
+
     def update(self, arr: np.ndarray) -> None:
         """Take in observations (n, no)."""
         super().update(np.concatenate([arr, self.mirror(arr)]))
