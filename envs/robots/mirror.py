@@ -10,7 +10,7 @@ from poise.configs.errors import ConfigError
 from .robot import Robot
 
 SIDES = np.array([1.0, -1.0, 1.0])  # of a vector's x, y, z when left and right are exchanged
-# of the CoM's height, by which a robot may differ from its mirror image: real ones do, by a millimetre
+# of the CoM's height, by which a robot may differ from its mirror image: real ones by a millimetre
 TOLERANCE = 2e-3
 
 

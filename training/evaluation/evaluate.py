@@ -9,7 +9,8 @@ from rich.console import Console
 
 from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError
-from poise.configs.files import packaged
+from poise.configs.files import packaged, packaged_folder
+from poise.configs.reading import read_json
 from poise.envs.pushes.sampler import LimitTable
 from poise.envs.robots.robot import load_robot
 from poise.training.running.summary import Summary
@@ -104,16 +105,26 @@ def benchmark(
         ConfigError, PoiseError: as `evaluate`.
     """
     run = Run(
-        controllers or default_controllers(), suite, out, robot, seed, workers, backend, trials,
+        controllers or default_controllers(load_robot(robot).name), suite, out, robot, seed, workers, backend, trials,
         overwrite, console, reference=REFERENCE, measured=PushLimits,
     )  # fmt: skip
     return run.play(timed=True)
 
 
-def default_controllers() -> tuple[str, ...]:
-    """The reference, all other packaged controllers that can rest, and the packaged policies."""
+def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
+    """The reference, all other packaged controllers that can rest, and the robot's policies."""
     others = (name for name in packaged("controllers") if name not in (REFERENCE, *RESTLESS))
-    return (REFERENCE, *others, *packaged("policies"))
+    return (REFERENCE, *others, *packaged_policies(robot))
+
+
+def packaged_policies(robot: str) -> list[str]:
+    """The packaged policies that were trained on the robot of this name."""
+    folder = packaged_folder("policies")
+    return [
+        name
+        for name in packaged("policies")
+        if read_json(folder / name / "state.json")["robot"] == robot
+    ]
 
 
 def measured_limits(summary: Summary, path: Path, robot: str) -> None:

@@ -1,6 +1,6 @@
 """A trained policy, ready to use: observation in, action out, plain NumPy."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ def elu(x: np.ndarray) -> np.ndarray:
     return np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0)))
 
 
-ACTIVATIONS = {"tanh": np.tanh, "elu": elu}
+ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {"tanh": np.tanh, "elu": elu}
 
 
 class Policy(Copyable):

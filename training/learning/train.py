@@ -83,7 +83,7 @@ def train(
         if isinstance(start, Path):
             restore(start, model, normalize, robot.fingerprint, wider=True)
         elif start is not None:
-            import_policy(start, model, normalize)
+            import_policy(start, config.make_env(robot), model, normalize)
         if checkpoint is not None:
             state = restore(checkpoint, model, normalize, robot.fingerprint)
             check_controller(state, config, checkpoint / STATE)

@@ -14,13 +14,13 @@ import pytest
 
 import poise
 from poise.configs.errors import ConfigError
-from poise.configs.files import packaged
 from poise.envs.balance.config import StartNoise
 from poise.envs.pushes.push import Push
 from poise.envs.sensors.delayed import DelayedState
 from poise.training.cli.commands import main
 from poise.training.evaluation import run
-from poise.training.evaluation.evaluate import benchmark, default_controllers
+from poise.training.evaluation.evaluate import benchmark, default_controllers, packaged_policies
+from poise.training.learning.policy import load_policy
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.trials.agents import load_agent
@@ -272,9 +272,10 @@ def test_bad_input_is_refused_and_nothing_is_written(
 
 def test_everyone_takes_part_by_default() -> None:
     """The reference first, the packaged policies last."""
-    names, policies = default_controllers(), packaged("policies")
+    names, policies = default_controllers(), packaged_policies("humanoid")
     assert names[0] == "momentum-qp" and len(set(names)) == len(names)
     assert "residual" in policies and list(names[-len(policies) :]) == policies
+    assert all(load_policy(name).config.robot == "humanoid" for name in policies)
     assert {"pd", "macchietto09", "moskalev24", "lip-mpc"} <= set(names)
 
 

@@ -14,11 +14,11 @@ from poise.configs.schema import build
 from poise.envs.balance.config import ObservationConfig
 from poise.envs.balance.servos import ServoConfig
 from poise.training.learning.config import TrainConfig
+from poise.training.learning.imported import import_policy
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import (
     _training_envs,
     first_policy,
-    import_policy,
     make_model,
     train,
 )
@@ -74,7 +74,7 @@ def imported(chosen: TrainConfig) -> tuple[Any, Any]:
     """The model whose actor is the policy, and the environments."""
     normalize = _training_envs(chosen)
     model, start = make_model(chosen, normalize), first_policy(chosen.start_from)
-    import_policy(start, model, normalize)
+    import_policy(start, chosen.make_env(robot()), model, normalize)
     return model, normalize
 
 
