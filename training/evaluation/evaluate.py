@@ -104,8 +104,9 @@ def benchmark(
     Raises:
         ConfigError, PoiseError: as `evaluate`.
     """
+    chosen = controllers or default_controllers(load_robot(robot).name)
     run = Run(
-        controllers or default_controllers(load_robot(robot).name), suite, out, robot, seed, workers, backend, trials,
+        chosen, suite, out, robot, seed, workers, backend, trials,
         overwrite, console, reference=REFERENCE, measured=PushLimits,
     )  # fmt: skip
     return run.play(timed=True)
@@ -120,11 +121,8 @@ def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
 def packaged_policies(robot: str) -> list[str]:
     """The packaged policies that were trained on the robot of this name."""
     folder = packaged_folder("policies")
-    return [
-        name
-        for name in packaged("policies")
-        if read_json(folder / name / "state.json")["robot"] == robot
-    ]
+    states = {name: read_json(folder / name / "state.json") for name in packaged("policies")}
+    return [name for name, state in states.items() if state["robot"] == robot]
 
 
 def measured_limits(summary: Summary, path: Path, robot: str) -> None:
