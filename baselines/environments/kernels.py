@@ -48,11 +48,12 @@ _EXAMPLES = {
         "hand": {"kind": "position", "body": "left_lower_arm"},
     },
     "contacts": {"hand": {"kind": "point", "body": "left_lower_arm", "normal": [0.0, 0.0, 1.0]}},
+    "limits": {"speed": {"kind": "joint-speed", "largest": 5.0}, "torque": {"kind": "torque"}},
 }
 
 
 def rows() -> None:
-    """The rows of tasks and of contacts other than the feet."""
+    """The rows of tasks, of contacts other than the feet and of limits."""
     config = build(MomentumQPConfig, _EXAMPLES, "the packaged kinds")
     qp = MomentumQP(load_robot("humanoid"), config)
     env = ResidualBalanceEnv(controller=config, duration=0.1)

@@ -24,10 +24,11 @@ from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .contacts.contact import contact_arrays
+from .limits.limit import BoundLimit, bind_limits
 from .momentum_qp import MomentumQPConfig
 from .parameters import QPParameters, qp_parameters
 from .reduced_qp import Assembly, assemble
-from .stack import make_stack, put_rows
+from .stack import limit_program, make_stack, put_rows
 from .tasks.task import BoundTask, Rows, bind_tasks
 from .tick import Memory, accept, allocate_memory, forget, solve
 from .workspace import Workspace, allocate_workspace
@@ -137,7 +138,12 @@ class ContactSet(Copyable):
     """Arrays, parameters and scratch for one subset of the soles (its indices, in order)."""
 
     def __init__(
-        self, arrays: RobotArrays, parameters: QPParameters, soles: tuple[int, ...], index: int
+        self,
+        arrays: RobotArrays,
+        parameters: QPParameters,
+        soles: tuple[int, ...],
+        index: int,
+        limits: Iterable[BoundLimit],
     ):
         pick, self.index = np.array(soles), index
         self.soles, self.pick = soles, pick
@@ -148,8 +154,9 @@ class ContactSet(Copyable):
         cone = parameters.cone[pick]  # with a row more for each sole: the bound on its load
         self.parameters = replace(parameters, cone=np.pad(cone, ((0, 0), (0, 1), (0, 0))))
         self.workspace = allocate_workspace(
-            self.arrays, self.parameters.cone.shape[1], parameters.soft_root
-        )
+            self.arrays, self.parameters.cone.shape[1], parameters.soft_root,
+            limit_rows=sum(limit.size for limit in limits),
+        )  # fmt: skip
         nv, nc = len(arrays.q_standing) + 6, len(soles)
         self._own = {
             "J": guarded_zeros((6 * nc, nv)),
@@ -187,7 +194,8 @@ class ContactSet(Copyable):
             problem = Assembly(
                 robot=self.arrays, state=own, contacts=contact_arrays(own),
                 parameters=self.parameters, targets=targets, period=sets.period,
-                tasks=make_stack([*sets.tasks.values(), *tasks], s, ws, rows), workspace=ws,
+                tasks=make_stack([*sets.tasks.values(), *tasks], s, ws, rows),
+                limits=limit_program(sets.limits.values(), s, ws), workspace=ws,
             )  # fmt: skip
             self.block = ContactTick(
                 source=s, pick=self.pick, problem=problem, memory=sets.memory,
@@ -217,6 +225,7 @@ class ContactSets(Copyable):
         for name, (task, _) in self.tasks.items():
             if task.kernel is None:
                 raise ConfigError("has no kernel", field=f"tasks.{name}")
+        self.limits = bind_limits(config.limits, robot)
         self.arrays = robot_arrays(robot)
         self.parameters = parameters = qp_parameters(robot, self.arrays, config)
         count = len(robot.soles)
@@ -224,7 +233,7 @@ class ContactSets(Copyable):
         if count > 1:
             subsets.append(tuple(range(count)))
         self.sets = {
-            soles: ContactSet(self.arrays, parameters, soles, index)
+            soles: ContactSet(self.arrays, parameters, soles, index, self.limits.values())
             for index, soles in enumerate(subsets)
         }
         self.memory = allocate_memory(parameters.torque_limit)

@@ -52,7 +52,7 @@ FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the who
 
 @compiled
 def release_joints(ws: Workspace):
-    """Take away the joint limits, the last rows of the problem."""
+    """Take away the joint limits and what follows, the limits that a configuration adds."""
     ws.l[ws.first_joint :] = -np.inf
     ws.u[ws.first_joint :] = np.inf
 
