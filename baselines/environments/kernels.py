@@ -15,6 +15,7 @@ from poise.baselines.whole_body.momentum_qp import (
     solve,
 )
 from poise.configs.schema import build
+from poise.envs.compiled.calls import NO_KERNEL
 from poise.envs.physics.kinematics import allocate_state
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import load_robot
@@ -77,7 +78,7 @@ def steps() -> None:
     qp = env.controller
     assert isinstance(qp, MomentumQP)  # by default
     problem = qp.assembly(env.simulation.state, env.targets)
-    tick = Tick(problem, qp.memory, 0, 0)
+    tick = Tick(problem, qp.memory, NO_KERNEL, NO_KERNEL)
     policy_tick.compile((env.bind(tick, 0).numba_type,))
     momentum_tick.compile((tick.numba_type,))
     accept(problem.state, problem.parameters, problem.workspace, qp.memory)

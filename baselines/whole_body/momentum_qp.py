@@ -14,7 +14,7 @@ from poise.baselines.controller import (
 )
 from poise.baselines.solvers import QP, Status, make_solver
 from poise.baselines.warmup import prepare
-from poise.envs.compiled.calls import address_of
+from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
@@ -141,7 +141,7 @@ class MomentumQP(CompiledController):
         if self.solver is not None:
             self.solver.reset()
 
-    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Tick]:
+    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel[Tick], Tick]:
         """The kernel that compiled code calls for `torques`, and its block; see `outputs`."""
         tick = self.tick(state, targets)
         return address_of(momentum_tick, tick), tick

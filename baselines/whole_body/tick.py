@@ -7,7 +7,7 @@ import numpy as np
 from poise.baselines.solvers.dual_active_set import solve_dual
 from poise.baselines.solvers.scaled_rows import INFEASIBLE
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import call
+from poise.envs.compiled.calls import Kernel, call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.vectors import copy_into
@@ -95,8 +95,8 @@ class Tick(Block):
 
     problem: Assembly
     memory: Memory
-    assemble: int  # address of `assemble(problem)`
-    solve: int  # address of `solve(problem.workspace)`
+    assemble: Kernel[Assembly]  # `assemble`, of `problem`
+    solve: Kernel[Workspace]  # `solve`, of the problem's workspace
 
 
 @compiled

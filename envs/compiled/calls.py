@@ -160,7 +160,7 @@ def run(program: Program):
 class CompiledStep(NamedTuple):
     """A policy step: `kernel`, by its address, `ticks` times with `block`. It must not raise."""
 
-    kernel: int
+    kernel: Kernel
     block: Block
     ticks: int = 1
 
