@@ -1,4 +1,4 @@
-"""The momentum QP with any subset of the soles in contact.
+"""The momentum QP with any subset of the soles in contact, and with contacts of other bodies.
 
 One reduced problem for each subset (see `reduced_qp.py`), built on arrays that hold the soles in
 contact only. A stack of tasks says what else is asked of v̇, such as the way of a swing foot.
@@ -13,7 +13,7 @@ from poise.baselines.controller import TargetArrays, Targets
 from poise.baselines.solvers import QP
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import address_of, call
+from poise.envs.compiled.calls import Kernel, address_of, call
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
@@ -23,7 +23,7 @@ from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .contacts.contact import contact_arrays
+from .contacts.contact import BoundContact, bind_contacts, contact_arrays
 from .limits.limit import BoundLimit, bind_limits
 from .momentum_qp import MomentumQPConfig
 from .parameters import QPParameters, qp_parameters
@@ -49,8 +49,8 @@ class ContactTick(Block):
     follows: np.ndarray  # (1,) int: 1 where there was a last tick
     chosen: np.ndarray  # (1,) int: the subset of the last tick, −1: none
     index: int  # number of this subset
-    assemble: int  # address of `assemble(problem)`, compiled already
-    solve: int  # address of `solve(problem.workspace)`
+    assemble: Kernel[Assembly]  # `assemble`, of `problem`
+    solve: Kernel[Workspace]  # `solve`, of the problem's workspace
 
 
 @compiled
@@ -143,6 +143,7 @@ class ContactSet(Copyable):
         parameters: QPParameters,
         soles: tuple[int, ...],
         index: int,
+        points: Sequence[BoundContact],
         limits: Iterable[BoundLimit],
     ):
         pick, self.index = np.array(soles), index
@@ -155,6 +156,8 @@ class ContactSet(Copyable):
         self.parameters = replace(parameters, cone=np.pad(cone, ((0, 0), (0, 1), (0, 0))))
         self.workspace = allocate_workspace(
             self.arrays, self.parameters.cone.shape[1], parameters.soft_root,
+            [point.chain for point in points],
+            sum(point.contact.cone_rows for point in points),
             limit_rows=sum(limit.size for limit in limits),
         )  # fmt: skip
         nv, nc = len(arrays.q_standing) + 6, len(soles)
@@ -192,7 +195,11 @@ class ContactSet(Copyable):
         if wanted != self._bound_to:  # blocks are equal where they are the same
             ws, own = self.workspace, replace(s, **self._own)
             problem = Assembly(
-                robot=self.arrays, state=own, contacts=contact_arrays(own),
+                robot=self.arrays, state=own,
+                contacts=contact_arrays(
+                    own, list(sets.contacts.values()), ws.contact_accel, ws.force_weights,
+                    ws.force_des,
+                ),
                 parameters=self.parameters, targets=targets, period=sets.period,
                 tasks=make_stack([*sets.tasks.values(), *tasks], s, ws, rows),
                 limits=limit_program(sets.limits.values(), s, ws), workspace=ws,
@@ -218,13 +225,12 @@ class ContactSets(Copyable):
     """
 
     def __init__(self, robot: Robot, config: MomentumQPConfig, jump: float = np.inf):
-        if config.contacts:
-            raise ConfigError("has the soles in contact alone", field="contacts")
         self.robot, self.config, self.period = robot, config, config.period
         self.tasks = bind_tasks(config.tasks, robot)
         for name, (task, _) in self.tasks.items():
             if task.kernel is None:
                 raise ConfigError("has no kernel", field=f"tasks.{name}")
+        self.contacts = bind_contacts(config.contacts, robot)
         self.limits = bind_limits(config.limits, robot)
         self.arrays = robot_arrays(robot)
         self.parameters = parameters = qp_parameters(robot, self.arrays, config)
@@ -233,9 +239,12 @@ class ContactSets(Copyable):
         if count > 1:
             subsets.append(tuple(range(count)))
         self.sets = {
-            soles: ContactSet(self.arrays, parameters, soles, index, self.limits.values())
+            soles: ContactSet(
+                self.arrays, parameters, soles, index,
+                list(self.contacts.values()), self.limits.values(),
+            )
             for index, soles in enumerate(subsets)
-        }
+        }  # fmt: skip
         self.memory = allocate_memory(parameters.torque_limit)
         limit = parameters.torque_limit
         self.jump = np.where(limit > 0.0, jump * limit, np.inf)
@@ -255,6 +264,12 @@ class ContactSets(Copyable):
     def failures(self) -> int:
         """Ticks since the reset at which the QP was not solved."""
         return int(self.memory.failures[0])
+
+    @property
+    def forces(self) -> dict[str, np.ndarray]:
+        """(3,) force [N] on each of `contacts` in the last solution, world axes."""
+        forces = self.workspace.wrenches[len(self.workspace.wrenches) - 3 * len(self.contacts) :]
+        return dict(zip(self.contacts, forces.reshape(-1, 3).copy(), strict=True))
 
     def reset(self) -> None:
         """Forget the last trial."""
