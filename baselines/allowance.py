@@ -1,4 +1,4 @@
-"""Whose code may run: what the user has named, never what a file has.
+"""The code that may run: what the user has named, never what a file has.
 
 Files that are read (policies, results, configurations) may name a class from outside, and to find
 it is to run its module. `find_outside`, the one function that imports what has been named, asks
@@ -36,7 +36,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Allowance:
-    """What may run: `names` as of `_key`; `source`, the file that is being read, for errors."""
+    """The code that may run: `names` as of `_key`; `source`, the file being read, for errors."""
 
     names: frozenset[str] = frozenset()
     source: str | None = None
@@ -47,12 +47,12 @@ _current: ContextVar[Allowance] = ContextVar("allowance", default=NOTHING)
 
 
 def is_outside(name: object) -> TypeGuard[str]:
-    """Whether a name has the form ``module:Class``."""
+    """Return whether a name has the form ``module:Class``."""
     return isinstance(name, str) and name.isprintable() and NAME.fullmatch(name) is not None
 
 
 def is_script(name: str | Path) -> bool:
-    """Whether a file of this name is TorchScript."""
+    """Return whether a file of this name is TorchScript."""
     return Path(name).suffix in SCRIPTS and str(name).isprintable()
 
 
@@ -168,7 +168,7 @@ def _file(path: Path) -> Mapping[str, object] | None:
 
 
 def _key(name: str, source: str | None, field: str) -> str:
-    """What a name stands for: a file by its whole path, links followed."""
+    """Return what a name stands for: a file by its whole path, links followed."""
     if is_script(name):
         return str(whole_path(name, source, field))
     place, _, attribute = name.rpartition(":")

@@ -52,7 +52,7 @@ def outside_config(name: str, arguments: dict[str, object] | None = None) -> Out
 
 
 def find_outside(name: str) -> Any:
-    """What ``module:Class`` names; modules are searched for in the current folder, too, at last.
+    """Return what ``module:Class`` names; the current folder is searched for the module last.
 
     Nothing else in this package imports what a user or a file names. Raises ConfigError when the
     user has not allowed it (`allowing`), the module cannot be imported or lacks the name.

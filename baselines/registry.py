@@ -108,7 +108,7 @@ def load_controller(
 
 
 def _described(controller: str | Path | Mapping[str, object]) -> ControllerConfig:
-    """What a name, a file or a mapping says; nothing from outside is looked up for it."""
+    """Return what a name, a file or a mapping says, without importing anything for it."""
     if isinstance(controller, Mapping):
         return _build(dict(controller), "controller")
     if is_outside(controller):

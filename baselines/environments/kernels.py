@@ -100,7 +100,7 @@ def contacts() -> None:
 
 
 def planner() -> None:
-    """When, where to and how a foot steps, and what a policy sees of it."""
+    """The planner of steps and the swing, and what a policy sees of them."""
     env, tick = _stepping()
     capture_tick.compile((tick.numba_type,))
     env.bind(tick, 0)

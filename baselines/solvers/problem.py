@@ -104,7 +104,7 @@ def failed(qp: QP, status: Status, start: float, iterations: int = 0) -> Solutio
 
 
 def uncopyable(name: str) -> PoiseError:
-    """Why a library's solver cannot be copied between its problems."""
+    """Return the error for a library's solver, which cannot be copied between its problems."""
     return PoiseError(
         f"solver {name!r} cannot be copied within an episode, for its library does not tell what "
         "it remembers: copy after the reset"
@@ -112,7 +112,7 @@ def uncopyable(name: str) -> PoiseError:
 
 
 def refusal(qp: QP) -> Status | None:
-    """Why there is no need to ask a solver: numbers or bounds that cannot be; else None."""
+    """Return the status that numbers or bounds have without a solver; None where one is needed."""
     if not all(np.isfinite(a).all() for a in (qp.H, qp.g, qp.C)):
         return Status.INVALID
     if np.isnan(qp.l).any() or np.isnan(qp.u).any():

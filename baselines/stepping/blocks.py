@@ -152,7 +152,7 @@ class StepGains(Block):
 
 @dataclass(frozen=True, eq=False)
 class StepMemory(Block):
-    """What a controller that steps remembers from tick to tick."""
+    """The memory of a controller that steps, from tick to tick."""
 
     steps: np.ndarray  # (1,) int: steps begun since the reset
     recovering: np.ndarray  # (1,) int: 1 from a step until the robot is calm in its nominal stance

@@ -174,7 +174,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
 
     @property
     def stepped(self) -> bool:
-        """Whether a step has begun since the reset."""
+        """True once a step has begun since the reset."""
         return self.steps > 0
 
     @property
@@ -188,7 +188,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         return self._swing if self.memory.swinging[0] else None
 
     def stepping(self) -> Stepping:
-        """Where the controller is in its steps."""
+        """The step in progress, see `Stepping`."""
         swing = self.swing
         if swing is None:
             return STANDING._replace(steps=self.steps, since=float(self.memory.clock[0]))
@@ -255,7 +255,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     def compiled_tick(
         self, state: RobotState, targets: Targets
     ) -> tuple[Kernel[CaptureTick], CaptureTick]:
-        """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""
+        """Return the kernel that compiled code calls instead of `torques`, and its block; see `tau`."""
         tick = self.tick(state, targets)
         return address_of(capture_tick, tick), tick
 

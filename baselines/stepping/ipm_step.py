@@ -18,7 +18,7 @@ from .search import clip_to_limits, to_step_frame, to_world, with_offsets
 
 @compiled
 def rest_distance(speed: float, omega: float, height: float, arc: float) -> float:
-    """How far ahead of the CoM a foot stops it [m]: the energy left over the foot is 0.
+    """Return how far ahead of the CoM a foot stops it [m]: the energy left over the foot is 0.
 
     Linear pendulum, orbital energy E = ½ ẋ² − ½ ω² x² = 0:      x = ẋ/ω
     rigid leg, ½ ẋ² + g z = g √(z² + x²) [Coros10]:              x = ẋ/ω √(1 + ẋ²/(4 g z))

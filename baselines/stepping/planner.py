@@ -1,4 +1,4 @@
-"""Which foot steps, where to and how fast: footholds from which the fall can be stopped."""
+"""The planner of a step: foot, foothold and time from which the fall can be stopped."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace

@@ -130,7 +130,7 @@ def shift_weight(t: CaptureTick) -> None:
 
 @compiled
 def _is_calm(t: CaptureTick) -> bool:
-    """Whether the CoM is slow and the root upright."""
+    """Return whether the CoM is slow and the root upright."""
     s, r, up = t.state, t.recentring, 0.0
     for a in range(3):
         up += s.root_axes[2, a] * t.search.feedback.upright[a]
@@ -140,7 +140,7 @@ def _is_calm(t: CaptureTick) -> bool:
 
 @compiled
 def recentring_step_due(t: CaptureTick) -> bool:
-    """Whether one of two standing feet lifts off now to go back.
+    """Return whether one of two standing feet lifts off now to go back.
 
     Counts how long the robot has been calm. When that is long enough, begins to shift the weight,
     or ends the recovery where the feet are near their nominal stance.

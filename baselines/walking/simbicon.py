@@ -18,8 +18,7 @@ from poise.envs.robots.robot import Robot
 
 @dataclass(frozen=True)
 class Pose:
-    """What a state asks of the legs, from standing [rad]: the swing thigh forward (θ_d0), bend of
-    the knees."""
+    """The angles of the legs in a state, from standing [rad]: swing thigh (θ_d0) and knees."""
 
     swing_hip: float = 0.0
     swing_knee: float = 0.0

@@ -1,4 +1,4 @@
-"""What all environments share: a pushed robot, its observation, reward, fall and record."""
+"""The base of all environments: a pushed robot, its observation, reward, fall and record."""
 
 from collections.abc import Mapping
 from pathlib import Path

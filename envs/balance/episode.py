@@ -1,4 +1,4 @@
-"""What is recorded during an episode: fall, quiet time, effort, excursions; and the reward."""
+"""The record of an episode: fall, quiet time, effort, excursions; and the reward."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Where an episode begins: a disturbed standing posture."""
+"""The start of an episode: a disturbed standing posture."""
 
 from dataclasses import dataclass, field
 

@@ -165,7 +165,7 @@ class CompiledStep(NamedTuple):
     ticks: int = 1
 
     def row(self) -> tuple[int, int, int]:
-        """What `play` reads."""
+        """Return the addresses of the kernel and of its block, and how often `play` calls it."""
         return int(self.kernel), self.block.address, self.ticks
 
     def play(self) -> None:

@@ -55,7 +55,7 @@ threading.Thread(target=watch, daemon=True).start()
 
 
 def _compile_apart(module: str, shares: Sequence[str]) -> bool:
-    """Whether the processes have all finished without an error; Ctrl-C reaches this one alone."""
+    """Return whether all processes finished without an error; Ctrl-C reaches this one alone."""
     jobs: list[subprocess.Popen] = []
     try:
         for share in shares:

@@ -54,7 +54,7 @@ class LimitTable:
 
 @dataclass(frozen=True)
 class PushSampler:
-    """What random pushes are drawn from; every range [lo, hi] is drawn from uniformly.
+    """The distribution of random pushes; every range [lo, hi] is drawn from uniformly.
 
     `magnitude` has the unit named by `unit`:
     impulse [N·s], force [N] (peak), specific_impulse [N·s/kg], delta_v [m/s] (velocity kicks),

@@ -1,4 +1,4 @@
-"""What is drawn over a simulation: pushes, centre of mass, and what the balance depends on.
+"""The marks over a simulation: pushes, centre of mass, and what the balance depends on.
 
 | mark | shape and colour |
 |---|---|

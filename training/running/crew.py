@@ -95,7 +95,9 @@ class Crew:
     def _with_joblib(
         self, function: Callable[[Job], Result], jobs: Sequence[Job]
     ) -> Iterator[tuple[Job, Result]]:
-        """Who died of which job is not known here: all go on, until nothing is done between two."""
+        """Yield jobs and results. After a death, whose job is not known, the rest is played again,
+        until nothing is done between two.
+        """
         left, done = dict(enumerate(jobs)), True
         while left:
             try:

@@ -23,8 +23,10 @@ Recovered = Mapping[str, Sequence[bool]]  # controller → outcome of each trial
 
 @dataclass(frozen=True)
 class Standard:
-    """What the parts of a suite share: how long a trial lasts, how far its start is disturbed, and
-    the standard push, a square one at the body's centre of mass."""
+    """The settings that the parts of a suite have in common.
+
+    They are how long a trial lasts, how far its start is disturbed, and the standard push, a square
+    one at the body's centre of mass."""
 
     duration: float = field(default=6.0, metadata={"above": 1.0, "max": 1e6})  # of a trial [s]
     start: float = field(default=0.5, metadata={"min": 0.0})  # of the first push [s]
