@@ -31,8 +31,8 @@ class QP:
 
     def __post_init__(self) -> None:
         n, m = len(self.g), len(self.l)
-        wanted = {"H": (n, n), "g": (n,), "C": (m, n), "l": (m,), "u": (m,)}
-        for name, shape in wanted.items():
+        shapes = {"H": (n, n), "g": (n,), "C": (m, n), "l": (m,), "u": (m,)}
+        for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name} must be {shape}, not {getattr(self, name).shape}")
 

@@ -255,7 +255,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     def compiled_tick(
         self, state: RobotState, targets: Targets
     ) -> tuple[Kernel[CaptureTick], CaptureTick]:
-        """Return the kernel that compiled code calls instead of `torques`, and its block; see `tau`."""
+        """Return the kernel that compiled code calls instead of `torques`, and its block."""
         tick = self.tick(state, targets)
         return address_of(capture_tick, tick), tick
 

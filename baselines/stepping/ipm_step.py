@@ -49,7 +49,7 @@ class EnergyPlanner(StepPlanner):
     """Plans the foothold over which the pendulum stands still, from where it is at touchdown.
 
     Until then the CoP is taken to stay at p, where the stance sole brakes most; the cost is how
-    far limits keep the foothold from the one wanted [m].
+    far limits keep the foothold from the one desired [m].
     """
 
     foothold_rule = staticmethod(energy_foothold)

@@ -45,7 +45,7 @@ class ContactTick(Block):
     load_limits: np.ndarray  # (nc,) [N]
     limited: np.ndarray  # (1,) int: 1 where these limits count
     applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
-    jump: np.ndarray  # (nv−6,) the most that they may change [N·m]
+    slew: np.ndarray  # (nv−6,) the most that they may change [N·m]
     follows: np.ndarray  # (1,) int: 1 where there was a last tick
     chosen: np.ndarray  # (1,) int: the subset of the last tick, −1: none
     index: int  # number of this subset
@@ -100,20 +100,20 @@ def assemble_contacts(t: ContactTick):
 
 
 @compiled
-def bound_torques(t: ContactTick, jumps: bool):
-    """Keep τ = τ₀ + T x within its limits, and within `jump` of the last tick's or not."""
+def bound_torques(t: ContactTick, rate_limited: bool):
+    """Keep τ = τ₀ + T x within its limits, and within `slew` of the last tick's or not."""
     ws, limit = t.problem.workspace, t.problem.parameters.torque_limit
     first = ws.first_torque
     for a in range(limit.shape[0]):
         low, high = -limit[a], limit[a]
-        if jumps:
-            low, high = max(low, t.applied[a] - t.jump[a]), min(high, t.applied[a] + t.jump[a])
+        if rate_limited:
+            low, high = max(low, t.applied[a] - t.slew[a]), min(high, t.applied[a] + t.slew[a])
         ws.l[first + a], ws.u[first + a] = low - ws.tau0[a], high - ws.tau0[a]
 
 
 @compiled
 def solve_contacts(t: ContactTick):
-    """Torques from the assembled problem, none of which changes by more than `jump`."""
+    """Torques from the assembled problem, none of which changes by more than `slew`."""
     ws = t.problem.workspace
     call(t.solve, ws)
     if ws.status[0] != 0 and t.follows[0]:
@@ -122,7 +122,7 @@ def solve_contacts(t: ContactTick):
     accept(t.source, t.problem.parameters, ws, t.memory)
     for a in range(ws.tau.shape[0]):
         if t.follows[0]:
-            ws.tau[a] = min(max(ws.tau[a], t.applied[a] - t.jump[a]), t.applied[a] + t.jump[a])
+            ws.tau[a] = min(max(ws.tau[a], t.applied[a] - t.slew[a]), t.applied[a] + t.slew[a])
         t.applied[a] = ws.tau[a]
     t.follows[0] = 1
 
@@ -191,8 +191,8 @@ class ContactSet(Copyable):
         Its stack has the tasks of the configuration, then `tasks`, then so many `rows` that are
         written by hand.
         """
-        wanted = (s, targets, *tasks, rows)
-        if wanted != self._bound_to:  # blocks are equal where they are the same
+        bound = (s, targets, *tasks, rows)
+        if bound != self._bound_to:  # blocks are equal where they are the same
             ws, own = self.workspace, replace(s, **self._own)
             problem = Assembly(
                 robot=self.arrays, state=own,
@@ -208,11 +208,11 @@ class ContactSet(Copyable):
                 source=s, pick=self.pick, problem=problem, memory=sets.memory,
                 load_limits=guarded_zeros(len(self.soles)),
                 limited=guarded_zeros(1, dtype=np.int64),
-                applied=sets.applied, jump=sets.jump, follows=sets.follows, chosen=sets.chosen,
+                applied=sets.applied, slew=sets.slew, follows=sets.follows, chosen=sets.chosen,
                 index=self.index, assemble=address_of(assemble, problem),
                 solve=address_of(solve, ws),
             )  # fmt: skip
-            self._bound_to = wanted
+            self._bound_to = bound
         return self.block
 
 
@@ -220,11 +220,12 @@ class ContactSets(Copyable):
     """Solves the momentum QP for whichever soles are in contact; remembers torques between ticks.
 
     `tick` gives torques; after a call `workspace` holds the solution of the set that was used.
-    No torque changes by more than `jump` of its limit from one tick to the next, whatever the
-    contacts do: the QP knows this bound, and where it has no solution within, the torques are cut.
+    No torque changes by more than `torque_rate_limit` of its limit from one tick to the next,
+    whatever the contacts do: the QP knows this bound, and where it has no solution within, the
+    torques are cut.
     """
 
-    def __init__(self, robot: Robot, config: MomentumQPConfig, jump: float = np.inf):
+    def __init__(self, robot: Robot, config: MomentumQPConfig, torque_rate_limit: float = np.inf):
         self.robot, self.config, self.period = robot, config, config.period
         self.tasks = bind_tasks(config.tasks, robot)
         for name, (task, _) in self.tasks.items():
@@ -247,7 +248,7 @@ class ContactSets(Copyable):
         }  # fmt: skip
         self.memory = allocate_memory(parameters.torque_limit)
         limit = parameters.torque_limit
-        self.jump = np.where(limit > 0.0, jump * limit, np.inf)
+        self.slew = np.where(limit > 0.0, torque_rate_limit * limit, np.inf)
         self.applied = guarded_zeros(len(limit))  # torques of the last tick, if
         self.follows = guarded_zeros(1, dtype=np.int64)  # there was one
         # index of the subset of the last tick, −1: none

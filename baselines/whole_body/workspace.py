@@ -88,7 +88,7 @@ class Workspace(Block):
     first_joint: int
     rows: np.ndarray  # (r, n)
     offsets: np.ndarray  # (r,)
-    wanted: np.ndarray  # (r,) what each should be
+    desired: np.ndarray  # (r,) what each should be
     weights: np.ndarray  # (r,) of the squared differences
     weighted: np.ndarray  # (r, n) rows times weights
     values: np.ndarray  # (r,) at the solution
@@ -100,7 +100,7 @@ class Workspace(Block):
     W0: np.ndarray  # (6,) A v̇₀ + A_bias, a view
     w0: np.ndarray  # (k,) a view
     tau0: np.ndarray  # (nj,) a view
-    accel_des: np.ndarray  # (nv,) a view of `wanted`
+    accel_des: np.ndarray  # (nv,) a view of `desired`
     wrench_des: np.ndarray  # (6,) a view
     force_des: np.ndarray  # (k,) a view
     accel_weights: np.ndarray  # (nv,) a view of `weights`
@@ -159,17 +159,17 @@ def allocate_workspace(
     points = len(point_chains)
     lay = lay_out(robot, space, cone_rows, soft_root, points, point_rows, limit_rows)
     n, m, r, k, nj, z = lay.n, lay.m, lay.r, lay.k, lay.nj, guarded_zeros
-    rows, offsets, wanted, weights, values = z((r, n)), z(r), z(r), z(r), z(r)
+    rows, offsets, desired, weights, values = z((r, n)), z(r), z(r), z(r), z(r)
     V, B, E, T = lay.parts
     for i in range(3 * points):  # the forces of points are unknowns themselves
         rows[E][i - 3 * points, lay.first_force + i] = 1.0
     ws = Workspace(
         first_internal=lay.first_internal, first_force=lay.first_force, first_root=lay.first_root,
         first_point=lay.first_point, first_torque=lay.first_torque, first_joint=lay.first_joint,
-        rows=rows, offsets=offsets, wanted=wanted, weights=weights,
+        rows=rows, offsets=offsets, desired=desired, weights=weights,
         weighted=z((r, n)), values=values, V=rows[V], B=rows[B], E=rows[E], T=rows[T],
         vdot0=offsets[V], W0=offsets[B], w0=offsets[E], tau0=offsets[T],
-        accel_des=wanted[V], wrench_des=wanted[B], force_des=wanted[E],
+        accel_des=desired[V], wrench_des=desired[B], force_des=desired[E],
         accel_weights=weights[V], momentum_weights=weights[B], force_weights=weights[E],
         torque_weights=weights[T], space=space,
         contact_accel=z(k), y=z(6), cop_prev=z(2), cop_vel=z(2), momentum_rate=z(6),

@@ -88,7 +88,7 @@ def cases(draw: Draw) -> Json:
 def _stops() -> tuple[tuple[Any, str], ...]:
     """What long runs begin with."""
     return (
-        (run, "Crew"), (search, "Crew"), (train_seeds, "Crew"),
+        (run, "Executor"), (search, "Executor"), (train_seeds, "Executor"),
         (stable_baselines3.PPO, "learn"), (export, "recoveries"), (page, "film"),
         (video, "record"),
     )  # fmt: skip

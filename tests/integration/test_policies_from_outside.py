@@ -45,7 +45,7 @@ def folder(tmp_path: Path) -> Path:
 @pytest.fixture(autouse=True)
 def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trials are played in this process."""
-    monkeypatch.setattr(run, "Crew", InProcess)
+    monkeypatch.setattr(run, "Executor", InProcess)
 
 
 def evaluate(folder: Path, *more: str) -> int:

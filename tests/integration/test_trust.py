@@ -43,7 +43,7 @@ from poise.training.results.compare import compare
 from poise.training.results.leaderboard import write_leaderboard
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
-from poise.training.running.crew import Crew
+from poise.training.running.executor import Executor
 from poise.training.trials.agents import load_agent
 from poise.training.trials.jobs import Job, Stage, play
 from poise.training.tuning.candidates import Candidate
@@ -465,9 +465,9 @@ def test_processes_are_told_what_is_allowed(ground: Ground, backend: str) -> Non
     for module in ("multiprocessing", "joblib", "signal", "numpy", "poise", "contextlib", "yaml"):
         (ground.here / f"{module}.py").write_text((ground.here / f"{ground.module}.py").read_text())
     workers = 1 if backend == "local" else 2  # joblib plays with one in this process
-    with poise.allowing("a:B"), Crew(backend, workers) as crew:
+    with poise.allowing("a:B"), Executor(backend, workers) as executor:
         names = ["a:B", "a:C"]
-        assert dict(crew.each(allowed_there, names)) == {"a:B": True, "a:C": False}
+        assert dict(executor.each(allowed_there, names)) == {"a:B": True, "a:C": False}
     assert not ground.sprung()
 
 
@@ -477,8 +477,8 @@ def test_workers_load_what_is_allowed(ground: Ground) -> None:
         "class Zero:\n    period = 0.004\n    def __init__(self, robot): pass\n"
         "    def reset(self, state): pass\n    def torques(self, state, targets): return 0\n"
     )
-    with poise.allowing("fine:Zero"), Crew("local", 1) as crew:
-        assert dict(crew.each(loaded_there, ["fine:Zero"])) == {"fine:Zero": "fine:Zero"}
+    with poise.allowing("fine:Zero"), Executor("local", 1) as executor:
+        assert dict(executor.each(loaded_there, ["fine:Zero"])) == {"fine:Zero": "fine:Zero"}
 
 
 def test_the_current_folder_plants_nothing(ground: Ground) -> None:

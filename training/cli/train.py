@@ -17,7 +17,7 @@ from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.seeds import SEEDS
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import train_seeds
-from poise.training.running.crew import Backend
+from poise.training.running.executor import Backend
 from poise.training.running.terminal import terminal
 
 from .commands import Allow

@@ -174,7 +174,7 @@ def test_evaluate_and_replay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One command plays, the other plays one of its trials again and says that it is the same."""
-    monkeypatch.setattr(run, "Crew", InProcess)
+    monkeypatch.setattr(run, "Executor", InProcess)
     InProcess.played, InProcess.stop_after = 0, None
     suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
     args = ["evaluate", "zero", "--suite", suite, "--out", out, "--trials", "2", "--seed", "3"]
@@ -195,7 +195,7 @@ def test_ctrl_c_says_how_to_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 130, no traceback; the same command finishes the evaluation."""
-    monkeypatch.setattr(run, "Crew", InProcess)
+    monkeypatch.setattr(run, "Executor", InProcess)
     InProcess.played, InProcess.stop_after = 0, 1
     suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
     args = ["evaluate", "zero", "--suite", suite, "--out", out]

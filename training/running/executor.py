@@ -39,7 +39,7 @@ def check_backend(backend: str) -> None:
             ) from None
 
 
-class Crew:
+class Executor:
     """Does jobs on `workers` processes until closed; use as a context.
 
     None: all cores, of this machine or of the cluster; `workers` tells how many once it is open.
@@ -53,7 +53,7 @@ class Crew:
         self._given = workers is not None
         self._pool: WorkerPool | None = None
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> Executor:
         self._open = ExitStack()
         self._open.enter_context(single_threaded())
         if self.backend == "local":
