@@ -5,7 +5,6 @@ import numpy as np
 from poise.baselines.controller import Targets
 from poise.baselines.stepping.blocks import CaptureTick
 from poise.baselines.stepping.tick import capture_tick
-from poise.baselines.whole_body.contact_sets import contact_tick
 from poise.baselines.whole_body.momentum_qp import (
     MomentumQP,
     MomentumQPConfig,
@@ -14,6 +13,7 @@ from poise.baselines.whole_body.momentum_qp import (
     momentum_tick,
     solve,
 )
+from poise.baselines.whole_body.tick import contact_tick
 from poise.configs.schema import build
 from poise.envs.compiled.calls import NO_KERNEL
 from poise.envs.physics.kinematics import allocate_state

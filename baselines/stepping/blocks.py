@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.baselines.controller import TargetArrays
-from poise.baselines.whole_body.contact_sets import ContactTick
 from poise.baselines.whole_body.momentum_qp import Tick
+from poise.baselines.whole_body.tick import ContactTick
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Kernel
 from poise.envs.physics.arrays import RobotArrays

@@ -7,9 +7,10 @@ import numpy as np
 from poise.baselines.controller import CompiledController, Outputs, Targets
 from poise.baselines.solvers.problem import Solver
 from poise.baselines.warmup import prepare
-from poise.baselines.whole_body.contact_sets import ContactSets, contact_tick
+from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.baselines.whole_body.momentum_qp import COMPILED_SOLVER, AroundQP, momentum_tick
 from poise.baselines.whole_body.parameters import QPParameters
+from poise.baselines.whole_body.tick import contact_tick
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.calls import NO_KERNEL, Kernel, address_of
 from poise.envs.compiled.memory import guarded_zeros

@@ -6,7 +6,7 @@
 import numpy as np
 
 from poise.baselines.motions.offsets import TRIGGER
-from poise.baselines.whole_body.contact_sets import ContactTick
+from poise.baselines.whole_body.tick import ContactTick
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import copy_into
