@@ -28,7 +28,7 @@ from poise.baselines.plugins import find_outside
 from poise.baselines.registry import controller_config, load_controller, momentum_qp_config
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled import warmup
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.evaluation.evaluate import benchmark, evaluate
 from poise.training.evaluation.seed_groups import seed_groups
 from poise.training.learning.checkpoints import check_controller, controller_fingerprint
@@ -495,7 +495,7 @@ def test_the_current_folder_plants_nothing(ground: Ground) -> None:
     code = (
         "import poise; poise.load_policy('policy'); import numba, poise.training.cli; "
         "assert not numba.config.CACHE_DIR and not numba.config.CACHE_LOCATOR_CLASSES; "
-        "assert poise.training.cli.commands.main(['replay', '.', '--trial', '0']) == 2"
+        "assert poise.training.cli.entry.main(['replay', '.', '--trial', '0']) == 2"
     )  # fmt: skip
     environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
     done = subprocess.run(

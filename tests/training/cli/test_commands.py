@@ -1,4 +1,4 @@
-"""training/cli/commands.py and training/cli/train.py."""
+"""training/cli/commands.py, entry.py and training/cli/train.py."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.schema import to_dict
 from poise.training.cli import commands
 from poise.training.cli import train as train_command
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.cli.train import parse
 from poise.training.evaluation import run
 from poise.training.learning.config import TrainConfig, train_config
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
 RICH = (
-    "from poise.training.cli import commands\n"
+    "from poise.training.cli import entry\n"
     "from poise.training.running.terminal import terminal\n"
-    "commands._run = lambda _: terminal().print('x')"
+    "entry._run = lambda _: terminal().print('x')"
 )
 BAD_SUITE = "random: {trials: many}\n"
 BAD_ROBOT = "name: a\nsource: {mjcf: nowhere.xml}\nroot: b\nfeet: []\n"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.evaluation.evaluate import benchmark
 from poise.training.running import log as trial_log
 from tests.support.benchmarks_small import TRIALS, InProcessExecutor, play_in_process, write_small

@@ -18,7 +18,7 @@ from poise.configs.files import packaged
 from poise.envs.balance.config import StartNoise
 from poise.envs.pushes.push import Push
 from poise.envs.sensors.delayed import DelayedState
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.evaluation import run
 from poise.training.evaluation.evaluate import benchmark, default_controllers
 from poise.training.results.read import load_results
