@@ -225,9 +225,9 @@ class CaptureStepConfig:
 
 @dataclass(frozen=True)
 class IPMStepConfig(CaptureStepConfig):
-    """As `capture-step`, with footholds by energy: of `foothold` only `lateral_offset` counts.
+    """The configuration of `capture-step`, with footholds by energy.
 
-    `time_min` = `time_max` = T.
+    Of `foothold` only `lateral_offset` counts. `time_min` = `time_max` = T.
     """
 
     kind: Literal["ipm-step"] = "ipm-step"  # type: ignore[assignment]

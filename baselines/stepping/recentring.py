@@ -254,7 +254,7 @@ def lower_foot(t: CaptureTick, foot: int) -> None:
 
 @compiled
 def end_recentring_swing(r: Recentring) -> None:
-    """At touchdown: let the foot that went back take up its load."""
+    """Let the foot that went back take up its load, at touchdown."""
     r.slip_time[0] = r.slip_time[1] = 0.0
     if r.stage[0] == SWINGING:
         r.stage[0] = LOADING

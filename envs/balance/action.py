@@ -1,14 +1,12 @@
 """The check of an action: a number in [−1, 1] for each of its names."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import real_array
 
 
-def checked_action(action: object, names: Sequence[str]) -> np.ndarray:
+def checked_action(action: object, names: tuple[str, ...]) -> np.ndarray:
     """Return `action` as numbers (len(names),).
 
     Raises ConfigError naming the entries: all for a wrong shape, else those out of bounds.

@@ -106,7 +106,7 @@ def _peek(args: Sequence[str]) -> argparse.Namespace:
 
 
 def _is_humanoid(robot: str) -> bool:
-    """By its name or its file; what there is not is refused later."""
+    """Return whether a name or a file is the humanoid's; it need not exist yet."""
     with contextlib.suppress(ConfigError):
         return resolve("robots", robot).samefile(resolve("robots", HUMANOID))
     return False

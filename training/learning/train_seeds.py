@@ -143,7 +143,7 @@ def train_run(run: SeedRun) -> str | None:
 
 
 def _all_seeds(seeds: Sequence[int], out: Path, resume: bool) -> list[int]:
-    """Those of the folder and the given ones; refuses what is no list of seeds."""
+    """Return the seeds of the folder and the given ones; refuses what is no list of seeds."""
     for seed in seeds:
         if seed < 0:
             raise ConfigError(f"must be at least 0, not {seed}", field="seeds")

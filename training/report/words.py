@@ -50,7 +50,7 @@ def push_times(trial: Trial) -> list[tuple[float, float]]:
 
 
 def _world(trial: Trial) -> list[str]:
-    """In what the trial differs from the standard one."""
+    """Return how the conditions of a trial differ from the standard ones."""
     said, conditions = [], trial.conditions
     if conditions.friction is not None:
         said.append(f"friction {conditions.friction:.2f}")

@@ -80,7 +80,7 @@ class Executor:
     def each(
         self, function: Callable[[Job], Result], jobs: Sequence[Job]
     ) -> Iterator[tuple[Job, Result]]:
-        """Each job with `function(job)`, as they are done; both are pickled.
+        """Yield each job with `function(job)`, in the order that they end in; both are pickled.
 
         What the user allows to run here may run there.
 
