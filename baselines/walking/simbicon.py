@@ -45,7 +45,7 @@ class Gain:
 class SimbiconConfig:
     """Poses of the two states of a step, for `lift_time` [1/ω] and until touchdown.
 
-    `first`: share of `lift_time` in the first step, which starts from rest. `width`: θ_d0 in the
+    `first`: fraction of `lift_time` in the first step, which starts from rest. `width`: θ_d0 in the
     frontal plane, outward [rad]. `lean` of the trunk, forward [rad].
     """
 

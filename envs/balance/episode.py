@@ -21,7 +21,7 @@ from .termination import Limits, has_diverged, has_fallen, uprightness
     FALLEN,  # 1 after a fall
     ENERGY,  # ∫ Σ |τ q̇| dt [J]
     PEAK_TORQUE,  # largest |τ|/τ_max
-    SATURATED,  # sum over ticks of the share of motors at their limit
+    SATURATED,  # sum over ticks of the fraction of motors at their limit
     TICKS,  # control ticks
     MAX_COM,  # largest distance of the CoM from the middle of the soles [m]
     MAX_CAPTURE,  # the same of the capture point [m]

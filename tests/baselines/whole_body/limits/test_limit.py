@@ -7,7 +7,7 @@ import pytest
 
 from poise.baselines import CaptureStep, CaptureStepConfig, MomentumQP, MomentumQPConfig, Targets
 from poise.baselines.registry import controller_config, load_controller
-from poise.baselines.solvers import make_solver, residuals
+from poise.baselines.solvers import Status, make_solver, residuals
 from poise.baselines.whole_body.constraint_rows import torque_matrix
 from poise.baselines.whole_body.formulation import build, torques_of, unknowns
 from poise.baselines.whole_body.limits.joint_speed import JointSpeed
@@ -145,6 +145,8 @@ def test_a_problem_that_limits_make_impossible_is_solved_without_them():
     """They go with the joint limits, and no failure is counted."""
     tick = solved_ticks()[3]
     qp = controller("joint-speed", largest=1e-6, horizon=1e-6, floor=1e9)  # beyond all torques
+    impossible = make_solver("daqp").solve(qp.problem(tick.state, tick.targets))
+    assert impossible.status is Status.INFEASIBLE
     default = MomentumQP(qp.robot, replace(qp.config, limits={}, joint=None))
     ours, theirs = (each.torques(tick.state, tick.targets) for each in (qp, default))
     assert qp.failures == 0
