@@ -15,7 +15,7 @@ from poise.baselines.allowance import SCRIPTS
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.schema import to_dict
-from poise.training.cli import commands
+from poise.training.cli import entry
 from poise.training.cli import train as train_command
 from poise.training.cli.entry import main
 from poise.training.cli.train import parse
@@ -84,7 +84,7 @@ def test_a_broken_pipe_of_another_kind_is_raised(
     def fail(_: object) -> int:
         raise BrokenPipeError
 
-    monkeypatch.setattr(commands, "_run", fail)
+    monkeypatch.setattr(entry, "_run", fail)
     with pytest.raises(BrokenPipeError):
         main(["list"])
     print("still here")
@@ -165,7 +165,7 @@ def test_a_wrong_flag_ends_with_code_2(
 
 def test_a_traceback_is_left_to_real_faults(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only Poise's own errors become a line."""
-    monkeypatch.setitem(commands.COMMANDS, "list", lambda: 1 / 0)
+    monkeypatch.setitem(entry.COMMANDS, "list", lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         main(["list"])
 
