@@ -1,7 +1,7 @@
-"""Whose code may run: what the user has named, never what a file has.
+"""The code that may run: what the user has named, never what a file has.
 
 Files that are read (policies, results, configurations) may name a class from outside, and to find
-it is to run its module. `find_outside`, the one function that imports what has been named, asks
+it is to run its module. `find_plugin`, the one function that imports what has been named, asks
 `check_allowed` first. Nothing is allowed to begin with; a scope is opened with
 
 - what the user types as a controller, or hands to an environment (`named`), and
@@ -36,7 +36,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Allowance:
-    """What may run: `names` as of `_key`; `source`, the file that is being read, for errors."""
+    """The code that may run: `names` as of `_key`; `source`, the file being read, for errors."""
 
     names: frozenset[str] = frozenset()
     source: str | None = None
@@ -46,13 +46,13 @@ NOTHING = Allowance()
 _current: ContextVar[Allowance] = ContextVar("allowance", default=NOTHING)
 
 
-def is_outside(name: object) -> TypeGuard[str]:
-    """Whether a name has the form ``module:Class``."""
+def is_plugin(name: object) -> TypeGuard[str]:
+    """Return whether a name has the form ``module:Class``."""
     return isinstance(name, str) and name.isprintable() and NAME.fullmatch(name) is not None
 
 
 def is_script(name: str | Path) -> bool:
-    """Whether a file of this name is TorchScript."""
+    """Return whether a file of this name is TorchScript."""
     return Path(name).suffix in SCRIPTS and str(name).isprintable()
 
 
@@ -84,7 +84,7 @@ def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) 
     """
     names = [names] if isinstance(names, str) else list(names)
     for name in names:
-        if not is_outside(name) and not is_script(name):
+        if not is_plugin(name) and not is_script(name):
             raise ConfigError(
                 f"{name!r} is not of the form module:Class or file.py:Class, nor a file of "
                 f"TorchScript ({', '.join(SCRIPTS)})",
@@ -125,11 +125,11 @@ def named(*controllers: object) -> list[str]:
         if isinstance(controller, (list, tuple)):
             found += named(*controller)
             continue
-        if isinstance(controller, (str, Path)) and not is_outside(controller):
+        if isinstance(controller, (str, Path)) and not is_plugin(controller):
             controller = _file(Path(controller))
         if isinstance(controller, Mapping):
             controller = controller.get("name") if controller.get("kind") == "outside" else None
-        if is_outside(controller):
+        if is_plugin(controller):
             found.append(controller)
     return found
 
@@ -168,7 +168,7 @@ def _file(path: Path) -> Mapping[str, object] | None:
 
 
 def _key(name: str, source: str | None, field: str) -> str:
-    """What a name stands for: a file by its whole path, links followed."""
+    """Return what a name stands for: a file by its whole path, links followed."""
     if is_script(name):
         return str(whole_path(name, source, field))
     place, _, attribute = name.rpartition(":")

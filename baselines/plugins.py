@@ -19,19 +19,19 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .allowance import NAME, allowing, check_allowed, is_outside
+from .allowance import NAME, allowing, check_allowed, is_plugin
 from .controller import BaseController, Controller, Targets, WrappedController
 
 METHODS = ("period", "reset", "torques")
 
 
 @dataclass(frozen=True)
-class OutsideConfig:
+class PluginConfig:
     """`name` is ``module:Class`` or ``file.py:Class``, called with the robot and `arguments`.
 
     `source` is a hash of the file that the class is in, so that results tell versions apart; it is
-    filled in by `outside_config`. Whoever holds one may make its controller: what files say becomes
-    one by `outside_config` alone, which asks whether the user allows it.
+    filled in by `plugin_config`. Whoever holds one may make its controller: what files say becomes
+    one by `plugin_config` alone, which asks whether the user allows it.
     """
 
     name: str
@@ -40,25 +40,25 @@ class OutsideConfig:
     source: str = ""
 
 
-def outside_config(name: str, arguments: dict[str, object] | None = None) -> OutsideConfig:
+def plugin_config(name: str, arguments: dict[str, object] | None = None) -> PluginConfig:
     """The configuration of a class from outside; raises ConfigError where there is none."""
-    found = find_outside(name)
+    found = find_plugin(name)
     try:
         path = inspect.getsourcefile(found)
     except TypeError:  # an object without a source
         path = None
     source = hashlib.sha256(Path(path).read_bytes()).hexdigest() if path else ""
-    return OutsideConfig(name, arguments=arguments or {}, source=source)
+    return PluginConfig(name, arguments=arguments or {}, source=source)
 
 
-def find_outside(name: str) -> Any:
-    """What ``module:Class`` names; modules are searched for in the current folder, too, at last.
+def find_plugin(name: str) -> Any:
+    """Return what ``module:Class`` names; the current folder is searched for the module last.
 
     Nothing else in this package imports what a user or a file names. Raises ConfigError when the
     user has not allowed it (`allowing`), the module cannot be imported or lacks the name.
     """
     match = NAME.fullmatch(name)
-    if match is None or not is_outside(name):
+    if match is None or not is_plugin(name):
         raise ConfigError(f"{name!r} is not of the form module:Class", field="controller")
     check_allowed(name)
     module = _module(match["place"])
@@ -69,10 +69,10 @@ def find_outside(name: str) -> Any:
     return getattr(module, match["name"])
 
 
-def make_outside(name: str, robot: Robot, arguments: dict[str, object] | None = None) -> object:
+def make_plugin(name: str, robot: Robot, arguments: dict[str, object] | None = None) -> object:
     """An instance for `robot`; raises ConfigError when it cannot be made."""
     try:
-        return find_outside(name)(robot, **(arguments or {}))
+        return find_plugin(name)(robot, **(arguments or {}))
     except PoiseError:
         raise
     except Exception as error:
@@ -81,16 +81,16 @@ def make_outside(name: str, robot: Robot, arguments: dict[str, object] | None = 
         ) from error
 
 
-class OutsideController(WrappedController):
+class PluginController(WrappedController):
     """A controller from outside, whose torques are checked before they act.
 
     A wrong shape or a number that is not finite is an error: MuJoCo would act on zeros instead.
     One that derives from `BaseController` tells more than its torques.
     """
 
-    def __init__(self, robot: Robot, config: OutsideConfig):
+    def __init__(self, robot: Robot, config: PluginConfig):
         with allowing(config.name):
-            inner = make_outside(config.name, robot, config.arguments)
+            inner = make_plugin(config.name, robot, config.arguments)
         if not isinstance(inner, Controller):
             missing = [name for name in METHODS if not hasattr(inner, name)]
             raise ConfigError(f"is no controller: it lacks {', '.join(missing)}",
@@ -123,14 +123,14 @@ class OutsideController(WrappedController):
         return tau
 
 
-def _blank(kind: type[OutsideController], name: str) -> OutsideController:
+def _blank(kind: type[PluginController], name: str) -> PluginController:
     """A controller still without anything, once its module is there to find its class in.
 
     Whoever copied it had been allowed to make it, and to unpickle is to run code anyway: Poise
     itself unpickles nothing that it reads from a folder.
     """
     with allowing(name):
-        find_outside(name)
+        find_plugin(name)
     return kind.__new__(kind)
 
 

@@ -23,14 +23,14 @@ from poise.configs.files import packaged, resolve
 from poise.configs.schema import build, on_base, read_yaml
 from poise.envs.robots.robot import Robot
 
-from .allowance import is_outside
+from .allowance import is_plugin
 from .controller import Controller
-from .plugins import OutsideConfig, OutsideController, outside_config
+from .plugins import PluginConfig, PluginController, plugin_config
 
 #: The configuration of a controller of this package, or of one from outside.
 ControllerConfig = (
     MomentumQPConfig | PDConfig | StablePDConfig | JacobianTransposeConfig | Kudoh02Config
-    | Macchietto09Config | CapturePointConfig | LQRLIPConfig | LIPMPCConfig | OutsideConfig
+    | Macchietto09Config | CapturePointConfig | LQRLIPConfig | LIPMPCConfig | PluginConfig
     | CaptureStepConfig | IPMStepConfig | SimbiconConfig | PolicyFileConfig
 )  # fmt: skip
 
@@ -45,7 +45,7 @@ KINDS: dict[str, tuple[type, type]] = {
     "capture-point": (CapturePointConfig, CapturePoint),
     "lqr-lip": (LQRLIPConfig, LQRLIP),
     "lip-mpc": (LIPMPCConfig, LIPMPC),
-    "outside": (OutsideConfig, OutsideController),
+    "outside": (PluginConfig, PluginController),
     "capture-step": (CaptureStepConfig, CaptureStep),
     "ipm-step": (IPMStepConfig, IPMStep),
     "simbicon": (SimbiconConfig, Simbicon),
@@ -63,8 +63,8 @@ def controller_config(controller: str | Path | Mapping[str, object]) -> Controll
     user has not allowed, see `allowing`.
     """
     config = _described(controller)
-    if isinstance(config, OutsideConfig):  # with the hash of what is there now
-        return outside_config(config.name, config.arguments)
+    if isinstance(config, PluginConfig):  # with the hash of what is there now
+        return plugin_config(config.name, config.arguments)
     return config
 
 
@@ -108,11 +108,11 @@ def load_controller(
 
 
 def _described(controller: str | Path | Mapping[str, object]) -> ControllerConfig:
-    """What a name, a file or a mapping says; nothing from outside is looked up for it."""
+    """Return what a name, a file or a mapping says, without importing anything for it."""
     if isinstance(controller, Mapping):
         return _build(dict(controller), "controller")
-    if is_outside(controller):
-        return OutsideConfig(str(controller))
+    if is_plugin(controller):
+        return PluginConfig(str(controller))
     if controller not in packaged("controllers") and is_policy(controller):
         return policy_config(controller)
     path = resolve("controllers", controller)

@@ -3,13 +3,13 @@
 from poise.envs.compiled.warmup import fill_cache
 
 KERNELS = "poise.baselines.environments.kernels"  # the module that lists the kernels
-SHARES = ("assembly", "solver", "steps")
+PARTS = ("assembly", "solver", "steps")
 
 
 def prepare(*further: str) -> None:
     """Fill the cache of compiled kernels if it is cold: some twenty seconds on two cores, once.
 
-    `further` shares of `environments/kernels.py` follow, for ten more; they use the kernels of
+    `further` parts of `environments/kernels.py` follow, for ten more; they use the kernels of
     the first.
     """
-    fill_cache(KERNELS, SHARES, further)
+    fill_cache(KERNELS, PARTS, further)

@@ -22,7 +22,7 @@ def packaged(kind: str) -> list[str]:
 
 
 def packaged_folder(kind: str) -> Path:
-    """Where the packaged configurations of one kind lie."""
+    """Return the folder of the packaged configurations of one kind."""
     return Path(str(files("poise.configs"))) / kind
 
 

@@ -31,7 +31,7 @@ class OfKind:
 
 
 def kind_of(cls: Any) -> str:
-    """What `kind` says in the files of a dataclass; empty where it has no such field."""
+    """Return what `kind` says in the files of a dataclass; empty where it has no such field."""
     own = [field for field in fields(cls) if field.name == "kind"] if is_dataclass(cls) else []
     return str(own[0].default) if own else ""
 

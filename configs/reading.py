@@ -29,7 +29,7 @@ CELLS = 10_000_000  # of a table
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether there is such a file; a name that no file can have is that of none."""
+    """Return whether there is such a file; False for a name that no file can have."""
     try:
         return Path(path).is_file()
     except (OSError, ValueError):  # too long, or with a NUL
@@ -37,7 +37,7 @@ def is_file(path: str | Path) -> bool:
 
 
 def is_folder(path: str | Path) -> bool:
-    """Whether there is such a folder; a name that no folder can have is that of none."""
+    """Return whether there is such a folder; False for a name that no folder can have."""
     try:
         return Path(path).is_dir()
     except (OSError, ValueError):
@@ -45,7 +45,7 @@ def is_folder(path: str | Path) -> bool:
 
 
 def exists(path: str | Path) -> bool:
-    """Whether there is anything of this name; a name that nothing can have is that of nothing."""
+    """Return whether there is anything of this name; False for a name that nothing can have."""
     try:
         return Path(path).exists()
     except (OSError, ValueError):

@@ -132,7 +132,7 @@ def to_dict(obj: Any, levels: int = DEPTH) -> Any:
 
 
 def _is_omitted(field: dataclasses.Field[Any], obj: object) -> bool:
-    """Whether a field is to be left out of what :func:`to_dict` makes of an object."""
+    """Return whether :func:`to_dict` leaves a field of this object out."""
     if field.metadata.get("omit") != "default":
         return False
     factory = field.default_factory

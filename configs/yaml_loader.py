@@ -1,4 +1,4 @@
-"""How Poise reads YAML: PyYAML's safe loader, within bounds, with two of its surprises removed."""
+"""The reader of YAML: PyYAML's safe loader, within bounds, with two of its surprises removed."""
 
 from __future__ import annotations
 

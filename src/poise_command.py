@@ -15,7 +15,7 @@ def command() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _leave)
-    from poise.training.cli.commands import command
+    from poise.training.cli.entry import command
 
     command()
 

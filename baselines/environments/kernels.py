@@ -5,7 +5,6 @@ import numpy as np
 from poise.baselines.controller import Targets
 from poise.baselines.stepping.blocks import CaptureTick
 from poise.baselines.stepping.tick import capture_tick
-from poise.baselines.whole_body.contact_sets import contact_tick
 from poise.baselines.whole_body.momentum_qp import (
     MomentumQP,
     MomentumQPConfig,
@@ -14,7 +13,9 @@ from poise.baselines.whole_body.momentum_qp import (
     momentum_tick,
     solve,
 )
+from poise.baselines.whole_body.tick import contact_tick
 from poise.configs.schema import build
+from poise.envs.compiled.calls import NO_KERNEL
 from poise.envs.physics.kinematics import allocate_state
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import load_robot
@@ -48,11 +49,12 @@ _EXAMPLES = {
         "hand": {"kind": "position", "body": "left_lower_arm"},
     },
     "contacts": {"hand": {"kind": "point", "body": "left_lower_arm", "normal": [0.0, 0.0, 1.0]}},
+    "limits": {"speed": {"kind": "joint-speed", "largest": 5.0}, "torque": {"kind": "torque"}},
 }
 
 
 def rows() -> None:
-    """The rows of tasks and of contacts other than the feet."""
+    """The rows of tasks, of contacts other than the feet and of limits."""
     config = build(MomentumQPConfig, _EXAMPLES, "the packaged kinds")
     qp = MomentumQP(load_robot("humanoid"), config)
     env = ResidualBalanceEnv(controller=config, duration=0.1)
@@ -76,7 +78,7 @@ def steps() -> None:
     qp = env.controller
     assert isinstance(qp, MomentumQP)  # by default
     problem = qp.assembly(env.simulation.state, env.targets)
-    tick = Tick(problem, qp.memory, 0, 0)
+    tick = Tick(problem, qp.memory, NO_KERNEL, NO_KERNEL)
     policy_tick.compile((env.bind(tick, 0).numba_type,))
     momentum_tick.compile((tick.numba_type,))
     accept(problem.state, problem.parameters, problem.workspace, qp.memory)
@@ -98,7 +100,7 @@ def contacts() -> None:
 
 
 def planner() -> None:
-    """When, where to and how a foot steps, and what a policy sees of it."""
+    """The planner of steps and the swing, and what a policy sees of them."""
     env, tick = _stepping()
     capture_tick.compile((tick.numba_type,))
     env.bind(tick, 0)

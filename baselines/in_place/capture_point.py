@@ -37,5 +37,5 @@ class CapturePoint(Guided):
     def cop(self, state: RobotState, targets: Targets) -> np.ndarray:
         """(2,) p [m]."""
         reference = targets.com[:2] + targets.com_vel[:2] / state.omega
-        wanted = state.capture_point + self.config.gain * (state.capture_point - reference)
-        return nearest_inside(shrunk(state.support_polygon, self.config.share), wanted)
+        desired = state.capture_point + self.config.gain * (state.capture_point - reference)
+        return nearest_inside(shrunk(state.support_polygon, self.config.share), desired)

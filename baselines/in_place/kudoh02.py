@@ -16,7 +16,7 @@ from .pd import PDGains, StablePD, StablePDConfig
 @dataclass(frozen=True)
 class Kudoh02Config:
     """The QP takes over where the capture point is farther than `far` from c_ref, and hands back
-    below `near` [shares of the CoM height]; torques pass from one to the other in `blend` [s].
+    below `near` [fractions of the CoM height]; torques pass from one to the other in `blend` [s].
 
     `qp` brings the CoM back with the CoP in the soles; it tracks no motion but for what makes
     its solution unique.

@@ -1,4 +1,4 @@
-"""The least sole wrenches for a wanted wrench on the body."""
+"""The least sole wrenches for a desired wrench on the body."""
 
 import numpy as np
 

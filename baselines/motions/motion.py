@@ -36,7 +36,7 @@ class Keyframe:
 
 @dataclass(frozen=True)
 class Balance:
-    """Roles that keep the CoM over its place: role → share of the angle that is solved for."""
+    """Roles that keep the CoM over its place: role → fraction of the angle that is solved for."""
 
     forward: dict[str, float] = field(default_factory=dict)
     left: dict[str, float] = field(default_factory=dict)

@@ -21,12 +21,12 @@ from .scaled_rows import (
     most_violated,
     scale_rows,
 )
+from .warm_start import resume
 
 FEASIBLE = 1e-11  # accepted violation of a scaled row, relative to ‖x‖
 ROUNDING = 1e-13  # the same, relative to the unconstrained ‖x‖, before correction
 CONSISTENT = 1e-9  # the same as FEASIBLE, for a row that depends on the active rows
 DEPENDENT = 1e-20  # squared sine (metric of H⁻¹) below which a row depends on the active ones
-RESUMED = 1e-12  # the same for a row that the last problem had active
 BLOCKS = 1e-13  # smallest multiplier direction that can block a step, relative to the largest
 ALIGNMENT = 8  # of the rows of the factors, in float64: unaligned ones cost a quarter more time
 CHECKS = 20  # times that a finished solution may be found wanting and taken up again
@@ -102,76 +102,6 @@ def _step_length(
         if r[k] > threshold and mult[k] < t * r[k]:
             blocking, t = k, mult[k] / r[k]
     return blocking, t
-
-
-@compiled
-def _resume(
-    Jt: np.ndarray,
-    Rt: np.ndarray,
-    Ct: np.ndarray,
-    q: int,
-    equalities: int,
-    rows: np.ndarray,
-    sides: np.ndarray,
-    active: np.ndarray,
-    sign: np.ndarray,
-    bound: np.ndarray,
-    mult: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-    x: np.ndarray,
-    trace: float,
-    d: np.ndarray,
-    z: np.ndarray,
-    r: np.ndarray,
-    normal: np.ndarray,
-    s: np.ndarray,
-    work: np.ndarray,
-) -> int:
-    """Makes `rows` active at once and lets go of those that pull; returns the number of rows.
-
-    What is left is a start as good as any for the method: x is optimal for the rows it holds.
-    """
-    n = Jt.shape[0]
-    for i in range(len(rows)):
-        row, side = rows[i], sides[i]
-        if q == n or not 0 <= row < Ct.shape[1] or not (side == 1 or side == -1):
-            continue
-        limit = lower[row] if side == 1 else -upper[row]
-        if not limit > -np.inf:
-            continue
-        for j in range(n):
-            normal[j] = side * Ct[j, row]
-        free, square = split(Jt, q, normal, d, z)
-        if free <= max(RESUMED * square, 1e-28 * trace):
-            continue
-        append(Jt, Rt, q, d, z, free)
-        active[q], sign[q], bound[q], mult[q] = row, side, limit, 0.0
-        q += 1
-    while True:
-        for k in range(q):
-            d[k] = bound[k] - sign[k] * s[active[k]]
-        lift(Jt, Rt, q, d, z)
-        solve_upper(Rt, q, d, r)
-        pulling = int(np.int64(-1))  # not a literal, as above
-        for k in range(equalities, q):
-            if r[k] < 0.0 and (pulling < 0 or r[k] < r[pulling]):
-                pulling = k
-        if pulling < 0:
-            break
-        remove(Jt, Rt, q, pulling)
-        q -= 1
-        for k in range(pulling, q):
-            active[k], sign[k], bound[k] = active[k + 1], sign[k + 1], bound[k + 1]
-    for j in range(n):
-        x[j] += z[j]
-    for k in range(q):
-        mult[k] += r[k]
-        if k >= equalities:
-            lower[active[k]], upper[active[k]] = -np.inf, np.inf
-    s[:] = 0.0
-    advance(Ct, x, 1.0, s, work)
-    return q
 
 
 @compiled
@@ -261,7 +191,7 @@ def solve_dual(
         equality = row >= 0
         if not equality:
             if lasts > 0:
-                q = _resume(
+                q = resume(
                     Jt, Rt, Ct, q, equalities, last[:lasts], last_sign, active, sign, bound, mult,
                     lower, upper, x, trace, d, z, r, normal, s, work,
                 )  # fmt: skip

@@ -31,8 +31,8 @@ class QP:
 
     def __post_init__(self) -> None:
         n, m = len(self.g), len(self.l)
-        wanted = {"H": (n, n), "g": (n,), "C": (m, n), "l": (m,), "u": (m,)}
-        for name, shape in wanted.items():
+        shapes = {"H": (n, n), "g": (n,), "C": (m, n), "l": (m,), "u": (m,)}
+        for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name} must be {shape}, not {getattr(self, name).shape}")
 
@@ -104,7 +104,7 @@ def failed(qp: QP, status: Status, start: float, iterations: int = 0) -> Solutio
 
 
 def uncopyable(name: str) -> PoiseError:
-    """Why a library's solver cannot be copied between its problems."""
+    """Return the error for a library's solver, which cannot be copied between its problems."""
     return PoiseError(
         f"solver {name!r} cannot be copied within an episode, for its library does not tell what "
         "it remembers: copy after the reset"
@@ -112,7 +112,7 @@ def uncopyable(name: str) -> PoiseError:
 
 
 def refusal(qp: QP) -> Status | None:
-    """Why there is no need to ask a solver: numbers or bounds that cannot be; else None."""
+    """Return the status that numbers or bounds have without a solver; None where one is needed."""
     if not all(np.isfinite(a).all() for a in (qp.H, qp.g, qp.C)):
         return Status.INVALID
     if np.isnan(qp.l).any() or np.isnan(qp.u).any():

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.baselines.controller import TargetArrays
-from poise.baselines.whole_body.contact_sets import ContactTick
 from poise.baselines.whole_body.momentum_qp import Tick
+from poise.baselines.whole_body.tick import ContactTick
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Kernel
 from poise.envs.physics.arrays import RobotArrays
@@ -152,7 +152,7 @@ class StepGains(Block):
 
 @dataclass(frozen=True, eq=False)
 class StepMemory(Block):
-    """What a controller that steps remembers from tick to tick."""
+    """The memory of a controller that steps, from tick to tick."""
 
     steps: np.ndarray  # (1,) int: steps begun since the reset
     recovering: np.ndarray  # (1,) int: 1 from a step until the robot is calm in its nominal stance

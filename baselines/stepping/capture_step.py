@@ -7,9 +7,10 @@ import numpy as np
 from poise.baselines.controller import CompiledController, Outputs, Targets
 from poise.baselines.solvers.problem import Solver
 from poise.baselines.warmup import prepare
-from poise.baselines.whole_body.contact_sets import ContactSets, contact_tick
+from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.baselines.whole_body.momentum_qp import COMPILED_SOLVER, AroundQP, momentum_tick
 from poise.baselines.whole_body.parameters import QPParameters
+from poise.baselines.whole_body.tick import contact_tick
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.calls import NO_KERNEL, Kernel, address_of
 from poise.envs.compiled.memory import guarded_zeros
@@ -174,7 +175,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
 
     @property
     def stepped(self) -> bool:
-        """Whether a step has begun since the reset."""
+        """True once a step has begun since the reset."""
         return self.steps > 0
 
     @property
@@ -188,7 +189,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         return self._swing if self.memory.swinging[0] else None
 
     def stepping(self) -> Stepping:
-        """Where the controller is in its steps."""
+        """The step in progress, see `Stepping`."""
         swing = self.swing
         if swing is None:
             return STANDING._replace(steps=self.steps, since=float(self.memory.clock[0]))
@@ -255,7 +256,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     def compiled_tick(
         self, state: RobotState, targets: Targets
     ) -> tuple[Kernel[CaptureTick], CaptureTick]:
-        """What compiled code calls instead of `torques`: `call(address, block)`, then `tau`."""
+        """Return the kernel that compiled code calls instead of `torques`, and its block."""
         tick = self.tick(state, targets)
         return address_of(capture_tick, tick), tick
 

@@ -1,4 +1,4 @@
-"""What the YAML files of the controllers that step say.
+"""The configuration of the controllers that step, as their YAML files have it.
 
 Numbers have no units: lengths are in h, times in 1/ω and speeds in h ω, with
 h the height of the standing CoM and ω = √(g/h), unless a comment says otherwise.
@@ -20,7 +20,7 @@ def _number(default: float, **bounds: float) -> float:
 
 @dataclass(frozen=True)
 class StepLimits:
-    """Where a foot may be put, measured from the stance foot along the heading, and how fast."""
+    """The footholds that a foot may reach, from the stance foot in the heading, and its speed."""
 
     ahead: float = _number(0.75, min=0.0)
     behind: float = _number(0.7, min=0.0)
@@ -40,7 +40,7 @@ class StepLimits:
 
 @dataclass(frozen=True)
 class FootholdChoice:
-    """Where a foothold lies from the capture point that it is to stop, and what a step costs."""
+    """The place of a foothold relative to the capture point that it stops, and a step's cost."""
 
     sagittal_offset: float = 0.04  # beyond ξ along the heading
     lateral_offset: float = 0.08  # beyond ξ to the foot's own side, so that ξ ends between the feet
@@ -96,7 +96,7 @@ class StepFeedback:
 
 @dataclass(frozen=True)
 class FallFeedback(StepFeedback):
-    """What is added to K in the first step of a fall along `angle` [°], to either side.
+    """An addition to K in the first step of a fall along `angle` [°], to either side.
 
     Gains of `later_step` do nothing here, since that signal is 0 in a first step.
     """
@@ -106,7 +106,7 @@ class FallFeedback(StepFeedback):
 
 @dataclass(frozen=True)
 class PivotGains:
-    """What turn and lean of the body add to a point, by r = `momentum` ω L/(m g) + `lean` h e.
+    """The shift r of a point by turn and lean of the body, r = `momentum` ω L/(m g) + `lean` h e.
 
     e is the horizontal part of the root's axis that stands at rest, L the angular momentum that
     turns the body along r. No gain has a unit.
@@ -133,7 +133,7 @@ class PivotConfig:
 
 @dataclass(frozen=True)
 class RecentringConfig:
-    """When and how feet go back to the nominal stance, the one of standing."""
+    """The return of the feet to the nominal stance, the one of standing."""
 
     distance: float = _number(0.0, min=0.0)  # of a foot from its nominal place; 0: never
     calm_speed: float = _number(0.1, min=0.0)  # the robot is calm while its CoM is slower
@@ -225,9 +225,9 @@ class CaptureStepConfig:
 
 @dataclass(frozen=True)
 class IPMStepConfig(CaptureStepConfig):
-    """As `capture-step`, with footholds by energy: of `foothold` only `lateral_offset` counts.
+    """The configuration of `capture-step`, with footholds by energy.
 
-    `time_min` = `time_max` = T.
+    Of `foothold` only `lateral_offset` counts. `time_min` = `time_max` = T.
     """
 
     kind: Literal["ipm-step"] = "ipm-step"  # type: ignore[assignment]

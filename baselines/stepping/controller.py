@@ -1,4 +1,4 @@
-"""What a controller that steps is: how its choices can be moved, and where it is in its steps."""
+"""The interface of a controller that steps: offsets to its choices, and the step in progress."""
 
 from typing import NamedTuple
 
@@ -42,7 +42,7 @@ def _pair(first: int, doc: str) -> property:
 
 
 class StepOffsets(Copyable):
-    """What a policy adds to a stepping controller's choices, along the axes of the step's heading.
+    """The offsets that a policy adds to a stepping controller's choices, in axes of the heading.
 
     Zeros add nothing. The order of `values` is that of `motions/offsets.py`.
     """
@@ -64,7 +64,7 @@ class StepOffsets(Copyable):
 
 
 class Stepping(NamedTuple):
-    """Where a stepping controller is in its steps."""
+    """The step that a controller is in."""
 
     steps: int  #: steps begun since the reset
     foot: int  #: the foot that swings; −1: none
@@ -89,7 +89,7 @@ class SteppingController(BaseController):
     offsets: StepOffsets  #: added to its own choices
 
     def stepping(self) -> Stepping:
-        """Where the controller is in its steps."""
+        """The step in progress, see `Stepping`."""
         raise NotImplementedError
 
     @property

@@ -1,4 +1,4 @@
-"""Where soles can put the centre of pressure with the torques of their ankles [Koolen12]."""
+"""The region of centres of pressure that soles reach with their ankles' torques [Koolen12]."""
 
 import mujoco
 import numpy as np
@@ -76,10 +76,10 @@ def distance_beyond(
     x: float,
     y: float,
 ) -> float:
-    """How far (x, y) lies outside the region of two soles at (fx, fy) and (sx, sy), whose heading
-    is (cos, sin) [m]; < 0 inside.
+    """Return how far (x, y) lies outside the region of two soles [m]; < 0 inside.
 
-    It is measured along 48 DIRECTIONS only, which lets corners reach some millimetres further.
+    The soles are at (fx, fy) and (sx, sy), their heading is (cos, sin). The distance is
+    measured along 48 DIRECTIONS only, which lets corners reach some millimetres further.
     """
     worst = -np.inf
     for d in range(r.directions.shape[0]):
@@ -146,7 +146,7 @@ def double_support_region(
 
 
 class CopRegion(Copyable):
-    """Where soles can put the centre of pressure p with the torques that their ankles have.
+    """The region in which soles can put the centre of pressure p with their ankles' torques.
 
     A sole under a load of λ m g reaches the p of its polygon with |N p − o| ≤ b/λ (`ankle_limits`).
     Two soles reach p = λ p_0 + (1 − λ) p_1, with p_i what sole i reaches under its load: the less a

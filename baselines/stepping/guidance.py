@@ -1,4 +1,4 @@
-"""What the QPs are asked for in a step and after; kernels on a `CaptureTick`."""
+"""The targets of the QPs in a step and after; kernels on a `CaptureTick`."""
 
 import numpy as np
 

@@ -18,7 +18,7 @@ from .search import clip_to_limits, to_step_frame, to_world, with_offsets
 
 @compiled
 def rest_distance(speed: float, omega: float, height: float, arc: float) -> float:
-    """How far ahead of the CoM a foot stops it [m]: the energy left over the foot is 0.
+    """Return how far ahead of the CoM a foot stops it [m]: the energy left over the foot is 0.
 
     Linear pendulum, orbital energy E = ½ ẋ² − ½ ω² x² = 0:      x = ẋ/ω
     rigid leg, ½ ẋ² + g z = g √(z² + x²) [Coros10]:              x = ẋ/ω √(1 + ẋ²/(4 g z))
@@ -49,7 +49,7 @@ class EnergyPlanner(StepPlanner):
     """Plans the foothold over which the pendulum stands still, from where it is at touchdown.
 
     Until then the CoP is taken to stay at p, where the stance sole brakes most; the cost is how
-    far limits keep the foothold from the one wanted [m].
+    far limits keep the foothold from the one desired [m].
     """
 
     foothold_rule = staticmethod(energy_foothold)

@@ -1,4 +1,4 @@
-"""Which foot steps, where to and how fast: footholds from which the fall can be stopped."""
+"""The planner of a step: foot, foothold and time from which the fall can be stopped."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -21,7 +21,7 @@ from .search import capture_foothold, plan_step, replan_step, set_foot
 from .swing import Swing
 
 
-class Plan(NamedTuple):
+class StepPlan(NamedTuple):
     """A step."""
 
     foot: int  #: the foot that steps
@@ -111,13 +111,13 @@ class StepPlanner(Copyable):
         search.heading[:] = np.cos(yaw), np.sin(yaw)
         return search
 
-    def plan(self, state: RobotState, yaw: float) -> Plan:
+    def plan(self, state: RobotState, yaw: float) -> StepPlan:
         """The best step of either foot from where they stand."""
         search = self._along(state, yaw)
         plan_step(search)
         return best_plan(search)
 
-    def replan(self, state: RobotState, foot: int, yaw: float, swing: Swing) -> Plan:
+    def replan(self, state: RobotState, foot: int, yaw: float, swing: Swing) -> StepPlan:
         """The foothold and the time left of a running step."""
         search = self._along(state, yaw)
         replan_step(search, foot, swing.arrays)
@@ -131,7 +131,7 @@ class StepPlanner(Copyable):
 
         The CoP is taken to stay at p, where the stance sole brakes ξ most, so that ξ drifts to
         p + (ξ − p) e^(ωt) [Koolen12]; the foothold is what limits of place and speed allow of the
-        one wanted there.
+        one desired there.
         """
         search = self._along(state, yaw)
         set_foot(search, foot)
@@ -144,7 +144,7 @@ class StepPlanner(Copyable):
         return footholds, costs
 
 
-def best_plan(search: Search) -> Plan:
+def best_plan(search: Search) -> StepPlan:
     """The best step of a search."""
     x, y, time, cost, offset = search.best.tolist()
-    return Plan(int(search.best_foot[0]), np.array([x, y]), time, cost, offset)
+    return StepPlan(int(search.best_foot[0]), np.array([x, y]), time, cost, offset)

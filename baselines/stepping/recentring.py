@@ -130,7 +130,7 @@ def shift_weight(t: CaptureTick) -> None:
 
 @compiled
 def _is_calm(t: CaptureTick) -> bool:
-    """Whether the CoM is slow and the root upright."""
+    """Return whether the CoM is slow and the root upright."""
     s, r, up = t.state, t.recentring, 0.0
     for a in range(3):
         up += s.root_axes[2, a] * t.search.feedback.upright[a]
@@ -140,7 +140,7 @@ def _is_calm(t: CaptureTick) -> bool:
 
 @compiled
 def recentring_step_due(t: CaptureTick) -> bool:
-    """Whether one of two standing feet lifts off now to go back.
+    """Return whether one of two standing feet lifts off now to go back.
 
     Counts how long the robot has been calm. When that is long enough, begins to shift the weight,
     or ends the recovery where the feet are near their nominal stance.
@@ -254,7 +254,7 @@ def lower_foot(t: CaptureTick, foot: int) -> None:
 
 @compiled
 def end_recentring_swing(r: Recentring) -> None:
-    """At touchdown: let the foot that went back take up its load."""
+    """Let the foot that went back take up its load, at touchdown."""
     r.slip_time[0] = r.slip_time[1] = 0.0
     if r.stage[0] == SWINGING:
         r.stage[0] = LOADING

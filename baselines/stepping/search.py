@@ -92,7 +92,7 @@ def with_offsets(q: Search, x: float, y: float) -> tuple[float, float]:
 
 @compiled
 def clip_to_limits(q: Search, x: float, y: float) -> tuple[float, float]:
-    """What the limits of place and speed leave of a foothold (x, y) in the frame of the step [m].
+    """Return the foothold (x, y) [m], in the frame of the step, within limits of place and speed.
 
     The place is limited to a box. The mean velocities vx and vy of the swing are limited to the
     ellipse (vx/`speed`)² + (vy/`side_speed`)² ≤ 1: the way from the start is shortened to it.
@@ -114,7 +114,7 @@ def end_capture_point(q: Search) -> tuple[float, float]:
 
 @compiled
 def distance_outside(q: Search, x: float, y: float) -> float:
-    """How far (x, y) lies outside the CoP region of both soles, the foot at its foothold [m]."""
+    """Return how far (x, y) lies outside the CoP region of both soles, one at its foothold [m]."""
     foot, heading = q.foot[0], q.heading
     first, second = q.foothold, q.state.sole_point[1 - foot]
     if foot == 1:

@@ -6,7 +6,7 @@
 import numpy as np
 
 from poise.baselines.motions.offsets import TRIGGER
-from poise.baselines.whole_body.contact_sets import ContactTick
+from poise.baselines.whole_body.tick import ContactTick
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import copy_into
@@ -44,8 +44,9 @@ FZ = 2  # of a sole's wrench
 
 @compiled
 def must_step(t: CaptureTick) -> bool:
-    """Whether ξ is so far outside the CoP region of both soles that a step begins, see
-    `CaptureStepConfig`."""
+    """Return whether ξ is so far outside the CoP region of both soles that a step begins.
+
+    `CaptureStepConfig` has the distance."""
     s, m, g, feet = t.state, t.memory, t.gains, t.state.sole_point
     stepped = m.recovering[0] > 0
     if stepped and m.clock[0] < g.double_support_time:
@@ -100,7 +101,7 @@ def begin_step(t: CaptureTick, to_nominal: bool) -> None:
 
 @compiled
 def has_landed(t: CaptureTick) -> bool:
-    """Whether the foot touches the ground, late in its swing and level."""
+    """Return whether the foot touches the ground, late in its swing and level."""
     s, w, foot = t.state, t.swing, t.memory.foot[0]
     low = s.sole_point[foot, 2] - w.ground[0] < LOW * t.robot.height_com
     return s.contacts[foot] > 0.5 and w.time[0] > LANDING * w.duration[0] and low

@@ -18,8 +18,7 @@ from poise.envs.robots.robot import Robot
 
 @dataclass(frozen=True)
 class Pose:
-    """What a state asks of the legs, from standing [rad]: the swing thigh forward (θ_d0), bend of
-    the knees."""
+    """The angles of the legs in a state, from standing [rad]: swing thigh (θ_d0) and knees."""
 
     swing_hip: float = 0.0
     swing_knee: float = 0.0
@@ -46,7 +45,7 @@ class Gain:
 class SimbiconConfig:
     """Poses of the two states of a step, for `lift_time` [1/ω] and until touchdown.
 
-    `first`: share of `lift_time` in the first step, which starts from rest. `width`: θ_d0 in the
+    `first`: fraction of `lift_time` in the first step, which starts from rest. `width`: θ_d0 in the
     frontal plane, outward [rad]. `lean` of the trunk, forward [rad].
     """
 
@@ -124,8 +123,8 @@ class Simbicon(BaseController):
         heading[:2, :2] = turn(self._yaw)
         tau = self.stiffness * (targets.q_ref - state.q) - self.damping * state.qvel[6:]
         for leg, bend in ((swing, pose.swing_knee), (stance, pose.stance_knee)):
-            wanted = targets.q_ref[leg.knee] + leg.bend * bend
-            tau[leg.knee] = self._pd(c.knee, wanted - state.q[leg.knee], state.qvel[6 + leg.knee])
+            desired = targets.q_ref[leg.knee] + leg.bend * bend
+            tau[leg.knee] = self._pd(c.knee, desired - state.q[leg.knee], state.qvel[6 + leg.knee])
         ankle = stance.ankle
         error = targets.q_ref[ankle] - state.q[ankle]
         tau[ankle] = self._pd(c.stance_ankle, error, state.qvel[6 + ankle])
@@ -172,9 +171,9 @@ class Simbicon(BaseController):
         upper = axes[:, swing.upper]
         thigh = trunk + upper @ (state.q - self.arrays.q_standing)[swing.upper]
         forward, left = self.placement(state, pose)
-        wanted = heading @ np.array([left, -forward, 0.0])
+        desired = heading @ np.array([left, -forward, 0.0])
         speed = spin + upper @ state.qvel[6 + swing.upper]
-        tau[swing.hip] = axes[:, swing.hip].T @ self._pd(c.hip, wanted - thigh, speed)
+        tau[swing.hip] = axes[:, swing.hip].T @ self._pd(c.hip, desired - thigh, speed)
         lean = c.lean * heading[:, 1]
         moment = self._pd(c.trunk, lean - trunk, spin) + axes[:, swing.hip] @ tau[swing.hip]
         held = state.J[6 * (1 - self.foot) + 3 : 6 * (1 - self.foot) + 6, 6 + stance.hip]

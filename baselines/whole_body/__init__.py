@@ -11,15 +11,15 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from poise.baselines.whole_body.constraint_rows import Bounds
     from poise.baselines.whole_body.formulation import build
+    from poise.baselines.whole_body.limits.limit import Bounds
     from poise.baselines.whole_body.tasks.task import Rows
 else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
-            "constraint_rows": ("Bounds",),
             "formulation": ("build",),
+            "limits.limit": ("Bounds",),
             "tasks.task": ("Rows",),
         },
     )

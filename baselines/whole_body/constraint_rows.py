@@ -5,7 +5,6 @@ of `points`, contacts of other bodies.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -13,15 +12,8 @@ from scipy.linalg import block_diag
 from poise.envs.physics.state import RobotState
 
 from .contacts.contact import ContactRows
+from .limits.limit import Bounds
 from .parameters import QPParameters
-
-
-class Bounds(NamedTuple):
-    """A constraint: l ≤ C x ≤ u. C may stop short: the columns left out are zero."""
-
-    C: np.ndarray  # (k, ≤ n)
-    l: np.ndarray  # (k,)  # noqa: E741
-    u: np.ndarray  # (k,)
 
 
 def contact_jacobian(state: RobotState, points: Sequence[ContactRows] = ()) -> np.ndarray:

@@ -1,143 +1,55 @@
-"""The momentum QP with any subset of the soles in contact.
+"""The momentum QP with any subset of the soles in contact, and with contacts of other bodies.
 
 One reduced problem for each subset (see `reduced_qp.py`), built on arrays that hold the soles in
 contact only. A stack of tasks says what else is asked of v̇, such as the way of a swing foot.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 
 from poise.baselines.controller import TargetArrays, Targets
 from poise.baselines.solvers import QP
 from poise.configs.errors import ConfigError
-from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import address_of, call
+from poise.envs.compiled.calls import address_of
 from poise.envs.compiled.copies import Copyable
-from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays, robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .contacts.contact import contact_arrays
+from .contacts.contact import BoundContact, bind_contacts, contact_arrays
+from .limits.limit import BoundLimit, bind_limits
 from .momentum_qp import MomentumQPConfig
 from .parameters import QPParameters, qp_parameters
 from .reduced_qp import Assembly, assemble
-from .stack import make_stack, put_rows
+from .stack import limit_program, make_stack, put_rows
 from .tasks.task import BoundTask, Rows, bind_tasks
-from .tick import Memory, accept, allocate_memory, forget, solve
+from .tick import (
+    ContactTick,
+    allocate_memory,
+    assemble_contacts,
+    forget,
+    pick_soles,
+    solve,
+    solve_contacts,
+)
 from .workspace import Workspace, allocate_workspace
-
-
-@dataclass(frozen=True, eq=False)
-class ContactTick(Block):
-    """All that a tick of one subset works on."""
-
-    source: StateArrays  # with all soles
-    pick: np.ndarray  # (nc,) int: the soles of the subset
-    problem: Assembly  # with these soles only
-    memory: Memory
-    load_limits: np.ndarray  # (nc,) [N]
-    limited: np.ndarray  # (1,) int: 1 where these limits count
-    applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
-    jump: np.ndarray  # (nv−6,) the most that they may change [N·m]
-    follows: np.ndarray  # (1,) int: 1 where there was a last tick
-    chosen: np.ndarray  # (1,) int: the subset of the last tick, −1: none
-    index: int  # number of this subset
-    assemble: int  # address of `assemble(problem)`, compiled already
-    solve: int  # address of `solve(problem.workspace)`
-
-
-@compiled
-def pick_soles(source: StateArrays, pick: np.ndarray, own: StateArrays):
-    """Copy what belongs to soles; the origin is the mean of those picked."""
-    nc = pick.shape[0]
-    own.origin[:] = 0.0
-    for i in range(nc):
-        sole = pick[i]
-        for r in range(6):
-            copy_into(source.J[6 * sole + r], own.J[6 * i + r])
-            own.J_v[6 * i + r] = source.J_v[6 * sole + r]
-            own.Jdot_v[6 * i + r] = source.Jdot_v[6 * sole + r]
-        for a in range(3):
-            copy_into(source.sole_axes[sole, a], own.sole_axes[i, a])
-            own.sole_point[i, a] = source.sole_point[sole, a]
-            own.origin[a] += source.sole_point[sole, a]
-        own.contacts[i] = source.contacts[sole]
-    for a in range(3):
-        own.origin[a] /= nc
-
-
-@compiled
-def choose_set(t: ContactTick):
-    """Forget what this subset remembers of earlier ticks, if the last one was another's."""
-    if t.chosen[0] != t.index:
-        ws, t.chosen[0] = t.problem.workspace, t.index
-        ws.cop_prev[0] = ws.cop_prev[1] = np.nan
-        for i in range(ws.iscratch.shape[0]):
-            ws.iscratch[i] = 0
-
-
-@compiled
-def assemble_contacts(t: ContactTick):
-    """The reduced QP of a subset."""
-    ws, cone = t.problem.workspace, t.problem.parameters.cone
-    choose_set(t)
-    pick_soles(t.source, t.pick, t.problem.state)
-    call(t.assemble, t.problem)
-    if t.limited[0]:
-        for i in range(cone.shape[0]):
-            row = (i + 1) * cone.shape[1] - 1
-            copy_into(ws.E[6 * i + 2], ws.C[row])
-            ws.u[row] = t.load_limits[i] - ws.w0[6 * i + 2]
-    if t.follows[0]:
-        bound_torques(t, True)
-
-
-@compiled
-def bound_torques(t: ContactTick, jumps: bool):
-    """Keep τ = τ₀ + T x within its limits, and within `jump` of the last tick's or not."""
-    ws, limit = t.problem.workspace, t.problem.parameters.torque_limit
-    first = ws.first_torque
-    for a in range(limit.shape[0]):
-        low, high = -limit[a], limit[a]
-        if jumps:
-            low, high = max(low, t.applied[a] - t.jump[a]), min(high, t.applied[a] + t.jump[a])
-        ws.l[first + a], ws.u[first + a] = low - ws.tau0[a], high - ws.tau0[a]
-
-
-@compiled
-def solve_contacts(t: ContactTick):
-    """Torques from the assembled problem, none of which changes by more than `jump`."""
-    ws = t.problem.workspace
-    call(t.solve, ws)
-    if ws.status[0] != 0 and t.follows[0]:
-        bound_torques(t, False)
-        call(t.solve, ws)
-    accept(t.source, t.problem.parameters, ws, t.memory)
-    for a in range(ws.tau.shape[0]):
-        if t.follows[0]:
-            ws.tau[a] = min(max(ws.tau[a], t.applied[a] - t.jump[a]), t.applied[a] + t.jump[a])
-        t.applied[a] = ws.tau[a]
-    t.follows[0] = 1
-
-
-@compiled
-def contact_tick(t: ContactTick):
-    """Run one tick with a subset: its workspace's `tau` (nv−6,) then holds torques."""
-    assemble_contacts(t)
-    solve_contacts(t)
 
 
 class ContactSet(Copyable):
     """Arrays, parameters and scratch for one subset of the soles (its indices, in order)."""
 
     def __init__(
-        self, arrays: RobotArrays, parameters: QPParameters, soles: tuple[int, ...], index: int
+        self,
+        arrays: RobotArrays,
+        parameters: QPParameters,
+        soles: tuple[int, ...],
+        index: int,
+        points: Sequence[BoundContact],
+        limits: Iterable[BoundLimit],
     ):
         pick, self.index = np.array(soles), index
         self.soles, self.pick = soles, pick
@@ -148,8 +60,11 @@ class ContactSet(Copyable):
         cone = parameters.cone[pick]  # with a row more for each sole: the bound on its load
         self.parameters = replace(parameters, cone=np.pad(cone, ((0, 0), (0, 1), (0, 0))))
         self.workspace = allocate_workspace(
-            self.arrays, self.parameters.cone.shape[1], parameters.soft_root
-        )
+            self.arrays, self.parameters.cone.shape[1], parameters.soft_root,
+            [point.chain for point in points],
+            sum(point.contact.cone_rows for point in points),
+            limit_rows=sum(limit.size for limit in limits),
+        )  # fmt: skip
         nv, nc = len(arrays.q_standing) + 6, len(soles)
         self._own = {
             "J": guarded_zeros((6 * nc, nv)),
@@ -181,23 +96,28 @@ class ContactSet(Copyable):
         Its stack has the tasks of the configuration, then `tasks`, then so many `rows` that are
         written by hand.
         """
-        wanted = (s, targets, *tasks, rows)
-        if wanted != self._bound_to:  # blocks are equal where they are the same
+        bound = (s, targets, *tasks, rows)
+        if bound != self._bound_to:  # blocks are equal where they are the same
             ws, own = self.workspace, replace(s, **self._own)
             problem = Assembly(
-                robot=self.arrays, state=own, contacts=contact_arrays(own),
+                robot=self.arrays, state=own,
+                contacts=contact_arrays(
+                    own, list(sets.contacts.values()), ws.contact_accel, ws.force_weights,
+                    ws.force_des,
+                ),
                 parameters=self.parameters, targets=targets, period=sets.period,
-                tasks=make_stack([*sets.tasks.values(), *tasks], s, ws, rows), workspace=ws,
+                tasks=make_stack([*sets.tasks.values(), *tasks], s, ws, rows),
+                limits=limit_program(sets.limits.values(), s, ws), workspace=ws,
             )  # fmt: skip
             self.block = ContactTick(
                 source=s, pick=self.pick, problem=problem, memory=sets.memory,
                 load_limits=guarded_zeros(len(self.soles)),
                 limited=guarded_zeros(1, dtype=np.int64),
-                applied=sets.applied, jump=sets.jump, follows=sets.follows, chosen=sets.chosen,
+                applied=sets.applied, slew=sets.slew, follows=sets.follows, chosen=sets.chosen,
                 index=self.index, assemble=address_of(assemble, problem),
                 solve=address_of(solve, ws),
             )  # fmt: skip
-            self._bound_to = wanted
+            self._bound_to = bound
         return self.block
 
 
@@ -205,18 +125,19 @@ class ContactSets(Copyable):
     """Solves the momentum QP for whichever soles are in contact; remembers torques between ticks.
 
     `tick` gives torques; after a call `workspace` holds the solution of the set that was used.
-    No torque changes by more than `jump` of its limit from one tick to the next, whatever the
-    contacts do: the QP knows this bound, and where it has no solution within, the torques are cut.
+    No torque changes by more than `torque_rate_limit` of its limit from one tick to the next,
+    whatever the contacts do: the QP knows this bound, and where it has no solution within, the
+    torques are cut.
     """
 
-    def __init__(self, robot: Robot, config: MomentumQPConfig, jump: float = np.inf):
-        if config.contacts:
-            raise ConfigError("has the soles in contact alone", field="contacts")
+    def __init__(self, robot: Robot, config: MomentumQPConfig, torque_rate_limit: float = np.inf):
         self.robot, self.config, self.period = robot, config, config.period
         self.tasks = bind_tasks(config.tasks, robot)
         for name, (task, _) in self.tasks.items():
             if task.kernel is None:
                 raise ConfigError("has no kernel", field=f"tasks.{name}")
+        self.contacts = bind_contacts(config.contacts, robot)
+        self.limits = bind_limits(config.limits, robot)
         self.arrays = robot_arrays(robot)
         self.parameters = parameters = qp_parameters(robot, self.arrays, config)
         count = len(robot.soles)
@@ -224,12 +145,15 @@ class ContactSets(Copyable):
         if count > 1:
             subsets.append(tuple(range(count)))
         self.sets = {
-            soles: ContactSet(self.arrays, parameters, soles, index)
+            soles: ContactSet(
+                self.arrays, parameters, soles, index,
+                list(self.contacts.values()), self.limits.values(),
+            )
             for index, soles in enumerate(subsets)
-        }
+        }  # fmt: skip
         self.memory = allocate_memory(parameters.torque_limit)
         limit = parameters.torque_limit
-        self.jump = np.where(limit > 0.0, jump * limit, np.inf)
+        self.slew = np.where(limit > 0.0, torque_rate_limit * limit, np.inf)
         self.applied = guarded_zeros(len(limit))  # torques of the last tick, if
         self.follows = guarded_zeros(1, dtype=np.int64)  # there was one
         # index of the subset of the last tick, −1: none
@@ -246,6 +170,12 @@ class ContactSets(Copyable):
     def failures(self) -> int:
         """Ticks since the reset at which the QP was not solved."""
         return int(self.memory.failures[0])
+
+    @property
+    def forces(self) -> dict[str, np.ndarray]:
+        """(3,) force [N] on each of `contacts` in the last solution, world axes."""
+        forces = self.workspace.wrenches[len(self.workspace.wrenches) - 3 * len(self.contacts) :]
+        return dict(zip(self.contacts, forces.reshape(-1, 3).copy(), strict=True))
 
     def reset(self) -> None:
         """Forget the last trial."""

@@ -15,7 +15,7 @@ and is tested against this one. To try another task or limit, hand its rows to `
     torques = torques_of(state, solution.x)
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,6 @@ from poise.baselines.solvers import QP
 from poise.envs.physics.state import RobotState
 
 from .constraint_rows import (
-    Bounds,
     contact_jacobian,
     joint_limits,
     point_cones,
@@ -34,8 +33,10 @@ from .constraint_rows import (
     sole_cones,
     sole_motion,
     torque_limits,
+    torque_matrix,
 )
 from .contacts.contact import ContactRows
+from .limits.limit import BoundLimit, Bounds
 from .parameters import QPParameters
 from .task_rows import (
     accel_rows,
@@ -78,6 +79,7 @@ def build(
     tasks: Sequence[Rows] = (),
     constraints: Sequence[Bounds] = (),
     points: Sequence[ContactRows] = (),
+    limits: Iterable[BoundLimit] = (),
 ) -> QP:
     """The QP of one tick in x = (v̇, w) or (v̇, w, u_root), with `tasks` and `constraints` added.
 
@@ -86,6 +88,7 @@ def build(
         cop_vel: (2,) ṗ, which a controller measures between its ticks; at rest if left out.
         tasks: such as `[task.rows(state) for task in controller.tasks.values()]`.
         points: contacts of other bodies, likewise of `controller.contacts`.
+        limits: such as `controller.limits.values()`.
     """
     p = parameters
     cop_vel = np.zeros(2) if cop_vel is None else cop_vel
@@ -103,7 +106,8 @@ def build(
         sole_motion(state, p),
         sole_cones(state, p),
         torque_limits(state, p, points),
-        joint_limits(state, p),
+        *([joint_limits(state, p)] if p.brakes else []),
+        *(limit.rows(state, torque_matrix(state, points)) for limit in limits),
         *constraints,
     ]
     if points:

@@ -21,7 +21,7 @@ class PostureTask:
     """h_t = ‖v̇ − (a_ref + k_t (q_ref ⊖ q) + d_t (v_ref − v))‖², weights per kind of joint.
 
     Joints are told apart by what they carry: legs move one sole, the trunk moves several, the
-    rest (arms, head) none. Damping is d_t = 2 ζ √k_t. All weights fall to a share of themselves
+    rest (arms, head) none. Damping is d_t = 2 ζ √k_t. All weights fall to a fraction of themselves
     as the CoM leaves c_ref: β = s + (1 − s) exp(−(|c − c_ref|/d)²), horizontally [Abe07]; then
     balance counts more than the posture.
     """
@@ -70,7 +70,7 @@ class CoPTask:
 
 @dataclass(frozen=True)
 class SoleContact:
-    """J v̇ + J̇ v = −k_v J v; wrenches inside a share of the real cone, and small."""
+    """J v̇ + J̇ v = −k_v J v; wrenches inside a fraction of the real cone, and small."""
 
     damping: float = _at_least(0.0, 5.0)
     friction_share: float = field(default=0.9, metadata={"above": 0.0, "max": 1.0})

@@ -14,7 +14,7 @@ from poise.baselines.controller import (
 )
 from poise.baselines.solvers import QP, Status, make_solver
 from poise.baselines.warmup import prepare
-from poise.envs.compiled.calls import address_of
+from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
@@ -22,9 +22,10 @@ from poise.envs.robots.robot import Robot
 
 from .contacts.contact import BoundContact, Contact, bind_contacts, contact_arrays
 from .gains import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
+from .limits.limit import BoundLimit, Limit, bind_limits
 from .parameters import QPParameters, qp_parameters
 from .reduced_qp import Assembly, assemble
-from .stack import fill_from_python, make_stack
+from .stack import fill_from_python, limit_program, make_stack
 from .tasks.task import BoundTask, Task, bind_tasks
 from .tick import Tick, accept, allocate_memory, forget, momentum_tick, release_joints, solve
 from .workspace import allocate_workspace
@@ -39,7 +40,8 @@ class MomentumQPConfig:
     `root`: "hard" lets nothing but the ground push the root (physics); "soft" adds a penalised
     wrench u_root on it (a game character that must not fail). `tasks`: what else v̇ is to do, each
     under a name of its own, see `tasks/`; `contacts`: what touches the world besides the soles, see
-    `contacts/`.
+    `contacts/`; `limits`: what else bounds the solution, see `limits/`. Without `joint` (null)
+    nothing stops joints before their limits.
     """
 
     kind: Literal["momentum-qp"] = "momentum-qp"
@@ -53,9 +55,10 @@ class MomentumQPConfig:
     cop: CoPTask = field(default_factory=CoPTask)
     contact: SoleContact = field(default_factory=SoleContact)
     torque: TorqueLimit = field(default_factory=TorqueLimit)
-    joint: JointLimit = field(default_factory=JointLimit)
+    joint: JointLimit | None = field(default_factory=JointLimit)
     tasks: dict[str, Task] = field(default_factory=dict, metadata={"omit": "default"})
     contacts: dict[str, Contact] = field(default_factory=dict, metadata={"omit": "default"})
+    limits: dict[str, Limit] = field(default_factory=dict, metadata={"omit": "default"})
 
 
 class MomentumQP(CompiledController):
@@ -63,25 +66,26 @@ class MomentumQP(CompiledController):
 
     `torques` solves the reduced problem of `reduced_qp.py`, whose readable form is
     `formulation.py`. After a call, `vdot`, `wrenches`, `forces`, `root_wrench` and `failures` tell
-    what was found. Raises ConfigError for an unknown solver or solver option, and for a task or a
-    contact of a body that the robot does not have.
+    what was found. Raises ConfigError for an unknown solver or solver option, and for a task, a
+    contact or a limit of a body or a joint that the robot does not have.
 
     Attributes:
         tasks: those of the configuration by name; the arrays of a task's `block`, such as its
             reference, may be written to at any time.
-        contacts: likewise.
+        contacts, limits: likewise.
     """
 
     def __init__(self, robot: Robot, config: MomentumQPConfig | None = None):
         self.robot = robot
         self.config = config or MomentumQPConfig()
-        if self.config.tasks or self.config.contacts:
+        if self.config.tasks or self.config.contacts or self.config.limits:
             prepare("rows")
         self.period = self.config.period
         self.arrays = robot_arrays(robot)
         self.parameters = qp_parameters(robot, self.arrays, self.config)
         self.tasks: dict[str, BoundTask] = bind_tasks(self.config.tasks, robot)
         self.contacts: dict[str, BoundContact] = bind_contacts(self.config.contacts, robot)
+        self.limits: dict[str, BoundLimit] = bind_limits(self.config.limits, robot)
         points = self.contacts.values()
         self.workspace = allocate_workspace(
             self.arrays,
@@ -89,6 +93,7 @@ class MomentumQP(CompiledController):
             self.config.root == "soft",
             [point.chain for point in points],
             sum(point.contact.cone_rows for point in points),
+            sum(limit.size for limit in self.limits.values()),
         )
         self.memory = allocate_memory(self.parameters.torque_limit)
         self.com_offset = self.config.com.offset * robot.height_com
@@ -136,7 +141,7 @@ class MomentumQP(CompiledController):
         if self.solver is not None:
             self.solver.reset()
 
-    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Tick]:
+    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel[Tick], Tick]:
         """The kernel that compiled code calls for `torques`, and its block; see `outputs`."""
         tick = self.tick(state, targets)
         return address_of(momentum_tick, tick), tick
@@ -177,6 +182,7 @@ class MomentumQP(CompiledController):
             targets=t,
             period=self.period,
             tasks=make_stack(self.tasks.values(), s, ws),
+            limits=limit_program(self.limits.values(), s, ws),
             workspace=ws,
         )
 

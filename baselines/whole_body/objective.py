@@ -124,7 +124,7 @@ def build_objective(
 ):
     """Fill H and g: ½ the weighted squares of posture, Ṗ, L̇, wrenches, torques and x.
 
-    What is wanted of v̇ lies in the workspace already, and so do the weights and wanted forces of
+    What is desired of v̇ lies in the workspace already, and so do the weights and desired forces of
     contacts other than soles.
     """
     nv, n = ws.V.shape
@@ -142,7 +142,7 @@ def build_objective(
         ws.torque_weights[a] = p.torque_weight[a]
     ws.g[:] = 0.0
     for r in range(weights.shape[0]):
-        residual = weights[r] * (ws.offsets[r] - ws.wanted[r])
+        residual = weights[r] * (ws.offsets[r] - ws.desired[r])
         for j in range(n):
             ws.weighted[r, j] = weights[r] * ws.rows[r, j]
             ws.g[j] += residual * ws.rows[r, j]

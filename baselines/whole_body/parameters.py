@@ -10,6 +10,7 @@ from poise.envs.physics.arrays import RobotArrays
 from poise.envs.robots.robot import Robot
 
 from .contacts.wrench_cone import robot_cones
+from .gains import JointLimit
 
 if TYPE_CHECKING:
     from .momentum_qp import MomentumQPConfig
@@ -39,6 +40,7 @@ class QPParameters(Block):
     sole_damping: float  # k_v [1/s]
     cone: np.ndarray  # (nc, rows, 6) cone · w_sole ≤ 0
     torque_limit: np.ndarray  # (nv−6,) 0 for a joint without a motor
+    brakes: bool  # false: nothing stops joints before their limits
     brake_accel: float  # [rad/s²] that braking may assume
     brake_horizon: float  # [s]
     brake_floor: float  # [rad/s²] braking is never asked to exceed
@@ -75,6 +77,7 @@ def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig")
 
     torque_limit = np.zeros(nj)  # a joint without a motor has none
     torque_limit[arrays.motor_dofs - 6] = config.torque.share * arrays.torque_limit
+    joint = config.joint or JointLimit()
     com_stiffness = np.array([com.stiffness, com.stiffness, com.height_stiffness])
     return QPParameters(
         accel_weight=accel_weight / omega**4,
@@ -97,9 +100,10 @@ def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig")
         sole_damping=config.contact.damping * omega,
         cone=robot_cones(robot, config.contact.friction_share, config.contact.polygon_share),
         torque_limit=torque_limit,
-        brake_accel=config.joint.brake * omega**2,
-        brake_horizon=config.joint.horizon / omega,
-        brake_floor=config.joint.floor * omega**2,
+        brakes=config.joint is not None,
+        brake_accel=joint.brake * omega**2,
+        brake_horizon=joint.horizon / omega,
+        brake_floor=joint.floor * omega**2,
         soft_root=config.root == "soft",
         root_weight=config.root_weight / np.repeat([force, moment], 3) ** 2,
     )

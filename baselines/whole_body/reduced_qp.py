@@ -18,14 +18,14 @@ import numpy as np
 
 from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import run
+from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
+from .constraints import build_constraints
 from .contacts.contact import ContactArrays
-from .limits import build_constraints
 from .null_space import solve_resting
 from .objective import (
     build_objective,
@@ -49,6 +49,7 @@ class Assembly(Block):
     targets: TargetArrays
     period: float  # [s] between two ticks
     tasks: TaskStack
+    limits: Program  # the kernels of further limits, see `limits/`
     workspace: Workspace
 
 
@@ -65,6 +66,7 @@ def assemble(a: Assembly):
     _torques(s, c, ws)
     build_objective(robot, s, p, t, ws)
     build_constraints(robot, s, p, c, ws)
+    run(a.limits)
     if a.tasks.b.shape[0] > 0:
         add_stack(a.tasks, ws)
 

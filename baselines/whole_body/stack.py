@@ -1,4 +1,4 @@
-"""The stack of tasks of a reduced problem: what is asked of v̇ besides posture and momentum."""
+"""Tasks and limits of a reduced problem besides its own: which rows are whose."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 
+from .limits.limit import BoundArrays, BoundLimit, LimitTick, ReducedMotion
 from .tasks.task import BoundTask, RowArrays, Rows, TaskTick
 from .workspace import Workspace
 
@@ -50,6 +51,21 @@ def make_stack(
         weighted=guarded_zeros((k, n)),
         fill=Program.of(calls),
     )
+
+
+def limit_program(
+    limits: Iterable[BoundLimit], state: StateArrays, workspace: Workspace
+) -> Program:
+    """Return the kernels of limits, whose rows are the last constraints of the workspace."""
+    limits, ws, calls = tuple(limits), workspace, []
+    motion = ReducedMotion(V=ws.V, vdot0=ws.vdot0, T=ws.T, tau0=ws.tau0)
+    first = len(ws.l) - sum(limit.size for limit in limits)
+    for each in limits:
+        own = slice(first, first + each.size)
+        rows = BoundArrays(C=ws.C[own], l=ws.l[own], u=ws.u[own])
+        calls.append((each.limit.kernel, LimitTick(state, motion, each.block, rows)))
+        first = own.stop
+    return Program.of(calls)
 
 
 def put_rows(stack: TaskStack, rows: Sequence[Rows], first: int = 0) -> None:

@@ -38,8 +38,8 @@ def posture_rows(state: RobotState, targets: Targets, p: QPParameters) -> Rows:
 def carrying_velocity(state: RobotState, angular_momentum: np.ndarray) -> np.ndarray:
     """(nv,) least v* that has A_L v* = L_ref and moves neither the soles nor the CoM."""
     rows = np.vstack([state.J, state.A])
-    wanted = np.concatenate([np.zeros(len(rows) - 3), angular_momentum])
-    return np.linalg.lstsq(rows, wanted, rcond=None)[0]
+    desired = np.concatenate([np.zeros(len(rows) - 3), angular_momentum])
+    return np.linalg.lstsq(rows, desired, rcond=None)[0]
 
 
 def desired_linear_rate(state: RobotState, targets: Targets, p: QPParameters) -> np.ndarray:
@@ -90,9 +90,9 @@ def wrench_rows(state: RobotState, p: QPParameters, points: Sequence[ContactRows
     nv, soles = len(state.qvel), len(state.J)
     weights = np.tile(np.repeat([p.force_weight, p.moment_weight], 3), soles // 6)
     weights = np.concatenate([weights, *(point.weights for point in points)])
-    wanted = np.concatenate([np.zeros(soles), *(point.force for point in points)])
-    k = len(wanted)
-    return Rows(np.eye(k, nv + k, nv), wanted, weights)
+    desired = np.concatenate([np.zeros(soles), *(point.force for point in points)])
+    k = len(desired)
+    return Rows(np.eye(k, nv + k, nv), desired, weights)
 
 
 def accel_rows(state: RobotState, p: QPParameters) -> Rows:

@@ -1,4 +1,7 @@
-"""The compiled control tick of the momentum QP: assemble, solve, accept or fall back."""
+"""The compiled control ticks of the momentum QP: assemble, solve, accept or fall back.
+
+One is of all soles, the other of a subset that may change from tick to tick (`contact_sets.py`).
+"""
 
 from dataclasses import dataclass
 
@@ -7,7 +10,7 @@ import numpy as np
 from poise.baselines.solvers.dual_active_set import solve_dual
 from poise.baselines.solvers.scaled_rows import INFEASIBLE
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import call
+from poise.envs.compiled.calls import Kernel, call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.vectors import copy_into
@@ -52,7 +55,7 @@ FALLBACK_SPEED = 10.0  # joint speed [rad/s] at which damping alone uses the who
 
 @compiled
 def release_joints(ws: Workspace):
-    """Take away the joint limits, the last rows of the problem."""
+    """Take away the joint limits and what follows, the limits that a configuration adds."""
     ws.l[ws.first_joint :] = -np.inf
     ws.u[ws.first_joint :] = np.inf
 
@@ -95,8 +98,8 @@ class Tick(Block):
 
     problem: Assembly
     memory: Memory
-    assemble: int  # address of `assemble(problem)`
-    solve: int  # address of `solve(problem.workspace)`
+    assemble: Kernel[Assembly]  # `assemble`, of `problem`
+    solve: Kernel[Workspace]  # `solve`, of the problem's workspace
 
 
 @compiled
@@ -106,3 +109,103 @@ def momentum_tick(t: Tick):
     call(t.assemble, a)
     call(t.solve, a.workspace)
     accept(a.state, a.parameters, a.workspace, t.memory)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTick(Block):
+    """All that a tick of one subset works on."""
+
+    source: StateArrays  # with all soles
+    pick: np.ndarray  # (nc,) int: the soles of the subset
+    problem: Assembly  # with these soles only
+    memory: Memory
+    load_limits: np.ndarray  # (nc,) [N]
+    limited: np.ndarray  # (1,) int: 1 where these limits count
+    applied: np.ndarray  # (nv−6,) torques of the last tick [N·m]
+    slew: np.ndarray  # (nv−6,) the most that they may change [N·m]
+    follows: np.ndarray  # (1,) int: 1 where there was a last tick
+    chosen: np.ndarray  # (1,) int: the subset of the last tick, −1: none
+    index: int  # number of this subset
+    assemble: Kernel[Assembly]  # `assemble`, of `problem`
+    solve: Kernel[Workspace]  # `solve`, of the problem's workspace
+
+
+@compiled
+def pick_soles(source: StateArrays, pick: np.ndarray, own: StateArrays):
+    """Copy what belongs to soles; the origin is the mean of those picked."""
+    nc = pick.shape[0]
+    own.origin[:] = 0.0
+    for i in range(nc):
+        sole = pick[i]
+        for r in range(6):
+            copy_into(source.J[6 * sole + r], own.J[6 * i + r])
+            own.J_v[6 * i + r] = source.J_v[6 * sole + r]
+            own.Jdot_v[6 * i + r] = source.Jdot_v[6 * sole + r]
+        for a in range(3):
+            copy_into(source.sole_axes[sole, a], own.sole_axes[i, a])
+            own.sole_point[i, a] = source.sole_point[sole, a]
+            own.origin[a] += source.sole_point[sole, a]
+        own.contacts[i] = source.contacts[sole]
+    for a in range(3):
+        own.origin[a] /= nc
+
+
+@compiled
+def choose_set(t: ContactTick):
+    """Forget what this subset remembers of earlier ticks, if the last one was another's."""
+    if t.chosen[0] != t.index:
+        ws, t.chosen[0] = t.problem.workspace, t.index
+        ws.cop_prev[0] = ws.cop_prev[1] = np.nan
+        for i in range(ws.iscratch.shape[0]):
+            ws.iscratch[i] = 0
+
+
+@compiled
+def assemble_contacts(t: ContactTick):
+    """The reduced QP of a subset."""
+    ws, cone = t.problem.workspace, t.problem.parameters.cone
+    choose_set(t)
+    pick_soles(t.source, t.pick, t.problem.state)
+    call(t.assemble, t.problem)
+    if t.limited[0]:
+        for i in range(cone.shape[0]):
+            row = (i + 1) * cone.shape[1] - 1
+            copy_into(ws.E[6 * i + 2], ws.C[row])
+            ws.u[row] = t.load_limits[i] - ws.w0[6 * i + 2]
+    if t.follows[0]:
+        bound_torques(t, True)
+
+
+@compiled
+def bound_torques(t: ContactTick, rate_limited: bool):
+    """Keep τ = τ₀ + T x within its limits, and within `slew` of the last tick's or not."""
+    ws, limit = t.problem.workspace, t.problem.parameters.torque_limit
+    first = ws.first_torque
+    for a in range(limit.shape[0]):
+        low, high = -limit[a], limit[a]
+        if rate_limited:
+            low, high = max(low, t.applied[a] - t.slew[a]), min(high, t.applied[a] + t.slew[a])
+        ws.l[first + a], ws.u[first + a] = low - ws.tau0[a], high - ws.tau0[a]
+
+
+@compiled
+def solve_contacts(t: ContactTick):
+    """Torques from the assembled problem, none of which changes by more than `slew`."""
+    ws = t.problem.workspace
+    call(t.solve, ws)
+    if ws.status[0] != 0 and t.follows[0]:
+        bound_torques(t, False)
+        call(t.solve, ws)
+    accept(t.source, t.problem.parameters, ws, t.memory)
+    for a in range(ws.tau.shape[0]):
+        if t.follows[0]:
+            ws.tau[a] = min(max(ws.tau[a], t.applied[a] - t.slew[a]), t.applied[a] + t.slew[a])
+        t.applied[a] = ws.tau[a]
+    t.follows[0] = 1
+
+
+@compiled
+def contact_tick(t: ContactTick):
+    """Run one tick with a subset: its workspace's `tau` (nv−6,) then holds torques."""
+    assemble_contacts(t)
+    solve_contacts(t)

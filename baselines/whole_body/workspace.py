@@ -19,7 +19,8 @@ class Layout(NamedTuple):
 
     Unknowns x = (z, y, f, u): what is left of v̇, internal wrenches of the soles, forces of the
     point contacts, a soft root's wrench. Affine in x are `rows` = (v̇, W, w, τ), see `Workspace`.
-    Constraints are the soles' cones, the points' cones, torque limits and joint limits.
+    Constraints are the soles' cones, the points' cones, torque limits, joint limits and further
+    limits.
     """
 
     nv: int
@@ -43,10 +44,19 @@ class Layout(NamedTuple):
 
 
 def lay_out(
-    robot: RobotArrays, space: NullSpace, cone_rows: int, soft_root: bool, points: int, rows: int
+    robot: RobotArrays,
+    space: NullSpace,
+    cone_rows: int,
+    soft_root: bool,
+    points: int,
+    rows: int,
+    limits: int,
 ) -> Layout:
-    """The layout for a robot whose soles' cones have `cone_rows` rows each, and with so many
-    `points` in contact, whose cones have so many `rows` together."""
+    """Return the layout for a robot whose soles' cones have `cone_rows` rows each.
+
+    So many `points` are in contact, whose cones have so many `rows` together; further limits have
+    so many rows as `limits`.
+    """
     nj, nc = len(robot.q_standing), len(robot.sole_body)
     nv, k = nj + 6, 6 * nc + 3 * points
     first_internal = nv - len(space.beta)
@@ -57,7 +67,7 @@ def lay_out(
     return Layout(
         nv=nv, nj=nj, k=k, n=first_root + (6 if soft_root else 0), first_internal=first_internal,
         first_force=first_force, first_root=first_root, r=nv + 6 + k + nj,
-        m=first_torque + 2 * nj, first_point=first_point, first_torque=first_torque,
+        m=first_torque + 2 * nj + limits, first_point=first_point, first_torque=first_torque,
         first_joint=first_torque + nj,
     )  # fmt: skip
 
@@ -78,7 +88,7 @@ class Workspace(Block):
     first_joint: int
     rows: np.ndarray  # (r, n)
     offsets: np.ndarray  # (r,)
-    wanted: np.ndarray  # (r,) what each should be
+    desired: np.ndarray  # (r,) what each should be
     weights: np.ndarray  # (r,) of the squared differences
     weighted: np.ndarray  # (r, n) rows times weights
     values: np.ndarray  # (r,) at the solution
@@ -90,7 +100,7 @@ class Workspace(Block):
     W0: np.ndarray  # (6,) A v̇₀ + A_bias, a view
     w0: np.ndarray  # (k,) a view
     tau0: np.ndarray  # (nj,) a view
-    accel_des: np.ndarray  # (nv,) a view of `wanted`
+    accel_des: np.ndarray  # (nv,) a view of `desired`
     wrench_des: np.ndarray  # (6,) a view
     force_des: np.ndarray  # (k,) a view
     accel_weights: np.ndarray  # (nv,) a view of `weights`
@@ -136,27 +146,30 @@ def allocate_workspace(
     soft_root: bool,
     point_chains: Sequence[np.ndarray] = (),
     point_rows: int = 0,
+    limit_rows: int = 0,
 ) -> Workspace:
     """Zeroed scratch for one robot, whose wrench cones have `cone_rows` rows each.
 
     Args:
         point_chains: for each point contact the degrees of freedom that move its body.
         point_rows: how many rows the cones of these have together.
+        limit_rows: how many rows there are of limits besides those of torques and joints.
     """
     space = allocate_null_space(robot, point_chains)
-    lay = lay_out(robot, space, cone_rows, soft_root, len(point_chains), point_rows)
+    points = len(point_chains)
+    lay = lay_out(robot, space, cone_rows, soft_root, points, point_rows, limit_rows)
     n, m, r, k, nj, z = lay.n, lay.m, lay.r, lay.k, lay.nj, guarded_zeros
-    rows, offsets, wanted, weights, values = z((r, n)), z(r), z(r), z(r), z(r)
+    rows, offsets, desired, weights, values = z((r, n)), z(r), z(r), z(r), z(r)
     V, B, E, T = lay.parts
-    for i in range(3 * len(point_chains)):  # the forces of points are unknowns themselves
-        rows[E][i - 3 * len(point_chains), lay.first_force + i] = 1.0
+    for i in range(3 * points):  # the forces of points are unknowns themselves
+        rows[E][i - 3 * points, lay.first_force + i] = 1.0
     ws = Workspace(
         first_internal=lay.first_internal, first_force=lay.first_force, first_root=lay.first_root,
         first_point=lay.first_point, first_torque=lay.first_torque, first_joint=lay.first_joint,
-        rows=rows, offsets=offsets, wanted=wanted, weights=weights,
+        rows=rows, offsets=offsets, desired=desired, weights=weights,
         weighted=z((r, n)), values=values, V=rows[V], B=rows[B], E=rows[E], T=rows[T],
         vdot0=offsets[V], W0=offsets[B], w0=offsets[E], tau0=offsets[T],
-        accel_des=wanted[V], wrench_des=wanted[B], force_des=wanted[E],
+        accel_des=desired[V], wrench_des=desired[B], force_des=desired[E],
         accel_weights=weights[V], momentum_weights=weights[B], force_weights=weights[E],
         torque_weights=weights[T], space=space,
         contact_accel=z(k), y=z(6), cop_prev=z(2), cop_vel=z(2), momentum_rate=z(6),

@@ -1,4 +1,4 @@
-"""What all environments share: a pushed robot, its observation, reward, fall and record."""
+"""The base of all environments: a pushed robot, its observation, reward, fall and record."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,13 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from poise.configs.errors import ConfigError, PoiseError, shown
-from poise.configs.numbers import (
-    finite_array,
-    option_mapping,
-    real_array,
-    seed_number,
-    whole_number,
-)
+from poise.configs.numbers import seed_number, whole_number
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Program, run
 from poise.envs.compiled.copies import Copyable
@@ -30,6 +24,7 @@ from poise.envs.sensors.delayed import DelayedState
 from poise.envs.sensors.source import StateSource
 from poise.envs.viewing.camera import Camera, find_camera
 
+from .action import checked_action
 from .config import EnvConfig as EnvConfig
 from .config import env_config
 from .docstrings import filled
@@ -41,18 +36,17 @@ from .episode import (
     StepEnd,
     allocate_episode,
     begin_episode,
+    make_judge,
 )
 from .info import step_info
 from .observation import Term, Terms, View, mirror_terms, observer, scales
-from .reward import REWARD_TERMS, RewardView, rewards
-from .start import disturbed_start
+from .reward import REWARD_TERMS
+from .start import chosen_start, reset_options
 from .termination import episode_limits
 from .terms import TERMS
 
 if TYPE_CHECKING:
     from poise.envs.viewing.renderer import SceneRenderer
-
-RESET_OPTIONS = ("push", "noise", "qpos", "qvel")
 
 
 class BalanceEnv(Copyable, gymnasium.Env):
@@ -228,26 +222,10 @@ class BalanceEnv(Copyable, gymnasium.Env):
 
     def _judge(self) -> Judge:
         """The block that judges the policy steps of this environment."""
-        world, e = self.simulation.world(), self.episode
-        view = RewardView(
-            robot=world.robot,
-            state=world.state,
-            scales=self.scales,
-            limits=self.limits,
-            q_ref=self._references()[0],
-            views=world.views,
-            action=e.action,
-            last_action=e.last_action,
-        )
-        return Judge(
-            robot=world.robot,
-            views=world.views,
-            state=world.state,
-            clock=world.clock,
-            limits=self.limits,
-            rewards=rewards(self.config.reward, view),
-            episode=e,
-        )
+        return make_judge(
+            self.simulation.world(), self.episode, self.scales, self.limits,
+            self.config.reward, self._references()[0],
+        )  # fmt: skip
 
     def step_end(self) -> StepEnd:
         """The block that ends a policy step; a new one when `simulation.world()` is."""
@@ -300,18 +278,10 @@ class BalanceEnv(Copyable, gymnasium.Env):
         Raises ConfigError naming the option that is unknown or wrong, and what it may be.
         """
         self.episode.running[0] = 0  # until this one has succeeded
-        options = option_mapping(options)
+        options = reset_options(options)
         super().reset(seed=seed_number(seed))
-        for name in options:
-            if name not in RESET_OPTIONS:
-                raise ConfigError(
-                    "unknown option", source="reset", field=str(name), choices=RESET_OPTIONS
-                )
-        push, qpos, qvel = (options.get(name) for name in ("push", "qpos", "qvel"))
-        noise = float(self._numbers(options.get("noise", 1.0), (), "noise"))
-        start, speed = disturbed_start(self.simulation, self.config.noise, noise, self.np_random)
-        qpos = start if qpos is None else self._numbers(qpos, start.shape, "qpos")
-        qvel = speed if qvel is None else self._numbers(qvel, speed.shape, "qvel")
+        push = options.get("push")
+        qpos, qvel = chosen_start(self.simulation, self.config.noise, options, self.np_random)
         state = self.simulation.reset(qpos, qvel)
         if push is not None:
             pushes = parse_pushes(push, self.robot, state.support_margin)
@@ -328,14 +298,6 @@ class BalanceEnv(Copyable, gymnasium.Env):
             self.render()
         return self.episode.observation.astype(np.float32), self.info()
 
-    @staticmethod
-    def _numbers(value: object, shape: tuple[int, ...], name: str) -> np.ndarray:
-        numbers = finite_array(value, shape)
-        if numbers is None:
-            expected = f"{shape[0]} finite numbers" if shape else "a finite number"
-            raise ConfigError(f"must be {expected}", source="reset", field=name)
-        return numbers
-
     def set_action(self, action: np.ndarray) -> None:
         """Check `action` and remember it and the one before.
 
@@ -346,29 +308,8 @@ class BalanceEnv(Copyable, gymnasium.Env):
         self.episode.action[:] = np.clip(vector, -1.0, 1.0)
 
     def check_action(self, action: np.ndarray) -> np.ndarray:
-        """`action` as numbers.
-
-        Raises ConfigError naming the entries: all for a wrong shape, else those out of bounds.
-        """
-        vector = real_array(action)
-        names = self.action_names
-        if vector is None:
-            raise ConfigError(
-                f"must be numbers of shape {(len(names),)}, not {shown(action)}: "
-                f"{', '.join(names)}",
-                field="action",
-            )
-        if vector.shape != (len(names),):
-            raise ConfigError(
-                f"has shape {vector.shape}, expected {(len(names),)}: {', '.join(names)}",
-                field="action",
-            )
-        vector = vector.astype(float, copy=False)
-        good = np.abs(vector) <= 1.0 + 1e-6  # NaN is not
-        if not good.all():
-            bad = [f"{names[i]} is {vector[i]:g}" for i in np.flatnonzero(~good)]
-            raise ConfigError(f"must lie in [-1, 1], but {', '.join(bad)}", field="action")
-        return vector
+        """Return `action` as numbers, see `checked_action`."""
+        return checked_action(action, self.action_names)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Take a policy step; a fall is `terminated`, the end of time is `truncated`.

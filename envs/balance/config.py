@@ -1,4 +1,4 @@
-"""What an environment is configured with: pushes, start, fall, reward and time."""
+"""The configuration of an environment: pushes, start, fall, reward and time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ class UnknownArgument(ConfigError, TypeError):
 
 @dataclass(frozen=True)
 class ObservationConfig:
-    """Which terms an observation is made of, by name and in this order."""
+    """The terms that an observation is made of, by name and in this order."""
 
     terms: tuple[str, ...] | None = None  # None: those that the environment has by default
     extra: tuple[str, ...] = ()  # after them

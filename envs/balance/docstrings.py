@@ -1,4 +1,4 @@
-"""What the docstrings of all environments have in common, and the tables that are made of terms."""
+"""The common part of the docstrings of all environments, and the tables that are made of terms."""
 
 import inspect
 import textwrap

@@ -1,4 +1,4 @@
-"""What is recorded during an episode: fall, quiet time, effort, excursions; and the reward."""
+"""The record of an episode: fall, quiet time, effort, excursions; and the reward."""
 
 from dataclasses import dataclass
 
@@ -10,8 +10,10 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, support_distance, update_support
+from poise.envs.physics.simulation import World
 
-from .reward import Rewards, sum_rewards
+from .observation import Scales
+from .reward import Rewards, RewardView, RewardWeights, rewards, sum_rewards
 from .termination import Limits, has_diverged, has_fallen, uprightness
 
 (
@@ -19,7 +21,7 @@ from .termination import Limits, has_diverged, has_fallen, uprightness
     FALLEN,  # 1 after a fall
     ENERGY,  # ∫ Σ |τ q̇| dt [J]
     PEAK_TORQUE,  # largest |τ|/τ_max
-    SATURATED,  # sum over ticks of the share of motors at their limit
+    SATURATED,  # sum over ticks of the fraction of motors at their limit
     TICKS,  # control ticks
     MAX_COM,  # largest distance of the CoM from the middle of the soles [m]
     MAX_CAPTURE,  # the same of the capture point [m]
@@ -110,6 +112,41 @@ class Judge(Block):
     limits: Limits
     rewards: Rewards
     episode: EpisodeArrays
+
+
+def make_judge(
+    world: World,
+    episode: EpisodeArrays,
+    scales: Scales,
+    limits: Limits,
+    weights: RewardWeights,
+    q_ref: np.ndarray,
+) -> Judge:
+    """Return the block that judges the policy steps of an environment.
+
+    Args:
+        weights: of the reward's terms.
+        q_ref: (nj,) joint positions of the reference [rad].
+    """
+    view = RewardView(
+        robot=world.robot,
+        state=world.state,
+        scales=scales,
+        limits=limits,
+        q_ref=q_ref,
+        views=world.views,
+        action=episode.action,
+        last_action=episode.last_action,
+    )
+    return Judge(
+        robot=world.robot,
+        views=world.views,
+        state=world.state,
+        clock=world.clock,
+        limits=limits,
+        rewards=rewards(weights, view),
+        episode=episode,
+    )
 
 
 @compiled

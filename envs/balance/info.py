@@ -1,4 +1,4 @@
-"""What environments tell besides observation and reward, of one and of many at once."""
+"""The `info` of environments, of one and of many at once."""
 
 from __future__ import annotations
 

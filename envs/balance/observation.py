@@ -1,4 +1,4 @@
-"""What an observation is made of: terms, their scales, their table and their mirror image."""
+"""The observation: its terms, their scales, their table and their mirror image."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass

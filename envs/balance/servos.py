@@ -120,10 +120,10 @@ def holding_torques(robot: Robot) -> np.ndarray:
         data.xpos[sole.body_id] + data.xmat[sole.body_id].reshape(3, 3) @ sole.position
         for sole in robot.soles
     ]
-    share = np.clip((com[1] - soles[0][1]) / (soles[1][1] - soles[0][1]), 0.0, 1.0)
+    fraction = np.clip((com[1] - soles[0][1]) / (soles[1][1] - soles[0][1]), 0.0, 1.0)
     torques = data.qfrc_bias - data.qfrc_passive
     jacobian = np.zeros((3, model.nv))
-    for sole, place, part in zip(robot.soles, soles, (1.0 - share, share), strict=True):
+    for sole, place, part in zip(robot.soles, soles, (1.0 - fraction, fraction), strict=True):
         point = np.array([com[0], place[1], 0.0])
         mujoco.mj_jac(model, data, jacobian, None, point, sole.body_id)
         torques = torques - jacobian[2] * part * robot.units.force

@@ -1,10 +1,16 @@
-"""Where an episode begins: a disturbed standing posture."""
+"""The start of an episode: a disturbed standing posture."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from poise.configs.errors import ConfigError
+from poise.configs.numbers import finite_array, option_mapping
 from poise.envs.physics.simulation import Simulation
+
+RESET_OPTIONS = ("push", "noise", "qpos", "qvel")
 
 
 @dataclass(frozen=True)
@@ -39,3 +45,43 @@ def disturbed_start(
     )
     qpos[2] -= lowest
     return qpos, qvel
+
+
+def reset_options(options: object) -> dict[str, Any]:
+    """Return the options of a reset; {} for None.
+
+    Raises ConfigError naming the option that is unknown, and what there is.
+    """
+    chosen = option_mapping(options)
+    for name in chosen:
+        if name not in RESET_OPTIONS:
+            raise ConfigError(
+                "unknown option", source="reset", field=str(name), choices=RESET_OPTIONS
+            )
+    return chosen
+
+
+def chosen_start(
+    simulation: Simulation,
+    noise: StartNoise,
+    options: Mapping[str, Any],
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the start (nq,), (nv,) of `options`, disturbed where these do not say it.
+
+    Raises ConfigError for "noise", "qpos" or "qvel" that are no finite numbers of their shape.
+    """
+    scale = float(_numbers(options.get("noise", 1.0), (), "noise"))
+    start = dict(zip(("qpos", "qvel"), disturbed_start(simulation, noise, scale, rng), strict=True))
+    for name, numbers in start.items():
+        if options.get(name) is not None:
+            start[name] = _numbers(options[name], numbers.shape, name)
+    return start["qpos"], start["qvel"]
+
+
+def _numbers(value: object, shape: tuple[int, ...], name: str) -> np.ndarray:
+    numbers = finite_array(value, shape)
+    if numbers is None:
+        expected = f"{shape[0]} finite numbers" if shape else "a finite number"
+        raise ConfigError(f"must be {expected}", source="reset", field=name)
+    return numbers

@@ -1,4 +1,4 @@
-"""When an episode ends by a fall, and when the robot is quiet again."""
+"""The end of an episode: by a fall, or once the robot is quiet again."""
 
 from dataclasses import dataclass, field
 

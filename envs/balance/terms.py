@@ -127,8 +127,8 @@ def push(v: View):
         row = v.pushes[k]
         age, duration = now - row[START], row[DURATION]
         if row[KIND] == PUSH and 0.0 <= age < duration:
-            share = np.sin(np.pi * age / duration) if row[PROFILE] == HALF_SINE else 1.0
+            fraction = np.sin(np.pi * age / duration) if row[PROFILE] == HALF_SINE else 1.0
             for a in range(3):
-                v.out[a] += share * row[FORCE + a]
+                v.out[a] += fraction * row[FORCE + a]
     put_local(v.state, v.out[0], v.out[1], v.scales.weight, v.out)
     v.out[2] /= v.scales.weight

@@ -43,7 +43,7 @@ def torque_step(step: TorqueStep):
 
 
 class MotorBalanceEnv(BalanceEnv):
-    """What environments have in common whose action is a number for each motor (nu,).
+    """The base of environments whose action is a number for each motor (nu,).
 
     The reference is the standing posture at rest. A subclass says by `_make_step` what is compiled.
     """

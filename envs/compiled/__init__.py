@@ -1,1 +1,1 @@
-"""What makes kernels: Numba's decorator, blocks, calls by address. A kernel needs no more of it."""
+"""The tools of kernels: Numba's decorator, blocks, calls by address. A kernel needs no more."""

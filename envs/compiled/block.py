@@ -50,7 +50,7 @@ class Block:
 
     @property
     def address(self) -> int:
-        """Where compiled code finds the members."""
+        """The address at which compiled code finds the members."""
         return self._address  # type: ignore[attr-defined]
 
     @property

@@ -12,7 +12,7 @@ _KIND = ctypes.CFUNCTYPE(None)
 
 
 class CallbackAddress(int):
-    """Where `callback` lies in this process. A copy of it is that of the copied callback."""
+    """The address of `callback` in this process. A copy of it is that of the copied callback."""
 
     callback: "Callback"
 
@@ -43,7 +43,7 @@ class Callback:
 
     @property
     def address(self) -> CallbackAddress:
-        """What `call_back` takes; it is that of a living function as long as this object lives."""
+        """The address that `call_back` takes, of a function that lives as long as this object."""
         if self._address is None:
             self._thunk = _KIND(self._run)
             place = ctypes.cast(self._thunk, ctypes.c_void_p).value

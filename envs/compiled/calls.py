@@ -160,12 +160,12 @@ def run(program: Program):
 class CompiledStep(NamedTuple):
     """A policy step: `kernel`, by its address, `ticks` times with `block`. It must not raise."""
 
-    kernel: int
+    kernel: Kernel
     block: Block
     ticks: int = 1
 
     def row(self) -> tuple[int, int, int]:
-        """What `play` reads."""
+        """Return the addresses of the kernel and of its block, and how often `play` calls it."""
         return int(self.kernel), self.block.address, self.ticks
 
     def play(self) -> None:

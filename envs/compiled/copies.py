@@ -66,7 +66,7 @@ _standing_in: WeakValueDictionary[int, Any] = WeakValueDictionary()
 
 
 def portable(value: Any) -> Any:
-    """What `copy` and `pickle` can make a copy of `value` from; looks into plain containers."""
+    """Return what `copy` and `pickle` can copy `value` from; looks into plain containers."""
     if type(value) is np.ndarray and not value.dtype.hasobject:
         return _stand_in(_Part, value)
     if type(value) is mujoco.MjData:

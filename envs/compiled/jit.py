@@ -65,7 +65,7 @@ class Patience(event.Listener):
     """
 
     def __init__(self) -> None:
-        self.depth, self.begun, self.told = 0, 0.0, False
+        self.depth, self.begun, self.announced = 0, 0.0, False
 
     def on_start(self, event: event.Event) -> None:
         if self.depth == 0:
@@ -76,8 +76,8 @@ class Patience(event.Listener):
             self.tell()
 
     def tell(self) -> None:
-        if not self.told:
-            self.told = True
+        if not self.announced:
+            self.announced = True
             print(MESSAGE, file=sys.stderr, flush=True)
 
     def on_end(self, event: event.Event) -> None:
@@ -94,5 +94,5 @@ def tell() -> None:
 
 
 def quiet() -> None:
-    """No message from this process: the one that started it has told."""
-    _patience.told = True
+    """No message from this process: the one that started it has announced it."""
+    _patience.announced = True

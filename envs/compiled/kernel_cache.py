@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept: a folder for everything that decides about their bits.
+"""The cache of compiled kernels: a folder for everything that decides about their bits.
 
 Numba's own cache tells processors and the file of the function apart. It knows neither the flags of
 `fastmath` nor the functions that were compiled into a kernel from other files, and processes that

@@ -13,15 +13,15 @@ from poise.configs.files import write_atomic
 from . import jit
 from .kernel_cache import stamp
 
-_READY = "kernels.ready"  # beside the kernels: the digest of the sources, then shares
+_READY = "kernels.ready"  # beside the kernels: the digest of the sources, then parts
 _compiling = False  # whether this process is one of those that compile
-_tried: set[str] = set()  # shares that this process has had compiled, or could not have
+_tried: set[str] = set()  # parts that this process has had compiled, or could not have
 
 
 def fill_cache(module: str, *groups: Sequence[str]) -> None:
-    """Compile what is missing: each group is a list of functions of `module`, its shares.
+    """Compile what is missing: each group is a list of functions of `module`, its parts.
 
-    The shares of a group are compiled at the same time, in a process each, and use the kernels of
+    The parts of a group are compiled at the same time, in a process each, and use the kernels of
     the groups before it. Where no cache can be written, nothing happens.
     """
     if _compiling or jit.CACHE is None:
@@ -29,10 +29,10 @@ def fill_cache(module: str, *groups: Sequence[str]) -> None:
     ready = jit.CACHE / _READY
     try:
         sources = stamp(jit.CACHE).read_text()
-        for shares in groups:
+        for parts in groups:
             digest, *done = ready.read_text().split() if ready.is_file() else [""]
             done = done if digest == sources else []
-            missing = [share for share in shares if share not in done and share not in _tried]
+            missing = [part for part in parts if part not in done and part not in _tried]
             if not missing:
                 continue
             _tried.update(missing)
@@ -54,14 +54,14 @@ threading.Thread(target=watch, daemon=True).start()
 """
 
 
-def _compile_apart(module: str, shares: Sequence[str]) -> bool:
-    """Whether the processes have all finished without an error; Ctrl-C reaches this one alone."""
+def _compile_apart(module: str, parts: Sequence[str]) -> bool:
+    """Return whether all processes finished without an error; Ctrl-C reaches this one alone."""
     jobs: list[subprocess.Popen] = []
     try:
-        for share in shares:
+        for part in parts:
             code = (
                 f"{_WATCH}from {__name__} import begin; begin();"
-                f"from {module} import {share}; {share}()"
+                f"from {module} import {part}; {part}()"
             )
             jobs.append(
                 subprocess.Popen(  # -P: no modules from the current folder

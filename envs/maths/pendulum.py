@@ -20,7 +20,7 @@ compiled_rate = compiled(pendulum_rate)  #: the same, for kernels
 
 @dataclass(frozen=True)
 class Units:
-    """What gains and costs without units are measured in: m, g and h of one robot, standing.
+    """The units of gains and costs that are given without: m, g and h of one robot, standing.
 
     Lengths in h, times in 1/ω, forces in m g, moments in m g h.
     """
@@ -46,7 +46,7 @@ class Units:
 
 
 def duration_factor(omega: float, duration: float, profile: Profile = "square") -> float:
-    """How much more impulse a push may have than an instantaneous one, J(T)/J(0) ≥ 1.
+    """Return how much more impulse a push may have than an instantaneous one, J(T)/J(0) ≥ 1.
 
     J(T)/J(0) = ∫F ds / ∫F e^(−ωs) ds over [0, T]:
     square    ωT / (1 − e^(−ωT))

@@ -34,7 +34,7 @@ def convex_hull(points: np.ndarray, n: int, line: float, out: np.ndarray) -> int
 
 @compiled
 def _turns_left(chain: np.ndarray, size: int, line: float, x: float, y: float) -> bool:
-    """Whether the last corner of a chain lies to the right of the way to (x, y)."""
+    """Return whether the last corner of a chain lies to the right of the way to (x, y)."""
     ax, ay = chain[size - 2, 0], chain[size - 2, 1]
     bx, by = chain[size - 1, 0] - ax, chain[size - 1, 1] - ay
     dx, dy = x - ax, y - ay
@@ -94,8 +94,10 @@ def clipped(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarra
 
 
 def ray_to_edge(polygon: np.ndarray, point: np.ndarray, ray: np.ndarray) -> float:
-    """How far it is from `point` (2,) along the unit vector `ray` (2,) to the edge of a
-    counter-clockwise polygon (k, 2); zero where the point is outside."""
+    """Return the distance from `point` (2,) along the unit vector `ray` (2,) to a polygon's edge.
+
+    The corners (k, 2) of the polygon are counter-clockwise. The distance is zero where the point is
+    outside."""
     edges = np.roll(polygon, -1, axis=0) - polygon
     normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)  # outward
     gaps = np.einsum("ij,ij->i", normals, polygon - point)

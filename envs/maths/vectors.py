@@ -58,9 +58,9 @@ def rotated(
 
 
 @compiled
-def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> None:
+def rotation_error(axes: np.ndarray, desired: np.ndarray, out: np.ndarray) -> None:
     """½ Σ aᵢ × bᵢ of the columns of two frames into `out` (3,): sine times axis of the turn that
-    leads from `axes` to `wanted`.
+    leads from `axes` to `desired`.
 
     The sine needs no division and is smooth everywhere. It equals the angle to first order, and
     falls again beyond 90°. So it serves where frames stay near each other, as soles and trunks that
@@ -70,12 +70,12 @@ def rotation_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> Non
         i, j = (a + 1) % 3, (a + 2) % 3
         total = 0.0
         for k in range(3):
-            total += wanted[j, k] * axes[i, k] - wanted[i, k] * axes[j, k]
+            total += desired[j, k] * axes[i, k] - desired[i, k] * axes[j, k]
         out[a] = 0.5 * total
 
 
 @compiled
-def turn_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> float:
+def turn_error(axes: np.ndarray, desired: np.ndarray, out: np.ndarray) -> float:
     """The turn that leads from a frame R to another one D, in the axes of R: sine times axis of
     RᵀD into `out` (3,); returned is angle/sine, by which `out` becomes angle times axis."""
     trace = 0.0  # of RᵀD; its skew part is axis · sin(angle)
@@ -83,17 +83,17 @@ def turn_error(axes: np.ndarray, wanted: np.ndarray, out: np.ndarray) -> float:
         i, j = (a + 1) % 3, (a + 2) % 3
         skew = 0.0
         for b in range(3):
-            trace += axes[b, a] * wanted[b, a]
-            skew += axes[b, j] * wanted[b, i] - axes[b, i] * wanted[b, j]
+            trace += axes[b, a] * desired[b, a]
+            skew += axes[b, j] * desired[b, i] - axes[b, i] * desired[b, j]
         out[a] = 0.5 * skew
     sine = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
     return np.arctan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 1e-9 else 1.0
 
 
-def rotation_between(axes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def rotation_between(axes: np.ndarray, desired: np.ndarray) -> np.ndarray:
     """(3,) `rotation_error` of two frames (3, 3): sine times axis of the turn between them."""
     out = np.empty(3)
-    rotation_error(np.array(axes), np.array(wanted), out)
+    rotation_error(np.array(axes), np.array(desired), out)
     return out
 
 

@@ -1,4 +1,4 @@
-"""What compiled code sees of a robot and of one simulation: blocks of arrays.
+"""The blocks of arrays in which compiled code sees a robot and one simulation.
 
 `RobotArrays` is constant and shared. `SimViews` holds views into one `MjData` and keeps it alive,
 so a kernel reads and writes the simulation itself.

@@ -68,7 +68,7 @@ def update_point(s: StateArrays, point: BodyPoint):
 
 
 class PointMotion(NamedTuple):
-    """Where a point of a body is and how it moves, world axes."""
+    """The place of a point of a body and its motion, world axes."""
 
     position: np.ndarray  # (3,) [m]
     axes: np.ndarray  # (3, 3) of the body, as columns

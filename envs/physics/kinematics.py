@@ -239,7 +239,7 @@ def _contact(robot: RobotArrays, views: SimViews, s: StateArrays):
 
 @compiled
 def _bodies(robot: RobotArrays, views: SimViews, s: StateArrays):
-    """Where the bodies are, and the axes of the degrees of freedom: what any point's J needs."""
+    """Fill the places of the bodies and the axes of the dofs, which any point's J needs."""
     for i in range(s.body_position.shape[0]):
         for a in range(3):
             s.body_position[i, a] = views.xpos[i, a]

@@ -163,7 +163,7 @@ class RobotState(Copyable):
 
     @property
     def other_contact(self) -> bool:
-        """Whether anything but the feet touches the ground."""
+        """True where anything but the feet touches the ground."""
         return bool(self.arrays.other_contacts[0] > 0.5)
 
     @property

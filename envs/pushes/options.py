@@ -12,7 +12,7 @@ from poise.envs.robots.robot import Robot
 
 from .push import Kick, Push
 
-Margin = Callable[[float], float]  # direction [deg] → support margin δ(θ) [m]
+SupportMargin = Callable[[float], float]  # direction [deg] → support margin δ(θ) [m]
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def to_impulse(
     direction: float,
     duration: float,
     profile: Profile,
-    margin: Margin | None = None,
+    margin: SupportMargin | None = None,
 ) -> float:
     """Impulse J [N·s] of a push whose magnitude is given in `unit`.
 
@@ -72,7 +72,7 @@ def to_impulse(
 
 
 def parse_pushes(
-    value: object, robot: Robot, margin: Margin | None = None, source: str = "push"
+    value: object, robot: Robot, margin: SupportMargin | None = None, source: str = "push"
 ) -> tuple[Push | Kick, ...]:
     """Pushes from one dictionary, one Push or Kick, or a list of them; [] means none.
 
@@ -95,7 +95,9 @@ def parse_pushes(
     )
 
 
-def _parse_one(item: object, robot: Robot, margin: Margin | None, source: str) -> Push | Kick:
+def _parse_one(
+    item: object, robot: Robot, margin: SupportMargin | None, source: str
+) -> Push | Kick:
     if isinstance(item, (Push, Kick)):
         item = asdict(item)
     if not isinstance(item, Mapping):

@@ -10,7 +10,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.maths.pendulum import Profile, duration_factor
 from poise.envs.robots.robot import Robot
 
-from .options import Margin, check_body, to_impulse
+from .options import SupportMargin, check_body, to_impulse
 from .push import Kick, Push
 
 Range = tuple[float, float]
@@ -54,7 +54,7 @@ class LimitTable:
 
 @dataclass(frozen=True)
 class PushSampler:
-    """What random pushes are drawn from; every range [lo, hi] is drawn from uniformly.
+    """The distribution of random pushes; every range [lo, hi] is drawn from uniformly.
 
     `magnitude` has the unit named by `unit`:
     impulse [N·s], force [N] (peak), specific_impulse [N·s/kg], delta_v [m/s] (velocity kicks),
@@ -88,7 +88,7 @@ class PushSampler:
         self,
         rng: np.random.Generator,
         robot: Robot,
-        margin: Margin | None = None,
+        margin: SupportMargin | None = None,
         limits: Limits | None = None,
     ) -> tuple[Push | Kick, ...]:
         """The pushes of one episode, in time order; the same for the same generator state.
@@ -117,7 +117,7 @@ class PushSampler:
         rng: np.random.Generator,
         robot: Robot,
         start: float,
-        margin: Margin | None,
+        margin: SupportMargin | None,
         limits: Limits | None,
     ) -> Push | Kick:
         bodies = self.bodies or push_bodies(robot)

@@ -61,12 +61,12 @@ def apply_pushes(
         if end <= begin:
             continue
         if push[PROFILE] == SQUARE:
-            share = (end - begin) / dt
+            fraction = (end - begin) / dt
         else:
             rate = np.pi / duration
-            share = (np.cos(rate * begin) - np.cos(rate * end)) / (rate * dt)
+            fraction = (np.cos(rate * begin) - np.cos(rate * end)) / (rate * dt)
         body = int(push[BODY])
-        fx, fy, fz = share * push[FORCE], share * push[FORCE + 1], share * push[FORCE + 2]
+        fx, fy, fz = fraction * push[FORCE], fraction * push[FORCE + 1], fraction * push[FORCE + 2]
         px, py, pz = push[POINT], push[POINT + 1], push[POINT + 2]
         R = xmat[body]
         rx = R[0] * px + R[1] * py + R[2] * pz

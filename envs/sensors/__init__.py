@@ -1,1 +1,1 @@
-"""What a controller may know of the state, and when."""
+"""Sensors: the state that a controller may know, and when."""

@@ -1,4 +1,4 @@
-"""Where a controller and a policy know the state from: by default it is the truth."""
+"""The source of the state that a controller and a policy believe: by default the truth."""
 
 from __future__ import annotations
 

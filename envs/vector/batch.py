@@ -210,7 +210,7 @@ class EnvBatch(Copyable):
             _work_off(work, todo.pop if thread % 2 else todo.popleft)
             turns.play(thread)
 
-        self._helpers.share(take_part, min(self.threads, len(todo) + len(turns.steps)) - 1)
+        self._helpers.distribute(take_part, min(self.threads, len(todo) + len(turns.steps)) - 1)
 
     def close(self) -> None:
         """Close the environments and stop the threads."""

@@ -55,7 +55,7 @@ class StepSchedule:
         self.taken[:] = 0
 
     def begin(self) -> None:
-        """All are to be played, once more."""
+        """Have all steps played once more."""
         self.turns[:] = self.ends[:-1]
         self.done[:] = 0
 

@@ -58,7 +58,7 @@ class ThreadTeam:
         self._calls.clear()
         self._threads.clear()
 
-    def share(self, work: Callable[[int], None], helpers: int) -> None:
+    def distribute(self, work: Callable[[int], None], helpers: int) -> None:
         """`work(0)` in this thread, `work(1)`, `work(2)`… in some helpers; returns when all have.
 
         Raises what one of them raised, PoiseError if they have been closed or have died.

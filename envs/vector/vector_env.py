@@ -25,7 +25,7 @@ try:
 except ImportError:  # Gymnasium 1.0, which knows the first mode only
 
     class AutoresetMode(Enum):  # type: ignore[no-redef]
-        """When an ended episode is followed by the next."""
+        """The moment at which an ended episode is followed by the next."""
 
         NEXT_STEP = "NextStep"
         SAME_STEP = "SameStep"

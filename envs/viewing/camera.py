@@ -1,4 +1,4 @@
-"""Where the camera stands: Poise's own, which follows the robot, or one of the robot's model."""
+"""The camera: Poise's own, which follows the robot, or one of the robot's model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from poise.configs.schema import build, to_dict
 
 @dataclass(frozen=True)
 class Camera:
-    """Where the camera stands, seen from the robot in its standing posture."""
+    """The place of the camera, seen from the robot in its standing posture."""
 
     azimuth: float = field(default=50.0)  # [deg] counter-clockwise: 0 = in front, 90 = left
     elevation: float = field(default=22.0, metadata={"min": 0.0, "max": 90.0})  # [deg] above it

@@ -1,4 +1,4 @@
-"""What is drawn over a simulation: pushes, centre of mass, and what the balance depends on.
+"""The marks over a simulation: pushes, centre of mass, and what the balance depends on.
 
 | mark | shape and colour |
 |---|---|
@@ -79,8 +79,8 @@ def push_arrows(simulation: Simulation) -> list[Mark]:
         if age < -1e-9 or opacity <= 0.0 or force == 0.0:
             continue
         tip = views.xipos[body] + views.xmat[body].reshape(3, 3) @ row[POINT : POINT + 3]
-        share = (simulation.robot.mass / KICK_TIME if is_kick else 1.0) * force / weight
-        length = size * float(np.clip(ARROW_GAIN * share, *ARROW_LENGTHS))
+        fraction = (simulation.robot.mass / KICK_TIME if is_kick else 1.0) * force / weight
+        length = size * float(np.clip(ARROW_GAIN * fraction, *ARROW_LENGTHS))
         tail = tip - length * vector / force
         found.append(Mark("push", ARROW, tail, tip, 0.035 * size, AMBER, float(opacity)))
     return found

@@ -103,8 +103,8 @@ class SceneRenderer:
         if elapsed < 0.0 or self.shown == 0.0:  # another episode
             self.view.lookat = target
         else:
-            share = 1.0 - np.exp(-elapsed / FOLLOW)
-            self.view.lookat = self.view.lookat + share * (target - self.view.lookat)
+            fraction = 1.0 - np.exp(-elapsed / FOLLOW)
+            self.view.lookat = self.view.lookat + fraction * (target - self.view.lookat)
 
     def _frame(self, screen: OffScreen) -> np.ndarray:
         """The scene, with the marks that it hides shining through."""

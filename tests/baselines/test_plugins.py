@@ -11,9 +11,9 @@ import pytest
 from stable_baselines3 import PPO
 
 import poise
-from poise.baselines.allowance import is_outside
+from poise.baselines.allowance import is_plugin
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.plugins import OutsideController
+from poise.baselines.plugins import PluginController
 from poise.baselines.registry import controller_config, load_controller
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.torque import TorqueBalanceEnv
@@ -100,7 +100,7 @@ def test_a_module_in_the_current_folder_is_found(module: str) -> None:
     """By its name, by its file, and by a function that makes it."""
     for name in (f"{module}:Zero", f"{module}.py:Zero", f"{module}:make"):
         controller = load_controller(name, robot())
-        assert isinstance(controller, OutsideController) and controller.period == 0.004
+        assert isinstance(controller, PluginController) and controller.period == 0.004
         assert load_agent(name, robot(), **SETTINGS).name == name
 
 
@@ -167,5 +167,5 @@ def test_what_is_wrong_is_said(module: str, name: str, message: str) -> None:
 
 def test_names_from_outside_have_a_colon() -> None:
     """Paths and packaged names have none."""
-    assert is_outside("a.b:C") and is_outside("a/b.py:C")
-    assert not any(map(is_outside, ("momentum-qp", "a/b.yaml", "a:b:c", "a:b.c", 3)))
+    assert is_plugin("a.b:C") and is_plugin("a/b.py:C")
+    assert not any(map(is_plugin, ("momentum-qp", "a/b.yaml", "a:b:c", "a:b.c", 3)))

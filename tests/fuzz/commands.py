@@ -12,7 +12,7 @@ import pytest
 import stable_baselines3
 from hypothesis import strategies as st
 
-from poise.training.cli import commands
+from poise.training.cli import entry
 from poise.training.evaluation import run
 from poise.training.figures import video
 from poise.training.learning import train_seeds
@@ -57,7 +57,7 @@ TOKENS = [
     *("--ppo.net-arch", "--env.pushes", "None", "--env.pushes:None", "True", "quick", "random"),
     *("--start-from", "--controller", "--gate", "--action", "step", "torque", "file", "-h", "--="),
 ]
-COMMANDS = sorted(commands.COMMANDS)
+COMMANDS = sorted(entry.COMMANDS)
 
 
 class Begun(BaseException):
@@ -88,7 +88,7 @@ def cases(draw: Draw) -> Json:
 def _stops() -> tuple[tuple[Any, str], ...]:
     """What long runs begin with."""
     return (
-        (run, "Crew"), (search, "Crew"), (train_seeds, "Crew"),
+        (run, "Executor"), (search, "Executor"), (train_seeds, "Executor"),
         (stable_baselines3.PPO, "learn"), (export, "recoveries"), (page, "film"),
         (video, "record"),
     )  # fmt: skip
@@ -117,7 +117,7 @@ def play(case: Json, folder: Path) -> None:
 
 def _code(words: list[str]) -> int | str | None:
     try:
-        return commands.main(words)
+        return entry.main(words)
     except Begun:
         return "begun"
     except SystemExit as end:  # of the parser: its own words

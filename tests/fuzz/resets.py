@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hypothesis import strategies as st
 
-from poise.envs.balance.base import RESET_OPTIONS
+from poise.envs.balance.start import RESET_OPTIONS
 from poise.envs.pushes.options import KICK_KEYS, PUSH_KEYS
 from tests.support.shared import robot
 

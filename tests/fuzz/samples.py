@@ -13,7 +13,7 @@ import pytest
 from poise.training.evaluation import run
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import benchmark, evaluate
-from tests.support.benchmarks_small import InProcessCrew, write_small
+from tests.support.benchmarks_small import InProcessExecutor, write_small
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
 CONTROLLERS = ("zero", "pd")
@@ -35,8 +35,8 @@ def samples() -> Path:
 def make_samples(path: Path) -> None:
     """Play both in this process."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evaluation, "Crew", InProcess)
-        patch.setattr(run, "Crew", InProcessCrew)
+        patch.setattr(evaluation, "Executor", InProcess)
+        patch.setattr(run, "Executor", InProcessExecutor)
         patch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
         suite = write_suite(path, RANDOM)
         evaluate(CONTROLLERS, suite, out=path / "evaluation", seed=4)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import pytest
 
-from poise.training.cli import commands, train
+from poise.training.cli import entry, train
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -91,8 +91,8 @@ def parsed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
         return record
 
-    recorders = {name: recorder(name, function) for name, function in commands.COMMANDS.items()}
-    monkeypatch.setattr(commands, "COMMANDS", recorders)
+    recorders = {name: recorder(name, function) for name, function in entry.COMMANDS.items()}
+    monkeypatch.setattr(entry, "COMMANDS", recorders)
     monkeypatch.setattr(train, "run", lambda args: (train.parse(args), called.append("train")))
     return called
 
@@ -140,7 +140,7 @@ def test_commands_of_sentences_parse(page: str, command: str, parsed: list[str])
     words = [PLACES.get(word, word) for word in re.sub(r"(\\\|\w+)+", "", command).split()[1:]]
     words = [word for word in words if word]
     if len(words) == 1 or words[1] == "--help":
-        assert words[0] in {*commands.COMMANDS, "COMMAND"}, page
+        assert words[0] in {*entry.COMMANDS, "COMMAND"}, page
         return
     if words[0] in NEEDED and "--out" not in words:
         words += ["--out", "out"]
@@ -150,7 +150,7 @@ def test_commands_of_sentences_parse(page: str, command: str, parsed: list[str])
 def parse(words: list[str], parsed: list[str]) -> None:
     """Fails with the parser's message where it refuses the words."""
     parsed.clear()
-    assert commands.main(words) == 0
+    assert entry.main(words) == 0
     assert parsed == words[:1]
 
 

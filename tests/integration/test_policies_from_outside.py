@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.evaluation import run
 from poise.training.trials.agents import load_agent
 from tests.support.benchmarks_small import TRIALS, play_in_process, write_small
@@ -45,7 +45,7 @@ def folder(tmp_path: Path) -> Path:
 @pytest.fixture(autouse=True)
 def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trials are played in this process."""
-    monkeypatch.setattr(run, "Crew", InProcess)
+    monkeypatch.setattr(run, "Executor", InProcess)
 
 
 def evaluate(folder: Path, *more: str) -> int:

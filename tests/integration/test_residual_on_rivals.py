@@ -16,7 +16,7 @@ from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train
 from poise.training.results.replay import replay
-from tests.support.benchmarks_small import InProcessCrew, write_small
+from tests.support.benchmarks_small import InProcessExecutor, write_small
 from tests.support.evaluations import InProcess, random_suite, write_suite
 from tests.support.shared import tiny_config
 
@@ -26,9 +26,9 @@ def test_a_residual_on_a_rival_end_to_end(
     controller: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Trained, it learns; evaluated, replayed and a row of the benchmark like any other."""
-    monkeypatch.setattr(evaluation, "Crew", InProcess)
-    monkeypatch.setattr(run, "Crew", InProcessCrew)
-    InProcess.stop_after = InProcessCrew.stop_after = None
+    monkeypatch.setattr(evaluation, "Executor", InProcess)
+    monkeypatch.setattr(run, "Executor", InProcessExecutor)
+    InProcess.stop_after = InProcessExecutor.stop_after = None
     train(tiny_config(controller=controller, steps=64), tmp_path / "run", progress=False)
     last = str(tmp_path / "run/last")
     policy = load_policy(last)

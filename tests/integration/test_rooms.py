@@ -28,7 +28,7 @@ FLOORS = """
  5 envs/pushes
  6 envs/physics
  7 envs/sensors, envs/viewing, baselines/controller
- 7 baselines/whole_body/contacts, baselines/whole_body/tasks
+ 7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
  9 envs/vector, baselines/in_place, baselines/policy_files, baselines/stepping
 10 baselines/walking

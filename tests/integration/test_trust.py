@@ -24,11 +24,11 @@ import torch
 import poise
 from poise.baselines.allowance import NOTHING, check_allowed, named
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.plugins import find_outside
+from poise.baselines.plugins import find_plugin
 from poise.baselines.registry import controller_config, load_controller, momentum_qp_config
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled import warmup
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.evaluation.evaluate import benchmark, evaluate
 from poise.training.evaluation.seed_groups import seed_groups
 from poise.training.learning.checkpoints import check_controller, controller_fingerprint
@@ -43,7 +43,7 @@ from poise.training.results.compare import compare
 from poise.training.results.leaderboard import write_leaderboard
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
-from poise.training.running.crew import Crew
+from poise.training.running.executor import Executor
 from poise.training.trials.agents import load_agent
 from poise.training.trials.jobs import Job, Stage, play
 from poise.training.tuning.candidates import Candidate
@@ -119,7 +119,7 @@ LOADERS: dict[str, Callable[[Ground, str], Any]] = {
     "controller_config": lambda g, n: controller_config(n),
     "controller_config, mapping": lambda g, n: controller_config({"kind": "outside", "name": n}),
     "load_controller": lambda g, n: load_controller(n, robot()),
-    "find_outside": lambda g, n: find_outside(n),
+    "find_plugin": lambda g, n: find_plugin(n),
     "load_agent": lambda g, n: load_agent(n, robot()),
     "load_agent, a policy's folder": lambda g, n: load_agent(str(policy(g, n)), robot()),
     "load_policy, best checkpoint": lambda g, n: load_policy(
@@ -248,10 +248,10 @@ ELSEWHERE: dict[str, Callable[[Ground, str], Any]] = {
     "a momentum QP": lambda g, n: momentum_qp_config(n),
     "a momentum QP, YAML": lambda g, n: momentum_qp_config(NAMES["YAML"](g)),
     "qp-set": lambda g, n: write_qp_set(g.here / "out", controller=n),
-    "the QP of a rival": lambda g, n: controller_config(
+    "the QP of lqr-lip": lambda g, n: controller_config(
         {"kind": "lqr-lip", "qp": {"kind": "outside", "name": n}}
     ),
-    "the QP of a rival, YAML": lambda g, n: controller_config(
+    "the QP of lqr-lip, YAML": lambda g, n: controller_config(
         {"kind": "lqr-lip", "qp": NAMES["YAML"](g)}
     ),
     "a kind": lambda g, n: controller_config({"kind": n}),
@@ -450,12 +450,12 @@ def test_modules_of_the_current_folder_replace_no_library(
     monkeypatch.delitem(sys.modules, "wave", raising=False)
     with poise.allowing(["wave:Trap", "wave:open", "nowhere:Trap"]):
         with pytest.raises(ConfigError, match="'wave' has no 'Trap'"):
-            find_outside("wave:Trap")
+            find_plugin("wave:Trap")
         with pytest.raises(ConfigError, match="No module named 'nowhere'"):
-            find_outside("nowhere:Trap")
+            find_plugin("nowhere:Trap")
     assert not ground.sprung() and str(ground.here) not in sys.path
     with poise.allowing(f"{ground.module}:Trap"):
-        find_outside(f"{ground.module}:Trap")
+        find_plugin(f"{ground.module}:Trap")
     assert sys.path[-1] == str(ground.here) and sys.path.count(str(ground.here)) == 1
 
 
@@ -465,9 +465,9 @@ def test_processes_are_told_what_is_allowed(ground: Ground, backend: str) -> Non
     for module in ("multiprocessing", "joblib", "signal", "numpy", "poise", "contextlib", "yaml"):
         (ground.here / f"{module}.py").write_text((ground.here / f"{ground.module}.py").read_text())
     workers = 1 if backend == "local" else 2  # joblib plays with one in this process
-    with poise.allowing("a:B"), Crew(backend, workers) as crew:
+    with poise.allowing("a:B"), Executor(backend, workers) as executor:
         names = ["a:B", "a:C"]
-        assert dict(crew.each(allowed_there, names)) == {"a:B": True, "a:C": False}
+        assert dict(executor.each(allowed_there, names)) == {"a:B": True, "a:C": False}
     assert not ground.sprung()
 
 
@@ -477,8 +477,8 @@ def test_workers_load_what_is_allowed(ground: Ground) -> None:
         "class Zero:\n    period = 0.004\n    def __init__(self, robot): pass\n"
         "    def reset(self, state): pass\n    def torques(self, state, targets): return 0\n"
     )
-    with poise.allowing("fine:Zero"), Crew("local", 1) as crew:
-        assert dict(crew.each(loaded_there, ["fine:Zero"])) == {"fine:Zero": "fine:Zero"}
+    with poise.allowing("fine:Zero"), Executor("local", 1) as executor:
+        assert dict(executor.each(loaded_there, ["fine:Zero"])) == {"fine:Zero": "fine:Zero"}
 
 
 def test_the_current_folder_plants_nothing(ground: Ground) -> None:
@@ -495,7 +495,7 @@ def test_the_current_folder_plants_nothing(ground: Ground) -> None:
     code = (
         "import poise; poise.load_policy('policy'); import numba, poise.training.cli; "
         "assert not numba.config.CACHE_DIR and not numba.config.CACHE_LOCATOR_CLASSES; "
-        "assert poise.training.cli.commands.main(['replay', '.', '--trial', '0']) == 2"
+        "assert poise.training.cli.entry.main(['replay', '.', '--trial', '0']) == 2"
     )  # fmt: skip
     environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
     done = subprocess.run(
@@ -539,8 +539,8 @@ DANGEROUS = {
         "src/poise/lazy.py",
     },
     "exec_module": {"baselines/plugins.py"},
-    "find_outside": {"baselines/plugins.py", "training/trials/agents.py"},
-    "OutsideConfig": {"baselines/plugins.py", "baselines/registry.py"},
+    "find_plugin": {"baselines/plugins.py", "training/trials/agents.py"},
+    "PluginConfig": {"baselines/plugins.py", "baselines/registry.py"},
     # TorchScript, of a file that `policy_file_config` has asked about
     "torch.jit.load": {"baselines/policy_files/networks.py"},
     "load_network": {"baselines/policy_files/controller.py"},
@@ -551,7 +551,7 @@ DANGEROUS = {
 
 
 def test_code_is_imported_in_one_place() -> None:
-    """By `find_outside`, which asks first; solvers come from a fixed list. Nothing unpickles."""
+    """By `find_plugin`, which asks first; solvers come from a fixed list. Nothing unpickles."""
     found: dict[str, set[str]] = {name: set() for name in DANGEROUS}
     for folder in ("envs", "baselines", "training", "configs", "src"):
         for path in (ROOT / folder).rglob("*.py"):
@@ -573,4 +573,4 @@ def test_nothing_is_allowed_to_begin_with() -> None:
     """Not even what the user would type first."""
     assert NOTHING.names == frozenset()
     with pytest.raises(ConfigError, match=REFUSED):
-        find_outside("os:getcwd")
+        find_plugin("os:getcwd")

@@ -1,4 +1,4 @@
-"""Why rivals fall where the momentum QP does not: `python -m tests.performance.order [PICTURE]`.
+"""Why others fall where the momentum QP does not: `python -m tests.performance.order [PICTURE]`.
 
 One push of 16 N·s backward on the torso, the same start for all. For each controller: how far the
 capture point ξ is behind the heels, the largest angular momentum in the sense of the fall, when it

@@ -40,14 +40,14 @@ def first_step(agent, impulse: float, direction: float, seed: int):
         over = over or fallen
         state, now = env.simulation.state, env.simulation.time
         feet = state.sole_points
-        told = env.controller.stepping()
-        if begun is None and told.steps == 1 and told.foot >= 0 and told.phase > 0.0:
-            begun = (told.foot, now, feet[told.foot, :2].copy())
+        observed = env.controller.stepping()
+        if begun is None and observed.steps == 1 and observed.foot >= 0 and observed.phase > 0.0:
+            begun = (observed.foot, now, feet[observed.foot, :2].copy())
         if now <= 0.5:
             start = state.com[:2].copy()
         elif begun is None:
             reach = max(reach, float((state.cop - start) @ away))
-        if begun is not None and found is None and (told.foot < 0 or told.steps > 1):
+        if begun is not None and found is None and (observed.foot < 0 or observed.steps > 1):
             foot, since, place = begun
             found = (reach, now - since, float(np.linalg.norm(feet[foot, :2] - place)))
     return None if fallen else found

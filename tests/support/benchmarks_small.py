@@ -1,4 +1,4 @@
-"""Small benchmarks for tests: a suite of seconds, and a crew that plays in this process."""
+"""Small benchmarks for tests: a suite of seconds, and a executor that plays in this process."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def write_small(folder: Path, **changes: Any) -> Path:
     return path
 
 
-def play_in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
+def play_in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessExecutor]:
     """Trials are played in this process, and ticks are not timed."""
-    monkeypatch.setattr(run, "Crew", InProcessCrew)
+    monkeypatch.setattr(run, "Executor", InProcessExecutor)
     monkeypatch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
-    InProcessCrew.played, InProcessCrew.stop_after = 0, None
-    return InProcessCrew
+    InProcessExecutor.played, InProcessExecutor.stop_after = 0, None
+    return InProcessExecutor
 
 
-class InProcessCrew(InProcess):
+class InProcessExecutor(InProcess):
     """With a count of its own."""

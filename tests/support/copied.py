@@ -28,6 +28,7 @@ from poise.envs.vector.batch import EnvBatch, replicate
 from poise.envs.vector.vector_env import BalanceVectorEnv
 from poise.training.learning.policy import load_policy
 from poise.training.learning.vec_env import ThreadedVecEnv
+from tests.support.limits import described as limits_described
 from tests.support.shared import robot
 from tests.support.tasks import described
 
@@ -224,7 +225,8 @@ for _name in packaged("controllers"):
 for _name in ("momentum-qp", "capture-step", "feedback-step", "ipm-step", "kudoh02", "lqr-lip"):
     KINDS[_name] = partial(make_loop, _name), play_loop
 _HAND = {"kind": "point", "body": "left_lower_arm", "normal": [0, 0, 1], "largest_force": 0.01}
-_TASKS = {"base": "momentum-qp", "tasks": described(), "contacts": {"hand": _HAND}}
+_ROWS = {"tasks": described(), "contacts": {"hand": _HAND}, "limits": limits_described()}
+_TASKS = {"base": "momentum-qp", **_ROWS}
 KINDS["env of tasks"], KINDS["tasks"] = _with(_TASKS), (partial(make_loop, _TASKS), play_loop)
 
 

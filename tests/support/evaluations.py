@@ -1,4 +1,4 @@
-"""Small evaluations for tests: short suites, and a crew that plays in this process."""
+"""Small evaluations for tests: short suites, and a executor that plays in this process."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def write_suite(folder: Path, fields: dict[str, Any], name: str = "suite") -> Pa
 
 
 class InProcess:
-    """Works like `Crew`, without processes; `played` counts jobs, `stop_after` interrupts."""
+    """Works like `Executor`, without processes; `played` counts jobs, `stop_after` interrupts."""
 
     played = 0
     stop_after: int | None = None

@@ -12,7 +12,7 @@ import pytest
 from poise.training.evaluation import run
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import benchmark, evaluate
-from tests.support.benchmarks_small import InProcessCrew, write_small
+from tests.support.benchmarks_small import InProcessExecutor, write_small
 from tests.support.evaluations import ENVELOPE, InProcess, random_suite, write_suite
 
 SOFT = 'a "soft" <b>&.yaml'  # a name that must be escaped wherever it is written
@@ -34,14 +34,14 @@ def finished(kind: str) -> Path:
     names = [str(path / SOFT), "capture-step" if steps else "zero"]
     if kind == "benchmark":
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(run, "Crew", InProcessCrew)
+            patch.setattr(run, "Executor", InProcessExecutor)
             patch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
-            InProcessCrew.stop_after = None
+            InProcessExecutor.stop_after = None
             benchmark(names, write_small(path), out=path / "out", seed=2)
         return path / "out"
     fields = {"random": random_suite(8), "envelope": ENVELOPE}[kind]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evaluation, "Crew", InProcess)
+        patch.setattr(evaluation, "Executor", InProcess)
         InProcess.stop_after = None
         suite = write_suite(path, fields)
         evaluate(names, suite, out=path / "out", seed=4)

@@ -4,7 +4,7 @@ import numpy as np
 
 from poise.baselines.stepping.cop_region import DIRECTIONS, LOAD_FRACTIONS
 from poise.baselines.stepping.feedback import LATER_STEP
-from poise.baselines.stepping.planner import Plan
+from poise.baselines.stepping.planner import StepPlan
 from poise.baselines.stepping.recentring import LOADING, SHIFTING
 from poise.envs.maths.pendulum import drifted
 from poise.envs.maths.polygons import nearest_inside
@@ -141,7 +141,7 @@ class ReadablePlanner:
             return plan
         time = max(plan.time + later, FROZEN)
         foothold, _ = self.foothold(state, plan.foot, yaw, time, start)
-        return Plan(plan.foot, foothold, time, plan.cost, time - plan.time)
+        return StepPlan(plan.foot, foothold, time, plan.cost, time - plan.time)
 
     def best(self, state, foot, yaw, times, start, extra):
         """The cheapest of several times."""
@@ -149,7 +149,7 @@ class ReadablePlanner:
         cost = np.array([left for _, left in tried]) + extra
         cost = cost + self.choice.time_price * times * self.h * self.omega
         k = int(np.argmin(cost))
-        return Plan(foot, tried[k][0], float(times[k]), float(cost[k]))
+        return StepPlan(foot, tried[k][0], float(times[k]), float(cost[k]))
 
     def foothold(self, state, foot, yaw, time, start):
         """Foothold (2,) of a step, and how far ξ will then be outside both soles' reach."""

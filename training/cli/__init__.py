@@ -1,5 +1,5 @@
 """The command `poise`: what its subcommands take, and what they call."""
 
-from .commands import command, main
+from .entry import command, main
 
 __all__ = ["command", "main"]

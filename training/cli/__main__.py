@@ -1,5 +1,5 @@
 """`python -m poise.training.cli`, where no script is installed."""
 
-from .commands import command
+from .entry import command
 
 command()

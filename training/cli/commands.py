@@ -1,118 +1,18 @@
 """The command `poise`. What is heavy (MuJoCo, Numba, torch) is imported by the sub-commands."""
 
 import csv
-import errno
-import os
-import select
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, TextIO
+from typing import TYPE_CHECKING, Literal
 
-import tyro
-
-from poise.configs.errors import ConfigError, PoiseError
-from poise.training.running.stopping import exit_at_once, stop_code, stop_message, stoppable
 from poise.training.running.terminal import terminal
+
+from .arguments import Allow, Names, Switch
+from .results import compare, leaderboard, replay, report
 
 if TYPE_CHECKING:
     from poise.training.running.summary import Summary
-
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
-
-Names = Annotated[
-    tuple[str, ...],
-    tyro.conf.Positional,
-    tyro.conf.arg(metavar="CONTROLLER …", help_behavior_hint=""),
-]
-Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
-Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
-Allow = Annotated[
-    tuple[str, ...],
-    tyro.conf.UseAppendAction,
-    tyro.conf.arg(
-        metavar="NAME",
-        help="What may run though a file names it: module:Class or file.py:Class of a controller "
-        "or a policy, or a policy's file of TorchScript (.pt, .pth, .jit, .ts); repeatable.",
-    ),
-]
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run a sub-command; returns 0, 1 (see `evaluate`), 2 after bad input or on a full disk, 130
-    after Ctrl-C, 143 after SIGTERM, 141 if nobody reads the output any more."""
-    args = list(sys.argv[1:] if args is None else args)
-    # Small matrices lose time to threads, and sums may change their order. Read at import.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    try:
-        try:
-            return _stoppable(args)
-        except PoiseError as error:
-            print(f"poise: {error}", file=sys.stderr)
-            return 2
-        finally:
-            if sys.stdout is not None:  # poise list >&-
-                sys.stdout.flush()
-    except BrokenPipeError:
-        unread = [stream for stream in (sys.stdout, sys.stderr) if _unread(stream)]
-        if not unread:
-            raise
-        with open(os.devnull, "w") as nowhere:  # the exit flushes once more
-            for stream in unread:
-                os.dup2(nowhere.fileno(), stream.fileno())
-        return 141
-
-
-def _stoppable(args: list[str]) -> int:
-    try:
-        with stoppable():
-            return _run(args)
-    except BaseException as error:
-        if isinstance(error, KeyboardInterrupt) or stop_code() is not None:
-            # a library may have made another error of the interrupt
-            print(stop_message(), file=sys.stderr)
-            return stop_code() or 130
-        if isinstance(error, OSError) and error.errno in FULL:
-            place = "" if error.filename is None else f"{error.filename}: "
-            raise PoiseError(f"{place}cannot be written ({error.strerror})") from None
-        raise
-
-
-def command() -> None:
-    """`main` as a process: after a stop, or at one that comes when all is done, the interpreter
-    takes no time for an end of its own."""
-    code = main()
-    if stop_code() is not None:
-        sys.stderr.flush()
-        os._exit(code)
-    exit_at_once(code)
-    sys.exit(code)
-
-
-def _unread(stream: TextIO | None) -> bool:
-    """True for a pipe that nobody reads any more."""
-    try:
-        poll = select.poll()
-        poll.register(stream.fileno(), 0)  # type: ignore[union-attr]
-    except (AttributeError, OSError, ValueError):  # no stream, no descriptor, no poll
-        return False
-    return bool(poll.poll(0))
-
-
-def _run(args: list[str]) -> int:
-    if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass
-        from .train import run
-
-        run(args[1:])
-        return 0
-    code = tyro.extras.subcommand_cli_from_dict(
-        COMMANDS,
-        prog="poise",
-        description="Keep a simulated humanoid on its feet while it is pushed.",
-        args=args,
-    )
-    return code if isinstance(code, int) else 0
 
 
 def demo(out: Path = Path("out/demo"), workers: int | None = None, seed: int = 0) -> None:
@@ -252,104 +152,6 @@ def _raised(summary: "Summary", out: Path) -> int:
         print(f"poise: a controller raised an error in {failed} trials, see the column error of "
               f"{table}; the first one: {first}", file=sys.stderr)  # fmt: skip
     return 1 if failed else 0
-
-
-def compare(
-    a: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_A")],
-    b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_B")],
-    /,
-) -> None:
-    """Say what changed from one result to another, with intervals.
-
-    Args:
-        a: written by poise benchmark or poise evaluate.
-        b: another of the same kind.
-    """
-    from poise.training.results.compare import compare, print_comparison
-
-    print_comparison(compare(a, b), a, b, terminal())
-
-
-def leaderboard(
-    results: Annotated[
-        tuple[Path, ...],
-        tyro.conf.Positional,
-        tyro.conf.arg(metavar="RESULT …", help_behavior_hint=""),
-    ],
-    /,
-    *,
-    page: Path = Path("docs/leaderboard.md"),
-) -> None:
-    """Write the leaderboard page from benchmarks' results.
-
-    Args:
-        results: summary.json of poise benchmark, or the folder that holds it. Controllers of
-            later results are added, or take the place of earlier ones of their name.
-        page: the Markdown file to write.
-    """
-    from poise.training.results.leaderboard import write_leaderboard
-
-    if not results:
-        raise ConfigError("needs one or more results", field="results")
-    write_leaderboard(results, page)
-    print(page)
-
-
-def replay(
-    folder: Folder,
-    /,
-    *,
-    trial: int,
-    controller: str | None = None,
-    video: Path | None = None,
-    plot: Path | None = None,
-    allow: Allow = (),
-) -> None:
-    """Play one trial of a result again, exactly, and say whether it ends as it was recorded.
-
-    Args:
-        folder: written by poise evaluate or poise benchmark.
-        trial: its number in trials.csv.
-        controller: which of the evaluated ones; the last if not given.
-        video: an MP4 file to write.
-        plot: a PNG file to write: CoM, CoP, capture point and torque over time.
-    """
-    if video is not None:
-        from poise.envs.viewing.gl import choose_gl_backend
-
-        choose_gl_backend()
-    from poise.training.results.replay import replay
-
-    done = replay(folder, trial, controller, video=video, plot=plot, allow=allow)
-    end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
-    print(f"trial {trial}, {done.controller}: {end}")
-    print(done.trial.push or "no push")
-    for name, (recorded, now) in done.differences.items():
-        print(f"{name}: recorded {recorded or 'nothing'}, now {now or 'nothing'}")
-    print("differs from the record" if done.differences else "exactly as recorded")
-    for path in (video, plot):
-        if path is not None:
-            print(path)
-
-
-def report(
-    folder: Folder, /, *, out: Path | None = None, films: bool = True, allow: Allow = ()
-) -> None:
-    """Write one HTML file that shows a result: ranking, envelopes, falls, worst trials, numbers.
-
-    The file opens from disk and needs nothing else.
-
-    Args:
-        folder: written by poise evaluate or poise benchmark.
-        out: file to write; report.html in the folder if not given.
-        films: play the worst trials again, for pictures and plots over time (seconds for each).
-    """
-    from poise.envs.viewing.gl import choose_gl_backend
-
-    choose_gl_backend()
-    from poise.training.report.page import write_report
-
-    write_report(folder, out, films=films, console=terminal(), allow=allow)
 
 
 def tune(

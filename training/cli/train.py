@@ -17,7 +17,7 @@ from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.seeds import SEEDS
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import train_seeds
-from poise.training.running.crew import Backend
+from poise.training.running.executor import Backend
 from poise.training.running.terminal import terminal
 
 from .commands import Allow
@@ -106,7 +106,7 @@ def _peek(args: Sequence[str]) -> argparse.Namespace:
 
 
 def _is_humanoid(robot: str) -> bool:
-    """By its name or its file; what there is not is refused later."""
+    """Return whether a name or a file is the humanoid's; it need not exist yet."""
     with contextlib.suppress(ConfigError):
         return resolve("robots", robot).samefile(resolve("robots", HUMANOID))
     return False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from poise.training.running.summary import Eurobench, Factor, Level, Margin
+from poise.training.running.summary import Eurobench, Factor, Level, MarginFigures
 from poise.training.statistics.eurobench import (
     Size,
     energy_factor,
@@ -62,7 +62,7 @@ def eurobench_figures(played: Played, limits: PushLimits) -> Eurobench:
     }
 
 
-def _margins(played: Played, limits: PushLimits) -> list[Margin]:
+def _margins(played: Played, limits: PushLimits) -> list[MarginFigures]:
     """Stability margin per direction: force [N], energy [J], and both on a human's scale."""
     if not played:
         return []
@@ -72,7 +72,7 @@ def _margins(played: Played, limits: PushLimits) -> list[Margin]:
     for angle in dict.fromkeys(direction.tolist()):
         here = direction == angle
         largest = stability_margin(impulse[here], fallen[here])
-        margin: Margin = {"direction": angle, "impulse": largest}
+        margin: MarginFigures = {"direction": angle, "impulse": largest}
         if largest is not None:
             size = Size(robot.mass, robot.height_com, limits.margin(angle))
             reach = human_reach(angle)

@@ -10,7 +10,7 @@ from poise.training.running.summary import (
     Counts,
     Direction,
     Entry,
-    Envelope,
+    EnvelopeFigures,
     Fractions,
     RobotFigures,
     Sector,
@@ -94,7 +94,9 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
     }
 
 
-def envelope(played: Played, limits: PushLimits, steps: NStepLimit | None = None) -> Envelope:
+def envelope(
+    played: Played, limits: PushLimits, steps: NStepLimit | None = None
+) -> EnvelopeFigures:
     """J50 [N·s], J90, η and the share of the limit of `steps` in each direction; their means."""
     direction, impulse, duration = pushes(played)
     recovered, mass = won(played), limits.robot.mass
@@ -123,7 +125,7 @@ def envelope(played: Played, limits: PushLimits, steps: NStepLimit | None = None
             fit.directions, fit.fits, ankle, eta_values, etas.fits, strict=True
         )
     ]
-    figures: Envelope = {
+    figures: EnvelopeFigures = {
         "j50_mean": fit.j50_mean,
         "j50_mean_ci95": fit.j50_mean_ci,
         "j50_mean_per_mass": fit.j50_mean / mass,

@@ -17,7 +17,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import to_dict
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.learning.seeds import expand_seeds
-from poise.training.running.crew import Crew, check_backend
+from poise.training.running.executor import Executor, check_backend
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS, plain
 from poise.training.running.provenance import circumstances, versions
 from poise.training.running.stopping import keeps
@@ -66,7 +66,7 @@ class Run:
         self.suite = load_suite(suite) if trials is None else load_suite(suite).resized(trials)
         self.robot, self.out = load_robot(robot), Path(out)
         self.limits, self.reference = measured(self.robot), reference
-        self.crew, self.overwrite = Crew(backend, workers), overwrite
+        self.executor, self.overwrite = Executor(backend, workers), overwrite
         Plan(self.suite, self.limits, seed, names)  # refuses what does not fit the robot
         prepare()
         self.stage = Stage(robot, self.suite.duration, self.suite.noise)
@@ -142,7 +142,7 @@ class Run:
             "step_limits": curves(steps, suite.push_duration) if "directions" in entries[first]
             else [],
             "seeds": seed_groups(tuple(played), entries),
-            **circumstances(self.started, self.crew.workers, self.crew.backend),
+            **circumstances(self.started, self.executor.workers, self.executor.backend),
         }  # fmt: skip
         return plain(whole)
 
@@ -167,8 +167,8 @@ class Run:
     def _play(self, folder: ResultFolder, plan: Plan) -> None:
         """Play what is missing: the first stage, then what follows from it."""
 
-        def missing(wanted: Iterable[tuple[str, Trial]]) -> list[Job]:
-            jobs = [Job(self.stage, name, trial) for name, trial in wanted
+        def missing(pairs: Iterable[tuple[str, Trial]]) -> list[Job]:
+            jobs = [Job(self.stage, name, trial) for name, trial in pairs
                     if (name, trial.number) not in folder.finished]  # fmt: skip
             return sorted(jobs, key=lambda job: job.trial.number)
 
@@ -182,10 +182,10 @@ class Run:
             rates.add(name, outcome.recovered)
         with progress_bar(self.console) as bar, contextlib.ExitStack() as working:
             task = bar.add_task("", total=plan.count, completed=len(folder.finished), rates="")
-            crew = None
+            executor = None
             for jobs in filter(None, stages()):
-                crew = crew or working.enter_context(self.crew)
-                for job, outcome in crew.each(play, jobs):
+                executor = executor or working.enter_context(self.executor)
+                for job, outcome in executor.each(play, jobs):
                     folder.append(job.controller, job.trial.number, outcome)
                     rates.add(job.controller, outcome.recovered)
                     bar.update(task, completed=len(folder.finished), rates=str(rates))

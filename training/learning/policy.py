@@ -116,7 +116,7 @@ class Policy(Copyable):
         return (x @ weight + bias)[..., 0, :]
 
     def content(self) -> list[bytes]:
-        """All that decides its actions."""
+        """Return the bytes of all that decides the policy's actions."""
         layers = [array for layer in self.layers for array in layer]
         sides = [] if self._mirrors is None else [m.sign * (1 + m.order) for m in self._mirrors]
         numbers = [*layers, self._mean, self._scale, np.array(self._clip), *sides]

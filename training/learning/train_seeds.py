@@ -17,7 +17,7 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
-from poise.training.running.crew import Crew, check_backend
+from poise.training.running.executor import Executor, check_backend
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.provenance import circumstances
 from poise.training.running.stopping import keeps
@@ -86,7 +86,7 @@ def train_seeds(
     keeps(out / SEEDS, f"what is trained is kept in {out}; go on with --resume")
     with FolderLock(out):
         _all_seeds(given, out, resume)  # another process may have begun since
-        return _train(config, runs, missing, out, Crew(backend, workers), console, started)
+        return _train(config, runs, missing, out, Executor(backend, workers), console, started)
 
 
 def _train(
@@ -94,7 +94,7 @@ def _train(
     runs: Sequence[SeedRun],
     missing: Sequence[SeedRun],
     out: Path,
-    crew: Crew,
+    executor: Executor,
     console: Console,
     started: float,
 ) -> SeedSummary:
@@ -103,8 +103,8 @@ def _train(
     write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
     write_atomic(out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n")
     failed: list[str] = []
-    with SeedProgress(runs, console), crew:
-        for run, error in crew.each(train_run, missing):
+    with SeedProgress(runs, console), executor:
+        for run, error in executor.each(train_run, missing):
             if error is None and not _finished(run):
                 error = f"{run.folder} is not finished here: do all machines see it?"
             if error is None:
@@ -119,7 +119,7 @@ def _train(
     summary: SeedSummary = {
         "runs": entries,
         "recovered": recovered,
-        **circumstances(started, crew.workers, crew.backend),
+        **circumstances(started, executor.workers, executor.backend),
     }
     write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
     print_seeds(summary, console)
@@ -143,7 +143,7 @@ def train_run(run: SeedRun) -> str | None:
 
 
 def _all_seeds(seeds: Sequence[int], out: Path, resume: bool) -> list[int]:
-    """Those of the folder and the given ones; refuses what is no list of seeds."""
+    """Return the seeds of the folder and the given ones; refuses what is no list of seeds."""
     for seed in seeds:
         if seed < 0:
             raise ConfigError(f"must be at least 0, not {seed}", field="seeds")

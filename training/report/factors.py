@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from poise.training.results.read import Results
-from poise.training.running.summary import Level, Margin, both_ends
+from poise.training.running.summary import Level, MarginFigures, both_ends
 from poise.training.statistics.rates import wilson_interval
 from poise.training.statistics.seeds import FIGURES
 
@@ -134,7 +134,7 @@ def indicators(results: Results, order: Sequence[str]) -> Table | None:
     """EUROBENCH's indicators; None where no standard pushes were played."""
     entries = results.summary["controllers"]
     order = [name for name in order if "eurobench" in entries[name]]
-    margins: dict[str, dict[float, Margin]] = {
+    margins: dict[str, dict[float, MarginFigures]] = {
         name: {margin["direction"]: margin for margin in entries[name]["eurobench"]["margins"]}
         for name in order
     }
@@ -162,7 +162,7 @@ def indicators(results: Results, order: Sequence[str]) -> Table | None:
             figure_cell(found, "recovery_time_trials", "d"),
         ]
         for angle in angles:
-            margin = margins[name].get(angle, Margin(direction=angle))
+            margin = margins[name].get(angle, MarginFigures(direction=angle))
             sign = "≥ " if margin.get("largest_tried") else ""
             for key in ("force", "force_normalised", "energy_normalised"):
                 form = ".1f" if "energy" in key else ".0f"

@@ -139,8 +139,8 @@ class Chart:
 
     @staticmethod
     def _map(value: ArrayLike, ends: tuple[float, float], first: float, last: float) -> np.ndarray:
-        share = (np.asarray(value, dtype=float) - ends[0]) / (ends[1] - ends[0])
-        return first + share * (last - first)
+        fraction = (np.asarray(value, dtype=float) - ends[0]) / (ends[1] - ends[0])
+        return first + fraction * (last - first)
 
 
 def ticks(low: float, high: float, count: int = 5) -> list[float]:

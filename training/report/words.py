@@ -50,14 +50,14 @@ def push_times(trial: Trial) -> list[tuple[float, float]]:
 
 
 def _world(trial: Trial) -> list[str]:
-    """In what the trial differs from the standard one."""
-    said, world = [], trial.world
-    if world.friction is not None:
-        said.append(f"friction {world.friction:.2f}")
-    if world.delay:
-        said.append(f"sensors {1000.0 * world.delay:.0f}\u00a0ms late")
-    if world.mass_error:
-        said.append(number_text(world.mass_error, "+.0%") + " mass")
+    """Return how the conditions of a trial differ from the standard ones."""
+    said, conditions = [], trial.conditions
+    if conditions.friction is not None:
+        said.append(f"friction {conditions.friction:.2f}")
+    if conditions.delay:
+        said.append(f"sensors {1000.0 * conditions.delay:.0f}\u00a0ms late")
+    if conditions.mass_error:
+        said.append(number_text(conditions.mass_error, "+.0%") + " mass")
     if len(trial.pushes) > 1:
         said.append(f"{len(trial.pushes)} pushes")
     return said

@@ -60,9 +60,9 @@ class Film:
 def choose_exhibits(results: Results, baseline: str, order: Sequence[str]) -> list[Exhibit]:
     """One trial for each controller, in this order, if it lost any.
 
-    For a rival, the smallest push that it lost and the baseline recovered; else, and for the
-    baseline, the smallest push that the controller lost. Pushes are compared by their share of the
-    limit. Without pushes, the first trial that was lost.
+    Of a controller other than the baseline it is the smallest push that it lost and the baseline
+    recovered; else, and of the baseline, the smallest push that it lost. Pushes are compared by
+    their fraction of the limit. Without pushes, it is the first trial that was lost.
     """
     recovered: dict[tuple[str, ...], dict[str, Record]] = {}
     for record in results.records:
@@ -115,7 +115,7 @@ def film(results: Results, record: Record, times: Sequence[float], draw: bool = 
 
 
 def frame_times(record: Record) -> list[float]:
-    """From the push to the fall, or to when it is over [s]; of a trial that was lost."""
+    """Return the times of frames, from the push to the fall, or to when it is over [s]."""
     start = float(record.line.get("start") or 0.0)
     end = record.fall_time if math.isfinite(record.fall_time) else start + 3.0
     return [float(t) for t in np.linspace(start, max(end, start + AFTER), FRAMES)]

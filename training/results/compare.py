@@ -164,11 +164,11 @@ def _rates(
     part: str | None = None,
 ) -> Iterator[Change]:
     """A recovered rate: in pairs if both played the same trials, else by intervals."""
-    wanted = {"factor": factor, "level": level, "part": part}
+    required = {"factor": factor, "level": level, "part": part}
     table = {(x, y): 0 for x in (True, False) for y in (True, False)}
     others = _outcomes(b, name)
     for record in a.of(name):
-        here = all(value is None or record.line[key] == value for key, value in wanted.items())
+        here = all(value is None or record.line[key] == value for key, value in required.items())
         if here and record.met in others:
             table[record.recovered, others[record.met]] += 1
     both, only_a, only_b, neither = table.values()

@@ -19,7 +19,7 @@ from poise.training.trials.play import run_trial
 from poise.training.trials.signals import Signals
 from poise.training.trials.table import outcome_cells
 from poise.training.trials.trial import Outcome, Trial
-from poise.training.trials.worlds import Worlds
+from poise.training.trials.variants import AgentVariants
 
 from .read import Results, load_results
 
@@ -73,7 +73,7 @@ def replay(
         name = results.controllers[-1] if controller is None else controller
         record = results.record(name, trial)
         again = results.trial(record)
-        agent = Worlds(_agent(results, name)).enter(again.world)
+        agent = AgentVariants(_agent(results, name)).under(again.conditions)
     signals = Signals() if plot is not None else None
     watches = [each for each in (signals, watch) if each is not None]
     outcome = run_trial(agent, again, lambda env: [each(env) for each in watches])

@@ -1,1 +1,1 @@
-"""How anything long is run: processes, terminal, files, and where a result comes from."""
+"""Running anything long: processes, terminal, files, and where a result comes from."""

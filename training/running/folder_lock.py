@@ -84,7 +84,7 @@ def _holder(path: Path) -> str:
 
 
 def _remove_parts(path: Path) -> None:
-    """What `write_atomic` and `video.record` had not finished when their process was killed."""
+    """Remove what `write_atomic` and `video.record` left unfinished when they were killed."""
     for part in path.glob(".*.part*"):
         found = re.fullmatch(r"\..*\.(\d+)\.part(\.mp4)?", part.name)
         if found and not _alive(int(found[1])):

@@ -45,7 +45,7 @@ class WorkerPool:
     def each(
         self, function: Callable[[Job], Result], jobs: Sequence[Job]
     ) -> Iterator[tuple[Job, Result]]:
-        """Each job with `function(job)`, as they are done; both are pickled.
+        """Yield each job with `function(job)`, in the order that they end in; both are pickled.
 
         Raises PoiseError when two workers have died of a job, and what the function raises.
         """

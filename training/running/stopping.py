@@ -38,7 +38,7 @@ class Stopped(KeyboardInterrupt):
 
 
 def keeps(path: Path, words: str) -> None:
-    """From now on, a stop says `words`, what is kept and how to go on, once `path` exists.
+    """Have a stop say `words`, what is kept and how to go on, from now on, once `path` exists.
 
     Of several, the first counts: that of the outermost caller.
     """
@@ -81,7 +81,7 @@ def stoppable() -> Iterator[None]:
 
 
 def exit_at_once(code: int) -> None:
-    """From now on a signal ends this process with `code`: its work is done and written."""
+    """Have a signal end this process with `code` from now on: its work is done and written."""
     for number in SIGNALS:
         if signal.getsignal(number) not in (signal.SIG_IGN, None):
             signal.signal(number, lambda number, frame: os._exit(code))

@@ -100,7 +100,7 @@ class Direction(DirectionJ50, total=False):
     step_share_inf: float
 
 
-class Envelope(TypedDict, total=False):
+class EnvelopeFigures(TypedDict, total=False):
     """J50 over the directions."""
 
     j50_mean: float
@@ -136,7 +136,7 @@ class Factor(TypedDict):
     levels: list[Level]
 
 
-class Margin(Angle, total=False):
+class MarginFigures(Angle, total=False):
     """EUROBENCH's stability margin in a direction."""
 
     impulse: Number
@@ -154,7 +154,7 @@ class Eurobench(TypedDict):
     recovery_time_mean: Number
     recovery_time_trials: int
     trials: int
-    margins: list[Margin]
+    margins: list[MarginFigures]
 
 
 class Fractions(TypedDict, total=False):
@@ -173,7 +173,7 @@ class Played(Rate):
     errors: int
 
 
-class Entry(Played, Counts, Envelope, Fractions, total=False):
+class Entry(Played, Counts, EnvelopeFigures, Fractions, total=False):
     """A controller. The counts are of the part that is rated, else of all trials."""
 
     tick_us: Number

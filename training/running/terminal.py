@@ -36,6 +36,6 @@ def progress_bar(console: Console) -> Progress:
 
 
 def print_paths(paths: Sequence[Path], console: Console) -> None:
-    """One path a line, whole, as it is to be copied."""
+    """Print one path a line, whole, as it is to be copied."""
     for path in paths:
         console.print(str(path), markup=False, highlight=False, soft_wrap=True)

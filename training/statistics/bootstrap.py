@@ -223,7 +223,7 @@ def _gain(
 
 
 def _resample(trials: int, resamples: int, seed: np.random.SeedSequence) -> np.ndarray:
-    """How often each trial is drawn in each bootstrap replicate, (resamples, trials)."""
+    """Return how often each trial is drawn in each bootstrap replicate, (resamples, trials)."""
     even = np.full(trials, 1 / trials)
     return np.random.default_rng(seed).multinomial(trials, even, size=resamples).astype(float)
 

@@ -40,7 +40,7 @@ HUMAN_COM_HEIGHT = _human_com_height()
 
 @dataclass(frozen=True)
 class Size:
-    """What the normalisation needs of a robot.
+    """The sizes of a robot that the normalisation needs.
 
     Attributes:
         mass: [kg].

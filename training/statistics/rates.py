@@ -142,7 +142,7 @@ def percentile_interval(
 
 
 def eta(j50: ArrayLike, mass: float, limit: ArrayLike) -> np.ndarray:
-    """How near the physics of the ankles a controller is: η = (J50 / m) / limit.
+    """Return η = (J50 / m) / limit, how near a controller is to the physics of the ankles.
 
     Args:
         j50: impulse recovered half the time [N·s], any shape.

@@ -15,7 +15,7 @@ from poise.envs.pushes.options import check_body
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import Range, push_bodies
 from poise.training.trials.push_limits import PushLimits
-from poise.training.trials.trial import Trial, World
+from poise.training.trials.trial import Conditions, Trial
 
 MOST_TRIALS = 100_000  # all are drawn before the first is played
 Recovered = Mapping[str, Sequence[bool]]  # controller → outcome of each trial of the first stage
@@ -23,8 +23,10 @@ Recovered = Mapping[str, Sequence[bool]]  # controller → outcome of each trial
 
 @dataclass(frozen=True)
 class Standard:
-    """What the parts of a suite share: how long a trial lasts, how far its start is disturbed, and
-    the standard push, a square one at the body's centre of mass."""
+    """The settings that the parts of a suite have in common.
+
+    They are how long a trial lasts, how far its start is disturbed, and the standard push, a square
+    one at the body's centre of mass."""
 
     duration: float = field(default=6.0, metadata={"above": 1.0, "max": 1e6})  # of a trial [s]
     start: float = field(default=0.5, metadata={"min": 0.0})  # of the first push [s]
@@ -35,13 +37,13 @@ class Standard:
 
 
 class Marks(TypedDict, total=False):
-    """Fields that say which place a trial has in its suite, and its world."""
+    """Fields that say which place a trial has in its suite, and its conditions."""
 
     part: str
     stage: int
     factor: str | None
     level: str | None
-    world: World
+    conditions: Conditions
 
 
 class Draw:

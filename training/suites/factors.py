@@ -1,4 +1,4 @@
-"""Parts in which the world differs from the standard case: in one factor, or in all at once."""
+"""Parts in which conditions differ from the standard case: in one factor, or in all at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import Range
 from poise.envs.robots.ground import contact_friction
-from poise.training.trials.trial import OWN_WORLD, Trial, World
+from poise.training.trials.trial import STANDARD_CONDITIONS, Conditions, Trial
 
 from .draw import MOST_TRIALS, Draw, Part, check_rising, generator, start_seed
 
@@ -38,7 +38,7 @@ class Cell:
     duration: float | None = None
     body: str | None = None
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    world: World = OWN_WORLD
+    conditions: Conditions = STANDARD_CONDITIONS
     count: int = 1
 
     def push(self, draw: Draw, angle: float, fraction: float) -> Push:
@@ -69,7 +69,7 @@ class Factors(Part):
                 pushes = repeated(cell.push(draw, angle, fraction), cell.count, draw)
                 trial = draw.trial(
                     number + len(trials), pushes, part="factors", factor=cell.factor,
-                    level=cell.level, world=cell.world,
+                    level=cell.level, conditions=cell.conditions,
                 )  # fmt: skip
                 trials.append(replace(trial, seed=start_seed(draw.seed, number + k)))
         return trials
@@ -79,9 +79,11 @@ class Factors(Part):
         cells = [Cell("duration", f"{d:g}", duration=d) for d in levels.duration]
         cells += [Cell("body", body, body=body) for body in (draw.bodies if levels.body else ())]
         cells += [Cell("height", f"{h:.2f}", point=draw.point(first, h)) for h in levels.height]
-        cells += [Cell("friction", f"{f:g}", world=World(friction=f)) for f in levels.friction]
-        cells += [Cell("delay", f"{d:g}", world=World(delay=d)) for d in levels.delay]
-        cells += [Cell("mass_error", f"{e:g}", world=World(mass_error=e))
+        cells += [
+            Cell("friction", f"{f:g}", conditions=Conditions(friction=f)) for f in levels.friction
+        ]
+        cells += [Cell("delay", f"{d:g}", conditions=Conditions(delay=d)) for d in levels.delay]
+        cells += [Cell("mass_error", f"{e:g}", conditions=Conditions(mass_error=e))
                   for e in levels.mass_error]  # fmt: skip
         cells += [Cell("pushes", f"{n:g}", count=n) for n in levels.pushes]
         others = [cell for cell in cells if standard[cell.factor] != cell.level]
@@ -122,13 +124,13 @@ class Mix(Part):
             body, draw.standard.start, duration, fraction * draw.limits.ankle(angle, duration),
             angle, point=draw.point(body, height) if trunk else (0.0, 0.0, 0.0),
         )  # fmt: skip
-        world = World(
+        conditions = Conditions(
             friction=float(rng.uniform(*self.friction)),
             delay=self.delay[int(rng.integers(len(self.delay)))],
             mass_error=float(rng.uniform(*self.mass_error)),
         )
         count = 2 if rng.uniform() < self.repeated else 1
-        return draw.trial(number, repeated(push, count, draw), part="mix", world=world)
+        return draw.trial(number, repeated(push, count, draw), part="mix", conditions=conditions)
 
 
 def repeated(push: Push, count: int, draw: Draw) -> list[Push]:

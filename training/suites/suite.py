@@ -73,7 +73,7 @@ def load_suite(name: str | Path) -> Suite:
 
 
 def _of_old_form(data: dict[str, Any], path: Path) -> ConfigError:
-    """What a suite of one part, which its `kind` named, is to say today."""
+    """Return what a suite of one part, which its `kind` named, is to say today."""
     kind = data["kind"]
     if not isinstance(kind, str) or kind not in PARTS:
         part = "random: {trials: 200}"

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.allowance import is_outside
+from poise.baselines.allowance import is_plugin
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
-from poise.baselines.plugins import find_outside, make_outside, outside_config
+from poise.baselines.plugins import find_plugin, make_plugin, plugin_config
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.reading import RIVALS, is_policy
 from poise.baselines.registry import ControllerConfig, controller_config
@@ -68,11 +68,11 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
     theirs = is_policy(name)
     if name in policies or (is_folder(name) and not theirs):
         return _policy(name, robot, overrides)
-    if is_outside(name) and not _is_controller(name, robot):
+    if is_plugin(name) and not _is_controller(name, robot):
         return _outside_policy(name, robot, overrides)
     names = [*packaged("controllers"), *packaged(RIVALS)]
     found = is_file(name) and Path(name).suffix in (".yaml", ".yml")
-    if name not in names and not (found or theirs or is_outside(name)):
+    if name not in names and not (found or theirs or is_plugin(name)):
         raise ConfigError(
             f"no such controller: {shown(name)}; give a name, a .yaml file of a controller, "
             "a folder written by poise train, an ONNX file or a folder with a deploy.yaml, or "
@@ -136,13 +136,13 @@ ENVIRONMENTS = {
 
 def _is_controller(name: str, robot: Robot) -> bool:
     """True if a class, or what a function makes, gives torques."""
-    found = find_outside(name)
-    return hasattr(found if isinstance(found, type) else make_outside(name, robot), "torques")
+    found = find_plugin(name)
+    return hasattr(found if isinstance(found, type) else make_plugin(name, robot), "torques")
 
 
 def _outside_policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
     """A policy from outside: `act(observation)` in the environment that it names, or makes."""
-    policy = make_outside(name, robot)
+    policy = make_plugin(name, robot)
     if not hasattr(policy, "act"):
         raise ConfigError("has neither torques (a controller) nor act (a policy)", source=name)
     if hasattr(policy, "make_env"):
@@ -153,7 +153,7 @@ def _outside_policy(name: str, robot: Robot, overrides: dict[str, object]) -> Ag
             raise ConfigError(f"no such environment: {shown(kind)}", source=name,
                               field="environment", choices=ENVIRONMENTS)  # fmt: skip
         env = ENVIRONMENTS[kind](robot, **overrides)
-    content = to_yaml(outside_config(name)).encode()
+    content = to_yaml(plugin_config(name)).encode()
     return Agent(name, env, policy.act, _hash(content), getattr(policy, "reset", None))
 
 

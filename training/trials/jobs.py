@@ -12,7 +12,7 @@ from poise.envs.robots.robot import Robot, load_robot
 from .agents import Agent, load_agent
 from .play import run_trial
 from .trial import Outcome, Trial, failed
-from .worlds import Worlds
+from .variants import AgentVariants
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,13 @@ def play(job: Job) -> Outcome:
 
     Raises PoiseError when the controller cannot be loaded here: that is no trial.
     """
-    worlds = _loaded(job.stage, job.controller)
+    variants = _loaded(job.stage, job.controller)
     try:
-        return run_trial(worlds.enter(job.trial.world), job.trial)
+        return run_trial(variants.under(job.trial.conditions), job.trial)
     except MemoryError:  # of this process, not of the controller
         raise
     except Exception as error:  # a controller from outside may raise anything
-        del _worlds[job.stage, job.controller]  # it may be broken: the next trial gets a new one
+        del _variants[job.stage, job.controller]  # it may be broken: the next trial gets a new one
         return failed(error)
 
 
@@ -64,11 +64,11 @@ def _robot(name: str | Path) -> Robot:
     return load_robot(name)
 
 
-_worlds: dict[tuple[Stage, str], Worlds] = {}  # of this process
+_variants: dict[tuple[Stage, str], AgentVariants] = {}  # of this process
 
 
-def _loaded(stage: Stage, controller: str) -> Worlds:
+def _loaded(stage: Stage, controller: str) -> AgentVariants:
     key = (stage, controller)
-    if key not in _worlds:
-        _worlds[key] = Worlds(stage.load(controller))
-    return _worlds[key]
+    if key not in _variants:
+        _variants[key] = AgentVariants(stage.load(controller))
+    return _variants[key]

@@ -15,7 +15,7 @@ from poise.baselines.stepping.controller import SteppingController
 from poise.baselines.stepping.cop_region import CopRegion
 from poise.envs.maths.pendulum import capture_distance, duration_factor
 from poise.envs.maths.polygons import ray_to_edge
-from poise.training.running.summary import Curves, Direction, Envelope, StepCurves
+from poise.training.running.summary import Curves, Direction, EnvelopeFigures, StepCurves
 
 from .agents import Agent
 from .push_limits import PushLimits
@@ -65,7 +65,7 @@ class NStepLimit:
         d = capture_distance(count, r, length, omega, self.time)
         return mass * omega * d * duration_factor(omega, duration)
 
-    def add_to(self, figures: Envelope, duration: float) -> None:
+    def add_to(self, figures: EnvelopeFigures, duration: float) -> None:
         """Complete the figures of an envelope: in each of its `directions` r, l and T_s, the limits
         of `COUNTS` and the share of each that J50 is; over all directions the shares' means."""
         for entry in figures["directions"]:
@@ -78,7 +78,7 @@ class NStepLimit:
         entries = cast(list[dict[str, float]], figures["directions"])
         shares = {name: [entry[f"step_share_{name}"] for entry in entries] for name in COUNTS}
         means = {f"step_share_{name}_mean": float(np.mean(shares[name])) for name in COUNTS}
-        figures.update(cast(Envelope, means))
+        figures.update(cast(EnvelopeFigures, means))
 
 
 def stepping_limits(

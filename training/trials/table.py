@@ -12,17 +12,17 @@ from poise.configs.reading import parse_json
 from poise.configs.schema import build
 from poise.envs.pushes.push import Push
 
-from .trial import Outcome, Trial, World
+from .trial import Conditions, Outcome, Trial
 
 Cell = str | float | bool | None
 PUSH_COLUMNS = (
     *("body", "start", "duration", "impulse", "direction", "elevation"),
     *("point_x", "point_y", "point_z", "profile"),
 )
-WORLD_COLUMNS = tuple(World.__dataclass_fields__)
+CONDITION_COLUMNS = tuple(Conditions.__dataclass_fields__)
 CASE_COLUMNS = (
     *("trial", "controller", "seed", "stage", "part", "factor", "level"),
-    *(*PUSH_COLUMNS, *WORLD_COLUMNS, "limit_fraction", "later"),
+    *(*PUSH_COLUMNS, *CONDITION_COLUMNS, "limit_fraction", "later"),
 )
 OUTCOME_COLUMNS = tuple(
     "stepped" if name == "foot_displaced" else name for name in Outcome.__dataclass_fields__
@@ -42,7 +42,7 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
         "factor": trial.factor,
         "level": trial.level,
         **_push_cells(trial.push),
-        **asdict(trial.world),
+        **asdict(trial.conditions),
         "limit_fraction": trial.limit_fraction,
         "later": json.dumps(later) if later else None,
         **outcome_cells(outcome),
@@ -71,7 +71,7 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
             number=int(line["trial"]),
             seed=int(line["seed"]),
             pushes=tuple(build(Push, push, str(path)) for push in [*pushes, *later]),
-            world=World(
+            conditions=Conditions(
                 friction=_number(line["friction"]),
                 delay=float(line["delay"]),
                 mass_error=float(line["mass_error"]),

@@ -1,4 +1,4 @@
-"""One trial: a start, the pushes, the world that they meet, and what became of it."""
+"""One trial: a start, the pushes, the conditions that they meet, and what became of it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from poise.envs.pushes.push import Push
 
 
 @dataclass(frozen=True)
-class World:
+class Conditions:
     """The difference of a trial's robot from the one that its controller knows.
 
     Attributes:
@@ -22,7 +22,7 @@ class World:
     mass_error: float = 0.0
 
 
-OWN_WORLD = World()  # the robot as its controller knows it
+STANDARD_CONDITIONS = Conditions()  # the robot as its controller knows it
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Trial:
         number: of the trial within its suite.
         seed: of the disturbed start.
         pushes: one after the other; none where the robot only stands.
-        world: in which it is played.
+        conditions: in which it is played.
         limit_fraction: impulse of the only push over its limit (see `PushLimits.scale`), of
             repeated pushes that of each.
         part: of the suite.
@@ -45,7 +45,7 @@ class Trial:
     number: int
     seed: int
     pushes: tuple[Push, ...] = ()
-    world: World = OWN_WORLD
+    conditions: Conditions = STANDARD_CONDITIONS
     limit_fraction: float | None = None
     part: str = ""
     stage: int = 1

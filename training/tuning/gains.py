@@ -27,13 +27,13 @@ class Gain:
         return self.low > 0.0
 
     def value(self, unit: float) -> float:
-        """From the search's [0, 1] to the gain."""
+        """Return the gain that belongs to a number of the search, in [0, 1]."""
         if self.log:
             return float(self.low * (self.high / self.low) ** unit)
         return float(self.low + (self.high - self.low) * unit)
 
     def unit(self, value: float) -> float:
-        """From a gain to [0, 1]."""
+        """Return the number of the search, in [0, 1], that belongs to a gain."""
         value = min(max(value, self.low), self.high)
         if self.log:
             return float(np.log(value / self.low) / np.log(self.high / self.low))
@@ -86,7 +86,7 @@ def _put(data: dict[str, Any], path: str, value: float) -> None:
 
 
 def _numbers(data: Mapping[str, object], prefix: str = "") -> dict[str, float]:
-    """All numbers of a configuration by their paths."""
+    """Return all numbers of a configuration by their paths."""
     found: dict[str, float] = {}
     for name, value in data.items():
         if isinstance(value, Mapping):

@@ -19,7 +19,7 @@ from poise.configs.files import resolve, write_atomic
 from poise.configs.reading import is_file, parse_json, read_lines
 from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
 from poise.envs.robots.robot import load_robot
-from poise.training.running.crew import Crew
+from poise.training.running.executor import Executor
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
 
@@ -117,13 +117,13 @@ def tune(
     _known(config, out, resume)  # what is refused makes no folder
     console = console or Console(quiet=True)
     keeps(out / HISTORY, f"the finished generations are kept in {out}; go on with --resume")
-    with FolderLock(out), Crew("local", workers) as crew:
+    with FolderLock(out), Executor("local", workers) as executor:
         rows = _known(config, out, resume)  # another search may have ended since
         for row in rows:
             search.again(row, out / HISTORY)
         write_atomic(out / CONFIG, to_yaml(config))
         while search.generation < config.generations:
-            rows.append(search.step(crew))
+            rows.append(search.step(executor))
             write_atomic(out / GAINS, to_yaml(gains.at(search.mean)))
             write_atomic(out / HISTORY, "".join(json.dumps(row) + "\n" for row in rows))
             console.print(search.words(rows[-1]), highlight=False)
@@ -179,7 +179,7 @@ class _Search:
         self.mean = gains.first()  #: what the search has found
         self.centres: list[np.ndarray] = []
 
-    def step(self, crew: Crew) -> Generation:
+    def step(self, executor: Executor) -> Generation:
         """A generation; returns its line of the history."""
         config = self.config
         units = [np.asarray(u) for u in self.cma.ask()]
@@ -198,7 +198,7 @@ class _Search:
             )
             for number, u in enumerate(units)
         ]  # fmt: skip
-        found = {job.number: values for job, values in crew.each(play, jobs)}
+        found = {job.number: values for job, values in executor.each(play, jobs)}
         values = [[found[k][agent] for k in range(len(units))] for agent in range(2)]
         generation, tried = self.generation, [u.tolist() for u in units]
         self._take(units, values)

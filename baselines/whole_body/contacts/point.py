@@ -22,7 +22,7 @@ class PointContactBlock(Block):
     point: BodyPoint
     normal: np.ndarray  # (3,) out of the surface, world
     cone: np.ndarray  # (5, 3) cone · f ≤ (0, 0, 0, 0, largest)
-    force: np.ndarray  # (1,) along the normal, wanted [N]
+    force: np.ndarray  # (1,) along the normal, desired [N]
     largest: np.ndarray  # (1,) along the normal [N]
     force_weight: float  # per N²
     damping: float  # k_v [1/s]

@@ -31,7 +31,7 @@ def wrench_cone(polygon: np.ndarray, friction: float) -> np.ndarray:
 
 
 def robot_cones(robot: Robot, friction_share: float, polygon_share: float) -> np.ndarray:
-    """Cones (nc, r, 6) of all soles, with a share of the real friction and of the real polygon.
+    """Cones (nc, r, 6) of all soles, with a fraction of the real friction and of the real polygon.
 
     Rows are padded with zeros, so that soles of any polygon have the same count.
     """

@@ -33,7 +33,7 @@ class OrientationBlock(Block):
     k: float  # [1/s²]
     d: float  # [1/s]
     weight: float  # per (rad/s²)²
-    wanted: np.ndarray  # (3, 3) scratch: R_ref in the world
+    desired: np.ndarray  # (3, 3) scratch: R_ref in the world
     error: np.ndarray  # (3,) scratch
 
 
@@ -45,9 +45,9 @@ def fill_orientation(t: TaskTick[OrientationBlock]):
     update_point(s, point)
     cos, sin = (s.heading[0], s.heading[1]) if o.turns else (1.0, 0.0)
     for c in range(3):
-        o.wanted[0, c], o.wanted[1, c] = turned(cos, sin, o.axes[0, c], o.axes[1, c])
-        o.wanted[2, c] = o.axes[2, c]
-    gain = o.k * turn_error(R, o.wanted, error)
+        o.desired[0, c], o.desired[1, c] = turned(cos, sin, o.axes[0, c], o.axes[1, c])
+        o.desired[2, c] = o.axes[2, c]
+    gain = o.k * turn_error(R, o.desired, error)
     for a in range(3):
         turn = R[a, 0] * error[0] + R[a, 1] * error[1] + R[a, 2] * error[2]
         rows.b[a] = gain * turn - o.d * point.J_v[3 + a] - point.Jdot_v[3 + a]
@@ -81,14 +81,14 @@ class Orientation(Task[OrientationBlock]):
         return OrientationBlock(
             point=point, axes=standing_frame(robot, point)[1], turns=self.frame == "heading",
             k=k, d=d, weight=float(self.weight / units.omega**4),
-            wanted=guarded_zeros((3, 3)), error=guarded_zeros(3),
+            desired=guarded_zeros((3, 3)), error=guarded_zeros(3),
         )  # fmt: skip
 
     def rows(self, state: RobotState, block: OrientationBlock) -> Rows:
         """The rows in v̇, in NumPy."""
         motion = point_motion(state, block.point)
         yaw = state.heading_yaw if block.turns else 0.0
-        wanted = Rotation.from_euler("z", yaw).as_matrix() @ block.axes
-        turn = Rotation.from_matrix(wanted @ motion.axes.T).as_rotvec()
+        desired = Rotation.from_euler("z", yaw).as_matrix() @ block.axes
+        turn = Rotation.from_matrix(desired @ motion.axes.T).as_rotvec()
         b = block.k * turn - block.d * motion.J_v[3:] - motion.Jdot_v[3:]
         return Rows(motion.J[3:], b, np.full(3, block.weight))

@@ -96,5 +96,7 @@ class Position(Task[PositionBlock]):
             cos, sin = state.heading
             turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
             place, velocity, accel = state.origin + turn @ place, turn @ velocity, turn @ accel
-        wanted = accel + block.k * (place - motion.position) + block.d * (velocity - motion.J_v[:3])
-        return Rows(motion.J[:3], wanted - motion.Jdot_v[:3], np.full(3, block.weight))
+        desired = (
+            accel + block.k * (place - motion.position) + block.d * (velocity - motion.J_v[:3])
+        )
+        return Rows(motion.J[:3], desired - motion.Jdot_v[:3], np.full(3, block.weight))

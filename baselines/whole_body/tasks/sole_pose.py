@@ -76,8 +76,8 @@ class SolePose(Task[SolePoseBlock]):
         velocity, axes = state.J_v[own], state.sole_axes[block.sole]
         turn = 0.5 * np.cross(axes.T, block.axes.T).sum(axis=0)
         error = np.concatenate([reference[0] - state.sole_points[block.sole], turn])
-        wanted = np.concatenate([reference[1], np.zeros(3)])
-        b = gains.stiffness * error + gains.damping * (wanted - velocity) - state.Jdot_v[own]
+        desired = np.concatenate([reference[1], np.zeros(3)])
+        b = gains.stiffness * error + gains.damping * (desired - velocity) - state.Jdot_v[own]
         b[:3] += reference[2]
         weights = [gains.weight] * 3 + [gains.turn_weight] * 2 + [gains.yaw_weight]
         return Rows(state.J[own], b, np.array(weights))

@@ -100,6 +100,6 @@ class Spring(NamedTuple):
 
 
 def spring(units: Units, stiffness: float, damping_ratio: float) -> Spring:
-    """From a stiffness in ω² and a damping ratio ζ."""
+    """Return k and d in SI units, from a stiffness in ω² and a damping ratio ζ."""
     k = stiffness * units.omega**2
     return Spring(float(k), float(2.0 * damping_ratio * np.sqrt(k)))

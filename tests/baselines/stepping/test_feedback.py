@@ -59,13 +59,13 @@ def turned(ahead=0.0, left=0.0):
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_lean(side):
     """The sine of the angle, ahead and to the foot's side; at rest next to nothing."""
-    told = signals(turned(ahead=0.2), side)
-    assert told["lean_ahead"] == pytest.approx(np.sin(0.2), abs=1e-3)
-    assert told["lean_outward"] == pytest.approx(0.0, abs=1e-3)
-    told = signals(turned(left=0.3), side)
-    assert told["lean_outward"] == pytest.approx(side * np.sin(0.3), abs=1e-3)
-    told = signals(turned(), side)
-    assert abs(told["lean_ahead"]) + abs(told["lean_outward"]) < 1e-3
+    values = signals(turned(ahead=0.2), side)
+    assert values["lean_ahead"] == pytest.approx(np.sin(0.2), abs=1e-3)
+    assert values["lean_outward"] == pytest.approx(0.0, abs=1e-3)
+    values = signals(turned(left=0.3), side)
+    assert values["lean_outward"] == pytest.approx(side * np.sin(0.3), abs=1e-3)
+    values = signals(turned(), side)
+    assert abs(values["lean_ahead"]) + abs(values["lean_outward"]) < 1e-3
 
 
 def test_spin_is_mujocos_angular_momentum():
@@ -76,11 +76,11 @@ def test_spin_is_mujocos_angular_momentum():
     x, y, _ = data.subtree_angmom[0]
     g, h = -model.opt.gravity[2], r.height_com
     unit = np.sqrt(g / h) / (r.mass * g * h)
-    told = signals(simulation, side=-1.0)
+    values = signals(simulation, side=-1.0)
     ahead = unit * (np.cos(YAW) * y - np.sin(YAW) * x)  # about the axis to the left
     right = unit * (np.cos(YAW) * x + np.sin(YAW) * y)  # about the axis ahead
-    assert told["momentum_ahead"] == pytest.approx(ahead, rel=1e-6)
-    assert told["momentum_outward"] == pytest.approx(right, rel=1e-6)
+    assert values["momentum_ahead"] == pytest.approx(ahead, rel=1e-6)
+    assert values["momentum_outward"] == pytest.approx(right, rel=1e-6)
     assert min(abs(ahead), abs(right)) > 1e-4
 
 

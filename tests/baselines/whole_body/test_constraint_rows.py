@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from poise.baselines.whole_body.constraint_rows import joint_limits, root_dynamics, sole_cones
+from poise.baselines.whole_body.constraints import braking_bounds
 from poise.baselines.whole_body.formulation import torques_of
-from poise.baselines.whole_body.limits import braking_bounds
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import (
     contact_forces,

@@ -107,9 +107,9 @@ def test_load_limits_bind(sets):
 
 
 def test_torques_follow_those_of_before():
-    """With a bound on jumps the torques stay near those followed, and the plan knows of it."""
+    """With a bound on changes the torques stay near those followed, and the plan knows of it."""
     limit = robot().torque_limit
-    bounded = ContactSets(robot(), MomentumQPConfig(), jump=0.3)
+    bounded = ContactSets(robot(), MomentumQPConfig(), torque_rate_limit=0.3)
     state, targets, rows = situation()
     joints = bounded.arrays.motor_dofs - 6
     before = np.zeros(len(bounded.parameters.torque_limit))

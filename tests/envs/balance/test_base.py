@@ -5,8 +5,9 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import ConfigError, PoiseError
-from poise.envs.balance.base import RESET_OPTIONS, EnvConfig, env_config
+from poise.envs.balance.base import EnvConfig, env_config
 from poise.envs.balance.reward import REWARD_TERMS
+from poise.envs.balance.start import RESET_OPTIONS
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.pushes.push import Kick, Push
 from poise.envs.pushes.sampler import PushSampler

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.plugins import OutsideController
+from poise.baselines.plugins import PluginController
 from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 from poise.configs.errors import PoiseError
 from poise.envs.balance.torque import TorqueBalanceEnv
@@ -271,7 +271,7 @@ def test_a_controller_from_outside_is_copied_with_its_environment(tmp_path):
     for _ in range(BEFORE):
         env.step(np.zeros(4))
     data, twins = pickle.dumps(env), [make(env) for make in WAYS.values()]
-    assert all(type(twin.controller) is OutsideController for twin in twins)
+    assert all(type(twin.controller) is PluginController for twin in twins)
     expected = digest(play_env(env))
     assert [digest(play_env(twin)) for twin in twins] == [expected] * len(twins)
     context = multiprocessing.get_context("spawn")

@@ -51,7 +51,7 @@ def test_numba_tells_the_listener(clock, capsys, monkeypatch: pytest.MonkeyPatch
     (listener,) = [
         item for item in jit.event._registered["numba:compile"] if isinstance(item, jit.Patience)
     ]
-    monkeypatch.setattr(listener, "told", False)
+    monkeypatch.setattr(listener, "announced", False)
     inner = jit.numba.njit(lambda x: x + 1.0)
     inner.py_func.__module__ = "poise.test"
 

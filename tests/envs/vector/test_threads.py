@@ -17,7 +17,7 @@ def test_the_work_is_shared():
         meeting.wait()
         seen[number] = threading.current_thread()
 
-    helpers.share(work, 2)
+    helpers.distribute(work, 2)
     assert set(seen) == {0, 1, 2} and len(set(seen.values())) == 3
     assert seen[0] is threading.current_thread()
     helpers.close()
@@ -35,9 +35,9 @@ def test_an_error_reaches_the_one_that_asked(where):
         done.append(number)
 
     with pytest.raises(ArithmeticError, match="too fast"):
-        helpers.share(work, 1)
+        helpers.distribute(work, 1)
     assert done == [1 - where]
-    helpers.share(done.append, 1)
+    helpers.distribute(done.append, 1)
     assert sorted(done[1:]) == [0, 1]
     helpers.close()
 
@@ -48,7 +48,7 @@ def test_threads_end(how):
     before = set(threading.enumerate())
     helpers = ThreadTeam()
     assert set(threading.enumerate()) == before  # a copy of this process would have none of them
-    helpers.share(lambda number: None, 2)
+    helpers.distribute(lambda number: None, 2)
     ours = set(threading.enumerate()) - before
     assert len(ours) == 2
     if how == "closed":
@@ -56,7 +56,7 @@ def test_threads_end(how):
         for thread in ours:
             thread.join(10.0)
         with pytest.raises(PoiseError, match="close"):
-            helpers.share(lambda number: None, 1)
+            helpers.distribute(lambda number: None, 1)
     del helpers
     for thread in ours:
         thread.join(10.0)
@@ -72,4 +72,4 @@ def test_the_dead_are_not_waited_for():
     for thread in set(threading.enumerate()) - before:
         thread.join(10.0)
     with pytest.raises(PoiseError, match="a thread has ended"):
-        helpers.share(lambda number: None, 1)
+        helpers.distribute(lambda number: None, 1)

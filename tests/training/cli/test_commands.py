@@ -1,4 +1,4 @@
-"""training/cli/commands.py and training/cli/train.py."""
+"""training/cli/commands.py, entry.py and training/cli/train.py."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from poise.baselines.allowance import SCRIPTS
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.schema import to_dict
-from poise.training.cli import commands
+from poise.training.cli import entry
 from poise.training.cli import train as train_command
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.cli.train import parse
 from poise.training.evaluation import run
 from poise.training.learning.config import TrainConfig, train_config
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
 RICH = (
-    "from poise.training.cli import commands\n"
+    "from poise.training.cli import entry\n"
     "from poise.training.running.terminal import terminal\n"
-    "commands._run = lambda _: terminal().print('x')"
+    "entry._run = lambda _: terminal().print('x')"
 )
 BAD_SUITE = "random: {trials: many}\n"
 BAD_ROBOT = "name: a\nsource: {mjcf: nowhere.xml}\nroot: b\nfeet: []\n"
@@ -84,7 +84,7 @@ def test_a_broken_pipe_of_another_kind_is_raised(
     def fail(_: object) -> int:
         raise BrokenPipeError
 
-    monkeypatch.setattr(commands, "_run", fail)
+    monkeypatch.setattr(entry, "_run", fail)
     with pytest.raises(BrokenPipeError):
         main(["list"])
     print("still here")
@@ -165,7 +165,7 @@ def test_a_wrong_flag_ends_with_code_2(
 
 def test_a_traceback_is_left_to_real_faults(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only Poise's own errors become a line."""
-    monkeypatch.setitem(commands.COMMANDS, "list", lambda: 1 / 0)
+    monkeypatch.setitem(entry.COMMANDS, "list", lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         main(["list"])
 
@@ -174,7 +174,7 @@ def test_evaluate_and_replay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One command plays, the other plays one of its trials again and says that it is the same."""
-    monkeypatch.setattr(run, "Crew", InProcess)
+    monkeypatch.setattr(run, "Executor", InProcess)
     InProcess.played, InProcess.stop_after = 0, None
     suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
     args = ["evaluate", "zero", "--suite", suite, "--out", out, "--trials", "2", "--seed", "3"]
@@ -195,7 +195,7 @@ def test_ctrl_c_says_how_to_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 130, no traceback; the same command finishes the evaluation."""
-    monkeypatch.setattr(run, "Crew", InProcess)
+    monkeypatch.setattr(run, "Executor", InProcess)
     InProcess.played, InProcess.stop_after = 0, 1
     suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
     args = ["evaluate", "zero", "--suite", suite, "--out", out]

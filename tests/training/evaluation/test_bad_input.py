@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.evaluation.evaluate import benchmark
 from poise.training.running import log as trial_log
-from tests.support.benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small
+from tests.support.benchmarks_small import TRIALS, InProcessExecutor, play_in_process, write_small
 
 ROOT = Path(__file__).parents[3]
 BOTH = ("momentum-qp", "zero")
@@ -34,7 +34,7 @@ benchmark({both!r}, {suite!r}, out={out!r}, workers=2)
 
 
 @pytest.fixture(autouse=True)
-def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
+def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessExecutor]:
     """Trials are played in this process, and ticks are not timed."""
     return play_in_process(monkeypatch)
 
@@ -46,7 +46,7 @@ def lines(folder: Path) -> int:
 
 
 def test_a_kill_in_the_middle_loses_no_finished_trial(
-    tmp_path: Path, in_process: type[InProcessCrew]
+    tmp_path: Path, in_process: type[InProcessExecutor]
 ) -> None:
     """SIGKILL of the command with two processes: they end too, the rest is played, once."""
     suite, out = write_small(tmp_path), tmp_path / "out"
@@ -78,7 +78,7 @@ def short_command(folder: Path) -> list[str]:
 
 def test_a_full_disk_loses_no_finished_trial(
     tmp_path: Path,
-    in_process: type[InProcessCrew],
+    in_process: type[InProcessExecutor],
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -106,7 +106,7 @@ def test_a_full_disk_loses_no_finished_trial(
 
 def test_a_disk_that_is_full_at_the_end(
     tmp_path: Path,
-    in_process: type[InProcessCrew],
+    in_process: type[InProcessExecutor],
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -130,7 +130,7 @@ def test_a_disk_that_is_full_at_the_end(
 
 
 def test_overwriting_removes_the_old_report(
-    tmp_path: Path, in_process: type[InProcessCrew]
+    tmp_path: Path, in_process: type[InProcessExecutor]
 ) -> None:
     """Stopped right after --overwrite, the folder shows nothing of before."""
     suite, out = write_small(tmp_path, mix=None, factors=None), tmp_path / "out"

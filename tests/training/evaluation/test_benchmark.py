@@ -1,4 +1,4 @@
-"""`poise benchmark`: training/evaluation, training/trials/worlds.py and the command."""
+"""`poise benchmark`: training/evaluation, training/trials/variants.py and the command."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.balance.config import StartNoise
 from poise.envs.pushes.push import Push
 from poise.envs.sensors.delayed import DelayedState
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.evaluation import run
 from poise.training.evaluation.evaluate import benchmark, default_controllers, packaged_policies
 from poise.training.learning.policy import load_policy
@@ -27,9 +27,9 @@ from poise.training.trials.agents import load_agent
 from poise.training.trials.jobs import Job, Stage, play
 from poise.training.trials.play import run_trial
 from poise.training.trials.table import outcome_cells
-from poise.training.trials.trial import Trial, World
-from poise.training.trials.worlds import Worlds
-from tests.support.benchmarks_small import TRIALS, InProcessCrew, play_in_process, write_small
+from poise.training.trials.trial import Conditions, Trial
+from poise.training.trials.variants import AgentVariants
+from tests.support.benchmarks_small import TRIALS, InProcessExecutor, play_in_process, write_small
 from tests.support.shared import robot
 
 BOTH = ("momentum-qp", "zero")
@@ -47,7 +47,7 @@ class Flaky:
 
 
 @pytest.fixture(autouse=True)
-def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
+def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessExecutor]:
     """Trials are played in this process, and ticks are not timed."""
     return play_in_process(monkeypatch)
 
@@ -57,7 +57,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished benchmark; do not write into it."""
     out = tmp_path_factory.mktemp("benchmark")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "Crew", InProcessCrew)
+        patch.setattr(run, "Executor", InProcessExecutor)
         patch.setattr(run, "tick_times", lambda agents: dict.fromkeys(agents, 12.5))
         benchmark(BOTH, write_small(out), out=out / "out", seed=2)
     return out / "out"
@@ -69,26 +69,28 @@ def rows(folder: Path) -> list[dict[str, str]]:
 
 
 def test_the_standard_case_is_that_of_an_evaluation() -> None:
-    """Bit for bit the outcome of `run_trial`, also after other worlds were played."""
+    """Bit for bit the outcome of `run_trial`, also after other variants were played."""
     agent = load_agent("momentum-qp", robot(), duration=1.6, pushes=None)
     trial = Trial(0, 5, (Push("torso", 0.1, 0.1, 8.0, 30.0),))
     expected = run_trial(agent, trial)
-    worlds = Worlds(load_agent("momentum-qp", robot(), duration=1.6, pushes=None))
-    several = [World(), World(friction=0.4), World(delay=0.02), World(mass_error=0.1), World()]
-    outcomes = [run_trial(worlds.enter(world), trial) for world in several]
+    variants = AgentVariants(load_agent("momentum-qp", robot(), duration=1.6, pushes=None))
+    changes = ({}, {"friction": 0.4}, {"delay": 0.02}, {"mass_error": 0.1}, {})
+    several = [Conditions(**each) for each in changes]
+    outcomes = [run_trial(variants.under(conditions), trial) for conditions in several]
     assert outcomes[0] == outcomes[-1] == expected
     assert all(outcome != expected for outcome in outcomes[1:-1])
 
 
 def test_delays_of_world_and_environment_add_up() -> None:
-    """Whichever else the world changes; an own delay stays where it has none."""
+    """Whichever else the conditions change; an own delay stays where it has none."""
     agent = load_agent("momentum-qp", robot(), duration=1.6, sensors={"delay": 0.01})
-    worlds = Worlds(agent)
-    for world, late in (
-        (World(delay=0.02), 0.03), (World(mass_error=0.1), 0.01), (World(friction=0.4), 0.01),
-        (World(delay=0.02, mass_error=0.1), 0.03), (World(), 0.01),
+    variants = AgentVariants(agent)
+    for conditions, late in (
+        (Conditions(delay=0.02), 0.03), (Conditions(mass_error=0.1), 0.01),
+        (Conditions(friction=0.4), 0.01),
+        (Conditions(delay=0.02, mass_error=0.1), 0.03), (Conditions(), 0.01),
     ):  # fmt: skip
-        source = worlds.enter(world).env.state_source
+        source = variants.under(conditions).env.state_source
         assert isinstance(source, DelayedState) and source.delay == pytest.approx(late)
 
 
@@ -133,8 +135,8 @@ def test_the_table_of_trials_reads_back_exactly(finished: Path) -> None:
         assert again.trial == results.trial(record) and not again.differences
         texts = {k: "" if v is None else str(v) for k, v in outcome_cells(again.outcome).items()}
         assert texts == {key: record.line[key] for key in texts}
-    worlds = {results.trial(record).world for record in records}
-    assert {World(friction=0.4), World(delay=0.02), World(mass_error=0.1)} <= worlds
+    met = {results.trial(record).conditions for record in records}
+    assert {Conditions(friction=0.4), Conditions(delay=0.02), Conditions(mass_error=0.1)} <= met
     last = replay(finished, TRIALS - 1, "zero")
     assert not last.differences and last.trial.number == TRIALS - 1
 
@@ -171,7 +173,7 @@ def test_reading_names_what_is_wrong(finished: Path, tmp_path: Path) -> None:
 
 
 def test_a_finished_benchmark_is_not_played_again(
-    finished: Path, tmp_path: Path, in_process: type[InProcessCrew]
+    finished: Path, tmp_path: Path, in_process: type[InProcessExecutor]
 ) -> None:
     """A lost table is written anew; another controller adds its own trials only."""
     out = tmp_path / "out"
@@ -190,7 +192,7 @@ def test_a_finished_benchmark_is_not_played_again(
 
 
 def test_a_stopped_benchmark_ends_as_if_it_had_not_been(
-    finished: Path, tmp_path: Path, in_process: type[InProcessCrew]
+    finished: Path, tmp_path: Path, in_process: type[InProcessExecutor]
 ) -> None:
     """Stopped in the first stage and in the second, cut off in a line: nothing else is repeated."""
     out, suite = tmp_path / "out", finished.parent / "small.yaml"
@@ -228,7 +230,7 @@ def test_a_controller_that_raises_costs_its_trial_alone(
 
 
 def test_a_controller_that_cannot_be_loaded_is_no_trial(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: type[InProcessCrew]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: type[InProcessExecutor]
 ) -> None:
     """Neither where it is played, nor one that the folder has from before: nothing is recorded."""
     monkeypatch.chdir(tmp_path)
@@ -286,9 +288,9 @@ def test_every_backend_gives_the_same_trials(
     """trials.csv has the same bytes from two processes of any backend as from this one."""
     if backend == "ray":
         pytest.importorskip("ray")
-    from poise.training.running.crew import Crew
+    from poise.training.running.executor import Executor
 
-    monkeypatch.setattr(run, "Crew", Crew)
+    monkeypatch.setattr(run, "Executor", Executor)
     out = tmp_path / "out"
     threads = os.environ.get("OMP_NUM_THREADS")
     benchmark(BOTH, finished.parent / "small.yaml", out=out, seed=2, workers=2, backend=backend)

@@ -20,7 +20,7 @@ from poise.training.cli import demo
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate, measured_limits
 from poise.training.results.read import load_results
-from poise.training.running.crew import Crew
+from poise.training.running.executor import Executor
 from poise.training.running.provenance import Circumstances
 from poise.training.running.summary import Summary
 from poise.training.trials.table import CASE_COLUMNS
@@ -33,7 +33,7 @@ BOTH = ("momentum-qp", "zero")
 @pytest.fixture
 def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcess]:
     """Trials are played in this process."""
-    monkeypatch.setattr(evaluation, "Crew", InProcess)
+    monkeypatch.setattr(evaluation, "Executor", InProcess)
     InProcess.played, InProcess.stop_after = 0, None
     return InProcess
 
@@ -49,7 +49,7 @@ def test_results_do_not_depend_on_the_number_of_workers(
     """trials.csv has the same bytes from two processes and from one, in whatever order."""
     suite = write_suite(tmp_path, RANDOM)
     evaluate(BOTH, suite, out=tmp_path / "one", seed=3)
-    monkeypatch.setattr(evaluation, "Crew", Crew)
+    monkeypatch.setattr(evaluation, "Executor", Executor)
     evaluate(BOTH, suite, out=tmp_path / "two", seed=3, workers=2)
     one, two = ((tmp_path / name / "trials.csv").read_bytes() for name in ("one", "two"))
     assert one == two
@@ -249,7 +249,7 @@ def test_a_dead_worker_costs_nothing_that_is_finished(
         patch.setattr(evaluation.ResultFolder, "append", append_and_kill)
         evaluate(["zero"], suite, out=tmp_path / "out", workers=1)
     assert len(killed) == 1 and capsys.readouterr().err.count("has died by SIGKILL") == 1
-    monkeypatch.setattr(evaluation, "Crew", InProcess)
+    monkeypatch.setattr(evaluation, "Executor", InProcess)
     InProcess.stop_after = None
     evaluate(["zero"], suite, out=tmp_path / "whole")
     same = [(tmp_path / name / "trials.csv").read_bytes() for name in ("out", "whole")]

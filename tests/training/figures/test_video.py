@@ -30,22 +30,22 @@ def read(path):
 def test_video_holds_the_episode(can_render, env, tmp_path):
     """H.264 in yuv420p, every second policy step, and an account of the episode."""
     path = tmp_path / "new" / "a.mp4"
-    told = record(env, still, path, {"seed": 1}, size=(64, 48))
+    summary = record(env, still, path, {"seed": 1}, size=(64, 48))
     meta, frames = read(path)
     assert meta["codec"] == "h264" and meta["pix_fmt"].startswith("yuv420p")
     assert meta["fps"] == 25.0 and meta["size"] == (64, 48)
-    assert len(frames) == told["frames"] == 6
+    assert len(frames) == summary["frames"] == 6
     assert min(frame.mean() for frame in frames) > 100  # ground and sky are bright
-    assert told["seconds"] == pytest.approx(0.2) and told["fps"] == 25.0
-    assert told["fallen"] is False and np.isfinite(told["return"])
+    assert summary["seconds"] == pytest.approx(0.2) and summary["fps"] == 25.0
+    assert summary["fallen"] is False and np.isfinite(summary["return"])
     assert [p.name for p in path.parent.iterdir()] == ["a.mp4"]
 
 
 @pytest.mark.parametrize("fps, slow, frames, rate", [(50, 1, 11, 50), (25, 4, 11, 12.5)])
 def test_rate_and_slow_motion(can_render, env, tmp_path, fps, slow, frames, rate):
     """No step is drawn twice: where there are too few, the video has fewer frames a second."""
-    told = record(env, still, tmp_path / "a.mp4", fps=fps, slow_motion=slow, size=(32, 32))
-    assert (told["frames"], told["fps"]) == (frames, rate)
+    summary = record(env, still, tmp_path / "a.mp4", fps=fps, slow_motion=slow, size=(32, 32))
+    assert (summary["frames"], summary["fps"]) == (frames, rate)
     assert read(tmp_path / "a.mp4")[0]["fps"] == pytest.approx(rate)
 
 

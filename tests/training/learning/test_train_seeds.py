@@ -27,7 +27,7 @@ from poise.training.learning.checkpoints import find_checkpoint
 from poise.training.learning.config import PPOConfig
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import SeedRun, train_seeds
-from tests.support.benchmarks_small import InProcessCrew
+from tests.support.benchmarks_small import InProcessExecutor
 from tests.support.evaluations import random_suite, write_suite
 from tests.support.shared import finished_run, tiny_config
 from tests.training.learning.test_train import ROOT, weights
@@ -36,11 +36,11 @@ SHORT = 64  # steps: one rollout
 
 
 @pytest.fixture
-def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessCrew]:
+def in_process(monkeypatch: pytest.MonkeyPatch) -> type[InProcessExecutor]:
     """Runs are trained in this process."""
-    monkeypatch.setattr(module, "Crew", InProcessCrew)
-    InProcessCrew.played, InProcessCrew.stop_after = 0, None
-    return InProcessCrew
+    monkeypatch.setattr(module, "Executor", InProcessExecutor)
+    InProcessExecutor.played, InProcessExecutor.stop_after = 0, None
+    return InProcessExecutor
 
 
 def same(a: Path, b: Path) -> bool:
@@ -75,7 +75,7 @@ def test_runs_are_those_of_single_seeds(tmp_path: Path) -> None:
 
 
 def test_stopped_runs_go_on_and_finished_ones_are_left(
-    tmp_path: Path, in_process: type[InProcessCrew]
+    tmp_path: Path, in_process: type[InProcessExecutor]
 ) -> None:
     """After Ctrl-C between two seeds; a further seed joins; nothing that is done is done again."""
     config, out = tiny_config(steps=SHORT), tmp_path / "out"
@@ -96,7 +96,7 @@ def test_stopped_runs_go_on_and_finished_ones_are_left(
 
 
 def test_a_failed_seed_costs_no_other(
-    tmp_path: Path, in_process: type[InProcessCrew], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, in_process: type[InProcessExecutor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is named at the end with what it raised; --resume trains it alone."""
     real = module.train
@@ -117,7 +117,7 @@ def test_a_failed_seed_costs_no_other(
 
 
 def test_a_run_that_is_not_seen_is_no_success(
-    tmp_path: Path, in_process: type[InProcessCrew], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, in_process: type[InProcessExecutor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A machine of a cluster may have written to its own disk."""
     monkeypatch.setattr(module, "train", lambda *rest, **named: None)
@@ -145,7 +145,7 @@ def test_bad_input_is_refused_and_nothing_is_written(
     assert not (tmp_path / "out").exists()
 
 
-def test_runs_are_not_written_over(tmp_path: Path, in_process: type[InProcessCrew]) -> None:
+def test_runs_are_not_written_over(tmp_path: Path, in_process: type[InProcessExecutor]) -> None:
     """Neither runs of seeds, nor a single run, nor those of another configuration."""
     config, out = tiny_config(steps=SHORT), tmp_path / "out"
     train_seeds(config, [0], out)
@@ -163,7 +163,7 @@ def test_runs_are_not_written_over(tmp_path: Path, in_process: type[InProcessCre
 
 def test_the_command_takes_seeds(
     tmp_path: Path,
-    in_process: type[InProcessCrew],
+    in_process: type[InProcessExecutor],
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -220,13 +220,13 @@ def test_ctrl_c_ends_all_processes_at_once_and_loses_nothing(tmp_path: Path) -> 
 
 
 def test_an_evaluation_of_a_folder_of_seeds(
-    tmp_path: Path, in_process: type[InProcessCrew], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, in_process: type[InProcessExecutor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its runs play, and their IQM and the worst seed are in the summary and on the terminal."""
     from poise.training.evaluation import run as evaluation
     from tests.support.evaluations import InProcess
 
-    monkeypatch.setattr(evaluation, "Crew", InProcess)
+    monkeypatch.setattr(evaluation, "Executor", InProcess)
     InProcess.played, InProcess.stop_after = 0, None
     runs, text = tmp_path / "runs", io.StringIO()
     train_seeds(tiny_config(steps=SHORT), [0, 1], runs)

@@ -12,7 +12,7 @@ import qpsolvers
 
 from poise.baselines.solvers import QP, make_solver
 from poise.configs.errors import ConfigError, PoiseError
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.qp_set.export import problem_arrays, write_qp_set
 
 COUNT = 60  # three trials: the first recovers, the second falls

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from poise.configs.errors import ConfigError, PoiseError
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.report import page as html_report
 from poise.training.report.page import write_report
 from poise.training.results.read import load_results

@@ -36,7 +36,7 @@ def made(results: Results, *records: Record) -> Results:
 
 
 def test_a_rival_is_shown_where_the_baseline_did_better(results: Results) -> None:
-    """The smallest push that only the rival lost; without one, the smallest that it lost."""
+    """The smallest push that only the other lost; without one, the smallest that it lost."""
     trials = made(
         results,
         *(record(0, "a", False, 0.5), record(0, "b", False, 0.5)),

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from poise.configs.errors import ConfigError
 from poise.configs.schema import to_yaml
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.evaluation.figures import controller_entry
 from poise.training.evaluation.folder import Settings
 from poise.training.evaluation.pairs import alike, pair_figures, paired

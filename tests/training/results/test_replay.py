@@ -20,7 +20,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("replay")
     (path / "soft.yaml").write_text("kind: momentum-qp\ncom: {stiffness: 5.0}\n")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evaluation, "Crew", InProcess)
+        patch.setattr(evaluation, "Executor", InProcess)
         InProcess.stop_after = None
         suite = write_suite(path, RANDOM)
         evaluate([str(path / "soft.yaml"), "zero"], suite, out=path / "out", seed=4)

@@ -1,4 +1,4 @@
-"""training/running/processes.py and training/running/crew.py: who does a job when a worker dies."""
+"""training/running/{processes,executor}.py: who does a job when a worker dies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from poise.configs.errors import ConfigError, PoiseError
-from poise.training.running.crew import Crew
+from poise.training.running.executor import Executor
 from poise.training.running.processes import Task, Worker, WorkerTraceback
 
 
@@ -50,11 +50,11 @@ def test_what_a_dead_worker_was_at_is_done_by_another(
     """Killed once, or out of memory once: one line each, every job is done, the others stay."""
     jobs = [("die once", tmp_path / "die"), *(("plain", k) for k in range(20)),
             ("memory", tmp_path / "memory")]  # fmt: skip
-    with Crew("local", 2) as crew:
-        done = list(crew.each(work, jobs))
+    with Executor("local", 2) as executor:
+        done = list(executor.each(work, jobs))
         assert sorted(map(str, jobs)) == sorted(str(job) for job, _ in done)
         assert len({process for _, (_, process) in done}) <= 4
-        again = {process for _, (_, process) in crew.each(work, [("plain", 1)])}
+        again = {process for _, (_, process) in executor.each(work, [("plain", 1)])}
         assert again <= {process for _, (_, process) in done}  # they stay for the next jobs
     told = capsys.readouterr().err.splitlines()
     assert len(told) == 2 and all("another one does its work again" in line for line in told)
@@ -68,8 +68,10 @@ def test_a_job_that_kills_two_workers_is_an_error(tmp_path: Path) -> None:
     """No third one; what was done before stays done, and no process is left."""
     done = []
     with pytest.raises(PoiseError, match="by SIGKILL.*as did another.*same command again"):
-        with Crew("local", 1) as crew:
-            for job, _ in crew.each(work, [("plain", 0), ("die", tmp_path / "die"), ("plain", 1)]):
+        with Executor("local", 1) as executor:
+            for job, _ in executor.each(
+                work, [("plain", 0), ("die", tmp_path / "die"), ("plain", 1)]
+            ):
                 done.append(job)
     assert done == [("plain", 0)] and (tmp_path / "die").read_text() == "xx"
     assert not multiprocessing.active_children()
@@ -94,21 +96,24 @@ def test_joblib_does_the_work_of_the_dead_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Once; then it is the same error."""
-    with Crew("joblib", 2) as crew:
+    with Executor("joblib", 2) as executor:
         jobs = [("die once", tmp_path / "die"), *(("plain", k) for k in range(4))]
-        assert len(list(crew.each(work, jobs))) == 5
+        assert len(list(executor.each(work, jobs))) == 5
     assert capsys.readouterr().err.count("another one does its work again") == 1
-    with pytest.raises(PoiseError, match="twice at the same work"), Crew("joblib", 2) as crew:
-        list(crew.each(work, [("die", tmp_path / "die2")]))
+    with (
+        pytest.raises(PoiseError, match="twice at the same work"),
+        Executor("joblib", 2) as executor,
+    ):
+        list(executor.each(work, [("die", tmp_path / "die2")]))
 
 
 def test_what_a_job_raises_is_raised_here() -> None:
     """With its fields, and where it came from; an error that cannot be pickled by its words."""
-    with Crew("local", 1) as crew:
+    with Executor("local", 1) as executor:
         with pytest.raises(ConfigError, match="robot: is not there .choices: a, b") as error:
-            list(crew.each(work, [("config", 0)]))
+            list(executor.each(work, [("config", 0)]))
         assert error.value.field == "robot"
         assert isinstance(error.value.__cause__, WorkerTraceback)
         with pytest.raises(RuntimeError, match="Unportable: odd"):
-            list(crew.each(work, [("unportable", 0)]))
-        assert next(crew.each(work, [("plain", 0)]))[1][0] == "plain"
+            list(executor.each(work, [("unportable", 0)]))
+        assert next(executor.each(work, [("plain", 0)]))[1][0] == "plain"

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from poise.training.cli import commands
-from poise.training.cli.commands import main
+from poise.training.cli import entry
+from poise.training.cli.entry import main
 from poise.training.running.stopping import Stopped, stop_code, stoppable, uninterrupted
 from tests.endurance.processes import Running, heed_interrupts, kill
 from tests.support.evaluations import random_suite, write_suite
@@ -113,10 +113,10 @@ def test_an_error_that_a_library_makes_of_a_stop_is_a_stop(
             raise ImportError("initialization failed") from None
         return 0
 
-    monkeypatch.setattr(commands, "_run", imports)
+    monkeypatch.setattr(entry, "_run", imports)
     assert main(["list"]) == 143
     assert capsys.readouterr().err == "poise: stopped; the same command begins anew\n"
-    monkeypatch.setattr(commands, "_run", lambda _: 0)
+    monkeypatch.setattr(entry, "_run", lambda _: 0)
     assert main(["list"]) == 0 and stop_code() is None
 
 

@@ -111,8 +111,10 @@ def test_levels_meet_the_same_starts_directions_and_fractions() -> None:
     changed = {cell[0].factor: cell[0] for cell in cells}
     assert changed["duration"].push.duration == 0.3
     assert changed["duration"].push.impulse > standard[0].push.impulse
-    assert changed["friction"].world.friction == 0.4 and changed["delay"].world.delay == 0.02
-    assert changed["mass_error"].world.mass_error == 0.1 and len(changed["pushes"].pushes) == 3
+    assert (
+        changed["friction"].conditions.friction == 0.4 and changed["delay"].conditions.delay == 0.02
+    )
+    assert changed["mass_error"].conditions.mass_error == 0.1 and len(changed["pushes"].pushes) == 3
     bodies = {cell[0].push.body for cell in cells if cell[0].factor == "body"}
     assert bodies == set(robot().description.push_bodies[1:])
 
@@ -122,7 +124,7 @@ def test_the_standard_friction_is_that_of_the_contacts() -> None:
     1.0, and the suite's level 1.0 is another cell."""
     cases = Plan(load_suite("standard"), PushLimits(robot("compact")), 0, ["a"])
     assert cases.standard["friction"] == "0.8"
-    levels = {case.world.friction for case in cases.first if case.factor == "friction"}
+    levels = {case.conditions.friction for case in cases.first if case.factor == "friction"}
     assert levels == {0.4, 0.6, 1.0}
 
 
@@ -140,8 +142,13 @@ def test_the_mix_stays_in_its_ranges_and_uses_all_of_them() -> None:
     """Every factor varies; fractions and directions are spread evenly."""
     mix = {"trials": 60, "delay": [0.0, 0.02], "friction": [0.5, 0.6], "repeated": 0.5}
     cases = part(small(mix=mix), "mix")
-    assert all(0.5 <= c.world.friction <= 0.6 and -0.1 <= c.world.mass_error <= 0.1 for c in cases)
-    assert {c.world.delay for c in cases} == {0.0, 0.02} and {len(c.pushes) for c in cases} == {
+    assert all(
+        0.5 <= c.conditions.friction <= 0.6 and -0.1 <= c.conditions.mass_error <= 0.1
+        for c in cases
+    )
+    assert {c.conditions.delay for c in cases} == {0.0, 0.02} and {
+        len(c.pushes) for c in cases
+    } == {
         1,
         2,
     }

@@ -184,7 +184,7 @@ def test_an_evaluation_draws_and_prints_them(
 ) -> None:
     """The PNG gets the lines of the planner's limits, the table the mean share of one."""
     drawn: dict[str, Any] = {}
-    monkeypatch.setattr(evaluation, "Crew", InProcess)
+    monkeypatch.setattr(evaluation, "Executor", InProcess)
     monkeypatch.setattr(InProcess, "stop_after", None)
     monkeypatch.setattr(plots, "polar_envelope", lambda *_, **given: drawn.update(given))
     text, names = io.StringIO(), ["capture-step", "zero"]

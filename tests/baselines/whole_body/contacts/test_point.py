@@ -20,8 +20,9 @@ from poise.baselines.whole_body.formulation import build, torques_of, unknowns
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.state import RobotState
 from tests.support.physics import random_state, robot_named
-from tests.support.wall import HAND, contact_described, reaching, robot_at_a_wall, wall_force
+from tests.support.wall import contact_described, reaching, robot_at_a_wall, wall_force
 
 NORMAL = np.array([-1.0, 0.0, 0.0])
 
@@ -197,9 +198,25 @@ def test_a_contact_that_cannot_be_is_refused(contact, message):
         load_controller({"base": "momentum-qp", "contacts": {"c": contact}}, robot_at_a_wall())
 
 
-def test_controllers_that_step_have_their_soles_alone():
-    """Their QP in steps refuses further contacts."""
-    hand = PointContact("right_lower_arm", (-1.0, 0.0, 0.0), HAND)
-    config = CaptureStepConfig(step_qp=MomentumQPConfig(contacts={"hand": hand}))
-    with pytest.raises(ConfigError, match="contacts: "):
-        CaptureStep(robot_named("humanoid"), config)
+@pytest.mark.parametrize("soles", [(0,), (1,), (0, 1)])
+def test_controllers_that_step_have_contacts_in_every_contact_set(soles):
+    """With one foot on the ground or two: the readable problem's solution, and the wall's force."""
+    robot, qp = robot_at_a_wall(), controller()
+    hand = {"hand": PointContact(**contact_described(largest_force=0.05))}
+    config = CaptureStepConfig(step_qp=MomentumQPConfig(contacts=hand))
+    sets = CaptureStep(robot, config).sets
+    _, state, targets, _ = after(qp, 0.4)
+    points = [contact.rows(state) for contact in sets.contacts.values()]
+    sets.tick(state, targets, soles)
+    chosen = sets.sets[soles]
+    restricted = RobotState(chosen.arrays, chosen.state(state.arrays))
+    cop_vel = chosen.workspace.cop_vel
+    readable = build(restricted, targets, chosen.parameters, cop_vel, points=points)
+    solution = make_solver("daqp").solve(readable)
+    assert solution.solved and sets.failures == 0
+    vdot, w, _ = unknowns(restricted, solution.x, points)
+    np.testing.assert_allclose(chosen.workspace.vdot, vdot, atol=1e-6 * np.abs(vdot).max())
+    force = sets.forces["hand"]
+    np.testing.assert_allclose(force, w[-3:], atol=1e-6 * np.abs(w).max())
+    assert 1.0 < NORMAL @ force <= 0.05 * robot.units.force * (1.0 + 1e-9)
+    np.testing.assert_allclose(points[0].J @ chosen.workspace.vdot, points[0].accel, atol=1e-6)

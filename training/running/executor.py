@@ -39,7 +39,7 @@ def check_backend(backend: str) -> None:
             ) from None
 
 
-class Crew:
+class Executor:
     """Does jobs on `workers` processes until closed; use as a context.
 
     None: all cores, of this machine or of the cluster; `workers` tells how many once it is open.
@@ -53,7 +53,7 @@ class Crew:
         self._given = workers is not None
         self._pool: WorkerPool | None = None
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> Executor:
         self._open = ExitStack()
         self._open.enter_context(single_threaded())
         if self.backend == "local":
@@ -80,7 +80,7 @@ class Crew:
     def each(
         self, function: Callable[[Job], Result], jobs: Sequence[Job]
     ) -> Iterator[tuple[Job, Result]]:
-        """Each job with `function(job)`, as they are done; both are pickled.
+        """Yield each job with `function(job)`, in the order that they end in; both are pickled.
 
         What the user allows to run here may run there.
 
@@ -95,7 +95,9 @@ class Crew:
     def _with_joblib(
         self, function: Callable[[Job], Result], jobs: Sequence[Job]
     ) -> Iterator[tuple[Job, Result]]:
-        """Who died of which job is not known here: all go on, until nothing is done between two."""
+        """Yield jobs and results. After a death, whose job is not known, the rest is played again,
+        until nothing is done between two.
+        """
         left, done = dict(enumerate(jobs)), True
         while left:
             try:

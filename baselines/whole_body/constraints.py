@@ -1,4 +1,4 @@
-"""The compiled limits: cones of contacts, torques, and joints that can still stop in time."""
+"""The compiled constraints: cones of contacts, torques, joints that can still stop in time."""
 
 import numpy as np
 
@@ -67,10 +67,13 @@ def _torque_limits(p: QPParameters, ws: Workspace):
 
 @compiled
 def _joint_limits(robot: RobotArrays, s: StateArrays, p: QPParameters, ws: Workspace):
-    """Keep joint accelerations v̇₀ + V x within `braking_bounds`."""
+    """Keep joint accelerations v̇₀ + V x within `braking_bounds`, if joints brake at all."""
     first = ws.first_joint
     for a in range(ws.tau0.shape[0]):
         copy_into(ws.V[6 + a], ws.C[first + a])
+        if not p.brakes:
+            ws.l[first + a], ws.u[first + a] = -np.inf, np.inf
+            continue
         low, high = braking_bounds(
             s.qpos[7 + a], s.qvel[6 + a], robot.q_min[a], robot.q_max[a],
             p.brake_accel, p.brake_horizon, p.brake_floor,

@@ -1,0 +1,94 @@
+"""The process of the command `poise`: exit codes, stops, and what nobody reads any more."""
+
+import errno
+import os
+import select
+import sys
+from collections.abc import Sequence
+from typing import TextIO
+
+import tyro
+
+from poise.configs.errors import PoiseError
+from poise.training.running.stopping import exit_at_once, stop_code, stop_message, stoppable
+
+from .commands import COMMANDS
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run a sub-command; returns 0, 1 (see `evaluate`), 2 after bad input or on a full disk, 130
+    after Ctrl-C, 143 after SIGTERM, 141 if nobody reads the output any more."""
+    args = list(sys.argv[1:] if args is None else args)
+    # Small matrices lose time to threads, and sums may change their order. Read at import.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    try:
+        try:
+            return _stoppable(args)
+        except PoiseError as error:
+            print(f"poise: {error}", file=sys.stderr)
+            return 2
+        finally:
+            if sys.stdout is not None:  # poise list >&-
+                sys.stdout.flush()
+    except BrokenPipeError:
+        unread = [stream for stream in (sys.stdout, sys.stderr) if _unread(stream)]
+        if not unread:
+            raise
+        with open(os.devnull, "w") as nowhere:  # the exit flushes once more
+            for stream in unread:
+                os.dup2(nowhere.fileno(), stream.fileno())
+        return 141
+
+
+def _stoppable(args: list[str]) -> int:
+    try:
+        with stoppable():
+            return _run(args)
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) or stop_code() is not None:
+            # a library may have made another error of the interrupt
+            print(stop_message(), file=sys.stderr)
+            return stop_code() or 130
+        if isinstance(error, OSError) and error.errno in FULL:
+            place = "" if error.filename is None else f"{error.filename}: "
+            raise PoiseError(f"{place}cannot be written ({error.strerror})") from None
+        raise
+
+
+def command() -> None:
+    """`main` as a process: after a stop, or at one that comes when all is done, the interpreter
+    takes no time for an end of its own."""
+    code = main()
+    if stop_code() is not None:
+        sys.stderr.flush()
+        os._exit(code)
+    exit_at_once(code)
+    sys.exit(code)
+
+
+def _unread(stream: TextIO | None) -> bool:
+    """True for a pipe that nobody reads any more."""
+    try:
+        poll = select.poll()
+        poll.register(stream.fileno(), 0)  # type: ignore[union-attr]
+    except (AttributeError, OSError, ValueError):  # no stream, no descriptor, no poll
+        return False
+    return bool(poll.poll(0))
+
+
+def _run(args: list[str]) -> int:
+    if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass
+        from .train import run
+
+        run(args[1:])
+        return 0
+    code = tyro.extras.subcommand_cli_from_dict(
+        COMMANDS,
+        prog="poise",
+        description="Keep a simulated humanoid on its feet while it is pushed.",
+        args=args,
+    )
+    return code if isinstance(code, int) else 0

@@ -1,0 +1,109 @@
+"""The sub-commands that read finished results: compare, leaderboard, replay and report."""
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from poise.configs.errors import ConfigError
+from poise.training.running.terminal import terminal
+
+from .arguments import Allow, Folder
+
+
+def compare(
+    a: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_A")],
+    b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_B")],
+    /,
+) -> None:
+    """Say what changed from one result to another, with intervals.
+
+    Args:
+        a: written by poise benchmark or poise evaluate.
+        b: another of the same kind.
+    """
+    from poise.training.results.compare import compare, print_comparison
+
+    print_comparison(compare(a, b), a, b, terminal())
+
+
+def leaderboard(
+    results: Annotated[
+        tuple[Path, ...],
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="RESULT …", help_behavior_hint=""),
+    ],
+    /,
+    *,
+    page: Path = Path("docs/leaderboard.md"),
+) -> None:
+    """Write the leaderboard page from benchmarks' results.
+
+    Args:
+        results: summary.json of poise benchmark, or the folder that holds it. Controllers of
+            later results are added, or take the place of earlier ones of their name.
+        page: the Markdown file to write.
+    """
+    from poise.training.results.leaderboard import write_leaderboard
+
+    if not results:
+        raise ConfigError("needs one or more results", field="results")
+    write_leaderboard(results, page)
+    print(page)
+
+
+def replay(
+    folder: Folder,
+    /,
+    *,
+    trial: int,
+    controller: str | None = None,
+    video: Path | None = None,
+    plot: Path | None = None,
+    allow: Allow = (),
+) -> None:
+    """Play one trial of a result again, exactly, and say whether it ends as it was recorded.
+
+    Args:
+        folder: written by poise evaluate or poise benchmark.
+        trial: its number in trials.csv.
+        controller: which of the evaluated ones; the last if not given.
+        video: an MP4 file to write.
+        plot: a PNG file to write: CoM, CoP, capture point and torque over time.
+    """
+    if video is not None:
+        from poise.envs.viewing.gl import choose_gl_backend
+
+        choose_gl_backend()
+    from poise.training.results.replay import replay
+
+    done = replay(folder, trial, controller, video=video, plot=plot, allow=allow)
+    end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
+    print(f"trial {trial}, {done.controller}: {end}")
+    print(done.trial.push or "no push")
+    for name, (recorded, now) in done.differences.items():
+        print(f"{name}: recorded {recorded or 'nothing'}, now {now or 'nothing'}")
+    print("differs from the record" if done.differences else "exactly as recorded")
+    for path in (video, plot):
+        if path is not None:
+            print(path)
+
+
+def report(
+    folder: Folder, /, *, out: Path | None = None, films: bool = True, allow: Allow = ()
+) -> None:
+    """Write one HTML file that shows a result: ranking, envelopes, falls, worst trials, numbers.
+
+    The file opens from disk and needs nothing else.
+
+    Args:
+        folder: written by poise evaluate or poise benchmark.
+        out: file to write; report.html in the folder if not given.
+        films: play the worst trials again, for pictures and plots over time (seconds for each).
+    """
+    from poise.envs.viewing.gl import choose_gl_backend
+
+    choose_gl_backend()
+    from poise.training.report.page import write_report
+
+    write_report(folder, out, films=films, console=terminal(), allow=allow)
