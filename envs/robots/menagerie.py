@@ -22,11 +22,13 @@ ADVICE = (
 )
 
 
-def model_file(described: SourceDescription, path: Path) -> Path:
-    """The MJCF file of a description that lies at `path`; raises ConfigError as `find_model`."""
+def model_file(described: SourceDescription, path: Path) -> Path | None:
+    """The MJCF or URDF file of a description that lies at `path`, None where Poise builds the model
+    itself; raises ConfigError as `find_model`."""
     if described.menagerie is not None:
         return find_model(described.menagerie, str(path))
-    return path.parent / str(described.mjcf)
+    name = described.mjcf if described.urdf is None else described.urdf
+    return None if name is None else path.parent / name
 
 
 def find_model(file: str, source: str) -> Path:
