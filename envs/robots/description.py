@@ -18,7 +18,9 @@ class SourceDescription:
     Attributes:
         builder: a model that Poise builds itself.
         mjcf: path of an MJCF file, relative to the YAML file.
-        urdf: path of a URDF file, relative to the YAML file, see `read_urdf`.
+        urdf: path of a URDF file, relative to the YAML file, or ``package://NAME/path``, see
+            `find_file` and `read_urdf`.
+        srdf: of the SRDF file beside it, in the same form, for the links that do not collide.
         menagerie: folder and file of a model of MuJoCo Menagerie, see `find_model`.
         licence: of the model's files, for whoever reads the description.
     """
@@ -26,6 +28,7 @@ class SourceDescription:
     builder: Literal["humanoid"] | None = None
     mjcf: str | None = None
     urdf: str | None = None
+    srdf: str | None = None
     menagerie: str | None = None
     licence: str = ""
 
@@ -33,6 +36,8 @@ class SourceDescription:
         sources = (self.builder, self.mjcf, self.urdf, self.menagerie)
         if sum(given is not None for given in sources) != 1:
             raise ValueError("give exactly one of builder, mjcf, urdf and menagerie")
+        if self.srdf is not None and self.urdf is None:
+            raise ValueError("srdf: goes with urdf alone")
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from .ground import (
     set_options,
 )
 from .humanoid import humanoid_spec
-from .menagerie import model_file
+from .menagerie import model_file, ros_file
 from .mjcf import pointing_to_scenes, read_mjcf
 from .model_check import check_numbers, check_standing
 from .soles import Sole, build_sole, find_sole_plane, sole_geoms
@@ -116,7 +116,7 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
     source = str(path)
     description = build(RobotDescription, read_yaml(path), source)
     file = model_file(description.source, path)
-    spec, keyframes, ground_name = _prepare(description, file, source)
+    spec, keyframes, ground_name = _prepare(description, path, file)
     model = _compile(spec, source)
     data = mujoco.MjData(model)
     root = model.body(description.root).id
@@ -196,10 +196,11 @@ def fingerprint(model: mujoco.MjModel, standing_qpos: np.ndarray) -> str:
 
 
 def _prepare(
-    description: RobotDescription, file: Path | None, source: str
+    description: RobotDescription, path: Path, file: Path | None
 ) -> tuple[mujoco.MjSpec, dict[str, np.ndarray], str]:
     """The model with motors, ground, sensors and options; its keyframes; the ground's name."""
-    spec = _read(description, file, source)
+    source = str(path)
+    spec = _read(description, path, file)
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i}"
     ground = install_ground(spec, description.ground, source)
@@ -215,12 +216,14 @@ def _prepare(
     return spec, keyframes, ground
 
 
-def _read(description: RobotDescription, file: Path | None, source: str) -> mujoco.MjSpec:
+def _read(description: RobotDescription, path: Path, file: Path | None) -> mujoco.MjSpec:
     """The model as it comes from its file, or from its builder."""
+    origin, source = description.source, str(path)
     if file is None:
-        return BUILDERS[str(description.source.builder)]()
-    if description.source.urdf is not None:
-        return read_urdf(file, source)
+        return BUILDERS[str(origin.builder)]()
+    if origin.urdf is not None:
+        srdf = None if origin.srdf is None else ros_file(origin.srdf, path, "source.srdf")
+        return read_urdf(file, source, srdf)
     return read_mjcf(file, tuple(foot.body for foot in description.feet), source)
 
 

@@ -18,7 +18,7 @@ from .legs import Leg, find_legs
 from .one_leg import one_leg_qpos
 from .posture import PostureFigures, posture_figures
 from .stability import DirectionFigures, by_direction
-from .touching import SelfContact, self_contacts
+from .touching import SelfContact, self_contacts, sole_contacts
 from .uses import Uses, controllers_for
 
 
@@ -49,6 +49,7 @@ class RobotCheck:
         both_feet: what standing asks of the motors.
         one_foot: foot → the same with the other foot lifted; None where no posture was found in
             which the CoM is over that foot.
+        sole_contacts: foot → at how many points it touches the ground in MuJoCo.
         self_contacts: bodies that are inside each other while it stands.
         directions: margins, and pushes that a pendulum stops.
         controllers: "in place" and "stepping" → which packaged ones take the robot.
@@ -68,6 +69,7 @@ class RobotCheck:
     posture: PostureFigures
     both_feet: Holding
     one_foot: dict[str, Holding | None]
+    sole_contacts: dict[str, int]
     self_contacts: tuple[SelfContact, ...]
     directions: tuple[DirectionFigures, ...]
     controllers: dict[str, Uses]
@@ -92,7 +94,7 @@ def check_robot(robot: Robot | str | Path) -> RobotCheck:
     """Check a robot, by its name or description; raises ConfigError as `load_robot`."""
     robot = robot if isinstance(robot, Robot) else load_robot(robot)
     names = [robot.joint_names[dof - 6] for dof in robot.motor_dofs]
-    legs, touching = find_legs(robot), self_contacts(robot)
+    legs, touching, contacts = find_legs(robot), self_contacts(robot), sole_contacts(robot)
     both = holding(robot, robot.standing_qpos, range(len(robot.soles)))
     one = {sole.name: _on_one_foot(robot, i) for i, sole in enumerate(robot.soles)}
     directions = by_direction(PushLimits(robot))
@@ -118,10 +120,11 @@ def check_robot(robot: Robot | str | Path) -> RobotCheck:
         posture=posture_figures(robot),
         both_feet=both,
         one_foot=one,
+        sole_contacts=contacts,
         self_contacts=touching,
         directions=directions,
         controllers=controllers_for(robot),
-        faults=find_faults(legs, touching, both, one, directions),
+        faults=find_faults(legs, touching, contacts, both, one, directions),
     )
 
 

@@ -11,6 +11,7 @@ from .stability import DirectionFigures
 from .touching import SelfContact
 
 STRAIGHT = 10.0  # [deg] a knee that is bent less
+POINTS = 3  # at which a sole must touch the ground to stand flat
 SHOWN = 3  # pairs of bodies that a fault names
 
 
@@ -32,6 +33,7 @@ class Fault:
 def find_faults(
     legs: Sequence[Leg],
     touching: Sequence[SelfContact],
+    contacts: Mapping[str, int],
     both_feet: Holding,
     one_foot: Mapping[str, Holding | None],
     directions: Sequence[DirectionFigures],
@@ -40,6 +42,7 @@ def find_faults(
     return (
         *_touching([each for each in touching if not each.meshes], "self-collision"),
         *_touching([each for each in touching if each.meshes], "overlapping meshes"),
+        *_soles(contacts),
         *_support(directions),
         *_both_feet(both_feet),
         *_knees(legs),
@@ -59,6 +62,17 @@ def _touching(touching: Sequence[SelfContact], kind: str) -> Iterator[Fault]:
         f"standing, these are inside each other: {', '.join(pairs[:SHOWN])}{more}; {why}"
         "change the posture, the shapes, or exclude the pairs in the model (contact, exclude)",
     )
+
+
+def _soles(contacts: Mapping[str, int]) -> Iterator[Fault]:
+    few = {foot: count for foot, count in contacts.items() if count < POINTS}
+    if few:
+        counts = ", ".join(f"{foot} at {count}" for foot, count in few.items())
+        yield Fault(
+            "few contacts",
+            f"standing, soles touch the ground at fewer than {POINTS} points ({counts}) and rock: "
+            "of a mesh a few of its lowest points touch; make soles of boxes, capsules or spheres",
+        )
 
 
 def _support(directions: Sequence[DirectionFigures]) -> Iterator[Fault]:

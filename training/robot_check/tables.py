@@ -49,8 +49,8 @@ def _rows(check: RobotCheck) -> Iterator[tuple[str, str]]:
         yield (
             f"sole {escape(sole.name)}",
             (
-                f"{1000 * sole.length:.0f} × {1000 * sole.width:.0f} mm, "
-                f"{len(sole.corners)} corners, on {sole.body}"
+                f"{1000 * sole.length:.0f} × {1000 * sole.width:.0f} mm, {len(sole.corners)} "
+                f"corners, {check.sole_contacts[sole.name]} contacts, on {sole.body}"
             ),
         )
     for leg in check.legs:

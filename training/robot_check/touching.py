@@ -1,4 +1,4 @@
-"""Bodies of a robot that are inside each other in the standing posture."""
+"""What of a robot touches what in the standing posture: bodies each other, soles the ground."""
 
 from __future__ import annotations
 
@@ -44,3 +44,13 @@ def self_contacts(robot: Robot) -> tuple[SelfContact, ...]:
         if old is None or new.depth > old.depth:
             found[new.bodies] = new
     return tuple(sorted(found.values(), key=lambda each: -each.depth))
+
+
+def sole_contacts(robot: Robot) -> dict[str, int]:
+    """Foot → at how many points MuJoCo lets its sole touch the ground."""
+    data, ground = standing_data(robot), robot.ground_geom_id
+    pairs = [{data.contact[i].geom1, data.contact[i].geom2} for i in range(data.ncon)]
+    return {
+        sole.name: sum(ground in pair and bool(pair & set(sole.geom_ids)) for pair in pairs)
+        for sole in robot.soles
+    }

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.envs.robots.robot import load_robot
-from poise.envs.robots.urdf import PACKAGES, find_mesh
+from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.robots.urdf import PACKAGES, find_file
 from tests.support.small_urdf import BOX_SOLE, INERTIAL, JOINTS, LIMIT, mesh, write_stl, write_urdf
 
 MASS = 12.0 + 2 * (3 * 2.0 + 2 * 0.1)  # of the links as the file says
@@ -105,14 +105,14 @@ def test_meshes_of_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     urdf = write_urdf(tmp_path / "ws/my_robot/urdf").with_suffix(".urdf")
     elsewhere = write_stl(tmp_path / "opt/other/a.stl", (0.2, 0.2, 0.2))
     monkeypatch.delenv(PACKAGES, raising=False)
-    assert find_mesh("package://my_robot/meshes/a.stl", urdf) == beside
-    assert find_mesh("package:///my_robot/meshes/a.stl", urdf) == beside
-    assert find_mesh("../meshes/a.stl", urdf) == urdf.parent / "../meshes/a.stl"
-    assert find_mesh(f"file://{beside}", urdf) == beside
-    assert find_mesh("package://other/a.stl", urdf) is None
+    assert find_file("package://my_robot/meshes/a.stl", urdf) == beside
+    assert find_file("package:///my_robot/meshes/a.stl", urdf) == beside
+    assert find_file("../meshes/a.stl", urdf) == urdf.parent / "../meshes/a.stl"
+    assert find_file(f"file://{beside}", urdf) == beside
+    assert find_file("package://other/a.stl", urdf) is None
     for named in (elsewhere.parent, elsewhere.parent.parent):
         monkeypatch.setenv(PACKAGES, f"{tmp_path}/nowhere:{named}")
-        assert find_mesh("package://other/a.stl", urdf) == elsewhere
+        assert find_file("package://other/a.stl", urdf) == elsewhere
     trunk = mesh("package://my_robot/meshes/a.stl") + mesh("package://other/a.stl")
     robot = load_robot(write_urdf(urdf.parent, trunk=trunk))
     assert sorted(np.round(robot.model.mesh_vert.max(axis=1), 6).tolist())[-1] > 0.05
@@ -224,3 +224,76 @@ def test_refused_by_name(tmp_path: Path, case: str, monkeypatch: pytest.MonkeyPa
     change, text = REFUSED[case]
     found = problem(write_urdf(tmp_path, **change))
     assert re.match(text, found), found
+
+
+PAIRS = """<robot name="biped"><group name="x"><joint name="left_hip"/></group>
+<disable_collisions link1="{}" link2="{}" reason="Never"/>
+<disable_collisions link1="trunk" link2="camera"/> <disable_collisions link1="a" link2="a"/>
+<disable_collisions link1="{}" link2="{}"/></robot>"""
+BOX = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+
+
+def test_pairs_of_an_srdf_file_do_not_collide(tmp_path: Path) -> None:
+    """Said once or twice, in either order; links that there are not are passed over."""
+    two = "".join(part(n, "trunk", "revolute").replace("</link>", BOX + "</link>") for n in "ab")
+    free = write_urdf(tmp_path, extra=two)
+    assert contacts(load_robot(free)) == {("a", "b")}
+    (tmp_path / "biped.srdf").write_text(PAIRS.format("a", "b", "b", "a"))
+    source = {"urdf": "biped.urdf", "srdf": "biped.srdf"}
+    robot = load_robot(write_urdf(tmp_path, extra=two, source=source))
+    assert robot.model.nexclude == 1 and contacts(robot) == set()
+
+
+def contacts(robot: Robot) -> set[tuple[str, str]]:
+    """Links of the robot that touch each other, standing."""
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_forward(robot.model, data)
+    geoms = [(c.geom1, c.geom2) for c in data.contact if robot.ground_geom_id not in c.geom]
+    return {tuple(robot.model.body(robot.model.geom_bodyid[g]).name for g in p) for p in geoms}
+
+
+WRONG_SRDF = {
+    "none": (None, "source.srdf: no such file: .*biped.srdf"),
+    "no XML": ("<robot>", "source.srdf: .*biped.srdf is not valid SRDF: "),
+    "something else": ("<mujoco/>", "source.srdf: .*is not valid SRDF: it begins with <mujoco>"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_SRDF)
+def test_a_wrong_srdf_file(tmp_path: Path, case: str) -> None:
+    """One line with its field."""
+    text, message = WRONG_SRDF[case]
+    if text is not None:
+        (tmp_path / "biped.srdf").write_text(text)
+    source = {"urdf": "biped.urdf", "srdf": "biped.srdf"}
+    assert re.match(message, problem(write_urdf(tmp_path, source=source)))
+
+
+def test_a_package_that_this_machine_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """How to get it; with it, the description finds it; an SRDF file goes with a URDF file."""
+    monkeypatch.delenv(PACKAGES, raising=False)
+    urdf = write_urdf(tmp_path / "opt/no-such-robot").with_suffix(".urdf")
+    source = {"urdf": f"package://no-such-robot/{urdf.name}"}
+    own = write_urdf(tmp_path / "own", source=source)
+    assert problem(own) == (
+        f"source.urdf: this machine has no {source['urdf']}: pip install no-such-robot, if there "
+        "is such a wheel, or name the package's folder in ROS_PACKAGE_PATH"
+    )
+    monkeypatch.setenv(PACKAGES, str(tmp_path / "opt"))
+    assert load_robot(own).fingerprint == load_robot(urdf.with_suffix(".yaml")).fingerprint
+    alone = write_urdf(tmp_path / "own", source={"mjcf": "a.xml", "srdf": "b.srdf"})
+    assert problem(alone) == "source: srdf: goes with urdf alone"
+
+
+def test_talos() -> None:
+    """PAL's Talos: its mass and joints, box soles, no links inside each other."""
+    try:
+        robot = load_robot("pal_talos")
+    except ConfigError as error:
+        assert "pip install example-robot-data" in str(error)
+        pytest.skip("its model is not installed: pip install --no-deps example-robot-data")
+    assert robot.mass == pytest.approx(90.27, abs=0.01) and len(robot.joint_names) == 32
+    assert contacts(robot) == set() and robot.model.nmesh > 50
+    for sole in robot.soles:
+        assert np.ptp(sole.polygon, axis=0) == pytest.approx([0.21, 0.13])

@@ -111,6 +111,21 @@ def test_straight_knees_and_a_foot_without_roll_are_warned_of(tmp_path: Path) ->
     assert ("one foot", True) in kinds(found)
 
 
+def test_a_sole_that_rocks_is_warned_of(tmp_path: Path) -> None:
+    """Of three balls, one that hangs 3 mm higher than the others."""
+    ball = '<geom name="{{side}}_{name}" size="0.01" pos="{x} {y} -0.04"/>'
+    three = [("a", 0.13, 0.04), ("b", 0.13, -0.04), ("c", -0.07, 0.0)]
+    balls = [ball.format(name=name, x=x, y=y) for name, x, y in three]
+    flat = check_robot(write_biped(tmp_path, foot="".join(balls)))
+    assert flat.sole_contacts == {"left": 3, "right": 3}
+    assert "few contacts" not in dict(kinds(flat))
+    slanted = balls[2].replace("-0.04", "-0.037")  # within the 5 mm that count as flat
+    rocking = check_robot(write_biped(tmp_path, foot=balls[0] + balls[1] + slanted))
+    assert rocking.sole_contacts == {"left": 2, "right": 2}
+    assert dict(kinds(rocking))["few contacts"] is False
+    assert "left at 2, right at 2" in rocking.faults[0].text
+
+
 def test_weak_motors_are_warned_of(check: RobotCheck, tmp_path: Path) -> None:
     """Standing, or with one foot lifted; the joint is named."""
     weak = check_robot(write_urdf(tmp_path, torque_limits={"*_knee": 2}))
@@ -125,7 +140,7 @@ def test_weak_motors_are_warned_of(check: RobotCheck, tmp_path: Path) -> None:
 def test_a_com_beside_the_soles_is_warned_of(check: RobotCheck) -> None:
     """Where a margin is zero."""
     fallen = [replace(check.directions[0], margin=0.0), *check.directions[1:]]
-    found = find_faults(check.legs, (), check.both_feet, check.one_foot, fallen)
+    found = find_faults(check.legs, (), {}, check.both_feet, check.one_foot, fallen)
     assert [fault.kind for fault in found] == ["CoM"]
 
 

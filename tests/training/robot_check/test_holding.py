@@ -52,12 +52,16 @@ def test_a_com_beside_the_soles_is_not_held(tmp_path: Path) -> None:
 
 
 def test_friction_helps(tmp_path: Path) -> None:
-    """Feet that push apart take load off the hips; on ice they cannot."""
-    robot = load_robot(write_urdf(tmp_path))
-    ice = load_robot(write_urdf(tmp_path, options={"friction": 0.001}))
+    """Legs apart: feet that push outwards take load off the hips; on ice they cannot."""
+    apart = {"left_hip_roll": 15, "left_ankle_roll": -15}
+    apart |= {name.replace("left", "right"): -angle for name, angle in apart.items()}
+    posture = {"joints": {"*_hip": -20, "*_knee": 40, "*_ankle": -20, **apart}}
+    robot = load_robot(write_urdf(tmp_path, posture=posture))
+    ice = load_robot(write_urdf(tmp_path, posture=posture, options={"friction": 0.001}))
     fraction = holding(robot, robot.standing_qpos, [0, 1]).torque_fraction
-    other = holding(ice, ice.standing_qpos, [0, 1]).torque_fraction
-    assert fraction is not None and other is not None and fraction < 0.9 * other
+    on_ice = holding(ice, ice.standing_qpos, [0, 1])
+    assert str(on_ice.joint).endswith("_hip_roll") and on_ice.torque_fraction is not None
+    assert fraction is not None and fraction < 0.9 * on_ice.torque_fraction
 
 
 PAD = '<geom name="pad" type="{kind}" {shape} pos="0 0.1 -0.2"/>'
