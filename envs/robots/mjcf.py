@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError
-from poise.configs.reading import is_file
+from poise.configs.reading import is_file, read_text
 
-from .mjcf_bounds import MjcfText, check_spec
+from .mjcf_bounds import MJCF_BYTES, MjcfText, check_spec, tags
+
+SCENE_ELEMENTS = {"pair": "contact pairs", "key": "keyframes"}  # that a scene file often holds
 
 
 def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
@@ -42,6 +46,48 @@ def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
     _drop_missing_textures(spec, path)
     _drop_missing_meshes(spec, path, feet, source)
     return spec
+
+
+@contextmanager
+def pointing_to_scenes(path: Path | None, element: str) -> Iterator[None]:
+    """A ConfigError raised meanwhile also names the scene files that may be what was meant.
+
+    Args:
+        path: the MJCF file of the robot; None: there is none.
+        element: what a scene file may add to it, a key of `SCENE_ELEMENTS`.
+    """
+    try:
+        yield
+    except ConfigError as error:
+        scenes = ", ".join(scenes_with(path, element)) if path else ""
+        if not scenes:
+            raise
+        raise ConfigError(
+            f"{error.message}; {scenes} beside {path.name} includes it and has "  # type: ignore[union-attr]
+            + SCENE_ELEMENTS[element],
+            source=error.source,
+            field=error.field,
+            choices=error.choices,
+        ) from None
+
+
+def scenes_with(path: Path, element: str) -> list[str]:
+    """Names of the files beside an MJCF file that include it and hold `element`: ``key``, say."""
+    found = []
+    for beside in sorted(path.parent.glob("*.xml")):
+        if beside == path:
+            continue
+        try:
+            held = list(tags(read_text(beside, MJCF_BYTES)))
+        except ConfigError:  # whatever it is, it is no scene
+            continue
+        includes = any(
+            name == "include" and attributes.get("file") == path.name
+            for _, name, attributes, _ in held
+        )
+        if includes and any(name == element for _, name, _, _ in held):
+            found.append(beside.name)
+    return found
 
 
 def _drop_missing_meshes(

@@ -39,10 +39,11 @@ class MjcfText:
     Args:
         path: the main file.
         source: the description file, for errors.
+        field: the field in it that names `path`.
     """
 
-    def __init__(self, path: Path, source: str):
-        self._folder, self._source = path.parent, source
+    def __init__(self, path: Path, source: str, field: str = "source.mjcf"):
+        self._folder, self._source, self._field = path.parent, source, field
         self._elements = self._attached = self._models = self._size = 0
         self._walk(path, 1, 0)
         if self._elements + self._attached * self._models > ELEMENTS:
@@ -57,7 +58,7 @@ class MjcfText:
         if self._size > MJCF_BYTES:
             raise self._wrong(f"its files are together larger than {MJCF_BYTES / MIB:g} MiB")
         factors = [factor]
-        for closing, name, attributes, empty in _tags(text):
+        for closing, name, attributes, empty in tags(text):
             if not closing:
                 self._count(name, attributes, factors, depth)
                 if name == "replicate" and not empty:
@@ -87,31 +88,33 @@ class MjcfText:
             self._models += self._elements - before if name == "model" else 0
 
     def _wrong(self, problem: str) -> ConfigError:
-        return _wrong(problem, self._source)
+        return _wrong(problem, self._source, self._field)
 
 
-def check_spec(spec: mujoco.MjSpec, folder: Path, source: str) -> None:
+def check_spec(spec: mujoco.MjSpec, folder: Path, source: str, field: str = "source.mjcf") -> None:
     """Raise ConfigError for a model that is larger than a robot is, before it is compiled."""
     for name, most in LISTS.items():
         if len(getattr(spec, name)) > most:
-            raise _wrong(f"the model has more than {most} {name}", source)
+            raise _wrong(f"the model has more than {most} {name}", source, field)
     for name in _RESERVED:
         if getattr(spec, name) > LONGEST:
-            raise _wrong(f"size: {name} must be at most {LONGEST}", source)
+            raise _wrong(f"size: {name} must be at most {LONGEST}", source, field)
     if max(spec.memory, spec.nstack * 8, spec.njmax * 1000, spec.nconmax * 1000) > MEMORY:
-        raise _wrong(f"size: memory must be at most {MEMORY / MIB:g} MiB", source)
+        raise _wrong(f"size: memory must be at most {MEMORY / MIB:g} MiB", source, field)
     reserved = [x for s in spec.sensors for x in (s.dim, s.nsample)]
     reserved += [x for a in spec.actuators for x in (a.actdim, a.nsample)]
     if max(reserved, default=0) > LONGEST:
-        raise _wrong(f"sensors and actuators may have at most {LONGEST} numbers each", source)
+        raise _wrong(
+            f"sensors and actuators may have at most {LONGEST} numbers each", source, field
+        )
     if any(math.prod(map(int, camera.resolution)) > PIXELS for camera in spec.cameras):
-        raise _wrong(f"a camera may have at most {PIXELS} pixels", source)
+        raise _wrong(f"a camera may have at most {PIXELS} pixels", source, field)
     if spec.visual.global_.offwidth * spec.visual.global_.offheight > PIXELS:
-        raise _wrong(f"visual: a picture may have at most {PIXELS} pixels", source)
-    _check_assets(spec, folder, source)
+        raise _wrong(f"visual: a picture may have at most {PIXELS} pixels", source, field)
+    _check_assets(spec, folder, source, field)
 
 
-def _check_assets(spec: mujoco.MjSpec, folder: Path, source: str) -> None:
+def _check_assets(spec: mujoco.MjSpec, folder: Path, source: str, field: str) -> None:
     """Sizes of textures, height fields and the files of these and of meshes."""
     sides = [t.width * (t.height or t.width) * (1 if t.height else 6) for t in spec.textures]
     sides += [h.nrow * h.ncol for h in spec.hfields]
@@ -120,10 +123,10 @@ def _check_assets(spec: mujoco.MjSpec, folder: Path, source: str) -> None:
     files += [folder / spec.meshdir / x.file for x in (*spec.meshes, *spec.hfields) if x.file]
     for file in filter(is_file, files):
         if file.stat().st_size > ASSET_BYTES:
-            raise _wrong(f"{file} is larger than {ASSET_BYTES / MIB:g} MiB", source)
+            raise _wrong(f"{file} is larger than {ASSET_BYTES / MIB:g} MiB", source, field)
         sides.append(_pixels(file))
     if sum(sides) > PIXELS:
-        raise _wrong(f"textures and height fields may have at most {PIXELS} pixels", source)
+        raise _wrong(f"textures and height fields may have at most {PIXELS} pixels", source, field)
 
 
 def _pixels(file: Path) -> int:
@@ -135,7 +138,7 @@ def _pixels(file: Path) -> int:
     return int.from_bytes(head[16:20]) * int.from_bytes(head[20:24])
 
 
-def _tags(text: str) -> Iterator[tuple[bool, str, dict[str, str], bool]]:
+def tags(text: str) -> Iterator[tuple[bool, str, dict[str, str], bool]]:
     """Whether it closes, name, attributes, and whether it is empty, of all tags."""
     at = 0
     while match := _OPEN.search(text, at):
@@ -166,5 +169,5 @@ def _whole(text: str) -> int:
     return int(min(math.prod(max(1.0, x) for x in _numbers(text)), 1e12))
 
 
-def _wrong(problem: str, source: str) -> ConfigError:
-    return ConfigError(problem, source=source, field="source.mjcf")
+def _wrong(problem: str, source: str, field: str) -> ConfigError:
+    return ConfigError(problem, source=source, field=field)

@@ -25,11 +25,12 @@ from .ground import (
     set_options,
 )
 from .humanoid import humanoid_spec
-from .menagerie import model_file
-from .mjcf import read_mjcf
+from .menagerie import model_file, ros_file
+from .mjcf import pointing_to_scenes, read_mjcf
 from .model_check import check_numbers, check_standing
 from .soles import Sole, build_sole, find_sole_plane, sole_geoms
 from .standing import described_qpos, level_soles, turn_forward
+from .urdf import read_urdf
 
 BUILDERS = {"humanoid": humanoid_spec}
 TOUCH = 1e-9  # [m] by which the soles stand below z = 0, so that rounding loses no contact
@@ -73,6 +74,7 @@ class Robot(Copyable):
             foot name; ``"ground"`` counts all contacts with it. What the feet leave of it is
             contact of other bodies.
         fingerprint: hash of all that the dynamics depend on.
+        keyframes: name → (nq,) qpos of the keyframes that the model came with.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Robot(Copyable):
     torque_limit: np.ndarray
     sensor_adr: dict[str, int]
     fingerprint: str
+    keyframes: dict[str, np.ndarray]
 
     @property
     def units(self) -> Units:
@@ -112,19 +115,22 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
     path = resolve("robots", name_or_path)
     source = str(path)
     description = build(RobotDescription, read_yaml(path), source)
-    spec, keyframes, ground_name = _prepare(description, path)
+    file = model_file(description.source, path)
+    spec, keyframes, ground_name = _prepare(description, path, file)
     model = _compile(spec, source)
     data = mujoco.MjData(model)
     root = model.body(description.root).id
     bodies = [model.body(foot.body).id for foot in description.feet]
 
-    data.qpos[:] = described_qpos(model, description, keyframes, source)
+    with pointing_to_scenes(file, "key"):
+        data.qpos[:] = described_qpos(model, description, keyframes, source)
     mujoco.mj_kinematics(model, data)
     ground = model.geom(ground_name).id
     check_ground(model, ground, source)
     geoms, planes = [], []
     for i, foot in enumerate(description.feet):
-        ids = sole_geoms(model, bodies[i], foot.geoms, ground, source, f"feet[{i}]")
+        with pointing_to_scenes(file, "pair"):
+            ids = sole_geoms(model, bodies[i], foot.geoms, ground, source, f"feet[{i}]")
         planes.append(find_sole_plane(model, data, bodies[i], ids, source, f"feet[{i}]"))
         geoms.append(ids)
     level_soles(model, data, bodies, planes, source)
@@ -161,8 +167,15 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
             for name in ("ground", *(foot.name for foot in description.feet))
         },
         fingerprint=fingerprint(model, standing_qpos),
+        keyframes=keyframes,
     )
-    for array in (standing_qpos, robot.joint_range, robot.motor_dofs, robot.torque_limit):
+    for array in (
+        *keyframes.values(),
+        standing_qpos,
+        robot.joint_range,
+        robot.motor_dofs,
+        robot.torque_limit,
+    ):
         array.setflags(write=False)
     return robot
 
@@ -183,15 +196,11 @@ def fingerprint(model: mujoco.MjModel, standing_qpos: np.ndarray) -> str:
 
 
 def _prepare(
-    description: RobotDescription, path: Path
+    description: RobotDescription, path: Path, file: Path | None
 ) -> tuple[mujoco.MjSpec, dict[str, np.ndarray], str]:
     """The model with motors, ground, sensors and options; its keyframes; the ground's name."""
     source = str(path)
-    if description.source.builder is not None:
-        spec = BUILDERS[description.source.builder]()
-    else:
-        feet = tuple(foot.body for foot in description.feet)
-        spec = read_mjcf(model_file(description.source, path), feet, source)
+    spec = _read(description, path, file)
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i}"
     ground = install_ground(spec, description.ground, source)
@@ -205,6 +214,17 @@ def _prepare(
     add_contact_sensors(spec, description, ground)
     set_options(spec, description.options)
     return spec, keyframes, ground
+
+
+def _read(description: RobotDescription, path: Path, file: Path | None) -> mujoco.MjSpec:
+    """The model as it comes from its file, or from its builder."""
+    origin, source = description.source, str(path)
+    if file is None:
+        return BUILDERS[str(origin.builder)]()
+    if origin.urdf is not None:
+        srdf = None if origin.srdf is None else ros_file(origin.srdf, path, "source.srdf")
+        return read_urdf(file, source, srdf)
+    return read_mjcf(file, tuple(foot.body for foot in description.feet), source)
 
 
 def _check_bodies(model: mujoco.MjModel, description: RobotDescription, source: str) -> None:

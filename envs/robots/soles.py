@@ -71,27 +71,41 @@ def sole_geoms(
 ) -> tuple[int, ...]:
     """The geoms of a sole: those named, or all that are fixed to the foot and touch the ground.
 
+    A name is that of a geom, or of a body fixed to the foot, for all of its geoms.
+
     Raises:
         ConfigError: a name is none of these, or nothing of the foot can touch the ground.
     """
     rigid = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == body_id]
     solid = {model.geom(g).name or str(g): g for g in rigid if can_touch(model, g, ground)}
+    named = {name: [geom] for name, geom in solid.items()}
+    for geom in solid.values():
+        body = model.body(model.geom_bodyid[geom]).name
+        if body not in solid:
+            named.setdefault(body, []).append(geom)
     for name in names:
-        if name not in solid:
+        if name not in named:
             raise ConfigError(
                 f"{shown(name)} is no geom of the foot that collides with the ground",
                 source=source,
                 field=f"{field}.geoms",
-                choices=solid,
+                choices=named,
             )
     if not solid:
         raise ConfigError(
             f"the foot {model.body(body_id).name!r} has no collision geometry: none of its "
-            f"{len(rigid)} geoms collides with the ground (contype, conaffinity, pairs)",
+            f"{len(rigid)} geoms collides with the ground (contype, conaffinity, pairs)"
+            + _fixed_to(model, body_id),
             source=source,
             field=field,
         )
-    return tuple(solid[name] for name in names or solid)
+    return tuple(dict.fromkeys(geom for name in names or solid for geom in named[name]))
+
+
+def _fixed_to(model: mujoco.MjModel, body: int) -> str:
+    """For the error of a body without geometry: which body it is a part of."""
+    moving = model.body_weldid[body]
+    return "" if moving == body else f"; it is fixed to {model.body(moving).name!r}: name that one"
 
 
 def find_sole_plane(

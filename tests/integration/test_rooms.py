@@ -37,7 +37,7 @@ FLOORS = """
 13 training/learning
 14 training/trials
 15 training/figures, training/suites, training/tuning
-16 training/evaluation, training/qp_set
+16 training/evaluation, training/qp_set, training/robot_check
 17 training/results
 18 training/report
 19 training/cli

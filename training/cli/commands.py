@@ -219,6 +219,47 @@ def qp_set(
     print(f"{out}: {count} problems of {len(ends)} trials ({counts})")
 
 
+def robot(
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")],
+    /,
+    *,
+    out: Path | None = None,
+    picture: Path | None = None,
+) -> None:
+    """Check a robot before anything is tried on it: what it can hold, what will go wrong.
+
+    Mass, soles, margins, torques to stand on both feet and on one, self-contacts, posture, which
+    controllers take it, and the pushes that a pendulum of its size stops.
+
+    Args:
+        name: a packaged robot (see poise list) or a .yaml description.
+        out: a JSON file to write the figures to.
+        picture: a PNG file to write: the robot standing, and its soles.
+    """
+    if picture is not None:
+        from poise.envs.viewing.gl import choose_gl_backend
+
+        choose_gl_backend()
+    import json
+
+    from poise.configs.files import write_atomic
+    from poise.envs.robots.robot import load_robot
+    from poise.training.robot_check.check import check_robot
+    from poise.training.robot_check.tables import print_check
+
+    loaded = load_robot(name)
+    check = check_robot(loaded)
+    print_check(check, terminal())
+    if out is not None:
+        write_atomic(out, json.dumps(check.to_json(), indent=2, ensure_ascii=False) + "\n")
+        print(out)
+    if picture is not None:
+        from poise.training.robot_check.picture import draw_robot
+
+        draw_robot(loaded, picture)
+        print(picture)
+
+
 def list_names() -> None:
     """List what can be named: robots, environments, controllers, policies, suites and the like."""
     from poise.configs.files import packaged
@@ -251,5 +292,6 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "report": report,
     "tune": tune,
     "qp-set": qp_set,
+    "robot": robot,
     "list": list_names,
 }

@@ -137,3 +137,15 @@ def test_wrong_actuators(tmp_path: Path, change: dict, words: list[str]) -> None
         load_robot(path)
     for word in [str(path), *words]:
         assert word in str(caught.value)
+
+
+def test_force_ranges_without_actuators_are_motors(tmp_path: Path) -> None:
+    """As a URDF file's effort; a joint without a range stays passive; one actuator, and they are
+    only its bounds."""
+    leg = LEG.replace("range=", 'actuatorfrcrange="-17 18" range=', 1)
+    robot = load_robot(write_biped(tmp_path, leg=leg, extra=""))
+    assert [robot.joint_names[dof - 6] for dof in robot.motor_dofs] == ["left_hip", "right_hip"]
+    assert robot.torque_limit.tolist() == [17.0, 17.0]
+    extra = '<actuator><motor joint="left_hip" ctrlrange="-5 5"/></actuator>'
+    robot = load_robot(write_biped(tmp_path, leg=leg, extra=extra))
+    assert robot.torque_limit.tolist() == [5.0]

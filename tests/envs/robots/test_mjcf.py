@@ -9,7 +9,7 @@ import pytest
 
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import load_robot
-from tests.support.small_biped import BOX_FOOT, write_biped
+from tests.support.small_biped import BOX_FOOT, motors, write_biped
 
 MESH = '<mesh name="hull" file="hull.stl"/>'
 INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
@@ -91,3 +91,59 @@ def test_missing_include(tmp_path: Path) -> None:
     (tmp_path / "biped.xml").write_text('<mujoco><include file="legs.xml"/></mujoco>')
     with pytest.raises(ConfigError, match=r"biped\.xml.*legs\.xml"):
         load_robot(path)
+
+
+PAIRED = BOX_FOOT.replace("/>", ' contype="0" conaffinity="0"/>')
+SCENE = """
+<mujoco>
+  <include file="biped.xml"/>
+  <!-- <key/> -->
+  <worldbody><geom name="floor" type="plane" size="1 1 1"/></worldbody>
+  <contact>
+    <pair geom1="floor" geom2="left_sole"/> <pair geom1="floor" geom2="right_sole"/>
+  </contact>
+</mujoco>
+"""
+KEYS = '<mujoco><include file="biped.xml"/><keyframe><key name="home"/></keyframe></mujoco>'
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(ConfigError) as error:
+        load_robot(path)
+    return str(error.value)
+
+
+def test_errors_name_the_scene_that_has_the_contact_pairs(tmp_path: Path) -> None:
+    """Where feet collide by pairs alone, which stand in a file beside the robot's."""
+    path = write_biped(tmp_path, foot=PAIRED)
+    plain = refusal(path)
+    assert "the foot 'left_foot' has no collision geometry" in plain and "beside" not in plain
+    (tmp_path / "other.xml").write_text(SCENE.replace("biped.xml", "tall.xml"))
+    (tmp_path / "keys.xml").write_text(KEYS)
+    (tmp_path / "broken.xml").write_bytes(b"\xff\xfe")
+    assert refusal(path) == plain
+    (tmp_path / "scene.xml").write_text(SCENE)
+    assert refusal(path) == f"{plain}; scene.xml beside biped.xml includes it and has contact pairs"
+    assert load_robot(write_biped(tmp_path, foot=PAIRED, source={"mjcf": "scene.xml"})).soles
+
+
+def test_errors_list_keyframes_and_name_the_scene_that_has_more(tmp_path: Path) -> None:
+    """Those of the model are the choices."""
+    key = motors(ctrlrange="-50 50") + '<keyframe><key name="stand"/></keyframe>'
+    path = write_biped(tmp_path, extra=key, posture={"keyframe": "home"})
+    text = "posture.keyframe: no keyframe is called 'home'"
+    assert refusal(path) == f"{path}: {text} (choices: stand)"
+    (tmp_path / "scene.xml").write_text(SCENE)
+    assert refusal(path) == f"{path}: {text} (choices: stand)"
+    (tmp_path / "keys.xml").write_text(KEYS)
+    more = "; keys.xml beside biped.xml includes it and has keyframes"
+    assert refusal(path) == f"{path}: {text}{more} (choices: stand)"
+
+
+def test_a_robot_has_the_keyframes_of_its_model(tmp_path: Path) -> None:
+    """Their qpos, by name; they do not change."""
+    key = f'<keyframe><key name="stand" qpos="1 2 3 1 0 0 0 {"0.5 " * 8}"/></keyframe>'
+    robot = load_robot(write_biped(tmp_path, extra=motors(ctrlrange="-50 50") + key))
+    assert robot.keyframes["stand"].tolist() == [1, 2, 3, 1, 0, 0, 0] + [0.5] * 8
+    with pytest.raises(ValueError):
+        robot.keyframes["stand"][0] = 0.0

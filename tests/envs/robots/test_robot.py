@@ -40,8 +40,8 @@ def sole_poses(robot: Robot, data: mujoco.MjData) -> list[tuple[np.ndarray, np.n
 
 
 def test_packaged() -> None:
-    """These robots are packaged, besides those of test_menagerie.py."""
-    assert set(packaged("robots")) == set(ROBOTS) | set(OF_OTHERS)
+    """These robots are packaged, besides those of test_menagerie.py and test_urdf.py."""
+    assert set(packaged("robots")) == set(ROBOTS) | set(OF_OTHERS) | {"pal_talos"}
 
 
 def test_soles_lie_flat_at_the_origin_facing_forward(robot: Robot) -> None:

@@ -45,7 +45,7 @@ def test_help_is_light() -> None:
     assert done.returncode == 0, done.stderr
     names = (
         *("train", "evaluate", "benchmark", "compare", "leaderboard", "replay", "demo", "tune"),
-        *("qp-set", "report", "list"),
+        *("qp-set", "report", "robot", "list"),
     )
     for name in names:
         assert name in done.stdout
@@ -117,6 +117,8 @@ def test_a_broken_pipe_of_another_kind_is_raised(
         (["train", "--out", "run", "--seed", "1", "--ppo.gamma", "2"], "ppo.gamma"),
         (["train", "--out", "run", "--config", "bad.yaml"], "bad.yaml: random: unknown field"),
         (["tune", "--out", "run", "--controller", "pid"], "controllers: no such name: 'pid'"),
+        (["robot", "robby"], "robots: no such name: 'robby'"),
+        (["robot", "robot.yaml", "--out", "run/a.json"], "robot.yaml: feet: a biped has two feet"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(

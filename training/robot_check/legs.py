@@ -1,0 +1,89 @@
+"""What the joints of a leg can do: how far its knee is bent, about which axes its ankle turns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from poise.envs.robots.robot import Robot
+
+ALONG = 0.7  # |cos| between an axis and a direction from which the axis is of that direction
+ANKLE = 1.0 / 3.0  # of the height of a leg's first joint: joints below belong to the ankle
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A leg in the standing posture: the joints that move one foot and not the other.
+
+    Attributes:
+        foot: the foot's name.
+        joints: from the trunk to the foot.
+        knee: the joint between the last two of three or more that turn about the robot's left;
+            None where there are fewer.
+        knee_bend: angle between the lines from hip to knee and from knee to ankle [deg].
+        ankle_pitch, ankle_roll: whether a joint of the ankle turns about the robot's left, about
+            its forward direction.
+    """
+
+    foot: str
+    joints: tuple[str, ...]
+    knee: str | None
+    knee_bend: float | None
+    ankle_pitch: bool
+    ankle_roll: bool
+
+
+def standing_data(robot: Robot) -> mujoco.MjData:
+    """The robot's data in the standing posture at rest, all of it computed, contacts too."""
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_forward(robot.model, data)
+    return data
+
+
+def find_legs(robot: Robot) -> tuple[Leg, ...]:
+    """The leg of each foot, in the order of the soles."""
+    data = standing_data(robot)
+    chains = [_chain(robot.model, sole.body_id) for sole in robot.soles]
+    shared = set(chains[0]).intersection(*chains[1:])
+    return tuple(
+        _leg(robot.model, data, sole.name, [joint for joint in chain if joint not in shared])
+        for sole, chain in zip(robot.soles, chains, strict=True)
+    )
+
+
+def _chain(model: mujoco.MjModel, body: int) -> list[int]:
+    """The joints between the world and a body."""
+    joints: list[int] = []
+    while body != 0:
+        first = model.body_jntadr[body]
+        joints = [*range(first, first + model.body_jntnum[body]), *joints]
+        body = model.body_parentid[body]
+    return joints
+
+
+def _leg(model: mujoco.MjModel, data: mujoco.MjData, foot: str, joints: list[int]) -> Leg:
+    names = [model.joint(i).name for i in joints]
+    axes, anchors = np.abs(data.xaxis[joints]), data.xanchor[joints]
+    pitch, low = axes[:, 1] > ALONG, anchors[:, 2] < ANKLE * anchors[0, 2]
+    knee, bend = None, None
+    if np.count_nonzero(pitch) >= 3:
+        hip, middle, ankle = np.flatnonzero(pitch)[-3:]
+        knee, bend = names[middle], _bend(*anchors[[hip, middle, ankle]][:, [0, 2]])
+    return Leg(
+        foot=foot,
+        joints=tuple(names),
+        knee=knee,
+        knee_bend=bend,
+        ankle_pitch=bool(np.any(pitch & low)),
+        ankle_roll=bool(np.any((axes[:, 0] > ALONG) & low)),
+    )
+
+
+def _bend(hip: np.ndarray, knee: np.ndarray, ankle: np.ndarray) -> float:
+    """Angle [deg] between the thigh and the shin's continuation of it, in the sagittal plane."""
+    thigh, shin = knee - hip, ankle - knee
+    cross = thigh[0] * shin[1] - thigh[1] * shin[0]
+    return float(np.degrees(abs(np.arctan2(cross, thigh @ shin))))

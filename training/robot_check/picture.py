@@ -1,0 +1,72 @@
+"""A robot in its standing posture, from in front and from its left, and its soles from above."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+
+from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.robot import Robot
+from poise.envs.viewing.camera import Camera
+from poise.envs.viewing.renderer import SceneRenderer
+from poise.training.figures.style import BLUE, GREEN, INK, PALE, legend_below, saved_figure
+
+SIZE = (420, 620)  # of a view [pixels]
+VIEWS = {"in front": 0.0, "left": 90.0}  # name → azimuth [deg]
+ELEVATION = 6.0  # [deg]
+
+
+def draw_robot(robot: Robot, path: str | Path) -> None:
+    """Write a PNG file.
+
+    Raises:
+        PoiseError: there is no OpenGL to draw with, or the file cannot be written.
+    """
+    simulation = Simulation(robot)
+    views = {name: _view(simulation, azimuth) for name, azimuth in VIEWS.items()}
+    with saved_figure(path, 11.0, 5.0) as figure:
+        axes = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.3))
+        for ax, (name, frame) in zip(axes, views.items(), strict=False):
+            ax.imshow(frame)
+            ax.set_axis_off()
+            ax.set_title(f"{robot.name}, {name}" if ax is axes[0] else name)
+        _soles(axes[2], simulation)
+        legend_below(figure)
+
+
+def _view(simulation: Simulation, azimuth: float) -> np.ndarray:
+    camera = Camera(azimuth=azimuth, elevation=ELEVATION)
+    renderer = SceneRenderer(simulation, human=False, width=SIZE[0], height=SIZE[1], camera=camera)
+    try:
+        frame = renderer.render()
+    finally:
+        renderer.close()
+    assert frame is not None, "off-screen"
+    return frame
+
+
+def _soles(ax: Axes, simulation: Simulation) -> None:
+    """Forward is up, left is left."""
+    state = simulation.state
+    for sole, point, turn in zip(
+        simulation.robot.soles, state.sole_points, state.sole_axes, strict=True
+    ):
+        corners = point[:2] + sole.polygon @ turn[:2, :2].T
+        ax.add_patch(Polygon(_plan(corners), facecolor=PALE, edgecolor=INK))
+        ax.annotate(sole.name, _plan(point[None, :2])[0], ha="center", va="center")
+    support = _plan(np.array(state.support_polygon))
+    ax.add_patch(Polygon(support, fill=False, edgecolor=GREEN, label="support polygon"))
+    ax.plot(*_plan(state.com[None, :2]).T, "o", color=BLUE, label="CoM")
+    ax.autoscale_view()
+    ax.set_aspect("equal")
+    ax.set_title("soles")
+    ax.set_xlabel("to the right [mm]")
+    ax.set_ylabel("ahead [mm]")
+
+
+def _plan(points: np.ndarray) -> np.ndarray:
+    """Ground points (k, 2) [m] as they lie in the picture [mm]."""
+    return 1000.0 * np.column_stack([-points[:, 1], points[:, 0]])

@@ -1,0 +1,117 @@
+"""The check of a robot for people: tables in the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from .check import RobotCheck
+from .holding import Holding
+from .legs import Leg
+from .posture import Difference
+
+EVERY = 2  # of the directions, in the table
+
+
+def print_check(check: RobotCheck, console: Console) -> None:
+    """The robot, its directions, who can use it, what will go wrong."""
+    table = Table(title=escape(check.name), title_justify="left", show_header=False)
+    table.add_column("of the robot", no_wrap=True)
+    table.add_column("value", overflow="fold")
+    for name, value in _rows(check):
+        table.add_row(name, escape(value))
+    console.print(table)
+    console.print(_directions(check))
+    for family, uses in check.controllers.items():
+        takes = ", ".join(uses.takes) or "none"
+        console.print(f"controllers {family}: {takes}", markup=False, highlight=False)
+        for name, reason in uses.refused.items():
+            console.print(f"  not {name}: {reason}", markup=False, highlight=False)
+    for fault in check.faults:
+        where = " (stepping)" if fault.stepping else ""
+        console.print(f"[yellow]warning[/yellow]: {fault.kind}{where}: {escape(fault.text)}",
+                      highlight=False)  # fmt: skip
+    if not check.faults:
+        console.print("no warnings")
+
+
+def _rows(check: RobotCheck) -> Iterator[tuple[str, str]]:
+    ahead, left = (1000.0 * x for x in check.posture.com)
+    yield "mass", f"{check.mass:.2f} kg"
+    yield "CoM", (f"{check.height_com:.3f} m high, {ahead:+.0f} mm ahead and {left:+.0f} mm to the "
+                  "left of the middle of the soles")  # fmt: skip
+    yield "joints", f"{check.joints}, without a motor: {', '.join(check.without_motor) or 'none'}"
+    yield "torque limits", _limits(check.torque_limits)
+    for sole in check.soles:
+        yield (
+            f"sole {escape(sole.name)}",
+            (
+                f"{1000 * sole.length:.0f} × {1000 * sole.width:.0f} mm, {len(sole.corners)} "
+                f"corners, {check.sole_contacts[sole.name]} contacts, on {sole.body}"
+            ),
+        )
+    for leg in check.legs:
+        yield f"leg {escape(leg.foot)}", _leg(leg)
+    posture = check.posture
+    yield "posture", (f"from {posture.keyframe or 'the zero posture of the model'}, soles levelled "
+                      f"by {_difference(posture.levelling)}")  # fmt: skip
+    for name, difference in posture.differences.items():
+        yield f"against {escape(name)}", f"at most {_difference(difference)}"
+    yield "keyframes", ", ".join(posture.keyframes) or "none"
+    yield "to stand", _holding(check.both_feet)
+    for foot, holding in check.one_foot.items():
+        text = "no posture found" if holding is None else _holding(holding)
+        yield f"on {escape(foot)} alone", text
+    depth = max((each.depth for each in check.self_contacts), default=0.0)
+    pairs = len(check.self_contacts)
+    yield "self-contacts", f"{pairs}, up to {1000 * depth:.1f} mm deep" if pairs else "none"
+    yield "licence", check.licence or "not said"
+
+
+def _leg(leg: Leg) -> str:
+    axes = {"pitch": leg.ankle_pitch, "roll": leg.ankle_roll}
+    knee = "none found" if leg.knee_bend is None else f"{leg.knee}, bent {leg.knee_bend:.0f}°"
+    turns = " and ".join(name for name, there in axes.items() if there) or "nothing"
+    return f"{len(leg.joints)} joints; knee: {knee}; ankle: {turns}"
+
+
+def _limits(limits: dict[str, float]) -> str:
+    least, most = min(limits, key=limits.__getitem__), max(limits, key=limits.__getitem__)
+    return f"{limits[least]:g} N·m ({least}) to {limits[most]:g} N·m ({most})"
+
+
+def _difference(difference: Difference) -> str:
+    return f"{difference.amount:.1f}° ({difference.joint})"
+
+
+def _holding(holding: Holding) -> str:
+    if holding.torque_fraction is None:
+        return "no forces of the ground hold it"
+    return f"{holding.torque_fraction:.0%} of the torque limit of {holding.joint}"
+
+
+def _directions(check: RobotCheck) -> Table:
+    """Every other direction, and the mean over all."""
+    table = Table(title="push of 0.1 s", title_justify="left")
+    headings = ("direction", "CoM to edge [mm]", "CoP by ankles [mm]", "in place [N·s]", "[N·s/kg]",
+                "one step ≤ [N·s]", "[N·s/kg]")  # fmt: skip
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    for each in check.directions[::EVERY]:
+        table.add_row(
+            f"{each.direction:g}°",
+            f"{1000 * each.margin:.0f}",
+            f"{1000 * each.reach:.0f}",
+            *_impulses(each.in_place, each.one_step, check.mass),
+        )
+    table.add_section()
+    table.add_row("mean", "", "", *_impulses(check.in_place, check.one_step, check.mass))
+    return table
+
+
+def _impulses(in_place: float, one_step: float, mass: float) -> tuple[str, str, str, str]:
+    values = (in_place, in_place / mass, one_step, one_step / mass)
+    return tuple(f"{x:.{n}f}" for x, n in zip(values, (1, 2, 1, 2), strict=True))  # type: ignore[return-value]
