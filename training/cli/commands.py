@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from poise.training.running.terminal import terminal
 
-from .arguments import Allow, Names, Switch
+from .arguments import Allow, Names, RobotName, Switch
 from .results import compare, leaderboard, replay, report
 
 if TYPE_CHECKING:
@@ -220,7 +220,7 @@ def qp_set(
 
 
 def robot(
-    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")],
+    name: RobotName,
     /,
     *,
     out: Path | None = None,
