@@ -56,7 +56,8 @@ def _soles(ax: Axes, simulation: Simulation) -> None:
     ):
         corners = point[:2] + sole.polygon @ turn[:2, :2].T
         ax.add_patch(Polygon(_plan(corners), facecolor=PALE, edgecolor=INK))
-        ax.annotate(sole.name, _plan(point[None, :2])[0], ha="center", va="center")
+        x, y = _plan(point[None, :2])[0]
+        ax.annotate(sole.name, (x, y), ha="center", va="center")
     support = _plan(np.array(state.support_polygon))
     ax.add_patch(Polygon(support, fill=False, edgecolor=GREEN, label="support polygon"))
     ax.plot(*_plan(state.com[None, :2]).T, "o", color=BLUE, label="CoM")

@@ -25,6 +25,7 @@ WORLD = (
     '<link name="world"/><joint name="base" type="floating"><parent link="world"/>'
     '<child link="trunk"/></joint>'
 )
+BOX = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
 SHADE = mesh("lost.stl", "visual")
 
 
@@ -63,8 +64,10 @@ def test_root_floats_and_efforts_limit_motors(tmp_path: Path) -> None:
 
 
 def test_links_at_fixed_joints_stay(tmp_path: Path) -> None:
-    """A link of the world above the root, a head on it: nothing is fused away."""
-    floating = WORLD + part("head", "trunk")
+    """A link of the world above the root, a head on it: nothing is fused away. Only an inertial has
+    mass."""
+    pad = part("pad", "trunk").replace(INERTIAL.format(z=0.0, mass=0.5, i=0.001), BOX)
+    floating = WORLD + part("head", "trunk") + pad
     extra = floating.replace("floating", "fixed")
     robot = load_robot(write_urdf(tmp_path, extra=extra, push_bodies=["head"]))
     assert robot.mass == pytest.approx(MASS + 0.5)
@@ -230,7 +233,6 @@ PAIRS = """<robot name="biped"><group name="x"><joint name="left_hip"/></group>
 <disable_collisions link1="{}" link2="{}" reason="Never"/>
 <disable_collisions link1="trunk" link2="camera"/> <disable_collisions link1="a" link2="a"/>
 <disable_collisions link1="{}" link2="{}"/></robot>"""
-BOX = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
 
 
 def test_pairs_of_an_srdf_file_do_not_collide(tmp_path: Path) -> None:

@@ -112,15 +112,18 @@ def test_straight_knees_and_a_foot_without_roll_are_warned_of(tmp_path: Path) ->
 
 
 def test_a_sole_that_rocks_is_warned_of(tmp_path: Path) -> None:
-    """Of three balls, one that hangs 3 mm higher than the others."""
-    ball = '<geom name="{{side}}_{name}" size="0.01" pos="{x} {y} -0.04"/>'
-    three = [("a", 0.13, 0.04), ("b", 0.13, -0.04), ("c", -0.07, 0.0)]
-    balls = [ball.format(name=name, x=x, y=y) for name, x, y in three]
-    flat = check_robot(write_biped(tmp_path, foot="".join(balls)))
-    assert flat.sole_contacts == {"left": 3, "right": 3}
+    """Of three pairs of balls one behind the other, the middle one hangs 1 mm lower."""
+
+    def foot(raised: float) -> str:
+        places = [(x, y) for x in (-0.07, 0.03, 0.13) for y in (-0.04, 0.04)]
+        return "".join(
+            f'<geom size="0.01" pos="{x} {y} {-0.04 + raised * (x != 0.03)}"/>' for x, y in places
+        )
+
+    flat = check_robot(write_biped(tmp_path, foot=foot(0.0)))
+    assert flat.sole_contacts == {"left": 6, "right": 6}
     assert "few contacts" not in dict(kinds(flat))
-    slanted = balls[2].replace("-0.04", "-0.037")  # within the 5 mm that count as flat
-    rocking = check_robot(write_biped(tmp_path, foot=balls[0] + balls[1] + slanted))
+    rocking = check_robot(write_biped(tmp_path, foot=foot(0.001)))
     assert rocking.sole_contacts == {"left": 2, "right": 2}
     assert dict(kinds(rocking))["few contacts"] is False
     assert "left at 2, right at 2" in rocking.faults[0].text
