@@ -14,7 +14,7 @@ from rich.console import Console
 from poise.envs.maths.pendulum import ankle_limit
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
-from poise.training.cli.commands import main
+from poise.training.cli.entry import main
 from poise.training.robot_check.check import RobotCheck, check_robot
 from poise.training.robot_check.faults import find_faults
 from poise.training.robot_check.tables import print_check

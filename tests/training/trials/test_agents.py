@@ -14,6 +14,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.robots.robot import Robot, load_robot
+from poise.training.evaluation import evaluate
 from poise.training.evaluation.evaluate import default_controllers
 from poise.training.learning import policy
 from poise.training.learning.policy import load_policy
@@ -82,7 +83,7 @@ def test_a_packaged_policy_is_known_by_its_folder(
     def here(kind: str) -> Path:
         return tmp_path / kind if kind == "policies" else real(kind)
 
-    for module in (file_names, policy):
+    for module in (file_names, policy, evaluate):
         monkeypatch.setattr(module, "packaged_folder", here)
     agent = load_agent("residual-pd", robot)
     assert agent.fingerprint == load_agent(str(finished_run() / "last"), robot).fingerprint

@@ -21,7 +21,7 @@ def agent() -> Agent:
 def track(agent: Agent, push: object) -> tuple[bool, list[float], np.ndarray]:
     """Whether it recovered, the servos' shares, and where it ended."""
     env, shares = agent.env, []
-    env.reset(seed=4, options={"push": push})
+    env.reset(seed=4, options={"push": push, "noise": 0.0})
     while env.episode.running[0]:
         env.step_without_info(agent.act(env.episode.observation))
         shares.append(getattr(env, "authority", 0.0))
