@@ -1,5 +1,6 @@
 """The process of the command `poise`: exit codes, stops, and what nobody reads any more."""
 
+import difflib
 import errno
 import os
 import select
@@ -9,7 +10,8 @@ from typing import TextIO
 
 import tyro
 
-from poise.configs.errors import PoiseError
+import poise
+from poise.configs.errors import ConfigError, PoiseError, shown
 from poise.training.running.stopping import exit_at_once, stop_code, stop_message, stoppable
 
 from .commands import COMMANDS
@@ -79,7 +81,19 @@ def _unread(stream: TextIO | None) -> bool:
     return bool(poll.poll(0))
 
 
+def _unknown(name: str) -> ConfigError:
+    """The error of a sub-command that does not exist, with the one that it looks like."""
+    near = difflib.get_close_matches(name, COMMANDS, n=1)
+    hint = f", did you mean {near[0]}?" if near else ""
+    return ConfigError(f"no such command: {shown(name)}{hint}", choices=COMMANDS)
+
+
 def _run(args: list[str]) -> int:
+    if args == ["--version"]:
+        print(f"poise {poise.__version__}")
+        return 0
+    if args and not args[0].startswith("-") and args[0] not in COMMANDS:
+        raise _unknown(args[0])
     if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass
         from .train import run
 

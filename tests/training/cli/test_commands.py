@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import poise
 from poise.baselines.allowance import SCRIPTS
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, packaged_folder, resolve
@@ -49,6 +50,22 @@ def test_help_is_light() -> None:
     )
     for name in names:
         assert name in done.stdout
+
+
+def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"poise {poise.__version__}\n"
+
+
+@pytest.mark.parametrize(("name", "hint"), [("evalute", ", did you mean evaluate?"), ("xyz", "")])
+def test_an_unknown_command_is_one_line(
+    capsys: pytest.CaptureFixture[str], name: str, hint: str
+) -> None:
+    """It names what it looks like, and all that there are."""
+    assert main([name, "momentum-qp"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"poise: no such command: '{name}'{hint} (choices: demo, train, ")
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize(("args", "before"), [(["list"], ""), (["--help"], ""), (["list"], RICH)])
