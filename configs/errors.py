@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 
@@ -89,3 +90,13 @@ def _listed(choices: tuple[str, ...]) -> str:
     names = [one_line(choice, LONGEST_VALUE) for choice in islice(choices, MOST_CHOICES)]
     more = [f"and {len(choices) - MOST_CHOICES} more"] if len(choices) > MOST_CHOICES else []
     return one_line(", ".join(names + more) or "none")
+
+
+@contextmanager
+def below(*fields: str) -> Iterator[None]:
+    """Let an error of a part name its whole: `fields` come before the field of a `ConfigError`."""
+    try:
+        yield
+    except ConfigError as error:
+        field = ".".join(part for part in (*fields, error.field) if part)
+        raise ConfigError(error.message, field=field, choices=error.choices) from None

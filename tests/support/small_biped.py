@@ -82,9 +82,14 @@ def write_biped(
         asset=asset, world=world, root_joint=root_joint, trunk=trunk, legs=legs, extra=extra
     )
     (folder / "biped.xml").write_text(text)
+    return describe(folder, {"mjcf": "biped.xml"}, description)
+
+
+def describe(folder: Path, source: dict[str, str], description: dict[str, object]) -> Path:
+    """The YAML file of the biped whose model `source` names; `description` wins."""
     fields: dict[str, object] = {
         "name": "biped",
-        "source": {"mjcf": "biped.xml"},
+        "source": source,
         "root": "trunk",
         "feet": [
             {"name": "left", "body": "left_foot"},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
-import yaml
+from tests.support.small_biped import describe
 
 INERTIAL = (
     '<inertial><origin xyz="0 0 {z}"/><mass value="{mass}"/>'
@@ -86,16 +86,4 @@ def write_urdf(
     text = f'<robot name="biped">{"".join(parts)}{extra}</robot>'
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "biped.urdf").write_text(text.replace(*change) if change[0] else text)
-    fields: dict[str, object] = {
-        "name": "biped",
-        "source": {"urdf": "biped.urdf"},
-        "root": "trunk",
-        "feet": [
-            {"name": "left", "body": "left_foot"},
-            {"name": "right", "body": "right_foot"},
-        ],
-        "posture": {"joints": {"*_hip": -20, "*_knee": 40, "*_ankle": -20}},
-    }
-    path = folder / "biped.yaml"
-    path.write_text(yaml.safe_dump(fields | description, sort_keys=False))
-    return path
+    return describe(folder, {"urdf": "biped.urdf"}, description)

@@ -102,7 +102,7 @@ def _run(args: list[str]) -> int:
     code = tyro.extras.subcommand_cli_from_dict(
         COMMANDS,
         prog="poise",
-        description="Keep a simulated humanoid on its feet while it is pushed.",
+        description="Keep a simulated humanoid on its feet while it is pushed (--version: which).",
         args=args,
     )
     return code if isinstance(code, int) else 0

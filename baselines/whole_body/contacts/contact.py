@@ -6,7 +6,7 @@ from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import below
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
@@ -101,11 +101,8 @@ def bind_contacts(contacts: Mapping[str, Contact], robot: Robot) -> dict[str, Bo
     """
     bound = {}
     for name, contact in contacts.items():
-        try:
+        with below("contacts", name):
             bound[name] = BoundContact(contact, contact.bind(robot))
-        except ConfigError as error:
-            field = ".".join(part for part in ("contacts", name, error.field) if part)
-            raise ConfigError(error.message, field=field, choices=error.choices) from None
     return bound
 
 

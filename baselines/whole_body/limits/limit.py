@@ -6,7 +6,7 @@ from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import below
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
 from poise.envs.physics.kinematics import StateArrays
@@ -107,11 +107,8 @@ def bind_limits(limits: Mapping[str, Limit], robot: Robot) -> dict[str, BoundLim
     """
     bound = {}
     for name, limit in limits.items():
-        try:
+        with below("limits", name):
             bound[name] = BoundLimit(limit, limit.bind(robot))
-        except ConfigError as error:
-            field = ".".join(part for part in ("limits", name, error.field) if part)
-            raise ConfigError(error.message, field=field, choices=error.choices) from None
     return bound
 
 

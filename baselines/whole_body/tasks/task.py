@@ -6,7 +6,7 @@ from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import below
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
 from poise.envs.maths.pendulum import Units
@@ -84,11 +84,8 @@ def bind_tasks(tasks: Mapping[str, Task], robot: Robot) -> dict[str, BoundTask]:
     """
     bound = {}
     for name, task in tasks.items():
-        try:
+        with below("tasks", name):
             bound[name] = BoundTask(task, task.bind(robot))
-        except ConfigError as error:
-            field = ".".join(part for part in ("tasks", name, error.field) if part)
-            raise ConfigError(error.message, field=field, choices=error.choices) from None
     return bound
 
 
