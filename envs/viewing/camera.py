@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build, to_dict
+
+SIDE = 65.0  # [deg] that `beside` stands off a push's line: 90 would never see a face
 
 
 @dataclass(frozen=True)
@@ -54,3 +56,19 @@ def point(view: mujoco.MjvCamera, camera: Camera | int, size: float) -> None:
     view.azimuth = camera.azimuth + 180.0
     view.elevation = -camera.elevation
     view.distance = camera.distance * size
+
+
+def beside(direction: float, camera: Camera | None = None) -> Camera:
+    """A camera that sees a push of `direction` [deg] from its side, and the robot's front if it can.
+
+    Its azimuth is `SIDE` off the push's line, on the one of four such places nearest to `camera`'s.
+    """
+    camera = camera or Camera()
+    places = [direction + turn for turn in (SIDE, 180.0 - SIDE, 180.0 + SIDE, -SIDE)]
+    azimuth = min(places, key=lambda place: abs(_turned(place - camera.azimuth)))
+    return replace(camera, azimuth=_turned(azimuth))
+
+
+def _turned(angle: float) -> float:
+    """The same angle within [-180, 180)."""
+    return (angle + 180.0) % 360.0 - 180.0

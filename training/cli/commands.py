@@ -15,20 +15,33 @@ if TYPE_CHECKING:
     from poise.training.running.summary import Summary
 
 
-def demo(out: Path = Path("out/demo"), workers: int | None = None, seed: int = 0) -> None:
-    """Push three controllers and the shipped policies, and compare, in a few minutes.
+def demo(
+    out: Path | None = None,
+    *,
+    full: Switch = False,
+    workers: int | None = None,
+    seed: int = 0,
+    overwrite: Switch = False,
+) -> None:
+    """Push four controllers and compare: a table, two plots and a video, in a minute or so.
 
-    momentum-qp, whose feet stay in place, and residual on it; capture-step and residual-step on it;
-    feedback-step.
+    momentum-qp, whose feet stay in place; capture-step, which steps; feedback-step and the policy
+    residual-step, which step better. The same command goes on where it was stopped.
 
     Args:
-        out: folder to write to; an earlier demo there is replaced.
+        out: folder to write to; out/demo, or out/demo-full, if not given.
+        full: more pushes, random ones too, and a policy with feet in place: some minutes.
         workers: number of processes; all cores if not given.
         seed: of the pushes.
+        overwrite: replace what the folder holds.
     """
+    from poise.envs.viewing.gl import choose_gl_backend
+
+    choose_gl_backend()
     from .demo import demo
 
-    demo(out, workers=workers, seed=seed, console=terminal())
+    folder = out or Path("out/demo-full" if full else "out/demo")
+    demo(folder, full=full, workers=workers, seed=seed, overwrite=overwrite, console=terminal())
 
 
 def train() -> None:

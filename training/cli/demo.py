@@ -1,50 +1,88 @@
-"""The main job in a few minutes: three controllers, and what a policy on two of them gains."""
+"""The main job in a minute or, in full, in some: who recovers from which pushes, to be looked at."""
 
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
 
+from poise.configs.errors import PoiseError
 from poise.training.evaluation.evaluate import evaluate
+from poise.training.results.film import film
+from poise.training.results.read import Results, load_results
 from poise.training.running.files import PLOTS
-from poise.training.running.stopping import ANEW, keeps
+from poise.training.running.stopping import keeps
 from poise.training.running.summary import Summary
 from poise.training.running.terminal import print_paths
 from poise.training.trials.agents import SHIPPED
 
-CONTROLLERS = ("momentum-qp", SHIPPED, "capture-step", "residual-step", "feedback-step")
-SUITES = ("demo-envelope", "demo-random")
+CONTROLLERS = ("momentum-qp", "capture-step", "feedback-step", "residual-step")
+SUITE = "demo"
+FULL_CONTROLLERS = ("momentum-qp", SHIPPED, "capture-step", "residual-step", "feedback-step")
+FULL_SUITES = ("demo-full-envelope", "demo-full-random")
+FILMED, VIDEO = 3, "push.mp4"  # how many controllers the video shows, its name
 
 
 def demo(
     out: str | Path,
     *,
+    full: bool = False,
     workers: int | None = None,
     seed: int = 0,
-    controllers: tuple[str, ...] = CONTROLLERS,
+    overwrite: bool = False,
+    controllers: Sequence[str] | None = None,
     console: Console | None = None,
 ) -> list[Summary]:
-    """Evaluate on both suites of the demo; returns their summaries.
+    """Evaluate on the demo's suite, or on both of the full one; returns their summaries.
 
-    An earlier demo in `out` is replaced.
+    `out` gets what `evaluate` writes, of the full demo in a folder for each suite, and else a video
+    of the same push with three controllers. It goes on where it was stopped.
 
     Raises:
         ConfigError, PoiseError: as `evaluate`.
     """
-    console = console or Console(quiet=True)
-    summaries = []
-    keeps(Path(out), ANEW)  # it replaces what there is
-    for suite in SUITES:
-        summary = evaluate(
-            controllers,
-            suite,
-            out=Path(out) / Path(suite).stem,
-            seed=seed,
-            workers=workers,
-            overwrite=True,
-            console=console,
-        )
-        summaries.append(summary)
+    console, out = console or Console(quiet=True), Path(out)
+    keeps(out, f"the finished trials are kept in {out}; the same command goes on")
+    names = controllers or (FULL_CONTROLLERS if full else CONTROLLERS)
+    folders = {suite: out / Path(suite).stem for suite in FULL_SUITES} if full else {SUITE: out}
+    summaries = [
+        evaluate(names, suite, out=folder, seed=seed, workers=workers, overwrite=overwrite,
+                 console=console)
+        for suite, folder in folders.items()
+    ]  # fmt: skip
+    shown = zip(folders.values(), PLOTS, strict=True) if full else [(out, plot) for plot in PLOTS]
     console.print("\npolar recovery plot and fall probability:")
-    folders = [Path(out) / Path(suite).stem for suite in SUITES]
-    print_paths([f / plot for f, plot in zip(folders, PLOTS, strict=True)], console)
+    print_paths([folder / plot for folder, plot in shown], console)
+    if not full:
+        _film(load_results(out), console)
     return summaries
+
+
+def _film(results: Results, console: Console) -> None:
+    """Film the hardest push that somebody recovers; where nothing can be drawn, say so."""
+    trial = hardest(results)
+    if trial is None:
+        return
+    ranking = results.summary["ranking"]
+    names = list(dict.fromkeys([*ranking[: -FILMED : -1], ranking[0]]))  # the best to the right
+    command = f"poise replay {results.folder} --trial {trial} --controller {' '.join(names)}"
+    path = results.folder / VIDEO
+    try:
+        film(results, trial, names, path)
+    except PoiseError as error:
+        console.print(f"no video: {error}", markup=False, highlight=False)
+        return
+    console.print("the hardest push that the best one recovers, filmed:")
+    print_paths([path], console)
+    console.print(f"{command} --video {path}", markup=False, highlight=False, soft_wrap=True)
+
+
+def hardest(results: Results) -> int | None:
+    """The trial of the largest share of the ankle limit that the best controller recovers.
+
+    All controllers have met it alike. None where there is no such trial.
+    """
+    best = results.summary["ranking"][0]
+    met = Counter(record.met for record in results.records)
+    won = [r for r in results.of(best) if r.recovered and met[r.met] == len(results.controllers)]
+    return max(won, key=lambda r: (r.fraction, -r.trial)).trial if won else None

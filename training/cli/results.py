@@ -1,7 +1,7 @@
 """The sub-commands that read finished results: compare, leaderboard, replay and report."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -9,6 +9,9 @@ from poise.configs.errors import ConfigError
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Folder
+
+if TYPE_CHECKING:
+    from poise.training.results.replay import Replay
 
 
 def compare(
@@ -57,7 +60,7 @@ def replay(
     /,
     *,
     trial: int,
-    controller: str | None = None,
+    controller: tuple[str, ...] = (),
     video: Path | None = None,
     plot: Path | None = None,
     allow: Allow = (),
@@ -67,26 +70,40 @@ def replay(
     Args:
         folder: written by poise evaluate or poise benchmark.
         trial: its number in trials.csv.
-        controller: which of the evaluated ones; the last if not given.
-        video: an MP4 file to write.
+        controller: which of the evaluated ones; the last if not given. A video shows several side
+            by side.
+        video: an MP4 or GIF file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
     """
     if video is not None:
         from poise.envs.viewing.gl import choose_gl_backend
 
         choose_gl_backend()
+    from poise.training.results.film import film
+    from poise.training.results.read import load_results
     from poise.training.results.replay import replay
 
-    done = replay(folder, trial, controller, video=video, plot=plot, allow=allow)
+    if plot is not None and len(controller) > 1:
+        raise ConfigError("of one controller alone", field="plot")
+    results = load_results(folder)
+    names = controller or results.controllers[-1:]
+    for name in names:
+        _print_replay(replay(results, trial, name, plot=plot, allow=allow))
+    if video is not None:
+        film(results, trial, names, video, allow=allow)
+    for path in (video, plot):
+        if path is not None:
+            print(path)
+
+
+def _print_replay(done: "Replay") -> None:
+    """How a trial ended that was played again, and in what it differs from its record."""
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
-    print(f"trial {trial}, {done.controller}: {end}")
+    print(f"trial {done.trial.number}, {done.controller}: {end}")
     print(done.trial.push or "no push")
     for name, (recorded, now) in done.differences.items():
         print(f"{name}: recorded {recorded or 'nothing'}, now {now or 'nothing'}")
     print("differs from the record" if done.differences else "exactly as recorded")
-    for path in (video, plot):
-        if path is not None:
-            print(path)
 
 
 def report(

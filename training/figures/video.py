@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +14,10 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.renderer import SceneRenderer
 
+from .encoder import FORMS, Encoder
 from .style import saved_figure
 
-CRF = 20  # quality of H.264, lower is better: 18 is visually lossless
+INK = (20, 20, 20)  # of names over pictures
 
 
 def record(
@@ -32,7 +31,7 @@ def record(
     size: tuple[int, int] = (640, 480),
     camera: Camera | str | int | None = None,
 ) -> dict[str, Any]:
-    """Play one episode and write it as an MP4 (H.264, yuv420p) that browsers play.
+    """Play one episode and write it as an MP4 (H.264, yuv420p) that browsers play, or as a GIF.
 
     The file appears complete or not at all. Every n-th policy step is drawn, with n such that the
     video has about `fps` frames a second; drawing takes most of the time.
@@ -40,7 +39,7 @@ def record(
     Args:
         env: one of Poise's environments, wrapped or not, in any render mode.
         act: the action for an observation.
-        path: where to write, ending in .mp4.
+        path: where to write, ending in .mp4 or .gif.
         reset_kwargs: `seed` and `options` of the reset.
         fps: frames a second that are wanted [1/s].
         slow_motion: how much longer the video takes than the episode.
@@ -55,37 +54,155 @@ def record(
         ConfigError: the path, rate, slow motion or size is not valid.
         PoiseError: nothing can be drawn or encoded here, or the file cannot be written.
     """
-    base = env.unwrapped
-    if not isinstance(base, BalanceEnv):
-        raise PoiseError(f"only Poise's environments can be recorded, not {type(base).__name__}")
     _check(path, fps, slow_motion, size)
-    period = base.config.policy_period * slow_motion
-    every = max(1, round(1.0 / (fps * period)))
-    rate = 1.0 / (every * period)
-    renderer = SceneRenderer(base.simulation, human=False, width=size[0], height=size[1],
-                             camera=camera)  # fmt: skip
-    total, frames, step, done = 0.0, 1, 0, False
-    try:
-        with _Encoder(Path(path), size, rate) as video:
-            observation, info = env.reset(**(reset_kwargs or {}))
-            video.send(renderer.render())
-            while not done:
-                observation, reward, terminated, truncated, info = env.step(act(observation))
-                total, step, done = total + float(reward), step + 1, terminated or truncated
-                if step % every == 0 or done:
-                    video.send(renderer.render())
-                    frames += 1
-    finally:
-        renderer.close()
+    with Episode(env, act, reset_kwargs, size, camera) as episode:
+        every, rate = _drawn(episode.base, fps, slow_motion)
+        frames = _film([episode], Path(path), size, every, rate, lambda: episode.frame)
     return {
         "path": str(path),
         "frames": frames,
         "fps": rate,
-        "seconds": base.simulation.time,
-        "fallen": base.fallen,
-        "recovered": bool(info["is_success"]),
-        "return": total,
+        "seconds": episode.base.simulation.time,
+        "fallen": episode.base.fallen,
+        "recovered": bool(episode.info["is_success"]),
+        "return": episode.total,
     }
+
+
+def record_together(
+    episodes: Mapping[str, Episode],
+    path: str | Path,
+    *,
+    fps: float = 25.0,
+    slow_motion: float = 1.0,
+) -> int:
+    """Film several episodes side by side, each under its name; returns the number of frames.
+
+    They run at the same time, so they must have the same policy period. One that has ended stays as
+    it was then, until the last has ended.
+
+    Raises:
+        ConfigError: the path, rate, slow motion or size is not valid, or periods or sizes differ.
+        PoiseError: the video cannot be encoded, or the file cannot be written.
+    """
+    own = list(episodes.values())
+    if not own or len({(each.base.config.policy_period, each.size) for each in own}) != 1:
+        raise ConfigError("give one or more, of one policy period and size", field="episodes")
+    width, height = own[0].size
+    _check(path, fps, slow_motion, (width, height))
+    every, rate = _drawn(own[0].base, fps, slow_motion)
+
+    def frame() -> np.ndarray:
+        return np.hstack([_labelled(name, each) for name, each in episodes.items()])
+
+    return _film(own, Path(path), (width * len(own), height), every, rate, frame)
+
+
+class Episode:
+    """An episode to be filmed; use as a context, which frees what draws it.
+
+    Args:
+        env, act, reset_kwargs, size, camera: as of `record`.
+
+    Attributes:
+        frame: the picture (height, width, 3) uint8 that `draw` has made last.
+        done: it has ended.
+        total: sum of rewards.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env,
+        act: Callable[[np.ndarray], np.ndarray],
+        reset_kwargs: dict[str, Any] | None = None,
+        size: tuple[int, int] = (640, 480),
+        camera: Camera | str | int | None = None,
+    ):
+        base = env.unwrapped
+        if not isinstance(base, BalanceEnv):
+            name = type(base).__name__
+            raise PoiseError(f"only Poise's environments can be recorded, not {name}")
+        self.env, self.base, self.act, self.size = env, base, act, size
+        self.reset_kwargs = reset_kwargs or {}
+        self.renderer = SceneRenderer(base.simulation, human=False, width=size[0], height=size[1],
+                                      camera=camera)  # fmt: skip
+
+    def start(self) -> None:
+        """Begin anew, with its first picture."""
+        self.observation, self.info = self.env.reset(**self.reset_kwargs)
+        self.total, self.done = 0.0, False
+        self.draw()
+
+    def step(self) -> None:
+        """Play one policy step, unless it has ended."""
+        if self.done:
+            return
+        self.observation, reward, terminated, truncated, self.info = self.env.step(
+            self.act(self.observation)
+        )
+        self.total, self.done = self.total + float(reward), terminated or truncated
+
+    def draw(self) -> None:
+        """Bring the picture up to date."""
+        frame = self.renderer.render()
+        assert frame is not None  # the renderer is open and off-screen
+        self.frame = frame
+
+    def __enter__(self) -> Episode:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.renderer.close()
+
+
+def _drawn(env: BalanceEnv, fps: float, slow_motion: float) -> tuple[int, float]:
+    """How many policy steps apart frames are, and how many of them the video has a second."""
+    period = env.config.policy_period * slow_motion
+    every = max(1, round(1.0 / (fps * period)))
+    return every, 1.0 / (every * period)
+
+
+def _film(
+    episodes: Sequence[Episode],
+    path: Path,
+    size: tuple[int, int],
+    every: int,
+    rate: float,
+    frame: Callable[[], np.ndarray],
+) -> int:
+    """Play all to their ends at the same time and write what `frame` gives; how many frames."""
+    frames, step = 1, 0
+    with Encoder(path, size, rate) as video:
+        for each in episodes:
+            each.start()
+        video.send(frame())
+        while not all(each.done for each in episodes):
+            playing = [each for each in episodes if not each.done]
+            for each in playing:
+                each.step()
+            step += 1
+            ended = all(each.done for each in episodes)
+            if step % every == 0 or ended:
+                for each in playing:
+                    each.draw()
+                video.send(frame())
+                frames += 1
+    return frames
+
+
+def _labelled(name: str, episode: Episode) -> np.ndarray:
+    """The episode's picture with its name, and how it ended."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    picture = Image.fromarray(episode.frame)
+    end = ("fell" if episode.base.fallen else "recovered" if episode.info["is_success"]
+           else "not quiet") if episode.done else ""  # fmt: skip
+    width, height = episode.size
+    font = ImageFont.load_default(max(10.0, height / 20.0))
+    draw = ImageDraw.Draw(picture)
+    draw.text((0.03 * width, 0.03 * height), name, fill=INK, font=font)
+    draw.text((0.97 * width, 0.03 * height), end, fill=INK, font=font, anchor="ra")
+    return np.asarray(picture)
 
 
 def frame_strip(
@@ -114,53 +231,9 @@ def frame_strip(
             ax.text(0.04, 0.04, f"{t:.2f} s", transform=ax.transAxes, fontsize=12)
 
 
-class _Encoder:
-    """FFmpeg, fed frame by frame; the file takes its name when the block ends well."""
-
-    def __init__(self, path: Path, size: tuple[int, int], rate: float):
-        self.path, self.size, self.rate = path, size, rate
-        self.part = path.with_name(f".{path.stem}.{os.getpid()}.part.mp4")
-
-    def __enter__(self) -> _Encoder:
-        import imageio_ffmpeg
-
-        self.writer = imageio_ffmpeg.write_frames(
-            str(self.part), self.size, fps=self.rate, codec="libx264", pix_fmt_out="yuv420p",
-            macro_block_size=2, quality=None, ffmpeg_log_level="error",
-            output_params=["-crf", str(CRF), "-movflags", "+faststart"],
-        )  # fmt: skip
-        with self._reported():
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.writer.send(None)
-        return self
-
-    def send(self, frame: np.ndarray | None) -> None:
-        assert frame is not None  # the renderer is open and off-screen
-        with self._reported():
-            self.writer.send(np.ascontiguousarray(frame))
-
-    def __exit__(self, failure: type | None, *_: object) -> None:
-        try:
-            with self._reported():
-                self.writer.close()
-                if failure is None:
-                    os.replace(self.part, self.path)
-        finally:
-            self.part.unlink(missing_ok=True)
-
-    @contextmanager
-    def _reported(self) -> Iterator[None]:
-        """FFmpeg's troubles as an error of ours."""
-        try:
-            yield
-        except (OSError, RuntimeError) as error:
-            reason = getattr(error, "strerror", None) or str(error).strip().splitlines()[0]
-            raise PoiseError(f"{self.path}: the video cannot be written ({reason})") from error
-
-
 def _check(path: str | Path, fps: float, slow_motion: float, size: tuple[int, int]) -> None:
-    if Path(path).suffix.lower() != ".mp4":
-        raise ConfigError("the name of a video must end in .mp4", source=path)
+    if Path(path).suffix.lower() not in FORMS:
+        raise ConfigError(f"the name of a video must end in {' or '.join(FORMS)}", source=path)
     for name, value in (("fps", fps), ("slow_motion", slow_motion)):
         if not (np.isfinite(value) and value > 0.0):
             raise ConfigError(f"must be positive, not {value}", field=name)

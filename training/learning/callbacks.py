@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-from rich.progress import Progress as Bar
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
@@ -18,6 +17,7 @@ from poise.configs.files import write_atomic
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.batch import EnvBatch, replicate
+from poise.training.running.terminal import ProgressLines
 
 from .checkpoints import controller_fingerprint, save_checkpoint
 from .config import TrainConfig
@@ -188,10 +188,10 @@ class Progress(BaseCallback):
         super().__init__()
         self.total = total
         self._episodes: deque[bool] = deque(maxlen=500)
-        self._bar: Bar | None = None
+        self._bar: ProgressLines | None = None
 
     def _on_training_start(self) -> None:
-        self._bar = Bar(
+        self._bar = ProgressLines(
             TextColumn("training"),
             BarColumn(),
             TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps"),

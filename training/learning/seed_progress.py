@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from poise.configs.errors import ConfigError
+from poise.training.running.terminal import ProgressLines
 
 from .checkpoints import STATE, find_checkpoint
 from .policy_files import read_state
@@ -30,7 +31,7 @@ class SeedProgress:
 
     def __init__(self, runs: Sequence[SeedRun], console: Console):
         self.runs = runs
-        self._bar = Progress(
+        self._bar = ProgressLines(
             TextColumn("seed {task.fields[seed]}"),
             BarColumn(),
             TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps"),

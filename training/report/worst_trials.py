@@ -11,7 +11,8 @@ import numpy as np
 
 from poise.configs.errors import PoiseError
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.viewing.renderer import Camera, SceneRenderer
+from poise.envs.viewing.camera import Camera, beside
+from poise.envs.viewing.renderer import SceneRenderer
 from poise.training.results.read import Record, Results
 from poise.training.results.replay import replay
 from poise.training.trials.signals import Signals
@@ -99,7 +100,7 @@ def film(results: Results, record: Record, times: Sequence[float], draw: bool = 
         PoiseError: nothing can be drawn here.
     """
     signals = Signals()
-    camera = _FrameTaker(times) if draw else None
+    camera = _FrameTaker(times, record.direction) if draw else None
 
     def watch(env: BalanceEnv) -> None:
         signals(env)
@@ -135,9 +136,10 @@ def can_draw() -> str | None:
 
 
 class _FrameTaker:
-    """Draws the frame at or just after each of the times."""
+    """Draws the frame at or just after each of the times, from beside the push."""
 
-    def __init__(self, times: Sequence[float]):
+    def __init__(self, times: Sequence[float], direction: float):
+        self.camera = beside(direction, CAMERA) if math.isfinite(direction) else CAMERA
         self.times, self.frames = list(times), []  # type: tuple[list[float], list[tuple[float, bytes]]]
         self._renderer: SceneRenderer | None = None
 
@@ -149,7 +151,7 @@ class _FrameTaker:
             self.times.pop(0)
         if self._renderer is None:
             self._renderer = SceneRenderer(env.simulation, human=False, width=SIZE[0],
-                                           height=SIZE[1], camera=CAMERA)  # fmt: skip
+                                           height=SIZE[1], camera=self.camera)  # fmt: skip
         frame = self._renderer.render()
         assert frame is not None  # off-screen
         self.frames.append((time, compressed(frame)))

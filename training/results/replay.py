@@ -7,20 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from poise.baselines.allowance import allowing
-from poise.configs.errors import ConfigError, shown
-from poise.configs.schema import build
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.robots.robot import load_robot
 from poise.training.running.files import SETTINGS
-from poise.training.suites.suite import Suite
-from poise.training.trials.agents import Agent
-from poise.training.trials.jobs import Stage
 from poise.training.trials.play import run_trial
 from poise.training.trials.signals import Signals
 from poise.training.trials.table import outcome_cells
 from poise.training.trials.trial import Outcome, Trial
-from poise.training.trials.variants import AgentVariants
 
+from .film import film
+from .player import player
 from .read import Results, load_results
 
 
@@ -57,7 +52,7 @@ def replay(
         folder: written by `evaluate` or `benchmark`, or what `load_results` has read there.
         trial: its number in trials.csv.
         controller: one that took part; None: the last, which is the first if it is alone.
-        video: an MP4 file to write.
+        video: an MP4 or GIF file to write, see `film`.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
         watch: called with the environment after the reset and after every step.
         allow: controllers from outside (``module:Class``) that may run.
@@ -73,7 +68,7 @@ def replay(
         name = results.controllers[-1] if controller is None else controller
         record = results.record(name, trial)
         again = results.trial(record)
-        agent = AgentVariants(_agent(results, name)).under(again.conditions)
+        agent = player(results, name, again)
     signals = Signals() if plot is not None else None
     watches = [each for each in (signals, watch) if each is not None]
     outcome = run_trial(agent, again, lambda env: [each(env) for each in watches])
@@ -85,27 +80,8 @@ def replay(
     if plot is not None and signals is not None:
         _draw(signals, Path(plot), again, f"Trial {trial}, {name}")
     if video is not None:
-        from poise.training.figures.video import record as film
-
-        if agent.begin is not None:  # it remembers the trial that has just been played
-            agent.begin()
-        film(agent.env, agent.act, video, {"seed": again.seed, "options": again.options})
+        film(results, trial, [name], video, allow=allow)
     return Replay(again, name, outcome, differences)
-
-
-def _agent(results: Results, name: str) -> Agent:
-    """The controller as it took part; raises ConfigError if it or the robot has changed since."""
-    settings, folder = results.settings, results.folder
-    robot = load_robot(settings.robot)
-    if robot.fingerprint != settings.robot_fingerprint:
-        raise ConfigError(f"the robot {shown(settings.robot)} has changed since", source=folder,
-                          field="robot_fingerprint")  # fmt: skip
-    suite = build(Suite, settings.suite, str(folder / SETTINGS))
-    agent = Stage(settings.robot, suite.duration, suite.noise).load(name, robot)
-    if agent.fingerprint != settings.controllers[name]:
-        raise ConfigError(f"the controller {shown(name)} has changed since", source=folder,
-                          field="controllers")  # fmt: skip
-    return agent
 
 
 def _draw(signals: Signals, path: Path, trial: Trial, title: str) -> None:

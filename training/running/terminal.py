@@ -1,12 +1,23 @@
 """The terminal, and what it shows while an evaluation runs."""
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
 
 WIDTH = 120  # of tables that no terminal shows
+SHORTEST, LONGEST = 10.0, 300.0  # [s] between lines of progress, where no terminal shows a bar
+GROWTH = 0.1  # the time between lines, over the time that has passed
 
 
 class Terminal(Console):
@@ -22,9 +33,31 @@ def terminal() -> Console:
     return console if console.is_terminal else Terminal(width=WIDTH)
 
 
+class ProgressLines(Progress):
+    """A bar in a terminal; elsewhere plain lines, the more seldom the longer it takes."""
+
+    _started = _due = -1.0  # [s], monotonic
+
+    def update(self, task_id: TaskID, **changes: Any) -> None:  # type: ignore[override]
+        """As of `Progress`."""
+        super().update(task_id, **changes)
+        if self.disable or self.console.is_terminal:
+            return
+        now = time.monotonic()
+        if self._started < 0.0:
+            self._started, self._due = now, now + SHORTEST
+        if now >= self._due:
+            self._due = now + min(max(GROWTH * (now - self._started), SHORTEST), LONGEST)
+            for task in self.tasks:
+                cells = [column(task) for column in self.columns
+                         if not isinstance(column, (str, BarColumn))]  # fmt: skip
+                line = " ".join(filter(None, (str(cell) for cell in cells)))
+                self.console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
 def progress_bar(console: Console) -> Progress:
-    """A bar with trials, recovery rates (its field `rates`) and the time left."""
-    return Progress(
+    """A bar, or lines, with trials, recovery rates (its field `rates`) and the time left."""
+    return ProgressLines(
         TextColumn("trials"),
         BarColumn(),
         MofNCompleteColumn(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -11,7 +12,7 @@ import pytest
 
 import poise
 from poise.envs import Camera, TorqueBalanceEnv, load_robot, replicate
-from poise.envs.viewing.camera import find_camera, point
+from poise.envs.viewing.camera import beside, find_camera, point
 
 TORQUE = "poise/TorqueBalance-v0"
 
@@ -102,3 +103,13 @@ def test_a_time_limit_of_gymnasium_s_own_comes_on_top() -> None:
     short.reset(seed=0)
     zero = np.zeros(short.action_space.shape, dtype=np.float32)
     assert [short.step(zero)[3] for _ in range(2)] == [False, True]
+
+
+@pytest.mark.parametrize("direction", [-170.0, -90.0, 0.0, 33.0, 90.0, 180.0, 300.0])
+def test_a_push_is_seen_from_its_side(direction: float) -> None:
+    """The camera's line of sight is 65° off the push's line, and it stays in front where it can."""
+    camera = beside(direction)
+    apart = abs((camera.azimuth - direction + 180.0) % 360.0 - 180.0)
+    assert min(apart, 180.0 - apart) == pytest.approx(65.0)
+    assert camera == replace(Camera(), azimuth=camera.azimuth)
+    assert abs((camera.azimuth - 50.0 + 180.0) % 360.0 - 180.0) <= 65.0

@@ -1,6 +1,4 @@
-"""`poise evaluate`: training/evaluation/run.py and tables.py, training/trials/jobs.py and
-training/cli/demo.py.
-"""
+"""`poise evaluate`: training/evaluation/run.py and tables.py, training/trials/jobs.py."""
 
 from __future__ import annotations
 
@@ -16,7 +14,6 @@ import yaml
 from rich.console import Console
 
 from poise.configs.errors import ConfigError
-from poise.training.cli import demo
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate, measured_limits
 from poise.training.results.read import load_results
@@ -254,21 +251,3 @@ def test_a_dead_worker_costs_nothing_that_is_finished(
     evaluate(["zero"], suite, out=tmp_path / "whole")
     same = [(tmp_path / name / "trials.csv").read_bytes() for name in ("out", "whole")]
     assert same[0] == same[1]
-
-
-def test_the_demo_shows_a_table_and_names_both_plots(
-    tmp_path: Path, in_process: type[InProcess], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It ends with the polar plot's and the fall plot's paths, and runs a second time."""
-    suites = [
-        write_suite(tmp_path, fields, name)
-        for fields, name in ((ENVELOPE, "envelope"), (RANDOM, "random"))
-    ]
-    monkeypatch.setattr(demo, "SUITES", tuple(suites))
-    for _ in range(2):
-        text = io.StringIO()
-        out = tmp_path / "demo"
-        demo.demo(out, controllers=BOTH, console=Console(file=text, width=140))
-    ends = text.getvalue().rstrip().splitlines()[-2:]
-    assert ends[0].endswith("polar_envelope.png") and ends[1].endswith("fall_probability.png")
-    assert all(Path(end).is_file() for end in ends)

@@ -1,0 +1,38 @@
+"""training/running/terminal.py."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console
+
+from poise.training.running import terminal
+from poise.training.running.terminal import progress_bar
+
+
+def test_progress_is_lines_where_no_terminal_shows_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One every ten seconds at first, then every tenth of the time that has passed."""
+    clock = [0.0]
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: clock[0])
+    text = io.StringIO()
+    with progress_bar(Console(file=text, width=100)) as bar:
+        task = bar.add_task("", total=300, rates="")
+        for second in range(300):
+            clock[0] = float(second)
+            bar.update(task, completed=second, rates="a 50%")
+        *lines, _ = text.getvalue().splitlines() + [""]
+    counts = [int(line.split("/")[0].split()[-1]) for line in lines]
+    assert all("recovered: a 50%" in line and "━" not in line for line in lines)
+    assert counts[:10] == list(range(10, 110, 10))
+    assert counts[10:] == [110, 121, 134, 148, 163, 180, 198, 218, 240, 264, 291]
+
+
+def test_a_quiet_console_shows_no_progress() -> None:
+    """Nor does a terminal get lines beside its bar."""
+    for quiet, is_terminal in ((True, False), (False, True)):
+        text = io.StringIO()
+        console = Console(file=text, width=100, quiet=quiet, force_terminal=is_terminal)
+        with progress_bar(console) as bar:
+            bar.update(bar.add_task("", total=2, rates=""), completed=1, rates="")
+        assert ("trials" in text.getvalue()) == is_terminal

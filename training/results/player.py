@@ -1,0 +1,37 @@
+"""The controller of a result, as it took part."""
+
+from __future__ import annotations
+
+from poise.configs.errors import ConfigError, shown
+from poise.configs.schema import build
+from poise.envs.robots.robot import load_robot
+from poise.training.running.files import SETTINGS
+from poise.training.suites.suite import Suite
+from poise.training.trials.agents import Agent
+from poise.training.trials.jobs import Stage
+from poise.training.trials.trial import Trial
+from poise.training.trials.variants import AgentVariants
+
+from .read import Results
+
+
+def player(results: Results, name: str, trial: Trial) -> Agent:
+    """The controller as it took part, in the conditions of `trial`.
+
+    Raises ConfigError if it or the robot has changed since.
+    """
+    return AgentVariants(_agent(results, name)).under(trial.conditions)
+
+
+def _agent(results: Results, name: str) -> Agent:
+    settings, folder = results.settings, results.folder
+    robot = load_robot(settings.robot)
+    if robot.fingerprint != settings.robot_fingerprint:
+        raise ConfigError(f"the robot {shown(settings.robot)} has changed since", source=folder,
+                          field="robot_fingerprint")  # fmt: skip
+    suite = build(Suite, settings.suite, str(folder / SETTINGS))
+    agent = Stage(settings.robot, suite.duration, suite.noise).load(name, robot)
+    if agent.fingerprint != settings.controllers[name]:
+        raise ConfigError(f"the controller {shown(name)} has changed since", source=folder,
+                          field="controllers")  # fmt: skip
+    return agent
