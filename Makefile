@@ -4,6 +4,7 @@
 # make docs    the site of docs/ and the docstrings, in build/site
 # make build   the wheel, tried alone       make bench   time the parts of a control tick
 # make clean   remove what was built (not .venv)
+# make release   the wheel and the sdist, checked, and tried alone on each of PYTHONS; notes
 # make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
@@ -14,6 +15,7 @@
 
 PYTHON311 ?= $(shell command -v python3.11 || command -v python3)
 PIP_ARGS ?=
+PYTHONS ?= python3.11 python3.12 python3.13
 LOCKED ?=
 PYTEST_ARGS ?=
 PYTEST_WORKERS ?= -n auto --maxprocesses 4
@@ -25,7 +27,7 @@ PYTHON := .venv/bin/python
 STAMP := .venv/.poise-setup
 DOCS := .venv/.poise-docs
 
-.PHONY: setup test test-processors demo check docs format build bench fuzz lock audit clean types-tree
+.PHONY: setup test test-processors demo check docs format build release bench fuzz lock audit clean types-tree
 
 setup: $(STAMP)
 
@@ -95,6 +97,24 @@ build: setup
 	$(PYTHON) -c "import sysconfig; print(sysconfig.get_path('purelib'))" \
 		> $$(build/smoke/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/main.pth
 	cd build/smoke && bin/python -P ../../tests/smoke.py && bin/poise --help >/dev/null
+	@ls dist
+
+build/twine:
+	$(PYTHON311) -m venv $@
+	$@/bin/python -m pip install -q $(PIP_ARGS) twine
+
+# Each of PYTHONS installs the wheel with its dependencies, and plays some trials.
+release: build build/twine
+	build/twine/bin/twine check --strict dist/*
+	set -e; for python in $(PYTHONS); do \
+		if ! $$python --version; then echo "$$python: not here, left out"; continue; fi; \
+		rm -rf build/alone; $$python -m venv build/alone; \
+		build/alone/bin/python -m pip install -q $(PIP_ARGS) -c constraints.txt dist/poise-*.whl; \
+		(cd build/alone && bin/python -P ../../tests/smoke.py && bin/poise --version && \
+		bin/poise evaluate momentum-qp zero --trials 4 --workers 1 --out trials >/dev/null); \
+	done
+	$(PYTHON) -c "import re, pathlib; print(re.split(r'(?m)^## ', pathlib.Path('CHANGELOG.md').read_text())[1])" \
+		> dist/notes.md
 	@ls dist
 
 bench: setup

@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,9 +14,11 @@ from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
 from poise.configs.schema import build, to_dict
+from poise.training.learning.checkpoints import STATE, find_checkpoint
 from poise.training.learning.config import TrainConfig, train_config
+from poise.training.learning.policy_files import read_state
 from poise.training.learning.seeds import SEEDS
-from poise.training.learning.train import train
+from poise.training.learning.train import LAST, train
 from poise.training.learning.train_seeds import train_seeds
 from poise.training.running.executor import Backend
 from poise.training.running.terminal import terminal
@@ -58,6 +61,8 @@ def run(args: Sequence[str]) -> None:
     command = parse(args)
     out, allow = command.out, [*named(_peek(args).controller), *command.allow]
     if not command.seeds and not (out / SEEDS).exists():
+        if note := steps_note(command.settings, out, command.resume):
+            print(f"poise: {note}", file=sys.stderr)
         print(train(command.settings, out, command.resume, allow=allow))
         return
     train_seeds(
@@ -65,6 +70,17 @@ def run(args: Sequence[str]) -> None:
         workers=command.workers, backend=command.backend, console=terminal(),
     )  # fmt: skip
     print(out / SEEDS)
+
+
+def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
+    """Where a run ends, if that is not at `config.steps`: steps come in whole rollouts."""
+    checkpoint = find_checkpoint(out / LAST) if resume else None
+    done = 0 if checkpoint is None else int(read_state(checkpoint / STATE)["timesteps"])
+    if done >= config.steps:
+        return f"{out} has {done:,} steps already; --steps says how many it is to have"
+    rollout = config.ppo.n_envs * config.ppo.n_steps
+    end = done + rollout * -(-(config.steps - done) // rollout)
+    return f"steps come in rollouts of {rollout:,}: it ends at {end:,}" if end > config.steps else ""
 
 
 def parse(args: Sequence[str]) -> Command:
