@@ -81,6 +81,7 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
         "steps_mean": over("steps", np.mean),
         "steps_max": over("steps", np.max),
         "solver_failures": sum(outcome.solver_failures for outcome in outcomes),
+        "solver_failures_recovered": sum(outcome.solver_failures for outcome in standing),
         "recovery_time_median": over("recovery_time", np.median),
         "max_com_median": over("max_com", np.median, standing),
         "max_capture_median": over("max_capture", np.median, standing),

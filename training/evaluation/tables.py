@@ -13,17 +13,47 @@ from poise.training.running.summary import Entry, Interval, Summary
 from .seed_groups import seed_lines
 
 NONE = "–"
+ROOT_FORCE = 1.0  # [N] more than a numerical residual
 IN_PAIRS = ("lost, won", "McNemar p")  # headings whose figures the table of pairs has
 BOUNDS = {None: "", "lower": "≥ ", "upper": "≤ "}
 
 
 def ranked(entries: Mapping[str, Entry]) -> list[str]:
-    """Controllers, the best first: by mean J50, else by the share of the limit, else by rate."""
-    if all("j50_mean" in entry for entry in entries.values()):
-        return sorted(entries, key=lambda name: -entries[name]["j50_mean"])
-    if all("fraction50" in entry for entry in entries.values()):
-        return sorted(entries, key=lambda name: -entries[name]["fraction50"])
-    return sorted(entries, key=lambda name: -entries[name]["recovered_rate"])
+    """Controllers, the best first: by mean J50, else by the share of the limit, else by rate.
+
+    Those that took a force from nowhere come last.
+    """
+    key = _measure(entries)[0]
+    return sorted(entries, key=lambda name: (assisted(entries[name]), -_value(entries[name], key)))
+
+
+def places(entries: Mapping[str, Entry]) -> dict[str, int | None]:
+    """The rank of each controller; those whose results print alike share one.
+
+    None for those that took a force from nowhere.
+    """
+    key, form = _measure(entries)
+    shown = {name: float(format(_value(entry, key), form))
+             for name, entry in entries.items() if not assisted(entry)}  # fmt: skip
+    better = {name: sum(other > value for other in shown.values()) for name, value in shown.items()}
+    return {name: better[name] + 1 if name in better else None for name in entries}
+
+
+def assisted(entry: Entry) -> bool:
+    """True if a soft root took force from nowhere: what is recovered so is not comparable."""
+    return (entry.get("root_force_max") or 0.0) > ROOT_FORCE
+
+
+def _measure(entries: Mapping[str, Entry]) -> tuple[str, str]:
+    """The key that controllers are ranked by, and the form in which it is printed."""
+    for key, form in (("j50_mean", ".1f"), ("fraction50", ".2f")):
+        if all(key in entry for entry in entries.values()):
+            return key, form
+    return "recovered_rate", ".2f"
+
+
+def _value(entry: Entry, key: str) -> float:
+    return float(entry[key])  # type: ignore[literal-required]
 
 
 def print_summary(summary: Summary, console: Console) -> None:
@@ -37,11 +67,14 @@ def print_summary(summary: Summary, console: Console) -> None:
         and not {text(name) for name in summary["ranking"]} <= {NONE, "0"}
     ]
     table = Table(title=title, title_justify="left")
+    table.add_column("#", justify="right")
     table.add_column("controller", overflow="fold", min_width=_room(summary["ranking"], 16))
     for heading, _ in columns:
         table.add_column(heading, justify="right", overflow="fold")
+    rank = places(summary["controllers"])
     for name in summary["ranking"]:
-        table.add_row(escape(name), *(text(name) for _, text in columns))
+        place = str(rank[name] or NONE)
+        table.add_row(place, escape(name), *(text(name) for _, text in columns))
     console.print(table)
     if summary["pairs"]:
         console.print(_pairs(summary))
@@ -94,6 +127,8 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         ("steps, mean", figure(lambda e: _number(e["steps_mean"] or None, ".1f"))),
         ("of one-step limit", figure(lambda e: f"{e['step_share_1_mean']:.2f}")),
         ("solver failures", figure(lambda e: f"{e['solver_failures'] or NONE}")),
+        ("of them in recoveries", figure(
+            lambda e: f"{e['solver_failures_recovered']}" if e["solver_failures"] else NONE)),
         ("mean |action|", figure(lambda e: _number(e["mean_abs_action"] or None, ".3f"))),
         ("root [N]", figure(lambda e: _number(e["root_force_max"], ".0f"))),
         ("tick [µs]", figure(lambda e: _number(e["tick_us"], ".0f"))),

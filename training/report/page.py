@@ -15,6 +15,7 @@ from poise.baselines.allowance import allowing
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
+from poise.training.evaluation.tables import assisted
 from poise.training.results.read import Record, Results, load_results
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
 from poise.training.running.terminal import print_paths
@@ -100,7 +101,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
             for name in order
         ],
         baseline=baseline,
-        assisted=[name for name in order if report_tables.assisted(results, name)],
+        assisted=[name for name in order if assisted(results.summary["controllers"][name])],
         lead=words.lead(results),
         tables=tables,
         forests=plots.forests(results),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import cast
 
-from poise.training.evaluation.tables import BOUNDS
+from poise.training.evaluation.tables import BOUNDS, places
 from poise.training.results.read import Results
 from poise.training.running.summary import Bound, Direction, Sector
 from poise.training.statistics.rates import wilson_interval
@@ -15,13 +15,7 @@ from .cells import Cell, Column, Table, cell, figure_cell, name_cell, p_cell
 from .worst_trials import smallest_lost
 
 SMALLEST = 3  # pushes listed for each controller
-ROOT_FORCE = 1.0  # [N] more than a numerical residual
 STEP_LIMITS = {"1": "1-step limit", "2": "2-step limit", "inf": "∞-step limit"}
-
-
-def assisted(results: Results, name: str) -> bool:
-    """True if a controller took force from nowhere, at a soft root."""
-    return (results.summary["controllers"][name].get("root_force_max") or 0.0) > ROOT_FORCE
 
 
 def ranking(results: Results, baseline: str) -> Table:
@@ -49,17 +43,18 @@ def ranking(results: Results, baseline: str) -> Table:
         Column("fallen", "Falls", "trials that ended on the ground"),
         Column("errors", "Errors", "trials in which the controller raised an error"),
         Column("solver_failures", "QP failures", "control ticks at which the QP was not solved"),
+        Column("solver_failures_recovered", "of them in recoveries", "in trials that recovered"),
         Column("tick_us", "Tick [µs]", "time of one control tick"),
         Column("root_force_max", "Root [N]", "largest force that a soft root took from nowhere"),
     ]  # fmt: skip
     rows = []
-    fair = [name for name in ranked if not assisted(results, name)]
+    rank = places(results.summary["controllers"])
     for name in ranked:
         entry = results.summary["controllers"][name]
         lost, won, p = against.get(name, (None, None, None))
         bound = BOUNDS.get(entry.get("fraction50_bound"), "")
         rows.append([
-            cell(fair.index(name) + 1 if name in fair else None, "d"),
+            cell(rank[name], "d"),
             name_cell(name, order.index(name)),
             figure_cell(entry, "j50_mean", ".1f", "j50_mean_ci95"),
             figure_cell(entry, "j50_mean_per_mass", ".3f"),
@@ -77,6 +72,7 @@ def ranking(results: Results, baseline: str) -> Table:
             figure_cell(entry, "fallen", "d"),
             cell(entry["errors"] or None, "d"),
             figure_cell(entry, "solver_failures", "d"),
+            figure_cell(entry, "solver_failures_recovered", "d"),
             figure_cell(entry, "tick_us", ".0f"),
             cell(entry.get("root_force_max") or None, ".0f"),
         ])  # fmt: skip

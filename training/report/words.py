@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 
+from poise.training.evaluation.tables import assisted
 from poise.training.results.read import Record, Results
 from poise.training.running.summary import both_ends
 from poise.training.trials.trial import Trial
 
 from .svg import number_text, towards
-from .tables import assisted
 
 
 def lead(results: Results) -> list[str]:
     """The result in a sentence or three."""
     summary = results.summary
-    fair = [name for name in summary["ranking"] if not assisted(results, name)]
+    fair = [name for name in summary["ranking"] if not assisted(summary["controllers"][name])]
     first = (fair or summary["ranking"])[0]
     best = summary["controllers"][first]
     unfair = len(fair) < len(results.controllers)

@@ -10,7 +10,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_folder
 from poise.training.evaluation.seed_groups import seed_lines
-from poise.training.evaluation.tables import ranked, table_columns
+from poise.training.evaluation.tables import places, ranked, table_columns
 from poise.training.running.files import SUMMARY
 from poise.training.running.summary import Entry, Summary
 
@@ -23,7 +23,8 @@ HEAD = """# Leaderboard
 Suite `{suite}`, robot `{robot}`, seed {seed}; Poise {poise}, MuJoCo {mujoco}, commit `{commit}`;
 {processor}, {cores} cores. Intervals are 95 %; what the columns mean: [benchmark.md](benchmark.md).
 `lost, won` and McNemar's p are against `{reference}` on the mix. `root [N]` is the largest
-force that a controller took from nowhere: only those with 0 obey physics.
+force that a controller took from nowhere: only those with 0 obey physics, the others have no rank.
+Equal results share a rank.
 
 """
 
@@ -128,8 +129,9 @@ Cells = list[list[str]]
 
 def _ranked(summary: Summary) -> tuple[list[str], Cells]:
     columns = [column for column in table_columns(summary) if column[0] in COLUMNS]
-    rows = [[str(place), f"`{name}`", *(text(name) for _, text in columns)]
-            for place, name in enumerate(summary["ranking"], 1)]  # fmt: skip
+    rank = places(summary["controllers"])
+    rows = [[str(rank[name] or "–"), f"`{name}`", *(text(name) for _, text in columns)]
+            for name in summary["ranking"]]  # fmt: skip
     return ["", "controller", *(heading for heading, _ in columns)], rows
 
 

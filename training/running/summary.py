@@ -39,6 +39,7 @@ class Counts(Rate, total=False):
     steps_mean: Number
     steps_max: Number
     solver_failures: int
+    solver_failures_recovered: int
     recovery_time_median: Number
     max_com_median: Number
     max_capture_median: Number

@@ -77,6 +77,15 @@ def test_counts_and_pairs(limits: PushLimits) -> None:
     assert [s["direction"] for s in a["sectors"]] == [0.0, 90.0, 180.0, 315.0]
 
 
+def test_solver_failures_of_recoveries_are_counted_apart(limits: PushLimits) -> None:
+    """Those of a robot that falls tell nothing: its QP has no solution on the ground."""
+    some = trials(limits, [5.0, 10.0], [0.0, 0.0], "random")
+    good, bad = outcomes([True, False])
+    ends = {"a": [replace(good, solver_failures=3), replace(bad, solver_failures=500)]}
+    (entry,) = summarise(some, ends, limits)[0].values()
+    assert (entry["solver_failures"], entry["solver_failures_recovered"]) == (503, 3)
+
+
 def test_the_envelope_finds_the_impulse_that_was_put_in(limits: PushLimits) -> None:
     """J50 of each direction, its mean, η and the paired gain are those of a known threshold."""
     impulses = np.tile(np.linspace(8.0, 30.0, 45), 2)

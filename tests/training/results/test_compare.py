@@ -61,7 +61,7 @@ def entry(outcomes: list[bool], j50: float) -> Entry:
     compared: Compared = {"lost": 0, "won": 0, "p_mcnemar": 1.0}
     return {
         **rate(sum(outcomes), len(outcomes)),
-        "played": 4, "errors": 0, "root_force_max": 3.0, "tick_us": 80.0, "fingerprint": "0",
+        "played": 4, "errors": 0, "root_force_max": 0.5, "tick_us": 80.0, "fingerprint": "0",
         "j50_mean": j50, "j50_mean_ci95": (j50 - 1, j50 + 1), "j50_mean_per_mass": j50 / 40,
         "j50_min": 9.0, "j50_bounded": 0,
         "eta_mean": 0.7, "eta_mean_ci95": (0.6, 0.8), "eta_min": 0.5,

@@ -1,0 +1,45 @@
+"""training/evaluation/tables.py: who comes first."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from poise.training.evaluation.tables import places, ranked
+from poise.training.running.summary import Entry
+
+
+def entries(measure: str, values: dict[str, tuple[float, float]]) -> dict[str, Entry]:
+    """Name → (result, force from nowhere) as entries of a summary."""
+    made: dict[str, Any] = {
+        name: {measure: value, "recovered_rate": 0.5, "root_force_max": force}
+        for name, (value, force) in values.items()
+    }
+    return made
+
+
+@pytest.mark.parametrize("measure, step", [("j50_mean", 0.1), ("fraction50", 0.01)])
+def test_results_that_print_alike_share_a_rank(measure: str, step: float) -> None:
+    """The next rank is left out."""
+    one = 2.0 + 0.2 * step
+    some = entries(measure, {
+        "a": (one, 0.0), "b": (2.0 + step, 0.0), "c": (2.0, 0.0), "d": (1.0, 0.4),
+    })  # fmt: skip
+    assert ranked(some) == ["b", "a", "c", "d"]
+    assert places(some) == {"b": 1, "a": 2, "c": 2, "d": 4}
+
+
+def test_a_force_from_nowhere_has_no_rank() -> None:
+    """It comes last, however much it recovers, and takes no place."""
+    some = entries("j50_mean", {"cheat": (9.0, 2e5), "a": (2.0, 0.0), "b": (1.0, 0.0)})
+    assert ranked(some) == ["a", "b", "cheat"]
+    assert places(some) == {"cheat": None, "a": 1, "b": 2}
+
+
+def test_without_a_j50_the_rate_decides() -> None:
+    """Also where only some have a J50."""
+    some = entries("j50_mean", {"a": (9.0, 0.0), "b": (1.0, 0.0)})
+    del some["a"]["j50_mean"]
+    some["a"]["recovered_rate"], some["b"]["recovered_rate"] = 0.25, 0.75
+    assert ranked(some) == ["b", "a"] and places(some) == {"a": 2, "b": 1}
