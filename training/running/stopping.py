@@ -128,9 +128,11 @@ def _raise(number: int, frame: FrameType | None) -> None:
 def _unraisable(
     otherwise: Callable[[sys.UnraisableHookArgs], object], lost: sys.UnraisableHookArgs
 ) -> None:
-    """A stop that is lost in a callback, of which Python would print a traceback."""
-    if not isinstance(lost.exc_value, Stopped):
-        otherwise(lost)
+    """A stop that is lost in a callback ends the process, which else would go on without what the
+    callback was to give: LLVM would run a kernel that has no code."""
+    if isinstance(lost.exc_value, Stopped):
+        end_now(_asked[0])
+    otherwise(lost)
 
 
 @contextmanager
