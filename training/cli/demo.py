@@ -1,4 +1,4 @@
-"""The main job in a minute or, in full, in some: who recovers from which pushes, to be looked at."""
+"""The main job in a minute or, in full, in some: who recovers from which pushes."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -64,7 +64,7 @@ def _film(results: Results, console: Console) -> None:
     if trial is None:
         return
     ranking = results.summary["ranking"]
-    names = list(dict.fromkeys([*ranking[: -FILMED : -1], ranking[0]]))  # the best to the right
+    names = list(dict.fromkeys([*ranking[:-FILMED:-1], ranking[0]]))  # the best to the right
     command = f"poise replay {results.folder} --trial {trial} --controller {' '.join(names)}"
     path = results.folder / VIDEO
     try:

@@ -1,5 +1,6 @@
 """The process of the command `poise`: exit codes, stops, and what nobody reads any more."""
 
+import atexit
 import difflib
 import errno
 import os
@@ -12,7 +13,13 @@ import tyro
 
 import poise
 from poise.configs.errors import ConfigError, PoiseError, shown
-from poise.training.running.stopping import exit_at_once, stop_code, stop_message, stoppable
+from poise.training.running.stopping import (
+    exit_at_once,
+    ignore_stops,
+    stop_code,
+    stop_message,
+    stoppable,
+)
 
 from .commands import COMMANDS
 
@@ -63,6 +70,7 @@ def _stoppable(args: list[str]) -> int:
 def command() -> None:
     """`main` as a process: after a stop, or at one that comes when all is done, the interpreter
     takes no time for an end of its own."""
+    atexit.register(ignore_stops)  # the first to be registered is the last to run
     code = main()
     if stop_code() is not None:
         sys.stderr.flush()

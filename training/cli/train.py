@@ -80,7 +80,9 @@ def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
         return f"{out} has {done:,} steps already; --steps says how many it is to have"
     rollout = config.ppo.n_envs * config.ppo.n_steps
     end = done + rollout * -(-(config.steps - done) // rollout)
-    return f"steps come in rollouts of {rollout:,}: it ends at {end:,}" if end > config.steps else ""
+    if end == config.steps:
+        return ""
+    return f"steps come in rollouts of {rollout:,}: it ends at {end:,}"
 
 
 def parse(args: Sequence[str]) -> Command:

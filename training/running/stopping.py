@@ -87,6 +87,14 @@ def exit_at_once(code: int) -> None:
             signal.signal(number, lambda number, frame: os._exit(code))
 
 
+def ignore_stops() -> None:
+    """Signals have no effect any more: what is left is the interpreter's own end, in which Python
+    takes its handlers away, and the process would seem to have been killed."""
+    for number in SIGNALS:
+        if signal.getsignal(number) is not None:
+            signal.signal(number, signal.SIG_IGN)
+
+
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Processes are started inside: a signal that comes takes effect when they are all known.

@@ -24,9 +24,7 @@ def played(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> type[InProcess]:
     monkeypatch.setattr(evaluation, "Executor", InProcess)
     envelope = write_suite(tmp_path, ENVELOPE, "envelope")
     monkeypatch.setattr(demo, "SUITE", envelope)
-    monkeypatch.setattr(
-        demo, "FULL_SUITES", (envelope, write_suite(tmp_path, RANDOM, "random"))
-    )
+    monkeypatch.setattr(demo, "FULL_SUITES", (envelope, write_suite(tmp_path, RANDOM, "random")))
     InProcess.played, InProcess.stop_after = 0, None
     return InProcess
 

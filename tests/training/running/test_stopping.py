@@ -133,7 +133,23 @@ poise_command.command()
 ENDING = """
 import atexit, os, sys, time
 import poise_command
-atexit.register(lambda: (os.kill(os.getpid(), {number}), time.sleep(600)))
+from poise.training.cli.commands import COMMANDS
+listed = COMMANDS["list"]
+def command():
+    listed()
+    atexit.register(lambda: (os.kill(os.getpid(), {number}), time.sleep(600)))
+COMMANDS["list"] = command
+sys.argv[1:] = ["list"]
+poise_command.command()
+"""
+# Python has taken its handlers away and drops the modules.
+LAST = """
+import os, sys
+import poise_command
+class Late:
+    def __del__(self, kill=os.kill, process=os.getpid()):
+        kill(process, {number})
+late = Late()
 sys.argv[1:] = ["list"]
 poise_command.command()
 """
@@ -154,9 +170,10 @@ with stoppable(), uninterrupted():
     [
         (IMPORTING, None, "", "poise: stopped; the same command begins anew\n"),
         (ENDING, 0, "robots: ", ""),
+        (LAST, 0, "robots: ", ""),
         (STARTING, None, "started\n", None),
     ],
-    ids=["importing", "ending", "starting"],
+    ids=["importing", "ending", "last", "starting"],
 )
 def test_a_stop_at_an_odd_moment(
     number: signal.Signals, code: str, exit_code: int | None, out: str, told: str | None
@@ -199,4 +216,3 @@ def test_a_stop_that_a_callback_loses_ends_the_process(number: signal.Signals) -
     assert done.returncode == 128 + number and done.stdout == "still here\n"
     assert "ValueError: told" in done.stderr and "Stopped" not in done.stderr
     assert done.stderr.endswith("poise: stopped; the same command begins anew\n")
-
