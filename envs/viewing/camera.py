@@ -59,7 +59,7 @@ def point(view: mujoco.MjvCamera, camera: Camera | int, size: float) -> None:
 
 
 def beside(direction: float, camera: Camera | None = None) -> Camera:
-    """A camera that sees a push of `direction` [deg] from its side, and the robot's front if it can.
+    """A camera that sees a push of `direction` [deg] from its side, the robot's front if it can.
 
     Its azimuth is `SIDE` off the push's line, on the one of four such places nearest to `camera`'s.
     """
