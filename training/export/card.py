@@ -31,9 +31,10 @@ PAGE = """\
 
 | file | what |
 | --- | --- |
-| `policy.onnx` | raw observations to actions: normalisation and limits are inside; its metadata say the rest |
+| `policy.onnx` | raw observations to actions, normalised and limited inside; see its metadata |
 | `policy.safetensors` | the actor's weights and its normalisation |
-| `{zip}`, `vec_normalize.pkl` | for `stable_baselines3.PPO.load` and `VecNormalize.load`, which unpickle: code |
+| `{zip}` | for `stable_baselines3.PPO.load`, which unpickles it |
+| `vec_normalize.pkl` | for `VecNormalize.load`, which unpickles it |
 | `config.json` | SB3's settings and the system, as huggingface_sb3 writes them |
 | `results.json` | the figures above |
 | `poise/` | what `poise.load_policy` reads |

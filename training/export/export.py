@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from poise.baselines.allowance import allows
-from poise.configs.errors import ConfigError, shown
 from poise.configs.files import check_new_folder, new_folder, packaged
 from poise.configs.reading import MIB, is_file, read_bytes, read_text
 from poise.envs.balance.base import BalanceEnv
+from poise.training.learning.checkpoints import FILES
 from poise.training.learning.policy import Policy, load_policy, locate_policy
 
 from .card import card
@@ -27,8 +27,7 @@ from .tensors import safetensors_bytes
 
 ONNX, TENSORS = "policy.onnx", "policy.safetensors"
 OWN = "poise"  # folder of what `load_policy` reads
-OWN_FILES = ("policy.zip", "vecnormalize.npz", "config.yaml", "state.json")
-NOTICE = "NOTICE.md"
+NOTICE, LICENCE = "NOTICE.md", "LICENSE"  # of whose the policy was before
 OURS = "apache-2.0"  # licence of the packaged policies
 LARGEST = 256 * MIB  # of a policy's file
 
@@ -73,15 +72,17 @@ def export_policy(
     found = figures(loaded, str(policy), result)
     if licence is None and str(policy) in packaged("policies"):
         licence = OURS
-    archive = f"ppo-{IDS[loaded.config.action].replace('/', '-')}"  # as huggingface_sb3 names it
+    # as huggingface_sb3 names it
+    archive = f"ppo-{IDS[loaded.config.action].replace('/', '-')}.zip"
     notice = read_text(source / NOTICE, MIB) if is_file(source / NOTICE) else ""
     with new_folder(out) as part:
         worst = _write_networks(part, loaded, env)
         write_stock(part, archive, loaded, source)
-        _write_own(part / OWN, source)
-        (part / "config.json").write_text(_settings(part / f"{archive}.zip"))
+        _copy(FILES, source, part / OWN)
+        _copy([n for n in (NOTICE, LICENCE) if is_file(source / n)], source, part)
+        (part / "config.json").write_text(_settings(part / archive))
         (part / "results.json").write_text(_results(found))
-        page = card(name, f"{archive}.zip", loaded, env, found, licence, notice)
+        page = card(name, archive, loaded, env, found, licence, notice)
         (part / "README.md").write_text(page)
     return worst
 
@@ -101,9 +102,9 @@ def _write_networks(folder: Path, policy: Policy, env: BalanceEnv) -> float:
     return check_onnx(folder / ONNX, policy)
 
 
-def _write_own(folder: Path, source: Path) -> None:
-    folder.mkdir()
-    for name in OWN_FILES:
+def _copy(names: Iterable[str], source: Path, folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    for name in names:
         (folder / name).write_bytes(read_bytes(source / name, LARGEST))
 
 

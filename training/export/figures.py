@@ -54,10 +54,9 @@ def _of_training(policy: Policy) -> list[Figure]:
     row = next((r for r in rows if _met(r, policy)), None) if isinstance(rows, list) else None
     if row is None:
         return []
-    trials = policy.config.evaluation.trials
-    source = f"held-out pushes of the training, {trials} trials"
+    source = f"{policy.config.evaluation.trials} held-out pushes during training"
     return [
-        Figure(key, f"{key} of {source}", row[key], f"{row[key]:.1%}", source)
+        Figure(key, f"{key}, {source}", row[key], f"{row[key]:.1%}", source)
         for key in ("recovered", "fallen")
         if isinstance(row.get(key), float) and 0.0 <= row[key] <= 1.0
     ]
@@ -79,7 +78,8 @@ def _of_result(policy: Policy, name: str, path: Path) -> list[Figure]:
     if "j50_mean" in entry and "j50_mean_ci95" in entry:
         low, high = entry["j50_mean_ci95"]
         text = f"{entry['j50_mean']:.1f} N·s, 95 % {_interval(low, high, '.1f')}"
-        found.append(Figure("j50_mean", f"mean J50 [N·s], {source}", entry["j50_mean"], text, source))
+        name = f"mean J50 [N·s], {source}"
+        found.append(Figure("j50_mean", name, entry["j50_mean"], text, source))
     return found
 
 

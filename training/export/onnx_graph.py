@@ -101,7 +101,8 @@ class _Network:
 
     def __init__(self, graph: _Graph, policy: Policy):
         self.graph = graph
-        self.shift, self.scale = graph.array("mean", policy.mean), graph.array("scale", policy.scale)
+        self.shift = graph.array("mean", policy.mean)
+        self.scale = graph.array("scale", policy.scale)
         self.limit = policy.clip
         self.layers = [
             (graph.array(f"layer{i}.weight", weight), graph.array(f"layer{i}.bias", bias))
