@@ -12,8 +12,11 @@ from typing import Any
 from poise.baselines.allowance import allows
 from poise.configs.files import check_new_folder, new_folder, packaged
 from poise.configs.reading import MIB, is_file, read_bytes, read_text
+from poise.configs.schema import build, read_yaml
 from poise.envs.balance.base import BalanceEnv
-from poise.training.learning.checkpoints import FILES
+from poise.envs.robots.robot import load_robot
+from poise.training.learning.checkpoints import CONFIG, FILES
+from poise.training.learning.config import TrainConfig
 from poise.training.learning.policy import Policy, load_policy, locate_policy
 
 from .card import card
@@ -67,9 +70,8 @@ def export_policy(
     check_new_folder(out)
     check_libraries()
     source, name = locate_policy(policy), _name(policy)
-    loaded = load_policy(source, allow=allow)
-    env = loaded.make_env()
-    found = figures(loaded, str(policy), result)
+    loaded, env = _load(source, allow)
+    found = figures(loaded, str(policy), env.robot, result)
     if licence is None and str(policy) in packaged("policies"):
         licence = OURS
     # as huggingface_sb3 names it
@@ -77,7 +79,7 @@ def export_policy(
     notice = read_text(source / NOTICE, MIB) if is_file(source / NOTICE) else ""
     with new_folder(out) as part:
         worst = _write_networks(part, loaded, env)
-        write_stock(part, archive, loaded, source)
+        write_stock(part, archive, loaded, env, source)
         _copy(FILES, source, part / OWN)
         _copy([n for n in (NOTICE, LICENCE) if is_file(source / n)], source, part)
         (part / "config.json").write_text(_settings(part / archive))
@@ -85,6 +87,14 @@ def export_policy(
         page = card(name, archive, loaded, env, found, licence, notice)
         (part / "README.md").write_text(page)
     return worst
+
+
+def _load(source: Path, allow: str | Iterable[str]) -> tuple[Policy, BalanceEnv]:
+    """The policy and its environment, whose robot is loaded once."""
+    config = source / CONFIG
+    robot = load_robot(build(TrainConfig, read_yaml(config), str(config)).robot)
+    policy = load_policy(source, robot, allow=allow)
+    return policy, policy.make_env(robot=robot)
 
 
 def _name(policy: str | Path) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from poise.configs.errors import ConfigError
 from poise.configs.reading import is_folder
+from poise.envs.robots.robot import Robot
 from poise.training.learning.policy import Policy
 from poise.training.results.summary import read_summary
 from poise.training.running.files import SUMMARY
@@ -34,7 +35,7 @@ class Figure:
     source: str
 
 
-def figures(policy: Policy, name: str, result: str | Path | None) -> list[Figure]:
+def figures(policy: Policy, name: str, robot: Robot, result: str | Path | None) -> list[Figure]:
     """What the run's own evaluation says of this policy, then what `result` says.
 
     `result` is a folder of `poise evaluate` or `poise benchmark`, or its summary.json.
@@ -44,7 +45,7 @@ def figures(policy: Policy, name: str, result: str | Path | None) -> list[Figure
     """
     found = _of_training(policy)
     if result is not None:
-        found += _of_result(policy, name, Path(result))
+        found += _of_result(load_agent(name, robot).fingerprint, Path(result))
     return found
 
 
@@ -66,10 +67,10 @@ def _met(row: object, policy: Policy) -> bool:
     return isinstance(row, Mapping) and row.get("timesteps") == policy.state["timesteps"]
 
 
-def _of_result(policy: Policy, name: str, path: Path) -> list[Figure]:
+def _of_result(fingerprint: str, path: Path) -> list[Figure]:
     path = path / SUMMARY if is_folder(path) else path
     summary = read_summary(path)
-    entry = _entry(summary, load_agent(name, policy.make_env().robot).fingerprint, path)
+    entry = _entry(summary, fingerprint, path)
     source = f"suite {summary['suite']}, seed {summary['seed']}, robot {summary['robot']}"
     low, high = entry["recovered_ci95"]
     rate = f"{entry['recovered_rate']:.1%} of {entry['trials']}"

@@ -15,6 +15,7 @@ import poise
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.observation import Scales, Term
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.training.learning.policy import Policy
 
@@ -69,7 +70,9 @@ def metadata(policy: Policy, env: BalanceEnv) -> dict[str, str]:
     """The metadata of a policy that acts in `env`, as texts.
 
     `observation_names` are terms; each has as many numbers as `observation_sizes` says, in the unit
-    of `observation_units`, whose ω, h, m and g are in `units` (JSON, SI). `action_scale` is what an
+    of `observation_units`, whose ω, h, m and g are in `units` (JSON, SI), and as a number
+    `observation_terms_scale`, by which SI is multiplied (``x;y`` where it is not the same for all).
+    `action_scale` is what an
     action of 1 adds, in the unit of `action_units`. `joint_names` are the motors' joints,
     `default_joint_pos` [rad] is where they stand. A policy with servos has `joint_stiffness`
     [N·m/rad], `joint_damping` [N·m·s/rad], and `joint_hold` [rad], the target at an action of 0.
@@ -82,6 +85,7 @@ def metadata(policy: Policy, env: BalanceEnv) -> dict[str, str]:
         "observation_names": _list(term.name for term in env.terms),
         "observation_sizes": _list(term.size for term in env.terms),
         "observation_units": _list(term.unit for term in env.terms),
+        "observation_terms_scale": _list(scale_of(term, env.scales) for term in env.terms),
         "action_names": _list(action.name for action in made),
         "action_scale": _list(action.scale for action in made),
         "action_units": _list(action.unit.replace(",", ";") for action in made),
@@ -117,6 +121,26 @@ def units(env: BalanceEnv) -> dict[str, float]:
     half = {"half_support_x": scales["support_x"], "half_support_y": scales["support_y"]}
     body = {"h": scales["height"], "omega": scales["omega"]}
     return {**body, "m": env.robot.mass, "g": env.robot.units.gravity, **half}
+
+
+def scale_of(term: Term, scales: Scales) -> str:
+    """1 over the unit of a term [1/SI]."""
+    h, omega = scales.height, scales.omega
+    values = {
+        "1": 1.0,
+        "rad": 1.0,
+        "half support": scales.support_x,
+        "0.1 h": 0.1 * h,
+        "0.5 h": 0.5 * h,
+        "0.2 ω h": scales.velocity,
+        "0.1 m h² ω": scales.momentum,
+        "m g": scales.weight,
+        "ω": omega,
+        "3 ω": 3.0 * omega,
+        "1/ω": 1.0 / omega,
+    }
+    value = repr(1.0 / values[term.unit])
+    return f"{value};{1.0 / scales.support_y!r}" if term.unit == "half support" else value
 
 
 def _list(values: Iterable[object]) -> str:

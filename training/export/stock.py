@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.mirror import Mirror
 from poise.training.learning.checkpoints import LEFT_OUT, POLICY, STATISTICS, plain
 from poise.training.learning.config import TrainConfig
@@ -25,18 +26,18 @@ TOLERANCE = 1e-4  # of an action: SB3 computes with 32 bits
 CHECKED = 1000  # observations
 
 
-def write_stock(folder: Path, archive: str, policy: Policy, source: Path) -> None:
+def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, source: Path) -> None:
     """Write `archive` for `PPO.load`, and the statistics for `VecNormalize.load`.
 
-    `source` is the policy's folder. A symmetric policy becomes an ordinary one that is twice as
-    wide, and as symmetric. The optimizer begins anew. Raises PoiseError where what SB3 makes of an
-    observation differs by more than `TOLERANCE`.
+    `env` is the policy's environment, `source` its folder. A symmetric policy becomes an ordinary
+    one that is twice as wide, and as symmetric. The optimizer begins anew. Raises PoiseError where
+    what SB3 makes of an observation differs by more than `TOLERANCE`.
     """
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import VecNormalize
 
     weights, config = _ordinary(read_weights(source / POLICY), policy)
-    normalize = VecNormalize(ThreadedVecEnv([policy.make_env()]), gamma=config.ppo.gamma)
+    normalize = VecNormalize(ThreadedVecEnv([env]), gamma=config.ppo.gamma)
     _set_statistics(normalize, source)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of a batch that one environment cannot fill
@@ -48,7 +49,6 @@ def write_stock(folder: Path, archive: str, policy: Policy, source: Path) -> Non
     seen = observations(policy, CHECKED)
     loaded = PPO.load(folder / archive, device="cpu")
     actions, _ = loaded.predict(normalize.normalize_obs(seen), deterministic=True)
-    normalize.close()
     compared(actions, policy.predict(seen)[0], TOLERANCE, archive)
 
 
