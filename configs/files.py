@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
+import tempfile
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 
 from .errors import ConfigError, PoiseError, shown
-from .reading import is_file
+from .reading import exists, is_file, is_folder, whole_path
 
 
 def packaged(kind: str) -> list[str]:
@@ -76,3 +79,47 @@ def write_atomic(path: str | Path, content: str | bytes) -> None:
     finally:
         with contextlib.suppress(OSError, ValueError):  # its folder may be a file
             part.unlink(missing_ok=True)
+
+
+def check_new_folder(out: str | Path) -> None:
+    """Raise ConfigError, about `out`, for a file and for a folder that is not empty."""
+    out = Path(out)
+    whole_path(out, field="out")
+    if exists(out) and not is_folder(out):
+        raise ConfigError("is not a folder", source=out, field="out")
+    with _writing(out):
+        if is_folder(out) and any(out.iterdir()):
+            raise ConfigError("is not empty: choose another folder", source=out, field="out")
+
+
+@contextlib.contextmanager
+def new_folder(out: str | Path) -> Iterator[Path]:
+    """A folder to fill, which is at `out` once the block has ended without an error.
+
+    Until then, and after an error or a kill, there is nothing at `out`. Missing folders above it
+    are made.
+
+    Raises:
+        ConfigError: `out` is a file, or a folder that is not empty.
+        PoiseError: it, or what the block writes, cannot be written.
+    """
+    out = Path(out)
+    check_new_folder(out)
+    with _writing(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
+        try:
+            part.chmod(0o755)
+            yield part
+            os.replace(part, out)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _writing(out: Path) -> Iterator[None]:
+    """Turn what a system says of a folder that cannot be written into a PoiseError."""
+    try:
+        yield
+    except OSError as error:
+        raise PoiseError(f"{out}: cannot be written ({error.strerror})") from None

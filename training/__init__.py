@@ -9,14 +9,18 @@ from poise.lazy import lazy
 
 __all__ = [
     "Policy",
+    "Readings",
+    "StandaloneController",
     "ThreadedVecEnv",
     "TrainConfig",
     "benchmark",
     "compare",
     "evaluate",
+    "export_policy",
     "frame_strip",
     "load_policy",
     "load_results",
+    "load_standalone",
     "record",
     "replay",
     "train",
@@ -27,6 +31,7 @@ __all__ = [
 
 if TYPE_CHECKING:
     from poise.training.evaluation.evaluate import benchmark, evaluate
+    from poise.training.export.export import export_policy
     from poise.training.figures.video import frame_strip, record
     from poise.training.learning.config import TrainConfig
     from poise.training.learning.policy import Policy, load_policy
@@ -37,12 +42,15 @@ if TYPE_CHECKING:
     from poise.training.results.compare import compare
     from poise.training.results.read import load_results
     from poise.training.results.replay import replay
+    from poise.training.standalone.controller import StandaloneController, load_standalone
+    from poise.training.standalone.readings import Readings
     from poise.training.tuning.search import tune
 else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
             "evaluation.evaluate": ("benchmark", "evaluate"),
+            "export.export": ("export_policy",),
             "figures.video": ("frame_strip", "record"),
             "learning.config": ("TrainConfig",),
             "learning.policy": ("Policy", "load_policy"),
@@ -53,6 +61,8 @@ else:
             "results.compare": ("compare",),
             "results.read": ("load_results",),
             "results.replay": ("replay",),
+            "standalone.controller": ("StandaloneController", "load_standalone"),
+            "standalone.readings": ("Readings",),
             "tuning.search": ("tune",),
         },
     )

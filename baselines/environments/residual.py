@@ -198,6 +198,7 @@ class ResidualBalanceEnv(BalanceEnv):
         super()._unbind()
         self._bound: tuple[PolicyStep, Block]  # what `_step` works on, the gains when it was made
         self._inputs: TargetInputs | None = None
+        self._accounts: TickAccount | None = None
 
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; robot and motion are shared.
@@ -294,29 +295,50 @@ class ResidualBalanceEnv(BalanceEnv):
             step.play()
             self.check()
         else:
-            self._advance_in_python()
+            self.episode.ticks[0] = 0  # the controller may have raised in the middle of a step
+            for _ in range(self.ticks):
+                self._tick_in_python()
 
     def check(self) -> None:
         """See `BalanceEnv`; it is the controller's."""
         self._told.check()
 
-    def _advance_in_python(self) -> None:
-        """Take the policy step of `policy_tick` with any controller, tick by tick."""
+    def tick(self) -> None:
+        if self.compiled_step() is None:
+            self._tick_in_python()
+        else:
+            super().tick()
+
+    def _tick_in_python(self) -> None:
+        """Play the control tick of `policy_tick` with any controller."""
         sim, e, a = self.simulation, self.episode, self._target_inputs()
         ctrl, wrench = sim.views.ctrl, e.root_wrench
-        set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
-        accounts = TickAccount(sim.world(), self.controller.period, e)
-        for _ in range(self.ticks):
-            set_targets(a)
-            ctrl[:] = self.controller.torques(self.state_source.state, self.targets)
-            wrench[:] = self._told.root_wrench
-            self._push_root(wrench)
-            account_tick(accounts)
-            sim.step(ctrl, self.control_substeps)
-            self.state_source.update()
-        e.metrics[FAILURES] = self._told.failures
+        if e.ticks[0] == 0:
+            set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
+        set_targets(a)
+        ctrl[:] = self.controller.torques(self.state_source.state, self.targets)
+        wrench[:] = self._told.root_wrench
+        self._push_root(wrench)
+        account_tick(self._account())
+        sim.step(ctrl, self.control_substeps)
+        self.state_source.update()
+        e.ticks[0] += 1
+        if e.ticks[0] == self.ticks:
+            self._end_in_python()
+
+    def _end_in_python(self) -> None:
+        """End the policy step, as `end_tick` does."""
+        self.episode.ticks[0] = 0
+        self.episode.metrics[FAILURES] = self._told.failures
         judge_step(self.step_end().judge)
         self._observe()
+
+    def _account(self) -> TickAccount:
+        """The block of `account_tick`; the same object until the world is another."""
+        world = self.simulation.world()
+        if self._accounts is None or self._accounts.world is not world:
+            self._accounts = TickAccount(world, self.controller.period, self.episode)
+        return self._accounts
 
     def _push_root(self, wrench: np.ndarray) -> None:
         """Apply a soft root's wrench, and take away the last one."""

@@ -259,6 +259,17 @@ class BalanceEnv(Copyable, gymnasium.Env):
         """Take the policy step of `episode.action`; the outcome is in `episode`."""
         raise NotImplementedError
 
+    def tick(self) -> None:
+        """Play the next control tick of the policy step of `episode.action`; the last one ends it.
+
+        For callers that look between two of them; `advance` plays all that a step has.
+        """
+        step = self.compiled_step()
+        if step is None:
+            raise NotImplementedError
+        step.play_tick()
+        self.check()
+
     def check(self) -> None:
         """Raise what has gone wrong in the last compiled step: compiled code cannot raise."""
 

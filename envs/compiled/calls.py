@@ -172,6 +172,10 @@ class CompiledStep(NamedTuple):
         """Take the step."""
         play_one(*self.row())
 
+    def play_tick(self) -> None:
+        """Take the next one of its ticks."""
+        play_one(int(self.kernel), self.block.address, 1)
+
 
 @compiled
 def play_one(kernel: int, block: int, ticks: int):

@@ -28,6 +28,7 @@ __all__ = [
     "load_controller",
     "load_policy",
     "load_robot",
+    "load_standalone",
     "training",
 ]
 
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from poise.envs.robots.robot import load_robot
     from poise.training.evaluation.evaluate import benchmark, evaluate
     from poise.training.learning.policy import load_policy
+    from poise.training.standalone.controller import load_standalone
 else:
     __getattr__, __dir__ = lazy(
         __name__,
@@ -84,5 +86,6 @@ else:
             "envs.robots.robot": ("load_robot",),
             "training.evaluation.evaluate": ("benchmark", "evaluate"),
             "training.learning.policy": ("load_policy",),
+            "training.standalone.controller": ("load_standalone",),
         },
     )

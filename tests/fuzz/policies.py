@@ -123,5 +123,5 @@ def play(case: Json, folder: Path) -> None:
         if content is not None:
             (path / name).write_bytes(content)
     policy = load_policy(path, robot())
-    action = policy.act(np.zeros(len(policy._mean)))
+    action = policy.act(np.zeros(len(policy.mean)))
     assert np.isfinite(action).all() and np.abs(action).max() <= 1.0, "no action"

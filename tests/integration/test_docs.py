@@ -28,7 +28,8 @@ SCRIPTS = ("git ", "tensorboard ", "pip install ")  # commands of others
 INLINE = re.compile(r"`(poise\s[^`]+)`")
 FOLDERS = "envs|baselines|training|configs|tests|examples"
 PLACES = {"N": "1", "K": "1", "…": "", "CONTROLLER…": "momentum-qp"}  # where a page names no value
-NEEDED = {"train": "--out", "benchmark": "--out", "tune": "--out", "qp-set": "--out"}
+NEEDED = {"train": "--out", "benchmark": "--out", "tune": "--out", "qp-set": "--out",
+          "export": "--out"}  # fmt: skip
 
 
 class Block(NamedTuple):

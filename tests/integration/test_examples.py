@@ -10,6 +10,7 @@ import pytest
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ARGUMENTS = {
     "own_controller.py": [],
+    "plain_mujoco.py": ["feedback-step"],
     "ppo_single_file.py": ["--steps", "128", "--envs", "2", "--rollout", "32"],
     "push_strip.py": ["strip.png"],
     "sb3_train.py": ["100"],
@@ -34,6 +35,12 @@ def test_every_example_is_tried():
 def test_a_controller_from_outside_stands(tmp_path):
     """It stands in all three places where it can act."""
     assert run("own_controller.py", tmp_path).count("stands") == 3
+
+
+def test_a_controller_outside_of_environments_stands(tmp_path):
+    """It steps in a loop of MuJoCo alone, and stands; the loop is short enough to copy."""
+    assert run("plain_mujoco.py", tmp_path) == "feedback-step stands\n"
+    assert len((EXAMPLES / "plain_mujoco.py").read_text().splitlines()) <= 40
 
 
 def test_ppo_in_a_single_file(tmp_path):

@@ -36,10 +36,10 @@ FLOORS = """
 12 baselines/environments
 13 training/learning
 14 training/trials
-15 training/figures, training/suites, training/tuning
+15 training/figures, training/standalone, training/suites, training/tuning
 16 training/evaluation, training/qp_set, training/robot_check
 17 training/results
-18 training/report
+18 training/export, training/report
 19 training/cli
 20 envs, baselines, training
 """

@@ -10,6 +10,7 @@ Names = Annotated[
     tyro.conf.Positional,
     tyro.conf.arg(metavar="CONTROLLER …", help_behavior_hint=""),
 ]
+PolicyName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]
 RobotName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Names, RobotName, Switch
+from .export import export
 from .results import compare, leaderboard, replay, report
 
 if TYPE_CHECKING:
@@ -305,6 +306,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "report": report,
     "tune": tune,
     "qp-set": qp_set,
+    "export": export,
     "robot": robot,
     "list": list_names,
 }

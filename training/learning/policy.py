@@ -46,9 +46,16 @@ class Policy(Copyable):
     """The mean of a Gaussian actor: a = clip(W₃ f(W₂ f(W₁ ô + b₁) + b₂) + b₃, −1, 1).
 
     ô = clip((o − mean)/√(var + ε), ±clip) is the normalised observation, f the activation, tanh or
-    ELU, after each of the hidden layers, of which there may be any number. `config` is the run's
-    configuration, `state` what its state.json says (steps, robot, evaluations). With `mirrors` a
-    is the mean of it and of its mirror image, see `symmetry.py`.
+    ELU, after each of the hidden layers, of which there may be any number. With `mirrors` a is the
+    mean of it and of its mirror image, see `symmetry.py`.
+
+    Attributes:
+        config: the run's configuration.
+        state: what its state.json says (steps, robot, evaluations).
+        layers: (W (in, out), b (out,)) of each layer.
+        mean, scale: (no,) of the observation's normalisation, scale = 1/√(var + ε).
+        clip: of the normalised observation.
+        mirrors: of an observation and of an action, or None.
     """
 
     def __init__(
@@ -63,10 +70,10 @@ class Policy(Copyable):
         mirrors: tuple[Mirror, Mirror] | None = None,
     ):
         self.config, self.state = config, state
-        self._mirrors = mirrors
+        self.mirrors = mirrors
         self.layers = layers
-        self._mean, self._scale = mean, 1.0 / np.sqrt(var + epsilon)
-        self._clip = clip
+        self.mean, self.scale = mean, 1.0 / np.sqrt(var + epsilon)
+        self.clip = clip
         self._activation = ACTIVATIONS[config.ppo.activation]
         self._make_env = carried(config.make_env)
 
@@ -76,8 +83,8 @@ class Policy(Copyable):
         An observation gives the same bits alone as in a batch: each is a product of its own.
         """
         mean = self._mean_action(observation)
-        if self._mirrors is not None:
-            seen, done = self._mirrors
+        if self.mirrors is not None:
+            seen, done = self.mirrors
             mean = 0.5 * (mean + done(self._mean_action(seen(observation))))
         return np.clip(mean, -1.0, 1.0)
 
@@ -108,7 +115,7 @@ class Policy(Copyable):
         return self.act(observation).astype(np.float32), None
 
     def _mean_action(self, observation: np.ndarray) -> np.ndarray:
-        x = np.clip((observation - self._mean) * self._scale, -self._clip, self._clip)
+        x = np.clip((observation - self.mean) * self.scale, -self.clip, self.clip)
         x = x[..., None, :]
         for weight, bias in self.layers[:-1]:
             x = self._activation(x @ weight + bias)
@@ -118,8 +125,8 @@ class Policy(Copyable):
     def content(self) -> list[bytes]:
         """Return the bytes of all that decides the policy's actions."""
         layers = [array for layer in self.layers for array in layer]
-        sides = [] if self._mirrors is None else [m.sign * (1 + m.order) for m in self._mirrors]
-        numbers = [*layers, self._mean, self._scale, np.array(self._clip), *sides]
+        sides = [] if self.mirrors is None else [m.sign * (1 + m.order) for m in self.mirrors]
+        numbers = [*layers, self.mean, self.scale, np.array(self.clip), *sides]
         return [array.tobytes() for array in numbers]
 
     def make_env(self, **overrides: Any) -> BalanceEnv:

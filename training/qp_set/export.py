@@ -6,9 +6,6 @@ or up to the fall.
 
 import io
 import json
-import os
-import shutil
-import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, TypedDict
@@ -21,6 +18,7 @@ from poise.baselines.whole_body import formulation
 from poise.baselines.whole_body.constraint_rows import torque_matrix
 from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.files import check_new_folder, new_folder
 from poise.configs.schema import to_dict
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import load_robot
@@ -150,10 +148,7 @@ def write_qp_set(
         raise ConfigError(f"must be at least 1, not {count}", field="count")
     if seed < 0:
         raise ConfigError(f"must be at least 0, not {seed}", field="seed")
-    if out.exists() and not out.is_dir():
-        raise ConfigError("is not a folder", source=out, field="out")
-    if out.is_dir() and any(out.iterdir()):
-        raise ConfigError("is not empty: choose another folder", source=out, field="out")
+    check_new_folder(out)
     body = load_robot(robot)
     limits = load_limits(body)
     config = momentum_qp_config(controller)
@@ -167,21 +162,10 @@ def write_qp_set(
         "commit": commit(), "versions": versions(LIBRARIES),
         "trials": [], "problems": [],
     }  # fmt: skip
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        part = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
-    except OSError as error:
-        raise PoiseError(f"{out}: cannot be written ({error.strerror})") from None
-    try:
-        part.chmod(0o755)
+    with new_folder(out) as part:
         _write_problems(part, manifest, recoveries(body, controller, limits, seed), writer)
         (part / "README.md").write_text(README)
         (part / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
-        os.replace(part, out)
-    except OSError as error:
-        raise PoiseError(f"{out}: cannot be written ({error.strerror})") from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     return manifest
 
 

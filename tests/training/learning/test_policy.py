@@ -102,7 +102,7 @@ def test_an_entry_that_never_changed_is_no_division_by_zero(folder):
 def test_one_observation_gives_the_same_bits_as_a_batch():
     """What an observation makes of it does not depend on its company."""
     policy = load_policy(finished_run())
-    seen = np.random.default_rng(1).normal(size=(7, len(policy._mean)))
+    seen = np.random.default_rng(1).normal(size=(7, len(policy.mean)))
     batch = policy.act(seen)
     assert batch.shape == (7, policy.layers[-1][0].shape[1])
     for row, action in zip(seen, batch, strict=True):
@@ -362,7 +362,7 @@ def test_the_shipped_policy_is_named_when_it_is_missing():
     except ConfigError as error:
         assert "residual" in str(error)
     else:
-        assert policy.act(np.zeros(len(policy._mean))).shape == (policy.layers[-1][0].shape[1],)
+        assert policy.act(np.zeros(len(policy.mean))).shape == (policy.layers[-1][0].shape[1],)
 
 
 def test_the_shipped_policy_fits_the_packaged_controller():

@@ -1,0 +1,132 @@
+"""`poise export`: a policy as a folder for other programs, checked before it is there."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from poise.baselines.allowance import allows
+from poise.configs.files import check_new_folder, new_folder, packaged
+from poise.configs.reading import MIB, is_file, read_bytes, read_text
+from poise.configs.schema import build, read_yaml
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.robots.robot import load_robot
+from poise.training.learning.checkpoints import CONFIG, FILES
+from poise.training.learning.config import TrainConfig
+from poise.training.learning.policy import Policy, load_policy, locate_policy
+
+from .card import card
+from .check import check_onnx
+from .figures import Figure, figures
+from .libraries import check_libraries
+from .metadata import IDS, metadata
+from .onnx_graph import onnx_bytes
+from .stock import write_stock
+from .tensors import safetensors_bytes
+
+ONNX, TENSORS = "policy.onnx", "policy.safetensors"
+OWN = "poise"  # folder of what `load_policy` reads
+NOTICE, LICENCE = "NOTICE.md", "LICENSE"  # of whose the policy was before
+OURS = "apache-2.0"  # licence of the packaged policies
+LARGEST = 256 * MIB  # of a policy's file
+
+
+@allows()
+def export_policy(
+    policy: str | Path,
+    out: str | Path,
+    *,
+    result: str | Path | None = None,
+    licence: str | None = None,
+    allow: str | Iterable[str] = (),
+) -> float:
+    """Write the folder `out`: ONNX, safetensors, SB3's files and a model card.
+
+    The folder is one that `huggingface_hub.upload_folder` can push as it is, and huggingface_sb3
+    can load. It appears when it is complete and its ONNX file has been compared with
+    `Policy.predict` on 10,000 random observations.
+
+    Args:
+        policy: a packaged policy, a policy folder, or a run folder of `poise train`.
+        out: a folder that does not exist, or is empty.
+        result: a folder of `poise evaluate` or `poise benchmark`, or its summary.json, whose
+            figures of this policy go into the card.
+        licence: for the card; if not given, that of the packaged policies, and none for others.
+        allow: as of `load_policy`.
+
+    Returns:
+        The largest difference of an action of the ONNX file from that of `Policy.predict`.
+
+    Raises:
+        ConfigError: no such policy, as `load_policy`; `out` is not empty; a library is missing; a
+            result in which the policy took no part.
+        PoiseError: an exported file does not act as the policy does (1e-6 for ONNX, 1e-4 for SB3,
+            which computes with 32 bits); the folder cannot be written.
+    """
+    check_new_folder(out)
+    check_libraries()
+    source, name = locate_policy(policy), _name(policy)
+    loaded, env = _load(source, allow)
+    found = figures(loaded, str(policy), env.robot, result)
+    if licence is None and str(policy) in packaged("policies"):
+        licence = OURS
+    # as huggingface_sb3 names it
+    archive = f"ppo-{IDS[loaded.config.action].replace('/', '-')}.zip"
+    notice = read_text(source / NOTICE, MIB) if is_file(source / NOTICE) else ""
+    with new_folder(out) as part:
+        worst = _write_networks(part, loaded, env)
+        write_stock(part, archive, loaded, env, source)
+        _copy(FILES, source, part / OWN)
+        _copy([n for n in (NOTICE, LICENCE) if is_file(source / n)], source, part)
+        (part / "config.json").write_text(_settings(part / archive))
+        (part / "results.json").write_text(_results(found))
+        page = card(name, archive, loaded, env, found, licence, notice)
+        (part / "README.md").write_text(page)
+    return worst
+
+
+def _load(source: Path, allow: str | Iterable[str]) -> tuple[Policy, BalanceEnv]:
+    """The policy and its environment, whose robot is loaded once."""
+    config = source / CONFIG
+    robot = load_robot(build(TrainConfig, read_yaml(config), str(config)).robot)
+    policy = load_policy(source, robot, allow=allow)
+    return policy, policy.make_env(robot=robot)
+
+
+def _name(policy: str | Path) -> str:
+    """The policy's name: of a run, that of its folder."""
+    path = Path(policy)
+    inner = path.parent.name if path.name in ("best", "last") else path.name
+    return inner or path.resolve().name
+
+
+def _write_networks(folder: Path, policy: Policy, env: BalanceEnv) -> float:
+    """The ONNX file, which is checked, and the tensors."""
+    said = metadata(policy, env)
+    (folder / ONNX).write_bytes(onnx_bytes(policy, said))
+    (folder / TENSORS).write_bytes(safetensors_bytes(policy, said))
+    return check_onnx(folder / ONNX, policy)
+
+
+def _copy(names: Iterable[str], source: Path, folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    for name in names:
+        (folder / name).write_bytes(read_bytes(source / name, LARGEST))
+
+
+def _settings(archive: Path) -> str:
+    """config.json: what SB3 says of the model, and of the system that wrote it."""
+    with zipfile.ZipFile(archive) as members:
+        said: dict[str, Any] = json.loads(members.read("data"))
+        said["system_info"] = members.read("system_info.txt").decode()
+    return json.dumps(said) + "\n"
+
+
+def _results(found: Sequence[Figure]) -> str:
+    """results.json; its words are huggingface_sb3's where it has one. Returns are not measured."""
+    said = {"is_deterministic": True, "figures": [asdict(figure) for figure in found]}
+    return json.dumps(said, indent=1, ensure_ascii=False) + "\n"

@@ -1,0 +1,27 @@
+"""The libraries that an export needs besides Poise's own; named once, where they are missing."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from poise.configs.errors import ConfigError
+
+NAMES = ("onnx", "onnxruntime", "safetensors")
+
+
+def check_libraries() -> None:
+    """Raise ConfigError, saying how to get them, unless all `NAMES` can be imported."""
+    for name in NAMES:
+        library(name)
+
+
+def library(name: str) -> Any:
+    """A module of one of `NAMES`; raises ConfigError where it is missing."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        package = name.split(".")[0]
+        raise ConfigError(
+            f"needs the package {package}: pip install 'poise[export]'", source="export"
+        ) from None

@@ -1,0 +1,136 @@
+"""A policy as an ONNX graph: raw observations in, actions out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from poise.envs.robots.mirror import Mirror
+from poise.training.learning.policy import Policy
+
+from .libraries import library
+
+OPSET, IR = 17, 8  # what runtimes of 2022 read
+INPUT, OUTPUT = "obs", "actions"  # the names that mjlab and rsl_rl give them
+NAME = "policy"
+
+
+def onnx_bytes(policy: Policy, metadata: Mapping[str, str]) -> bytes:
+    """The file of `policy` with these metadata; the same policy gives the same bytes.
+
+    `obs` (n, no) float32 are observations as the environment gives them, `actions` (n, na) float32
+    are those of `Policy.predict`: the normalisation, both sides of a symmetric policy and the
+    limits of the action are part of the graph. In between it computes with 64 bits, as `predict`
+    does. Weights are stored with 32 bits where these hold them exactly.
+    """
+    onnx = library("onnx")
+    graph = _Graph()
+    graph.add_policy(policy)
+    ends = [
+        onnx.helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, ["n", size])
+        for name, size in (
+            (INPUT, len(policy.mean)),
+            (OUTPUT, policy.layers[-1][0].shape[1]),
+        )
+    ]
+    made = onnx.helper.make_graph(graph.nodes, NAME, ends[:1], ends[1:], graph.tensors)
+    opset = [onnx.helper.make_opsetid("", OPSET)]
+    model = onnx.helper.make_model(made, opset_imports=opset, ir_version=IR)
+    model.producer_name = "poise"
+    for key, value in metadata.items():
+        model.metadata_props.add(key=key, value=value)
+    onnx.checker.check_model(model, full_check=True)
+    return bytes(model.SerializeToString(deterministic=True))
+
+
+class _Graph:
+    """Nodes and tensors, added one after the other; an edge is the name of its values."""
+
+    def __init__(self) -> None:
+        self.onnx = library("onnx")
+        self.nodes: list[Any] = []
+        self.tensors: list[Any] = []
+
+    def add_policy(self, policy: Policy) -> None:
+        """What `Policy.predict` computes, from `INPUT` to `OUTPUT`."""
+        network = _Network(self, policy)
+        seen = self.wide(INPUT)
+        mean = network.mean(seen)
+        if policy.mirrors is not None:
+            see, do = policy.mirrors
+            image = self.mirror(do, network.mean(self.mirror(see, seen, "see")), "do")
+            mean = self.op("Mul", self.op("Add", mean, image), self.number(0.5))
+        action = self.op("Clip", mean, self.number(-1.0), self.number(1.0))
+        self.op("Cast", action, to=self.onnx.TensorProto.FLOAT, output=OUTPUT)
+
+    def op(self, kind: str, *inputs: str, output: str = "", **attributes: Any) -> str:
+        """Add a node; returns the name of its values."""
+        output = output or f"x{len(self.nodes)}"
+        self.nodes.append(self.onnx.helper.make_node(kind, inputs, [output], **attributes))
+        return output
+
+    def array(self, name: str, values: np.ndarray) -> str:
+        """Add an array; returns the name of its values, which have 64 bits."""
+        stored = narrowed(values)
+        self.tensors.append(self.onnx.numpy_helper.from_array(stored, name))
+        return name if stored.dtype == values.dtype else self.wide(name)
+
+    def wide(self, name: str) -> str:
+        """Values of 32 bits with 64."""
+        return self.op("Cast", name, to=self.onnx.TensorProto.DOUBLE)
+
+    def number(self, value: float) -> str:
+        """Add a number, unless it is there."""
+        name = f"number {value:g}"
+        if name not in [tensor.name for tensor in self.tensors]:
+            self.tensors.append(self.onnx.numpy_helper.from_array(np.array(value), name))
+        return name
+
+    def mirror(self, mirror: Mirror, values: str, name: str) -> str:
+        """The image that `mirror` makes of `values`."""
+        order = self.onnx.numpy_helper.from_array(mirror.order.astype(np.int64), f"{name}.order")
+        self.tensors.append(order)
+        picked = self.op("Gather", values, order.name, axis=1)
+        return self.op("Mul", picked, self.array(f"{name}.sign", mirror.sign))
+
+
+class _Network:
+    """The layers of a policy, which a symmetric one passes twice."""
+
+    def __init__(self, graph: _Graph, policy: Policy):
+        self.graph = graph
+        self.shift = graph.array("mean", policy.mean)
+        self.scale = graph.array("scale", policy.scale)
+        self.limit = policy.clip
+        self.layers = [
+            (graph.array(f"layer{i}.weight", weight), graph.array(f"layer{i}.bias", bias))
+            for i, (weight, bias) in enumerate(policy.layers)
+        ]
+        self.activation = {"tanh": self.tanh, "elu": self.elu}[policy.config.ppo.activation]
+
+    def mean(self, observation: str) -> str:
+        """The mean action for observations, before its limits."""
+        graph = self.graph
+        x = graph.op("Mul", graph.op("Sub", observation, self.shift), self.scale)
+        x = graph.op("Clip", x, graph.number(-self.limit), graph.number(self.limit))
+        for weight, bias in self.layers[:-1]:
+            x = self.activation(graph.op("Gemm", x, weight, bias))
+        return graph.op("Gemm", x, *self.layers[-1])
+
+    def tanh(self, x: str) -> str:
+        return self.graph.op("Tanh", x)
+
+    def elu(self, x: str) -> str:
+        """max(x, 0) + exp(min(x, 0)) − 1: runtimes have Elu with 32 bits only."""
+        graph = self.graph
+        below = graph.op("Exp", graph.op("Min", x, graph.number(0.0)))
+        below = graph.op("Sub", below, graph.number(1.0))
+        return graph.op("Add", graph.op("Max", x, graph.number(0.0)), below)
+
+
+def narrowed(values: np.ndarray) -> np.ndarray:
+    """The values with 32 bits if these hold them exactly; else as they are."""
+    short = values.astype(np.float32)
+    return short if np.array_equal(short.astype(values.dtype), values) else values

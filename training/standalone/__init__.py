@@ -1,0 +1,1 @@
+"""Controllers and policies outside of an environment: readings of a robot in, torques out."""

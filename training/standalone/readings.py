@@ -1,0 +1,92 @@
+"""What a robot's sensors and its state estimate tell at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from poise.configs.errors import ConfigError
+from poise.configs.numbers import finite_array
+from poise.envs.robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class Readings:
+    """The base and the joints of a robot, and, where it is measured, the force of the ground.
+
+    The world's axes: z up, the ground at z = 0. The base is the robot's root body; its frame has
+    the origin and the axes of that body in the robot's model.
+
+    Attributes:
+        position: (3,) of the base's origin, world [m].
+        orientation: (4,) quaternion w, x, y, z that turns the base's axes into the world's.
+        velocity: (3,) of the base's origin, world axes [m/s].
+        angular_velocity: (3,) of the base, its own axes, as a gyroscope tells it [rad/s].
+        joint_positions: (nj,) in the order of `joint_names`, or by name [rad; m of a slide].
+        joint_velocities: (nj,) likewise [rad/s; m/s].
+        ground_wrench: (6,) of the ground on the robot since the readings before: force [N], world
+            axes, then moment [N·m] about the base's origin, the base's axes; None: not measured.
+    """
+
+    position: ArrayLike
+    orientation: ArrayLike
+    velocity: ArrayLike
+    angular_velocity: ArrayLike
+    joint_positions: ArrayLike | Mapping[str, float]
+    joint_velocities: ArrayLike | Mapping[str, float]
+    ground_wrench: ArrayLike | None = None
+
+    @classmethod
+    def of_mujoco(
+        cls, qpos: np.ndarray, qvel: np.ndarray, ground_wrench: ArrayLike | None = None
+    ) -> Readings:
+        """Readings from MuJoCo's qpos (nq,) and qvel (nv,) of a robot with a free joint.
+
+        `ground_wrench` may be ``data.qfrc_constraint[:6]`` where nothing but the ground touches it.
+        """
+        return cls(qpos[:3], qpos[3:7], qvel[:3], qvel[3:6], qpos[7:], qvel[6:], ground_wrench)
+
+    def qpos(self, robot: Robot) -> np.ndarray:
+        """(nq,) as MuJoCo orders it; raises ConfigError naming what is missing or no number."""
+        turn = _numbers(self.orientation, 4, "orientation")
+        if abs(float(np.linalg.norm(turn)) - 1.0) > 1e-3:
+            raise ConfigError("must be a quaternion of length 1", source="readings",
+                              field="orientation")  # fmt: skip
+        joints = _joints(self.joint_positions, robot.joint_names, "joint_positions")
+        return np.concatenate([_numbers(self.position, 3, "position"), turn, joints])
+
+    def qvel(self, robot: Robot) -> np.ndarray:
+        """(nv,) as MuJoCo orders it; raises ConfigError naming what is missing or no number."""
+        linear = _numbers(self.velocity, 3, "velocity")
+        angular = _numbers(self.angular_velocity, 3, "angular_velocity")
+        joints = _joints(self.joint_velocities, robot.joint_names, "joint_velocities")
+        return np.concatenate([linear, angular, joints])
+
+    def wrench(self) -> np.ndarray | None:
+        """(6,) of the ground, if it is measured; raises ConfigError where it is no six numbers."""
+        if self.ground_wrench is None:
+            return None
+        return _numbers(self.ground_wrench, 6, "ground_wrench")
+
+
+def _joints(
+    values: ArrayLike | Mapping[str, float], names: Sequence[str], field: str
+) -> np.ndarray:
+    if not isinstance(values, Mapping):
+        return _numbers(values, len(names), field)
+    if missing := [name for name in names if name not in values]:
+        raise ConfigError(f"lacks {', '.join(missing)}", source="readings", field=field)
+    if unknown := [name for name in values if name not in names]:
+        raise ConfigError(f"has unknown joints: {', '.join(map(str, unknown))}", source="readings",
+                          field=field, choices=names)  # fmt: skip
+    return _numbers([values[name] for name in names], len(names), field)
+
+
+def _numbers(values: object, count: int, field: str) -> np.ndarray:
+    numbers = finite_array(values, (count,))
+    if numbers is None:
+        raise ConfigError(f"must be {count} finite numbers", source="readings", field=field)
+    return numbers
