@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
+from poise.baselines.environments.scales import StepScales
+from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.stepping.guidance import copy_reference, guide_com
 from poise.configs.errors import ConfigError
 from poise.envs.sensors.delayed import DelayedState
