@@ -37,9 +37,10 @@ if TYPE_CHECKING:
         Targets,
         WrappedController,
     )
-    from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
-    from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
-    from poise.baselines.environments.whole import ResidualWholeEnv, WholeScales
+    from poise.baselines.environments.residual import ResidualBalanceEnv
+    from poise.baselines.environments.scales import ResidualScales, StepScales, WholeScales
+    from poise.baselines.environments.stepping import ResidualStepEnv
+    from poise.baselines.environments.whole import ResidualWholeEnv
     from poise.baselines.motions.motion import ReferenceMotion, load_motion
     from poise.baselines.registry import load_controller
     from poise.baselines.stepping.capture_step import CaptureStep
@@ -57,9 +58,10 @@ else:
                 "Targets",
                 "WrappedController",
             ),
-            "environments.residual": ("ResidualBalanceEnv", "ResidualScales"),
-            "environments.stepping": ("ResidualStepEnv", "StepScales"),
-            "environments.whole": ("ResidualWholeEnv", "WholeScales"),
+            "environments.residual": ("ResidualBalanceEnv",),
+            "environments.scales": ("ResidualScales", "StepScales", "WholeScales"),
+            "environments.stepping": ("ResidualStepEnv",),
+            "environments.whole": ("ResidualWholeEnv",),
             "motions.motion": ("ReferenceMotion", "load_motion"),
             "registry": ("load_controller",),
             "stepping.capture_step": ("CaptureStep",),

@@ -9,6 +9,7 @@ import numpy as np
 
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Kernel
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
@@ -193,8 +194,8 @@ class CompiledController(BaseController):
         """True where `compiled_tick` does what `torques` does; otherwise `torques` is called."""
         return self._same_tick
 
-    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, Block]:
-        """A kernel's address and the block it works on: one call is one tick, see `outputs`."""
+    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
+        """A kernel and the block it works on: one call is one tick, see `outputs`."""
         raise NotImplementedError
 
     def outputs(self) -> Outputs:
@@ -214,19 +215,19 @@ class WrappedController(BaseController):
 
     def __init__(self, inner: Controller, robot: Robot):
         self.inner, self.period = inner, inner.period
-        self._told = inner if isinstance(inner, BaseController) else BaseController()
+        self._base = inner if isinstance(inner, BaseController) else BaseController()
         self.robot = inner.robot if isinstance(inner, BaseController) else robot
-        self.com_offset = self._told.com_offset
+        self.com_offset = self._base.com_offset
 
     @property
     def failures(self) -> int:
         """See `BaseController`."""
-        return self._told.failures
+        return self._base.failures
 
     @property
     def root_wrench(self) -> np.ndarray:
         """See `BaseController`."""
-        return self._told.root_wrench
+        return self._base.root_wrench
 
     @property
     def unwrapped(self) -> Controller:
@@ -239,7 +240,7 @@ class WrappedController(BaseController):
 
     def check(self) -> None:
         """See `BaseController`."""
-        self._told.check()
+        self._base.check()
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] to hold for one `period`."""
@@ -250,8 +251,8 @@ class WrappedController(BaseController):
         raise cannot_be_shared()
 
 
-def told_by(controller: Controller, robot: Robot) -> BaseController:
-    """The controller, with the defaults of a `BaseController` where it is none."""
+def as_base_controller(controller: Controller, robot: Robot) -> BaseController:
+    """The controller itself, or a `WrappedController` around one that is no `BaseController`."""
     if isinstance(controller, BaseController):
         return controller
     return WrappedController(controller, robot)

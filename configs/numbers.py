@@ -42,6 +42,20 @@ def whole_number(value: Any, least: int, field: str, source: str | None = None) 
     return int(value)
 
 
+def whole_steps(
+    time: float, step: float, field: str, source: str | None = None, least: int = 1
+) -> int:
+    """The number of steps of `step` in `time`, both in [s].
+
+    Raises ConfigError unless it is whole and at least `least`.
+    """
+    count = round(time / step)
+    if count < least or abs(count * step - time) > 1e-9:
+        problem = f"{time} s is not a whole number of steps of {step} s"
+        raise ConfigError(problem, source=source, field=field)
+    return count
+
+
 def seed_number(seed: Any, field: str = "seed") -> int | None:
     """A seed of `reset`; raises ConfigError unless it is None or a whole number from 0 on."""
     return None if seed is None else whole_number(seed, 0, field, "reset")

@@ -1,4 +1,4 @@
-"""When joint servos take over from a controller, and when it takes back: see `ResidualWholeEnv`."""
+"""The hand-over from a controller to joint servos and back, see `ResidualWholeEnv`."""
 
 from dataclasses import dataclass, field
 
@@ -8,7 +8,7 @@ from poise.envs.balance.episode import record_tick
 from poise.envs.balance.servos import Servos, aim, pd_torque
 from poise.envs.balance.termination import uprightness
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.callbacks import call_back
+from poise.envs.compiled.callbacks import CallbackAddress, call_back
 from poise.envs.compiled.calls import call, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.kinematics import update_state
@@ -16,12 +16,12 @@ from poise.envs.physics.simulation import advance
 
 from .policy_step import PolicyStep, capture_error, end_tick, policy_tick, set_offsets, set_targets
 
-OPEN, CALM, SHARE, TOOK = range(4)  # entries of `HandOver.memory`
+OPEN, CALM, AUTHORITY, TOOK = range(4)  # entries of `HandOver.memory`
 
 
 @dataclass(frozen=True)
 class HandOverConfig:
-    """When the servos may take over, and when the controller takes back.
+    """The conditions on which the servos may take over, and on which the controller takes back.
 
     The servos may take over from the moment when the capture point is `opens` from the reference's.
     They may no longer when the robot was calm for `calm_time`: the capture point nearer than
@@ -51,8 +51,8 @@ class HandOver(Block):
     speed: float  # squared [m²/s²]
     joint_speed: float  # mean square [rad²/s²]
     calm_steps: float  # policy steps
-    memory: np.ndarray  # (4,) may take over, calm steps in a row, share of the servos, took over
-    begin: int  # address of the callback that begins a new trial of the controller
+    memory: np.ndarray  # (4,) may take over, calm steps in a row, authority w, took over
+    begin: CallbackAddress  # begins a new trial of the controller
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,10 @@ class WholeStep(Block):
 
 @compiled
 def is_calm(h: HandOver, step: PolicyStep, distance: float) -> bool:
-    """Whether the robot is calm now, `distance` the squared one of the capture point [m²]."""
+    """Return whether the robot is calm now.
+
+    `distance` [m²] is the square of the capture point's distance from the reference's.
+    """
     s = step.inputs.state
     if distance > h.closes or uprightness(step.inputs.robot, s) < h.cos_tilt:
         return False
@@ -82,8 +85,8 @@ def is_calm(h: HandOver, step: PolicyStep, distance: float) -> bool:
 
 
 @compiled
-def share_of_servos(h: HandOver, step: PolicyStep):
-    """Decide at the start of a policy step which share of the torques is the servos'."""
+def set_authority(h: HandOver, step: PolicyStep):
+    """Set w, the fraction of the torques that is the servos', at the start of a policy step."""
     a, m, action = step.inputs, h.memory, step.episode.action
     distance = capture_error(a.state, a.motion, a.com_offset)
     m[CALM] = m[CALM] + 1.0 if is_calm(h, step, distance) else 0.0
@@ -92,8 +95,8 @@ def share_of_servos(h: HandOver, step: PolicyStep):
     elif m[CALM] >= h.calm_steps:
         m[OPEN] = 0.0
     wanted = 2.0 * action[action.shape[0] - 1]
-    m[SHARE] = m[OPEN] * min(max(wanted, 0.0), 1.0)
-    if m[SHARE] > 0.0:
+    m[AUTHORITY] = m[OPEN] * min(max(wanted, 0.0), 1.0)
+    if m[AUTHORITY] > 0.0:
         m[TOOK] = 1.0
     elif m[TOOK] > 0.0:
         m[TOOK] = 0.0
@@ -103,7 +106,7 @@ def share_of_servos(h: HandOver, step: PolicyStep):
 @compiled
 def blend_torques(step: WholeStep):
     """`views.ctrl`: (1 − w) times the controller's torques, in `step.base.tau`, w the servos'."""
-    base, servos, w = step.base, step.servos, step.hand.memory[SHARE]
+    base, servos, w = step.base, step.servos, step.hand.memory[AUTHORITY]
     views = base.world.views
     for i in range(views.ctrl.shape[0]):
         dof = servos.dofs[i]
@@ -118,19 +121,19 @@ def blend_torques(step: WholeStep):
 
 @compiled
 def whole_tick(step: WholeStep):
-    """The control tick of `policy_tick`, of which the servos may have a share."""
+    """The control tick of `policy_tick`, with the servos' authority w over the torques."""
     base, hand, e = step.base, step.hand, step.base.episode
     if e.ticks[0] == 0:
-        share_of_servos(hand, base)
+        set_authority(hand, base)
         first = base.inputs.residual.moved.shape[0]
         aim(step.servos, e.action[first:-1])
-    if hand.memory[SHARE] == 0.0:
+    if hand.memory[AUTHORITY] == 0.0:
         policy_tick(base)
         return
     a, world = base.inputs, base.world
     if e.ticks[0] == 0:
         set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
-    if hand.memory[SHARE] < 1.0:
+    if hand.memory[AUTHORITY] < 1.0:
         set_targets(a)
         call(base.kernel, base.tick)
     for _ in range(base.substeps):

@@ -4,6 +4,8 @@ import numpy as np
 
 from poise.baselines.controller import Targets
 from poise.baselines.stepping.blocks import CaptureTick
+from poise.baselines.stepping.ipm_step import energy_foothold
+from poise.baselines.stepping.swing import time_left
 from poise.baselines.stepping.tick import capture_tick
 from poise.baselines.whole_body.momentum_qp import (
     MomentumQP,
@@ -15,16 +17,18 @@ from poise.baselines.whole_body.momentum_qp import (
 )
 from poise.baselines.whole_body.tick import contact_tick
 from poise.configs.schema import build
-from poise.envs.compiled.calls import NO_KERNEL
+from poise.envs.compiled.calls import NO_KERNEL, CompiledStep, Program, address_of, run
 from poise.envs.physics.kinematics import allocate_state
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import load_robot
 from poise.envs.vector.scheduler import StepSchedule
 from poise.envs.vector.threads import ThreadTeam
 
+from .hand_over import whole_tick
 from .policy_step import policy_tick
 from .residual import ResidualBalanceEnv
 from .stepping import ResidualStepEnv
+from .whole import ResidualWholeEnv
 
 
 def _standing() -> tuple[MomentumQP, RobotState, Targets]:
@@ -43,7 +47,7 @@ def assembly() -> None:
 
 
 #: one of each packaged kind, on bodies that the humanoid has
-_EXAMPLES = {
+EXAMPLES = {
     "tasks": {
         "trunk": {"kind": "orientation", "body": "torso"},
         "hand": {"kind": "position", "body": "left_lower_arm"},
@@ -55,7 +59,7 @@ _EXAMPLES = {
 
 def rows() -> None:
     """The rows of tasks, of contacts other than the feet and of limits."""
-    config = build(MomentumQPConfig, _EXAMPLES, "the packaged kinds")
+    config = build(MomentumQPConfig, EXAMPLES, "the packaged kinds")
     qp = MomentumQP(load_robot("humanoid"), config)
     env = ResidualBalanceEnv(controller=config, duration=0.1)
     env.reset(seed=0)
@@ -74,17 +78,31 @@ def steps() -> None:
     env.reset(seed=0, options={"push": {"impulse": 1.0, "start": 0.0}})
     env.simulation.step(np.zeros(env.robot.model.nu))
     env.simulation.state.support_distance(np.zeros(2))
-    # for its type alone: what is called by these addresses, other processes compile
-    qp = env.controller
-    assert isinstance(qp, MomentumQP)  # by default
-    problem = qp.assembly(env.simulation.state, env.targets)
-    tick = Tick(problem, qp.memory, NO_KERNEL, NO_KERNEL)
-    policy_tick.compile((env.bind(tick, 0).numba_type,))
-    momentum_tick.compile((tick.numba_type,))
-    accept(problem.state, problem.parameters, problem.workspace, qp.memory)
+    tick = _tick(env)
+    address_of(policy_tick, env.bind(tick, NO_KERNEL))
+    address_of(momentum_tick, tick)
+    problem = tick.problem
+    accept(problem.state, problem.parameters, problem.workspace, tick.memory)
+    nothing = Program.of(())
+    CompiledStep(address_of(run, nothing), nothing).play()
     helpers = ThreadTeam()
     StepSchedule(np.zeros((2, 3), dtype=np.int64), 2).play_all(helpers)
     helpers.close()
+
+
+def _tick(env: ResidualBalanceEnv) -> Tick:
+    """The tick of the baseline in `env`, for its type: other processes compile its kernels."""
+    qp = env.controller
+    assert isinstance(qp, MomentumQP)  # by default
+    problem = qp.assembly(env.simulation.state, env.targets)
+    return Tick(problem, qp.memory, NO_KERNEL, NO_KERNEL)
+
+
+def whole() -> None:
+    """The policy step with servos that take over from the controller."""
+    env = ResidualWholeEnv(duration=0.1)
+    env.reset(seed=0)
+    address_of(whole_tick, env.whole_step(env.bind(_tick(env), NO_KERNEL)))
 
 
 def _stepping() -> tuple[ResidualStepEnv, CaptureTick]:
@@ -96,11 +114,13 @@ def _stepping() -> tuple[ResidualStepEnv, CaptureTick]:
 
 def contacts() -> None:
     """The momentum QP with contacts that change. What a reset needs, `planner` compiles as well."""
-    contact_tick.compile((_stepping()[1].on_both.numba_type,))
+    address_of(contact_tick, _stepping()[1].on_both)
 
 
 def planner() -> None:
     """The planner of steps and the swing, and what a policy sees of them."""
     env, tick = _stepping()
-    capture_tick.compile((tick.numba_type,))
-    env.bind(tick, 0)
+    address_of(capture_tick, tick)
+    address_of(energy_foothold, tick.search)
+    time_left(tick.swing)
+    env.bind(tick, NO_KERNEL)

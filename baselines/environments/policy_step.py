@@ -16,7 +16,7 @@ from poise.envs.balance.episode import (
     record_tick,
 )
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import Erased, Program, call, run
+from poise.envs.compiled.calls import Erased, Kernel, Program, call, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
@@ -108,8 +108,8 @@ class PolicyStep(Block):
     """All that a policy step works on."""
 
     inputs: TargetInputs
-    kernel: int  # the address of the controller's tick
-    tick: Erased  # what it works on
+    kernel: Kernel[Erased]  # the controller's tick
+    tick: Erased  # that it works on
     tau: np.ndarray  # (nj,) what it finds [N·m]
     root_wrench: np.ndarray  # (6,) of a soft root
     failures: np.ndarray  # (1,) int: ticks that it could not solve

@@ -1,7 +1,6 @@
 """`poise/ResidualBalance-v0`: the action moves the targets of a momentum QP."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,27 +8,25 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import allowing, named
-from poise.baselines.controller import CompiledController, Controller, Targets, told_by
+from poise.baselines.controller import CompiledController, Controller, Targets, as_base_controller
 from poise.baselines.motions.motion import ReferenceMotion, load_motion
-from poise.baselines.motions.offsets import MOMENTUM_X, MOMENTUM_Y, TARGETS
-from poise.baselines.motions.targets import Motion
+from poise.baselines.motions.targets import motion_arrays
 from poise.baselines.registry import ControllerConfig, load_controller
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
+from poise.configs.numbers import whole_steps
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.base import BalanceEnv, EnvConfig
 from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, StepEnd, judge_step
-from poise.envs.balance.observation import Term, mirror_terms
+from poise.envs.balance.observation import mirror_terms
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import CompiledStep, Erased, address_of
-from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.calls import CompiledStep, Erased, Kernel, address_of
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
 from .policy_step import (
     PolicyStep,
-    Residual,
     TargetInputs,
     TickAccount,
     account_tick,
@@ -38,41 +35,7 @@ from .policy_step import (
     set_targets,
     soft_root_force,
 )
-
-
-@dataclass(frozen=True)
-class ResidualScales:
-    """The offsets that an action of 1 gives, heading frame; a scale of 0 takes an entry away."""
-
-    com: float = field(default=0.2, metadata={"min": 0.0})  # Δc_ref x, y [m]
-    cop: float = field(default=0.15, metadata={"min": 0.0})  # Δp_ref x, y [m]
-    height: float = field(default=0.0, metadata={"min": 0.0})  # Δc_ref z [m]
-    lean: float = field(default=0.0, metadata={"min": 0.0})  # of the root, about x and y [rad]
-    momentum: float = field(default=0.0, metadata={"min": 0.0})  # L_ref x, y [m h² ω]
-
-    def entries(self) -> dict[str, float]:
-        """The scale of each target that can be moved, in the order of `motions/offsets.py`."""
-        scales = (
-            self.com, self.com, self.cop, self.cop, self.height,
-            self.lean, self.lean, self.momentum, self.momentum,
-        )  # fmt: skip
-        return dict(zip(TARGETS, scales, strict=True))
-
-
-@dataclass(frozen=True)
-class _Lag:
-    """The lag and the gate between the action and the targets."""
-
-    smoothing: float = field(metadata={"min": 0.0})  # τ [s]
-    gate: float = field(metadata={"min": 0.0})  # d₀ [m]
-
-
-def action_term(name: str) -> Term:
-    """The term that tells a mirror what the action `name` is."""
-    if name[-2:] not in ("_x", "_y", "_z"):
-        return Term(name, (name,), "1", "", "number")
-    turns = name.startswith(("lean", "momentum"))
-    return Term(name, (name,), "1", "", "turn" if turns else "vector")
+from .scales import Lag, ResidualScales, action_term, make_residual
 
 
 class ResidualBalanceEnv(BalanceEnv):
@@ -134,40 +97,21 @@ class ResidualBalanceEnv(BalanceEnv):
         prepare()
         given = {} if residual is None else to_dict(residual)
         self.residual = build(self.scales_class, given, "residual")
-        scale = np.array(list(self.residual.entries().values()))
-        self._moved = np.flatnonzero(scale)
+        self._moved = np.flatnonzero(list(self.residual.entries().values()))
         if self.only_targets and len(self._moved) == 0:
             raise ConfigError("at least one scale must be above 0", field="residual")
         super().__init__(robot, config, render_mode=render_mode, **overrides)
-        lag = build(_Lag, to_dict({"smoothing": smoothing, "gate": gate}), "environment")
+        lag = build(Lag, to_dict({"smoothing": smoothing, "gate": gate}), "environment")
         self.smoothing, self.gate = lag.smoothing, lag.gate
-        # fraction of the way that the residual goes to the action in one policy step
-        period = self.config.policy_period
-        blend = 1.0 if lag.smoothing == 0.0 else -np.expm1(-period / lag.smoothing)
-        scale[MOMENTUM_X : MOMENTUM_Y + 1] *= 10.0 * self.scales.momentum  # m h² ω
-        self._offsets = guarded_zeros(len(scale))
-        self._residual = Residual(
-            moved=self._moved,
-            scale=scale[self._moved],
-            blend=float(blend),
-            gate=self.gate,
-            offsets=self._offsets,
-        )
+        momentum = 10.0 * self.scales.momentum  # m h² ω
+        self._residual = make_residual(self.residual, lag, self.config.policy_period, momentum)
+        self._offsets = self._residual.offsets
         with allowing(named(controller)):  # the user hands it over, not a file
             self.controller = load_controller(controller, self.robot)
-        self.motion = (
-            motion if isinstance(motion, ReferenceMotion) else load_motion(motion, self.robot)
-        )
-        if self.motion.coeffs.shape[2] != len(self.robot.joint_names) + 6:
-            raise ConfigError(
-                f"{self.motion.name!r} is not a motion of {self.robot.name!r}", field="motion"
-            )
+        self.motion = load_motion(motion, self.robot)
         self.targets = Targets.standing(self.robot, self.simulation.state)
         self._targets = self.targets.arrays()
-        columns = self.motion.coeffs.shape[2]
-        self._motion = Motion(
-            self.motion.knots, self.motion.coeffs, self.motion.loop, guarded_zeros((3, columns))
-        )
+        self._motion = motion_arrays(self.motion)
 
     @property
     def controller(self) -> Controller:
@@ -179,19 +123,20 @@ class ResidualBalanceEnv(BalanceEnv):
 
     @controller.setter
     def controller(self, controller: Controller) -> None:
-        told = told_by(controller, self.robot)
-        made_for = told.robot
+        base = as_base_controller(controller, self.robot)
+        made_for = base.robot
         if made_for.fingerprint != self.robot.fingerprint:  # compiled code trusts array sizes
             raise ConfigError(
                 f"is for the robot {made_for.name!r}, not {self.robot.name!r}", field="controller"
             )
-        period = told.period
-        self.control_substeps = self._whole(period, self.arrays.timestep, "controller period")
-        self.ticks = self._whole(self.config.policy_period, period, "policy_period")
-        self._controller, self._told = controller, told
+        period = base.period
+        step, source = self.arrays.timestep, "environment"
+        self.control_substeps = whole_steps(period, step, "controller period", source)
+        self.ticks = whole_steps(self.config.policy_period, period, "policy_period", source)
+        self._controller, self._told = controller, base
         # all others are called from Python, tick by tick
         self._compiled = isinstance(controller, CompiledController) and controller.compiled
-        self._com_offset = float(told.com_offset)
+        self._com_offset = float(base.com_offset)
         self._unbind()
 
     def _unbind(self) -> None:
@@ -254,8 +199,8 @@ class ResidualBalanceEnv(BalanceEnv):
             bound, made_with = self._bound
             if bound.world is world and made_with is gains:
                 return known
-        address, tick = controller.compiled_tick(self.state_source.state, self.targets)
-        bound = self.bind(tick, address)
+        kernel, tick = controller.compiled_tick(self.state_source.state, self.targets)
+        bound = self.bind(tick, kernel)
         self._bound = bound, gains
         self._step = self._stepping(bound)
         return self._step
@@ -264,8 +209,8 @@ class ResidualBalanceEnv(BalanceEnv):
         """The compiled policy step that works on `bound`."""
         return CompiledStep(address_of(policy_tick, bound), bound, bound.ticks)
 
-    def bind(self, tick: Block, kernel: int) -> PolicyStep:
-        """All that a step works on, with the controller's tick and the address of its kernel."""
+    def bind(self, tick: Block, kernel: Kernel) -> PolicyStep:
+        """All that a policy step works on, with the controller's `kernel` and its block `tick`."""
         controller = self._controller
         assert isinstance(controller, CompiledController)  # only they have ticks
         found = controller.outputs()

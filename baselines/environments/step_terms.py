@@ -64,7 +64,7 @@ def swing(t: StepView):
         t.seen.out[i] = 1.0 if int(t.report[FOOT]) == i else 0.0
 
 
-@STEP_TERMS.add(("share",), "1", "share of the swing that is over", "number")
+@STEP_TERMS.add(("fraction",), "1", "fraction of the swing that is over", "number")
 def phase(t: StepView):
     t.seen.out[0] = t.report[PHASE]
 

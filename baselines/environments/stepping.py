@@ -1,15 +1,14 @@
 """`poise/ResidualStep-v0`: the action moves the targets and the steps of a stepping controller."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from poise.baselines.controller import Controller, told_by
-from poise.baselines.motions.offsets import STEPS
+from poise.baselines.controller import Controller, as_base_controller
 from poise.baselines.registry import ControllerConfig
 from poise.baselines.stepping.controller import SteppingController
 from poise.configs.errors import ConfigError
@@ -22,24 +21,9 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
-from .residual import ResidualBalanceEnv, ResidualScales
+from .residual import ResidualBalanceEnv
+from .scales import StepScales
 from .step_terms import REPORTED, STEP_TERMS, StepReporter, StepView, report_steps
-
-
-@dataclass(frozen=True)
-class StepScales(ResidualScales):
-    """The offsets that an action of 1 gives, heading frame; a scale of 0 takes an entry away."""
-
-    com: float = field(default=0.1, metadata={"min": 0.0})  # Δc_ref x, y [m]
-    cop: float = field(default=0.05, metadata={"min": 0.0})  # Δp_ref x, y [m]
-    foothold: float = field(default=0.15, metadata={"min": 0.0})  # x, y [m]
-    time: float = field(default=0.08, metadata={"min": 0.0})  # of a step [s]
-    trigger: float = field(default=0.0, metadata={"min": 0.0})  # of a step [m]
-
-    def entries(self) -> dict[str, float]:
-        """Scale of each target that can be moved: those of the base class first."""
-        scales = self.foothold, self.foothold, self.time, self.trigger
-        return {**super().entries(), **dict(zip(STEPS, scales, strict=True))}
 
 
 class ResidualStepEnv(ResidualBalanceEnv):
@@ -95,7 +79,7 @@ class ResidualStepEnv(ResidualBalanceEnv):
 
         Raises ConfigError as `ResidualBalanceEnv` does, and for one that does not step.
         """
-        stepper = told_by(controller, self.robot).unwrapped
+        stepper = as_base_controller(controller, self.robot).unwrapped
         if not isinstance(stepper, SteppingController):
             raise ConfigError("does not step, so that no step can be moved", field="controller")
         ResidualBalanceEnv.controller.fset(self, controller)  # type: ignore[attr-defined]

@@ -1,7 +1,6 @@
 """`poise/ResidualWhole-v0`: joint servos that the action moves take over from a controller."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 
 from poise.baselines.controller import CompiledController, Controller
 from poise.baselines.registry import ControllerConfig
+from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.config import EnvConfig
@@ -23,17 +23,10 @@ from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
-from .hand_over import SHARE, HandOver, HandOverConfig, WholeStep, whole_tick
+from .hand_over import AUTHORITY, HandOver, HandOverConfig, WholeStep, whole_tick
 from .policy_step import PolicyStep
-from .residual import ResidualBalanceEnv, ResidualScales, action_term
-
-
-@dataclass(frozen=True)
-class WholeScales(ResidualScales):
-    """The offsets of the controller's targets that an action of 1 gives; by default none."""
-
-    com: float = field(default=0.0, metadata={"min": 0.0})  # Δc_ref x, y [m]
-    cop: float = field(default=0.0, metadata={"min": 0.0})  # Δp_ref x, y [m]
+from .residual import ResidualBalanceEnv
+from .scales import WholeScales, action_term
 
 
 class ResidualWholeEnv(ResidualBalanceEnv):
@@ -81,6 +74,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
     ):
         given = {} if hand_over is None else to_dict(hand_over)
         self.hand_over = build(HandOverConfig, given, "hand_over")
+        prepare("whole")
         self.servo_config = servo_config(servos)
         self._memory = guarded_zeros(4)
         self._callback = Callback(self._begin_anew)
@@ -103,8 +97,8 @@ class ResidualWholeEnv(ResidualBalanceEnv):
 
     @property
     def authority(self) -> float:
-        """The servos' share w of the torques in the last policy step."""
-        return float(self._memory[SHARE])
+        """w, the fraction of the torques that was the servos' in the last policy step."""
+        return float(self._memory[AUTHORITY])
 
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; robot and motion are shared.
@@ -115,9 +109,7 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         return {**super().arguments(), **own}
 
     def _action_names(self) -> tuple[str, ...]:
-        model = self.robot.model
-        motors = (model.actuator(i).name for i in range(model.nu))
-        return (*super()._action_names(), *motors, "authority")
+        return (*super()._action_names(), *self.robot.motor_names, "authority")
 
     def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
         targets = [action_term(name) for name in super()._action_names()]
@@ -141,7 +133,8 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         super().check()
         self._callback.check()
 
-    def _stepping(self, bound: PolicyStep) -> CompiledStep:
+    def whole_step(self, bound: PolicyStep) -> WholeStep:
+        """All that a policy step works on, `bound` to the controller."""
         h = self.hand_over
         hand = HandOver(
             opens=h.opens**2,
@@ -153,7 +146,10 @@ class ResidualWholeEnv(ResidualBalanceEnv):
             memory=self._memory,
             begin=self._callback.address,
         )
-        step = WholeStep(bound, self.servos, hand)
+        return WholeStep(bound, self.servos, hand)
+
+    def _stepping(self, bound: PolicyStep) -> CompiledStep:
+        step = self.whole_step(bound)
         return CompiledStep(address_of(whole_tick, step), step, bound.ticks)
 
 

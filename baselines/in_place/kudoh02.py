@@ -51,7 +51,7 @@ class Kudoh02(AroundQP):
         """Forget the last trial: start with PD."""
         super().reset(state)
         self.large = False  # whether the deviation is large
-        self._share = 0.0  # of the QP in the torques
+        self._qp_fraction = 0.0  # of the QP in the torques
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         """Joint torques (nu,) [N·m] for the next `period`."""
@@ -60,10 +60,10 @@ class Kudoh02(AroundQP):
         self.large = bool(away > limit * self.robot.height_com)
         step = self.period / self.config.blend
         # to the QP at once, a push does not wait; back to PD in `blend`
-        self._share = 1.0 if self.large else max(self._share - step, 0.0)
+        self._qp_fraction = 1.0 if self.large else max(self._qp_fraction - step, 0.0)
         tau = np.zeros(len(self.robot.motor_dofs))
-        if self._share > 0.0:
-            tau += self._share * self.qp.torques(state, targets)
-        if self._share < 1.0:
-            tau += (1.0 - self._share) * self.pd.torques(state, targets)
+        if self._qp_fraction > 0.0:
+            tau += self._qp_fraction * self.qp.torques(state, targets)
+        if self._qp_fraction < 1.0:
+            tau += (1.0 - self._qp_fraction) * self.pd.torques(state, targets)
         return tau

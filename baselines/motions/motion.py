@@ -112,13 +112,18 @@ class ReferenceMotion(Copyable):
         return MotionSample(*joints, *com, *root)
 
 
-def load_motion(name_or_path: str | Path, robot: Robot) -> ReferenceMotion:
-    """A packaged motion (`squat`) or a path to a .yaml file, for one robot.
+def load_motion(motion: str | Path | ReferenceMotion, robot: Robot) -> ReferenceMotion:
+    """A packaged motion (`squat`), that of a path to a .yaml file, or `motion` itself.
 
     Raises ConfigError naming file and field: no such motion, a role that the robot lacks, a
-    posture out of a joint's range, a CoM outside the soles, a balance that cannot be found.
+    posture out of a joint's range, a CoM outside the soles, a balance that cannot be found; or a
+    motion of a robot with other joints.
     """
-    path = resolve("motions", name_or_path)
+    if isinstance(motion, ReferenceMotion):
+        if motion.coeffs.shape[2] != len(robot.joint_names) + 6:
+            raise ConfigError(f"{motion.name!r} is not a motion of {robot.name!r}", field="motion")
+        return motion
+    path = resolve("motions", motion)
     description = build(MotionDescription, read_yaml(path), str(path))
     return make_motion(description, robot, path.stem, str(path))
 

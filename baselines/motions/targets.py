@@ -7,10 +7,12 @@ import numpy as np
 from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.vectors import copy_into, rotated
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
+from .motion import ReferenceMotion
 from .offsets import (
     COM_X,
     COM_Y,
@@ -33,6 +35,12 @@ class Motion(Block):
     coeffs: np.ndarray
     loop: bool
     samples: np.ndarray  # (3, nj + 6) scratch: position, velocity and acceleration
+
+
+def motion_arrays(motion: ReferenceMotion) -> Motion:
+    """The block of `motion`, with scratch of its own."""
+    samples = guarded_zeros((3, motion.coeffs.shape[2]))
+    return Motion(motion.knots, motion.coeffs, motion.loop, samples)
 
 
 @compiled

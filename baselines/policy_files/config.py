@@ -1,4 +1,4 @@
-"""What a learned policy from outside is, as data: its network, joints, what it sees and does."""
+"""The configuration of a policy from outside: its network, joints, observation and action."""
 
 from __future__ import annotations
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from poise.baselines.controller import CompiledController, Outputs, Targets
 from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.numbers import whole_steps
 from poise.envs.balance.servos import pd_torque
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.callbacks import Callback, call_back
-from poise.envs.compiled.calls import address_of
+from poise.envs.compiled.callbacks import Callback, CallbackAddress, call_back
+from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import robot_arrays
@@ -41,11 +42,11 @@ class Servos(Block):
 
 @dataclass(frozen=True, eq=False)
 class PolicyTick(Block):
-    """What a tick works on."""
+    """All that a control tick works on."""
 
     state: StateArrays
     servos: Servos
-    ask: int  # the address of the callback that asks the policy
+    ask: CallbackAddress  # asks the policy for new targets
 
 
 @compiled
@@ -76,13 +77,7 @@ class PolicyFile(CompiledController):
         self.robot, self.config = robot, config
         self.arrays = robot_arrays(robot)
         self.period = self.arrays.timestep
-        every = round(config.policy_period / self.period)
-        if abs(every * self.period - config.policy_period) > 1e-9:
-            raise ConfigError(
-                f"{config.policy_period} s is no whole number of physics steps of {self.period} s",
-                source=config.described_in,
-                field="policy_period",
-            )
+        every = whole_steps(config.policy_period, self.period, "policy_period", config.described_in)
         self.joints = joint_servos(robot, config)
         moved = len(self.joints.moved)
         self.observer = Observer(config, len(self.joints.index), moved, config.described_in)
@@ -155,7 +150,7 @@ class PolicyFile(CompiledController):
         self._servos.target[self.joints.moved] = self.joints.targets(action)
 
     def tick(self, state: RobotState) -> PolicyTick:
-        """What `policy_tick` works on."""
+        """The block that `policy_tick` works on, for `state`."""
         self._state = state
         known = self._tick
         if known is None or known.state is not state.arrays:
@@ -172,7 +167,9 @@ class PolicyFile(CompiledController):
         """Raise what went wrong in asking the policy."""
         self._callback.check()
 
-    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[int, PolicyTick]:
+    def compiled_tick(
+        self, state: RobotState, targets: Targets
+    ) -> tuple[Kernel[PolicyTick], PolicyTick]:
         """See `CompiledController`."""
         tick = self.tick(state)
         return address_of(policy_tick, tick), tick

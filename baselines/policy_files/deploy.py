@@ -15,7 +15,14 @@ GYM_TERMS = ("base_ang_vel", "projected_gravity", "command", "dof_pos", "dof_vel
 
 @dataclass(frozen=True)
 class LabAction:
-    """What an action of unitree_rl_lab moves."""
+    """An action of unitree_rl_lab: targets of joint positions [rad], scale · action + offset.
+
+    Attributes:
+        scale: a number, or one for each action [rad].
+        offset: target of action zero [rad]; None: the default posture.
+        clip: least and largest value of each action.
+        joint_ids: places of the moved joints in the policy's order; None: all.
+    """
 
     scale: float | tuple[float, ...] = 1.0
     offset: float | tuple[float, ...] | None = None
@@ -25,7 +32,7 @@ class LabAction:
 
 @dataclass(frozen=True)
 class LabTerm:
-    """A part of the observation."""
+    """A term of unitree_rl_lab's observation, see `ObservationTerm`."""
 
     params: dict[str, Any] = field(default_factory=dict)
     clip: tuple[float, float] | None = None
@@ -73,7 +80,10 @@ T = TypeVar("T", LabAction, LabTerm, LabDeploy, GymDeploy)
 
 
 def is_deploy(data: dict[str, object]) -> bool:
-    """Whether a YAML file is one of these."""
+    """Return whether the content of a YAML file is a configuration of another project.
+
+    Such a file has no `kind`, and either `joint_ids_map` or `num_obs`.
+    """
     return "kind" not in data and ("joint_ids_map" in data or "num_obs" in data)
 
 

@@ -1,4 +1,4 @@
-"""The files of a policy: which they are, and what tells one version from another."""
+"""The files of a policy: where they lie, and the digest of their version."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _LOCATION = re.compile(rb"\n\x08location\x12(.)", re.DOTALL)  # of tensors outsi
 
 
 def is_network(path: Path) -> bool:
-    """Whether it is an ONNX file."""
+    """Return whether `path` is an ONNX file."""
     return path.suffix in ONNX and is_file(path)
 
 
 def is_policy_place(name: str | Path) -> bool:
-    """Whether it is an ONNX file, or a folder with one or with what describes one."""
+    """Return whether `name` is an ONNX file, or a folder that holds or describes a network."""
     path = Path(name)
     if not is_folder(path):
         return is_network(path)

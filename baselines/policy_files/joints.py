@@ -1,4 +1,4 @@
-"""Which joints of a robot are a policy's, and how they and the others are controlled."""
+"""The joints of a robot that a policy moves, and the gains of all joints."""
 
 from __future__ import annotations
 

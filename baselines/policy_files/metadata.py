@@ -1,4 +1,4 @@
-"""What mjlab writes into the ONNX files that it exports."""
+"""The metadata that mjlab writes into the ONNX files that it exports."""
 
 from __future__ import annotations
 

@@ -21,13 +21,16 @@ HOW = "needs the package onnxruntime: pip install 'poise[onnx]'"
 
 
 class Network(Protocol):
-    """What plays a policy."""
+    """A policy's network: an observation in, an action out, with a memory of its own."""
 
     def reset(self) -> None:
-        """Forget the trial before."""
+        """Forget the last trial: a new one begins."""
 
     def act(self, observation: np.ndarray) -> np.ndarray:
-        """(na,) float64 of an observation (n,) float32; raises whatever its library raises."""
+        """The action (na,) float64 of an observation (n,) float32.
+
+        Raises whatever the library of the network raises.
+        """
 
 
 def load_network(path: Path) -> Network:

@@ -1,4 +1,4 @@
-"""What a policy sees: terms by the names that mjlab, Isaac Lab and legged_gym give them."""
+"""The observation of a policy: terms by the names of mjlab, Isaac Lab and legged_gym."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .config import ObservationTerm, PolicyFileConfig
 
 
 class Seen(NamedTuple):
-    """What terms are made from (n joints of the policy, na actions)."""
+    """All that terms are made from: n joints of the policy, na actions."""
 
     state: RobotState
     q: np.ndarray  # (n,) joint positions [rad]
@@ -86,7 +86,7 @@ class Observer:
 
     @property
     def size(self) -> int:
-        """Numbers of an observation."""
+        """The size of an observation."""
         return sum(term.size * term.described.history for term in self._terms)
 
     @property
@@ -99,12 +99,12 @@ class Observer:
         )
 
     def forget(self) -> None:
-        """A new trial: the first observation fills the history."""
+        """Forget the last trial: the next observation fills the history."""
         for term in self._terms:
             term.kept.clear()
 
     def observe(self, seen: Seen) -> np.ndarray:
-        """(size,) float32."""
+        """The observation (size,) float32 of this policy step, which enters the history."""
         for term in self._terms:
             term.look(seen)
         if self._by_frame:

@@ -22,10 +22,10 @@ RIVALS = "rivals"  # folder of packaged policies of others, which are for one ro
 
 
 def is_policy(name: object) -> bool:
-    """Whether it names a policy from outside.
+    """Return whether `name` is that of a policy from outside.
 
-    That is a packaged one, an ONNX file, a folder with one or with what describes one, or a
-    ``deploy.yaml``.
+    Such are packaged policies, ONNX files, folders that hold or describe a network, and files
+    like ``deploy.yaml``.
     """
     if not isinstance(name, (str, Path)):
         return False

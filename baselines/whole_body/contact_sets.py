@@ -22,7 +22,7 @@ from poise.envs.robots.robot import Robot
 
 from .contacts.contact import BoundContact, bind_contacts, contact_arrays
 from .limits.limit import BoundLimit, bind_limits
-from .momentum_qp import MomentumQPConfig
+from .momentum_qp import MomentumQPConfig, prepare_rows
 from .parameters import QPParameters, qp_parameters
 from .reduced_qp import Assembly, assemble
 from .stack import limit_program, make_stack, put_rows
@@ -131,6 +131,7 @@ class ContactSets(Copyable):
     """
 
     def __init__(self, robot: Robot, config: MomentumQPConfig, torque_rate_limit: float = np.inf):
+        prepare_rows(config)
         self.robot, self.config, self.period = robot, config, config.period
         self.tasks = bind_tasks(config.tasks, robot)
         for name, (task, _) in self.tasks.items():

@@ -61,6 +61,12 @@ class MomentumQPConfig:
     limits: dict[str, Limit] = field(default_factory=dict, metadata={"omit": "default"})
 
 
+def prepare_rows(config: MomentumQPConfig) -> None:
+    """Have the kernels of its tasks, contacts and limits compiled, where there are any."""
+    if config.tasks or config.contacts or config.limits:
+        prepare("rows")
+
+
 class MomentumQP(CompiledController):
     """Tracks a posture, the CoM through linear and the CoP through angular momentum.
 
@@ -78,8 +84,7 @@ class MomentumQP(CompiledController):
     def __init__(self, robot: Robot, config: MomentumQPConfig | None = None):
         self.robot = robot
         self.config = config or MomentumQPConfig()
-        if self.config.tasks or self.config.contacts or self.config.limits:
-            prepare("rows")
+        prepare_rows(self.config)
         self.period = self.config.period
         self.arrays = robot_arrays(robot)
         self.parameters = qp_parameters(robot, self.arrays, self.config)

@@ -2,27 +2,23 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
-import gymnasium
-import mujoco
 import numpy as np
 from gymnasium import spaces
 
-from poise.configs.errors import ConfigError, PoiseError, shown
-from poise.configs.numbers import seed_number, whole_number
+from poise.configs.errors import PoiseError
+from poise.configs.numbers import seed_number, whole_steps
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Program, run
-from poise.envs.compiled.copies import Copyable
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.simulation import Simulation, World
-from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import PushInfo, push_info
 from poise.envs.robots.mirror import Mirror, mirror_robot
 from poise.envs.robots.robot import Robot, load_robot
-from poise.envs.sensors.delayed import DelayedState
-from poise.envs.sensors.source import StateSource
-from poise.envs.viewing.camera import Camera, find_camera
+from poise.envs.sensors.sensed import SensedRobot
+from poise.envs.viewing.camera import Camera
+from poise.envs.viewing.rendered import RenderedEnv
 
 from .action import checked_action
 from .config import EnvConfig as EnvConfig
@@ -41,18 +37,14 @@ from .episode import (
 from .info import step_info
 from .observation import Term, Terms, View, mirror_terms, observer, scales
 from .reward import REWARD_TERMS
-from .start import chosen_start, reset_options
+from .start import chosen_pushes, chosen_start, reset_options
 from .termination import episode_limits
 from .terms import TERMS
 
-if TYPE_CHECKING:
-    from poise.envs.viewing.renderer import SceneRenderer
 
-
-class BalanceEnv(Copyable, gymnasium.Env):
+class BalanceEnv(SensedRobot, RenderedEnv):
     """Base of `ResidualBalanceEnv` and `TorqueBalanceEnv`: subclasses say what an action does."""
 
-    metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
     observation_space: spaces.Box
     action_space: spaces.Box
     known_terms: ClassVar[Terms] = TERMS  #: of which `observation` chooses
@@ -72,24 +64,17 @@ class BalanceEnv(Copyable, gymnasium.Env):
         camera: Camera | Mapping[str, object] | str | int | None = None,
         **overrides: object,
     ):
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ConfigError(
-                f"unknown render mode {shown(render_mode)}",
-                field="render_mode",
-                choices=tuple(self.metadata["render_modes"]),
-            )
-        self.render_mode = render_mode
         self.robot = robot if isinstance(robot, Robot) else load_robot(robot)
         self.config = env_config(config, **overrides)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.policy_period)}
-        self.width = whole_number(width, 1, "width", "environment")  #: of a frame [pixels]
-        self.height = whole_number(height, 1, "height", "environment")
-        self.camera = find_camera(camera, self.robot.model)
+        self._set_up_rendering(self.robot.model, render_mode, width, height, camera)
+        self.sensor_delay = self.config.sensors.delay
         self.push_sampler = self.config.pushes  #: may be replaced between episodes
         self.simulation = Simulation(self.robot)
         self.arrays: RobotArrays = self.simulation.arrays  #: of `robot`
         period = self.config.policy_period
-        self.substeps = self._whole(period, self.arrays.timestep, "policy_period")
+        timestep = self.arrays.timestep
+        self.substeps = whole_steps(period, timestep, "policy_period", "environment")
         self.max_steps = round(self.config.duration / period)
         self.quiet_steps = int(np.ceil(self.config.fall.quiet_time / period - 1e-9))
         state = self.simulation.state
@@ -104,47 +89,11 @@ class BalanceEnv(Copyable, gymnasium.Env):
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
         self._described: tuple[object, list[PushInfo]] = None, []  # pushes, their infos
-        self._renderer: SceneRenderer | None = None
-
-    def __getstate__(self) -> dict[str, object]:
-        if self._renderer is not None and self._renderer.viewer is not None:
-            raise PoiseError("an environment whose window is open cannot be copied: close() first")
-        return {**super().__getstate__(), "_renderer": None}  # the copy draws with one of its own
 
     @property
     def steps(self) -> int:
         """Policy steps since the reset."""
         return int(self.episode.steps[0])
-
-    @property
-    def simulation(self) -> Simulation:
-        """The robot and its world; may be replaced between episodes, and `state_source` with it."""
-        return self._simulation
-
-    @simulation.setter
-    def simulation(self, simulation: Simulation) -> None:
-        self._simulation = simulation
-        delay = self.config.sensors.delay
-        self.state_source = (
-            DelayedState(simulation, self.robot, delay) if delay else StateSource(simulation)
-        )
-
-    @property
-    def state_source(self) -> StateSource:
-        """The source of what is believed of the state; may be replaced between episodes.
-
-        The simulation's own state is what is judged. Raises ConfigError for a source of another
-        simulation.
-        """
-        return self._state_source
-
-    @state_source.setter
-    def state_source(self, source: StateSource) -> None:
-        if source.simulation is not self.simulation:
-            raise ConfigError("is about another simulation", field="state_source")
-        self._state_source = source
-        self.simulation.sensors = source.sense
-        self._unbind()
 
     @property
     def episode(self) -> EpisodeArrays:
@@ -162,31 +111,10 @@ class BalanceEnv(Copyable, gymnasium.Env):
         self._end: StepEnd | None = None
         self._end_of: World | None = None
 
-    @property
-    def model(self) -> mujoco.MjModel:
-        """MuJoCo's model, for reading: environments of one robot share it."""
-        return self.simulation.model
-
-    @property
-    def data(self) -> mujoco.MjData:
-        """MuJoCo's data of this environment, current after `reset` and after every `step`."""
-        return self.simulation.data
-
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; the robot is shared."""
         names = ("robot", "config", "render_mode", "width", "height", "camera")
         return {name: vars(self)[name] for name in names}
-
-    @staticmethod
-    def _whole(period: float, step: float, name: str) -> int:
-        count = round(period / step)
-        if count < 1 or abs(count * step - period) > 1e-9:
-            raise ConfigError(
-                f"{period} s is not a whole number of steps of {step} s",
-                source="environment",
-                field=name,
-            )
-        return count
 
     def _action_names(self) -> tuple[str, ...]:
         """The names of the action's entries."""
@@ -197,7 +125,7 @@ class BalanceEnv(Copyable, gymnasium.Env):
         chosen = self.config.observation
         names = {
             "joints": self.robot.joint_names,
-            "motors": tuple(self.robot.model.actuator(i).name for i in range(self.robot.model.nu)),
+            "motors": self.robot.motor_names,
             "feet": tuple(sole.name for sole in self.robot.soles),
             "actions": self.action_names,
         }
@@ -291,15 +219,10 @@ class BalanceEnv(Copyable, gymnasium.Env):
         self.episode.running[0] = 0  # until this one has succeeded
         options = reset_options(options)
         super().reset(seed=seed_number(seed))
-        push = options.get("push")
-        qpos, qvel = chosen_start(self.simulation, self.config.noise, options, self.np_random)
+        rng = self.np_random
+        qpos, qvel = chosen_start(self.simulation, self.config.noise, options, rng)
         state = self.simulation.reset(qpos, qvel)
-        if push is not None:
-            pushes = parse_pushes(push, self.robot, state.support_margin)
-        elif self.push_sampler is None:
-            pushes = ()
-        else:
-            pushes = self.push_sampler.sample(self.np_random, self.robot, state.support_margin)
+        pushes = chosen_pushes(options.get("push"), self.push_sampler, self.robot, state, rng)
         self.simulation.set_pushes(pushes)
         begin_episode(self.simulation.state_arrays, self.episode)
         self.state_source.reset()
@@ -379,21 +302,3 @@ class BalanceEnv(Copyable, gymnasium.Env):
             infos = [push_info(push, self.robot) for push in pushes]
             self._described = pushes, infos
         return [info.copy() for info in infos]
-
-    def render(self) -> np.ndarray | None:
-        """A frame (height, width, 3) for "rgb_array"; shows it for "human"."""
-        if self.render_mode is None:
-            return None
-        if self._renderer is None:
-            from poise.envs.viewing.renderer import SceneRenderer
-
-            self._renderer = SceneRenderer(
-                self.simulation, self.render_mode == "human", self.width, self.height, self.camera
-            )
-        return self._renderer.render()
-
-    def close(self) -> None:
-        """Free what rendering holds."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None

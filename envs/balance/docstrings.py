@@ -38,7 +38,7 @@ Info: "reward_terms" (name → weighted value; their sum is the reward), "push" 
 [N], duration [s], body, direction [deg], impulse J [N·s], specific_impulse J/m [N·s/kg]),
 "is_success" (tilt below `fall.quiet_tilt`, CoM slower than `fall.quiet_speed` and over the soles
 for the last `fall.quiet_time`), "solver_failures" (ticks of the episode), "torque_saturation" (mean
-share of motors at their limit), "root_wrench" (6,) (force [N] and moment [N·m] of a soft root in
+fraction of motors at their limit), "root_wrench" (6,) (force [N] and moment [N·m] of a soft root in
 the last tick).
 """
 

@@ -196,7 +196,7 @@ class RewardWeights:
     )
     joint_limits: float = _term(
         0.0, joint_limit_cost,
-        "−mean share of the last 5 % of a joint's range, at either end", "no divergence",
+        "−mean fraction of the last 5 % of a joint's range, at either end", "no divergence",
     )  # fmt: skip
     slip: float = _term(
         0.0, slip_cost,

@@ -1,4 +1,4 @@
-"""The start of an episode: a disturbed standing posture."""
+"""The start of an episode: a disturbed standing posture, and the pushes that will come."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,6 +9,11 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import finite_array, option_mapping
 from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.state import RobotState
+from poise.envs.pushes.options import parse_pushes
+from poise.envs.pushes.push import Kick, Push
+from poise.envs.pushes.sampler import PushSampler
+from poise.envs.robots.robot import Robot
 
 RESET_OPTIONS = ("push", "noise", "qpos", "qvel")
 
@@ -77,6 +82,24 @@ def chosen_start(
         if options.get(name) is not None:
             start[name] = _numbers(options[name], numbers.shape, name)
     return start["qpos"], start["qvel"]
+
+
+def chosen_pushes(
+    given: object,
+    sampler: PushSampler | None,
+    robot: Robot,
+    state: RobotState,
+    rng: np.random.Generator,
+) -> tuple[Push | Kick, ...]:
+    """Return the pushes that are `given`, else those that `sampler` draws; without either none.
+
+    Raises ConfigError as `parse_pushes` does.
+    """
+    if given is not None:
+        return parse_pushes(given, robot, state.support_margin)
+    if sampler is None:
+        return ()
+    return sampler.sample(rng, robot, state.support_margin)
 
 
 def _numbers(value: object, shape: tuple[int, ...], name: str) -> np.ndarray:

@@ -49,8 +49,7 @@ class MotorBalanceEnv(BalanceEnv):
     """
 
     def _action_names(self) -> tuple[str, ...]:
-        model = self.robot.model
-        return tuple(model.actuator(i).name for i in range(model.nu))
+        return self.robot.motor_names
 
     def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
         return parts["motors"]

@@ -10,8 +10,8 @@ def convex_hull(points: np.ndarray, n: int, line: float, out: np.ndarray) -> int
     """The hull of the first `n` rows of `points` (≥ n, 2), counter-clockwise, into rows of `out`
     (≥ 2 n + 1, 2); how many they are.
 
-    A corner nearer than `line` [m] to the line of its neighbours is none. Monotone chain; sorts
-    `points` by x, then y.
+    A corner at most `line` [m] from the segment between its neighbours is none. Monotone chain;
+    sorts `points` by x, then y.
     """
     for i in range(1, n):
         x, y = points[i, 0], points[i, 1]
@@ -25,20 +25,47 @@ def convex_hull(points: np.ndarray, n: int, line: float, out: np.ndarray) -> int
         if k == n:  # the lower chain is done, the upper one leads back
             least = size + 1
         i = k if k < n else 2 * n - 2 - k
-        while size >= least and not _turns_left(out, size, line, points[i, 0], points[i, 1]):
+        while size >= least and not _turns_left(out, size, points[i, 0], points[i, 1]):
             size -= 1
         out[size, 0], out[size, 1] = points[i, 0], points[i, 1]
         size += 1
-    return size - 1
+    return _without_flat_corners(out, size - 1, line) if line > 0.0 else size - 1
 
 
 @compiled
-def _turns_left(chain: np.ndarray, size: int, line: float, x: float, y: float) -> bool:
+def _turns_left(chain: np.ndarray, size: int, x: float, y: float) -> bool:
     """Return whether the last corner of a chain lies to the right of the way to (x, y)."""
     ax, ay = chain[size - 2, 0], chain[size - 2, 1]
     bx, by = chain[size - 1, 0] - ax, chain[size - 1, 1] - ay
-    dx, dy = x - ax, y - ay
-    return bx * dy - by * dx > line * np.sqrt(dx * dx + dy * dy)
+    return bx * (y - ay) - by * (x - ax) > 0.0
+
+
+@compiled
+def _without_flat_corners(polygon: np.ndarray, size: int, line: float) -> int:
+    """Take away corners at most `line` from the segment between their neighbours; how many stay.
+
+    The chain itself knows no tolerance: of an upright edge whose points differ in x by rounding it
+    may meet the middle before an end, and within a tolerance that end would be on the line.
+    """
+    i = checked = 0
+    while size > 1 and checked < size:
+        i = (i + 1) % size  # the first corner is checked last
+        checked += 1
+        if _is_flat(polygon[(i - 1) % size], polygon[i], polygon[(i + 1) % size], line):
+            for k in range(i, size - 1):
+                polygon[k, 0], polygon[k, 1] = polygon[k + 1, 0], polygon[k + 1, 1]
+            size, i, checked = size - 1, i - 1, 0
+    return size
+
+
+@compiled
+def _is_flat(a: np.ndarray, b: np.ndarray, c: np.ndarray, line: float) -> bool:
+    """Return whether `b` is at most `line` from the segment that leads from `a` to `c`."""
+    dx, dy, bx, by = c[0] - a[0], c[1] - a[1], b[0] - a[0], b[1] - a[1]
+    along = (bx * dx + by * dy) / max(dx * dx + dy * dy, 1e-300)
+    fraction = min(max(along, 0.0), 1.0)
+    x, y = bx - fraction * dx, by - fraction * dy
+    return x * x + y * y <= line * line
 
 
 @compiled

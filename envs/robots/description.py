@@ -13,7 +13,7 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True)
 class SourceDescription:
-    """Where the model comes from: one of the first four.
+    """The source of the model. Exactly one of `builder`, `mjcf`, `urdf` and `menagerie` is given.
 
     Attributes:
         builder: a model that Poise builds itself.

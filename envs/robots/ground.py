@@ -69,7 +69,10 @@ def check_ground(model: mujoco.MjModel, ground: int, source: str) -> None:
 
 
 def can_touch(model: mujoco.MjModel, geom: int, other: int) -> bool:
-    """Whether two geoms may collide: by their contype and conaffinity, or as an explicit pair."""
+    """Return whether two geoms of a model may collide.
+
+    They do by their contype and conaffinity, or as an explicit pair.
+    """
     return bool(
         model.geom_contype[geom] & model.geom_conaffinity[other]
         or model.geom_contype[other] & model.geom_conaffinity[geom]

@@ -1,4 +1,4 @@
-"""Where this machine has the models of MuJoCo Menagerie: public robots. Poise ships none."""
+"""The models of MuJoCo Menagerie on this machine. They are public robots; Poise ships none."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _in_checkout(variable: str, file: str, source: str) -> Path:
 
 
 def _installed(file: str) -> Iterator[Path]:
-    """Where packages may have brought the file."""
+    """The places to which packages may have brought the file."""
     wheel = importlib.util.find_spec(WHEEL)
     for place in (wheel.submodule_search_locations or ()) if wheel else ():
         yield Path(place) / IN_WHEEL / file

@@ -1,4 +1,4 @@
-"""Left and right exchanged: what the mirror image of a robot observes, and does."""
+"""Left and right exchanged: observations and actions of a robot's mirror image."""
 
 from dataclasses import dataclass
 
@@ -27,12 +27,14 @@ class Mirror:
 
 
 def mirror_robot(robot: Robot) -> dict[str, Mirror]:
-    """How joints, motors and the axes of the root look in the mirror plane y = 0.
+    """The mirrors of joints, motors and the root's axes in the plane y = 0.
 
-    In the standing posture, with S = diag(1, −1, 1): a slide's axis a becomes S a, a hinge's −S a;
-    with the root's axes R, a vector along them becomes Rᵀ S R u, a turn −Rᵀ S R u. Places, axes,
-    masses and torque limits are compared; inertia, joint ranges, springs, dampers and armature may
-    differ. "joints" (nv − 6), "motors" (nu), "root vector" and "root turn" (3).
+    They hold in the standing posture. With S = diag(1, −1, 1) a slide's axis a becomes S a, and a
+    hinge's −S a. With the root's axes R a vector u along them becomes Rᵀ S R u, and a turn
+    −Rᵀ S R u. Places, axes, masses and torque limits are compared; inertia, joint ranges, springs,
+    dampers and armature may differ.
+
+    The keys are "joints" (nv − 6), "motors" (nu), "root vector" and "root turn" (3).
 
     Raises ConfigError naming the robot and the body, joint or motor that has no mirror image.
     """

@@ -139,7 +139,10 @@ def _pixels(file: Path) -> int:
 
 
 def tags(text: str) -> Iterator[tuple[bool, str, dict[str, str], bool]]:
-    """Whether it closes, name, attributes, and whether it is empty, of all tags."""
+    """All tags of an XML text, in order: closing, name, attributes, empty.
+
+    `closing` is true of ``</name>``, `empty` of ``<name/>``. Comments and the like are left out.
+    """
     at = 0
     while match := _OPEN.search(text, at):
         close = _CLOSE.get(match[0])

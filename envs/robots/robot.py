@@ -95,6 +95,11 @@ class Robot(Copyable):
     keyframes: dict[str, np.ndarray]
 
     @property
+    def motor_names(self) -> tuple[str, ...]:
+        """The names of the motors, in the order of `motor_dofs` (nu,)."""
+        return tuple(self.model.actuator(i).name for i in range(self.model.nu))
+
+    @property
     def units(self) -> Units:
         """The robot's mass, gravity and standing height, and what follows from them."""
         return Units(self.mass, -float(self.model.opt.gravity[2]), self.height_com)

@@ -80,7 +80,7 @@ def find_file(name: str, near: Path) -> Path | None:
 
 
 def _package_folders(package: str, near: Path) -> Iterator[Path]:
-    """Where a package may lie."""
+    """The folders in which a package may lie."""
     named = [Path(x) for x in os.environ.get(PACKAGES, "").split(os.pathsep) if x]
     for folder in [*near.resolve().parents, *named]:
         if folder.name == package:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.configs.errors import ConfigError
+from poise.configs.numbers import whole_steps
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
@@ -108,12 +108,7 @@ class DelayedState(StateSource):
 
     def __init__(self, simulation: Simulation, robot: Robot, delay: float = 0.0):
         super().__init__(simulation)
-        step = simulation.model.opt.timestep
-        late = round(delay / step)
-        if late < 0 or abs(late * step - delay) > 1e-9:
-            raise ConfigError(
-                f"{delay} s is not a whole number of steps of {step} s", field="sensors.delay"
-            )
+        late = whole_steps(delay, simulation.model.opt.timestep, "sensors.delay", least=0)
         self.delay = delay
         self.known = Simulation(robot)
         self.arrays, self.state_arrays = self.known.arrays, self.known.state_arrays

@@ -22,7 +22,7 @@ from poise.baselines import (
     Targets,
     load_controller,
 )
-from poise.baselines.controller import WrappedController, told_by
+from poise.baselines.controller import WrappedController, as_base_controller
 from poise.baselines.registry import KINDS
 from poise.configs.files import packaged
 from poise.envs import RobotState, Simulation, replicate
@@ -102,7 +102,7 @@ def test_packaged_controllers_declare_what_is_asked(name: str) -> None:
 def test_three_members_are_enough() -> None:
     """Outside of any base class the rest has its default; two are too few."""
     given = Plain()
-    told = told_by(given, robot())
+    told = as_base_controller(given, robot())
     assert (told.failures, told.com_offset, told.robot) == (0, 0.0, robot())
     assert told.unwrapped is given and not told.root_wrench.any()
     env = env_of(given)

@@ -23,7 +23,7 @@ IDS = (
     "poise/ResidualBalance-v0", "poise/ResidualStep-v0", "poise/ResidualWhole-v0",
 )  # fmt: skip
 KINDS = ("random", "bang-bang", "drop", "spin")
-WARM, GROWTH = 0.1, 20.0  # share of the steps before memory counts; [MiB] that it may grow
+WARM, GROWTH = 0.1, 20.0  # fraction of the steps before memory counts; [MiB] that it may grow
 
 
 def main(arguments: list[str] | None = None) -> int:

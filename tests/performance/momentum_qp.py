@@ -1,6 +1,6 @@
 """Solvers on the QPs of real push recoveries: `python -m tests.performance.momentum_qp`.
 
-Torque errors are against the active-set method, as a share of the motors' limits; the optimality
+Torque errors are against the active-set method, as a fraction of the motors' limits; the optimality
 residuals of a solution are relative to the size of its terms.
 """
 

@@ -4,7 +4,7 @@ Every problem is solved cold, by one solver after the other: its numbers are new
 at every tick, and a warm start from another tick would be 80 ms old. Data are converted to each
 solver's own form before the clock starts; the clock is the thread's CPU time, so other jobs on the
 machine do not count. Torque errors are against a solution refined in extended precision, as a
-share of the torque limits, for the problems that a solver calls solved. Solvers that are not
+fraction of the torque limits, for the problems that a solver calls solved. Solvers that are not
 installed (proxsuite, piqp, clarabel, quadprog) are left out.
 """
 

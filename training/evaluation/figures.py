@@ -98,7 +98,7 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
 def envelope(
     played: Played, limits: PushLimits, steps: NStepLimit | None = None
 ) -> EnvelopeFigures:
-    """J50 [N·s], J90, η and the share of the limit of `steps` in each direction; their means."""
+    """J50 [N·s], J90, η and the fraction of the limit of `steps` in each direction; their means."""
     direction, impulse, duration = pushes(played)
     recovered, mass = won(played), limits.robot.mass
     over_limit = impulse / ankle_limits(played, limits)

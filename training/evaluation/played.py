@@ -46,7 +46,7 @@ def fractions(played: Played) -> np.ndarray:
 
 
 def sectors(played: Played) -> EnvelopeFit:
-    """Fits of the share of the limit in sectors of 45°, named by their middle."""
+    """Fits of the fraction of the limit in sectors of 45°, named by their middle."""
     direction, _, _ = pushes(played)
     middle = SECTOR * (np.rint(direction / SECTOR) % (360.0 / SECTOR))
     return mean_over_directions(middle, fractions(played), won(played))

@@ -38,22 +38,22 @@ def draw_plots(
     if directional:
         fits = {name: mean_over_directions(*pushes(own)[:2], won(own))
                 for name, own in shown.items()}  # fmt: skip
-        share = {name: pushes(own)[1] / ankle_limits(own, limits) for name, own in shown.items()}
+        fraction = {name: pushes(own)[1] / ankle_limits(own, limits) for name, own in shown.items()}
         fine, duration = np.arange(0.0, 360.0, 2.0), plan.suite.push_duration
         limit = [limits.ankle(d, duration) for d in fine]
         lines = _step_lines(steps or {}, fine, duration)
         polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit), step_limits=lines)
     else:
         fits = {name: sectors(own) for name, own in shown.items()}
-        share = {name: fractions(own) for name, own in shown.items()}
+        fraction = {name: fractions(own) for name, own in shown.items()}
         unit = f"of the {limits.scale}"
-        title = f"Recovered share of the {limits.scale} by push direction"
+        title = f"Recovered fraction of the {limits.scale} by push direction"
         polar_envelope(polar, _bands(fits), title=title, unit=unit)
         label = f"push impulse, as a fraction of the {limits.scale}"
     fall_probability(
         fall,
-        {name: (share[name], won(own)) for name, own in shown.items()},
-        {name: fit_logistic(share[name], won(own)) for name, own in shown.items()},
+        {name: (fraction[name], won(own)) for name, own in shown.items()},
+        {name: fit_logistic(fraction[name], won(own)) for name, own in shown.items()},
         unit="fraction",
         xlabel=label,
     )

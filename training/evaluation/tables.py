@@ -19,7 +19,7 @@ BOUNDS = {None: "", "lower": "≥ ", "upper": "≤ "}
 
 
 def ranked(entries: Mapping[str, Entry]) -> list[str]:
-    """Controllers, the best first: by mean J50, else by the share of the limit, else by rate.
+    """Controllers, the best first: by mean J50, else by the fraction of the limit, else by rate.
 
     Those that took a force from nowhere come last.
     """
@@ -159,7 +159,7 @@ def with_range(value: float | None, interval: Interval | None, form: str) -> str
 
 
 def _never_fell(entry: Entry) -> str:
-    """Shown where falls are what is counted: neither J50 nor a share of a limit is fitted."""
+    """Shown where falls are what is counted: neither J50 nor a fraction of a limit is fitted."""
     if "j50_mean" in entry or "fraction50" in entry:
         return NONE
     return with_range(entry["never_fell_rate"], entry["never_fell_ci95"], ".1%")

@@ -115,7 +115,7 @@ def fall_probability(
     xlabel: str | None = None,
     title: str = "Pushes that are not recovered",
 ) -> None:
-    """Share of trials that ended in a fall against the impulse, with the fitted curves.
+    """Fraction of trials that ended in a fall against the impulse, with the fitted curves.
 
     Dots are bins with about equally many trials each, bars their Wilson 95 % intervals, a line ends
     where the impulses end, and a tick on the 50 % line marks J50.

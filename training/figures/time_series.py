@@ -28,8 +28,8 @@ def training_curve(
     Args:
         path: PNG file to write.
         rows: one mapping per log entry with the column `x` and any others. Columns that end in
-            "rate" are shares in [0, 1] and share the top panel; NAME_low and NAME_high are the band
-            around NAME. An entry may lack a column (or hold NaN): evaluations are rarer than
+            "rate" are in [0, 1] and have the top panel in common; NAME_low and NAME_high are the
+            band around NAME. An entry may lack a column (or hold NaN): evaluations are rarer than
             rollouts.
         x: column of the horizontal axis [environment steps].
         baseline: recovery rate of the baseline controller, drawn as a line.

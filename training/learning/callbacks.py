@@ -24,7 +24,7 @@ from .config import TrainConfig
 
 
 class Throughput(BaseCallback):
-    """Logs steps per second and the update's share of the time."""
+    """Logs steps per second and the update's fraction of the time."""
 
     model: PPO
 

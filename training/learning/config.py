@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from poise.baselines.environments.hand_over import HandOverConfig
-from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
-from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.environments.scales import ResidualScales, StepScales
+from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import controller_config
 from poise.configs.files import resolve
@@ -65,7 +66,7 @@ class PPOConfig:
 
 @dataclass(frozen=True)
 class Curriculum:
-    """The largest push grows from `start` times its final size over a share of the run."""
+    """The largest push grows from `start` times its final size over a fraction of the run."""
 
     start: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})
     share: float = field(default=0.3, metadata={"min": 0.0, "max": 1.0})

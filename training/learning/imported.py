@@ -83,9 +83,9 @@ class Translation:
         }
 
     def observation(self) -> Affine:
-        """The policy's observation, as the environment's tells it.
+        """The policy's observation as a function of the environment's.
 
-        Raises ConfigError for a term that it does not tell, with a history, or with limits.
+        Raises ConfigError for a term that the environment's lacks, with a history, or with limits.
         """
         parts = [self._term(i, term) for i, term in enumerate(self.config.observations)]
         columns = [[p.index for p in parts], [p.gain for p in parts], [p.offset for p in parts]]
@@ -142,12 +142,12 @@ def import_policy(
     `Translation`; or where the actor has other layers.
     """
     translation, path = Translation(env, config), Path(config.policy)
-    told, layers = translation.observation(), read_layers(path)
+    inputs, layers = translation.observation(), read_layers(path)
     moments = normalize.obs_rms
     assert isinstance(moments, RunningMeanStd)  # observations are arrays
-    import_statistics(told, layers, moments, normalize.epsilon)
+    import_statistics(inputs, layers, moments, normalize.epsilon)
     weights, biases = list(layers.weights), list(layers.biases)
-    weights[0], biases[0] = first_layer(told, layers, moments, normalize.epsilon)
+    weights[0], biases[0] = first_layer(inputs, layers, moments, normalize.epsilon)
     weights[-1], biases[-1] = translation.last_layer(weights[-1], biases[-1])
     actor = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
     linear = [layer for layer in actor if isinstance(layer, torch.nn.Linear)]
@@ -161,32 +161,32 @@ def import_policy(
 
 
 def import_statistics(
-    told: Affine, layers: Layers, moments: RunningMeanStd, epsilon: float
+    inputs: Affine, layers: Layers, moments: RunningMeanStd, epsilon: float
 ) -> None:
     """Means and variances with which (o − mean)/√(var + ε) is the policy's normalised input.
 
     Those of a symmetric policy are made alike on both sides.
     """
-    known = told.index >= 0
+    known = inputs.index >= 0
     mean, var = np.zeros(moments.mean.shape), np.ones(moments.mean.shape)
-    mean[told.index[known]] = ((layers.mean - told.offset) / told.gain)[known]
-    var[told.index[known]] = (layers.scale / told.gain)[known] ** 2
+    mean[inputs.index[known]] = ((layers.mean - inputs.offset) / inputs.gain)[known]
+    var[inputs.index[known]] = (layers.scale / inputs.gain)[known] ** 2
     if isinstance(moments, MirroredMeanStd):
         mean, var = moments.alike(mean, var)
     moments.mean, moments.var, moments.count = mean, var - epsilon, FIRM
 
 
 def first_layer(
-    told: Affine, layers: Layers, moments: RunningMeanStd, epsilon: float
+    inputs: Affine, layers: Layers, moments: RunningMeanStd, epsilon: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The policy's first layer, for observations that are normalised by these `moments`."""
-    known = told.index >= 0
+    known = inputs.index >= 0
     mean, scale = np.zeros(len(known)), np.zeros(len(known))
-    mean[known] = moments.mean[told.index[known]]
-    scale[known] = np.sqrt(moments.var + epsilon)[told.index[known]]
+    mean[known] = moments.mean[inputs.index[known]]
+    scale[known] = np.sqrt(moments.var + epsilon)[inputs.index[known]]
     weight, bias = layers.weights[0], layers.biases[0]
-    bias = bias + weight @ ((told.gain * mean + told.offset - layers.mean) / layers.scale)
-    columns = weight * (told.gain * scale / layers.scale)
+    bias = bias + weight @ ((inputs.gain * mean + inputs.offset - layers.mean) / layers.scale)
+    columns = weight * (inputs.gain * scale / layers.scale)
     first = np.zeros((len(bias), len(moments.mean)))
-    first[:, told.index[known]] = columns[:, known]
+    first[:, inputs.index[known]] = columns[:, known]
     return first, bias

@@ -17,7 +17,7 @@ SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
 
 
 class Evaluation(TypedDict):
-    """A line of evaluations.csv: shares of the held-out pushes, and the mean |action|."""
+    """A line of evaluations.csv: fractions of the held-out pushes, and the mean |action|."""
 
     timesteps: int
     recovered: float

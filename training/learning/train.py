@@ -107,7 +107,10 @@ def train(
 
 
 def first_policy(name: str | None) -> Path | PolicyFileConfig | None:
-    """Where a new run begins: a policy folder, a policy from outside, or neither."""
+    """The policy that a new run begins with: a folder, one from outside, or None.
+
+    Raises ConfigError for a name of neither, and for a controller that is no policy.
+    """
     if name is None:
         return None
     if not is_policy(name) and Path(name).suffix not in (".yaml", ".yml"):

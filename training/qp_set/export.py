@@ -226,7 +226,7 @@ The same file holds how joint torques τ [N·m] follow from x, and what the cont
 
     data = np.load("qp00000.npz", allow_pickle=True)  # allow_pickle: for what is None
     torques = data["torque_matrix"] @ x + data["torque_offset"]
-    error = np.abs(torques - data["torques"]) / data["torque_limit"]  # share of the limits
+    error = np.abs(torques - data["torques"]) / data["torque_limit"]  # fraction of the limits
 
 Two forms (`form` in the manifest) of the same problem, with the same torques:
 

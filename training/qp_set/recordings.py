@@ -104,7 +104,7 @@ def recoveries(robot: Robot, controller: str, limits: PushLimits, seed: int) -> 
 
 
 def _push(body: str, limits: PushLimits, seed: int, number: int) -> Push:
-    """Near a direction and a share of the limit that take turns; 5 and 8 have no common factor."""
+    """Near a direction and a fraction of the limit that take turns; 5 and 8 are coprime."""
     rng = generator(seed, number)
     sector = 360.0 / DIRECTIONS
     direction = (sector * (3 * number % DIRECTIONS + rng.uniform(-0.5, 0.5))) % 360.0

@@ -140,7 +140,7 @@ def polar(
 def fall_curves(
     series: Sequence[Series], fits: Mapping[str, LogisticFit], title: str, span: tuple[float, float]
 ) -> Markup:
-    """Share of trials not recovered over the push: bins with their intervals, fitted curves.
+    """Fraction of trials not recovered over the push: bins with their intervals, fitted curves.
 
     A fit whose J50 is only a bound has no curve. `span` is the range of pushes that were tried.
     """
@@ -148,7 +148,7 @@ def fall_curves(
         f"{name} {'half at' if fit.bound is None else 'only a bound,'} {fit.j50:.2f}"
         for name, fit in fits.items()
     )
-    svg = Svg(440.0, 320.0, f"Share of trials not recovered, over {title}: {spans}.")
+    svg = Svg(440.0, 320.0, f"Fraction of trials not recovered, over {title}: {spans}.")
     chart = Chart(svg, (44.0, 30.0, 428.0, 268.0), _padded(np.array(span), 0.03), (-0.02, 1.02))
     chart.y_axis(np.linspace(0, 1, 5).tolist(), ".0%", "not recovered")
     chart.x_axis(ticks(*span), "g", title)
@@ -167,13 +167,13 @@ def fall_curves(
 def level_curves(
     series: Sequence[Series], levels: Sequence[str], title: str, standard: int | None = None
 ) -> Markup:
-    """Recovered share at every level of a factor; `x` counts the levels."""
+    """Recovery rate at every level of a factor; `x` counts the levels."""
     spans = "; ".join(
         f"{s.name} "
         + ", ".join(f"{levels[int(x)]}: {y:.0%}" for x, y in zip(s.x, s.y, strict=True))
         for s in series
     )
-    svg = Svg(440.0, 296.0, f"Recovered share over {title}: {spans}.")
+    svg = Svg(440.0, 296.0, f"Recovery rate over {title}: {spans}.")
     edge = 0.35
     chart = Chart(svg, (44.0, 30.0, 428.0, 268.0), (-edge, len(levels) - 1 + edge), (-0.02, 1.02))
     if standard is not None:
@@ -199,7 +199,7 @@ def level_text(level: str) -> str:
 def rate_series(
     name: str, index: int, x: Sequence[float], counts: Sequence[tuple[int, int]]
 ) -> Series:
-    """Shares with Wilson intervals from (successes, trials) at each x."""
+    """Rates with Wilson intervals from (successes, trials) at each x."""
     ends = [wilson_interval(*count) for count in counts]
     rates = np.array([won / trials for won, trials in counts])
     low, high = np.array(ends, dtype=float).reshape(-1, 2).T
@@ -229,12 +229,12 @@ def _with_ends(s: Series, k: int, form: str, scale: float = 1.0) -> str:
     return text
 
 
-def _padded(values: np.ndarray, share: float) -> tuple[float, float]:
+def _padded(values: np.ndarray, fraction: float) -> tuple[float, float]:
     """The range of the finite values, a little wider; of nothing: 0 to 1."""
     values = values[np.isfinite(values)]
     if not values.size:
         return 0.0, 1.0
-    margin = share * (values.max() - values.min())
+    margin = fraction * (values.max() - values.min())
     return float(values.min() - margin), float(values.max() + margin)
 
 

@@ -99,7 +99,7 @@ def factor_table(results: Results) -> Table | None:
         ]
         for name, factor, level in factor_levels(results)
     ]  # fmt: skip
-    caption = "Recovered share at every level of every factor."
+    caption = "Recovery rate at every level of every factor."
     return Table("factors", caption, columns, rows) if rows else None
 
 
@@ -126,7 +126,7 @@ def sensitivity(results: Results, order: Sequence[str]) -> Table | None:
             shown = cell(change, "+.0f" if abs(change) >= 0.5 else ".0f")
             row.append(shown._replace(ends_text=f"at {level_text(worst['level'])}"))
         rows.append(row)
-    caption = "Change of the recovered share at the worst level of each factor, in percent points."
+    caption = "Change of the recovery rate at the worst level of each factor, in percent points."
     return Table("sensitivity", caption, columns, rows) if rows else None
 
 

@@ -28,7 +28,7 @@ NONE = (np.nan, np.nan)
 
 
 def forests(results: Results) -> list[Markup]:
-    """J50, where it was measured, and the recovered share of all controllers, the best first."""
+    """J50, where it was measured, and the recovery rate of all controllers, the best first."""
     order, entries = results.controllers, results.summary["controllers"]
     j50, rates = [], []
     for name in results.summary["ranking"]:
@@ -71,7 +71,7 @@ def step_lines(results: Results) -> dict[str, tuple[list[float], list[float]]]:
 
 
 def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:
-    """Share of trials that were not recovered over the push, with a title, and its bins as CSV.
+    """Fraction of trials that were not recovered over the push, with a title, and its bins as CSV.
 
     There is a picture of each part whose pushes are measured by a limit.
     """
@@ -85,28 +85,28 @@ def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:
 
 
 def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]]]:
-    share, title = shares(results, part)
+    fraction, title = limit_fractions(results, part)
     series, fits = [], {}
     lines: list[tuple[object, ...]] = []
     for index, name in enumerate(results.controllers):
         mine = [k for k, record in enumerate(results.records)
-                if record.controller == name and np.isfinite(share[k])]  # fmt: skip
+                if record.controller == name and np.isfinite(fraction[k])]  # fmt: skip
         recovered = np.array([results.records[k].recovered for k in mine])
-        fits[name] = fit_logistic(share[mine], recovered)
-        bins = trial_bins(share[mine], recovered, BINS)
+        fits[name] = fit_logistic(fraction[mine], recovered)
+        bins = trial_bins(fraction[mine], recovered, BINS)
         series.append(rate_series(name, index, [b[0] for b in bins], [b[1:] for b in bins]))
         own, fit = series[-1], fits[name]
         lines += [
             (part, name, *bins[k], own.low[k], own.high[k], fit.j50, fit.bound, fit.scale)
             for k in range(len(bins))
         ]
-    tried = share[np.isfinite(share)]
+    tried = fraction[np.isfinite(fraction)]
     picture = fall_curves(series, fits, title, (float(tried.min()), float(tried.max())))
     return picture, lines
 
 
-def shares(results: Results, part: str) -> tuple[np.ndarray, str]:
-    """Every record's push over the limit, NaN for those of other parts, and what it is a share of.
+def limit_fractions(results: Results, part: str) -> tuple[np.ndarray, str]:
+    """Every record's push over the limit, NaN for those of other parts, and what of.
 
     Pushes by direction are measured by the ankle limit, as the summary has it.
     """
@@ -116,14 +116,15 @@ def shares(results: Results, part: str) -> tuple[np.ndarray, str]:
         for direction in (entry.get("directions", ()) if part in DIRECTIONAL else ())
     }
 
-    def share(record: Record) -> float:
+    def fraction(record: Record) -> float:
         if record.part != part:
             return np.nan
         limit = limits.get(record.direction)
         return record.impulse / limit if limit else record.fraction
 
     what = "ankle limit" if limits else results.summary["scale"]
-    return np.array([share(record) for record in results.records]), f"push, in shares of the {what}"
+    found = np.array([fraction(record) for record in results.records])
+    return found, f"push, in fractions of the {what}"
 
 
 def _envelopes(

@@ -25,7 +25,7 @@ def ranking(results: Results, baseline: str) -> Table:
     against, rated = _against(results, baseline), results.summary["rated"]
     mix = f" of the {rated}" if rated else ""
     columns = [
-        Column("rank", "#", "by mean J50, else by the share of the limit, else by rate"),
+        Column("rank", "#", "by mean J50, else by the fraction of the limit, else by rate"),
         Column("controller", "Controller"),
         Column("j50_mean", "J50 [N·s]", "impulse that half of the trials survive, mean over "
                "directions", interval=True),
@@ -35,7 +35,7 @@ def ranking(results: Results, baseline: str) -> Table:
         Column("eta_mean", "η mean", "J50 over the ankle limit, mean of all", interval=True),
         Column("eta_worst", "η worst", "in the worst direction"),
         Column("fraction50", "Half at", f"half of the trials survive, of the {scale}"),
-        Column("recovered_rate", "Recovered", f"share of all trials{mix}", interval=True),
+        Column("recovered_rate", "Recovered", f"fraction of all trials{mix}", interval=True),
         Column("trials", "Trials", f"that the rate is of{mix}"),
         Column("lost", "Lost", f"trials that {baseline} recovers and this controller does not"),
         Column("won", "Won", f"trials that this controller recovers and {baseline} does not"),
@@ -106,7 +106,7 @@ def pairs(results: Results) -> Table:
 
 
 def directions(results: Results) -> Table | None:
-    """J50 or the share of the limit in every direction; None where no suite measured it."""
+    """J50 or the fraction of the limit in every direction; None where no suite measured it."""
     columns = [
         Column("controller", "Controller"),
         Column("direction", "Direction [°]", "counter-clockwise from forward"),
@@ -114,13 +114,13 @@ def directions(results: Results) -> Table | None:
         Column("recovered", "Recovered"),
         Column("j50", "J50 [N·s]", interval=True),
         Column("j90", "J90 [N·s]", interval=True),
-        Column("fraction50", "Half at", "share of the limit", interval=True),
+        Column("fraction50", "Half at", "fraction of the limit", interval=True),
         Column("ankle_limit", "Ankle limit [N·s]"),
         Column("eta", "η"),
     ]
     for name, title in STEP_LIMITS.items():
         columns.append(Column(f"step_limit_{name}", title, "of a pendulum that steps [N·s]"))
-        columns.append(Column(f"step_share_{name}", "of it", "share of that limit that J50 is"))
+        columns.append(Column(f"step_share_{name}", "of it", "fraction of that limit that J50 is"))
     rows: list[list[Cell]] = []
     for name, index, entry in per_direction(results):
         bound = BOUNDS[_bound(entry)]
@@ -134,8 +134,8 @@ def directions(results: Results) -> Table | None:
             figure_cell(entry, "eta", ".2f"),
         ])  # fmt: skip
         for key in STEP_LIMITS:
-            share = figure_cell(entry, f"step_share_{key}", ".2f", sign=bound)
-            rows[-1] += [figure_cell(entry, f"step_limit_{key}", ".1f"), share]
+            fraction = figure_cell(entry, f"step_share_{key}", ".2f", sign=bound)
+            rows[-1] += [figure_cell(entry, f"step_limit_{key}", ".1f"), fraction]
     if not rows:
         return None
     return Table("directions", "Every direction.", columns, rows).without_empty()
@@ -173,7 +173,7 @@ def smallest(results: Results, order: Sequence[str]) -> Table:
     columns = [
         Column("controller", "Controller"),
         Column("trial", "Trial", "its number in trials.csv"),
-        Column("limit_fraction", "Push", "share of the limit"),
+        Column("limit_fraction", "Push", "fraction of the limit"),
         Column("impulse", "Impulse [N·s]"),
         Column("direction", "Direction [°]", "counter-clockwise from forward"),
         Column("duration", "Duration [s]"),

@@ -36,11 +36,11 @@ def push_text(record: Record, trial: Trial) -> str:
     """The first push in words, and in what the trial differs from the standard one."""
     if not math.isfinite(record.impulse):
         return "No push."
-    share = f", {record.fraction:.2f} of the limit" if math.isfinite(record.fraction) else ""
-    share += "".join(f"; {text}" for text in _world(trial))
+    details = f", {record.fraction:.2f} of the limit" if math.isfinite(record.fraction) else ""
+    details += "".join(f"; {text}" for text in _world(trial))
     return (
         f"{record.impulse:.1f}\u00a0N·s in {record.duration:.2f}\u00a0s on {record.line['body']}, "
-        f"towards {record.direction:.0f}° ({towards(record.direction)}){share}."
+        f"towards {record.direction:.0f}° ({towards(record.direction)}){details}."
     )
 
 

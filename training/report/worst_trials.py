@@ -171,5 +171,5 @@ def compressed(frame: np.ndarray) -> bytes:
 
 
 def _size(record: Record) -> tuple[float, int]:
-    """Sorts by the share of the limit, then by number; trials without a push come last."""
+    """Sorts by the fraction of the limit, then by number; trials without a push come last."""
     return (record.fraction if math.isfinite(record.fraction) else math.inf, record.trial)

@@ -35,7 +35,7 @@ class SoleFigures:
 
 @dataclass(frozen=True)
 class RobotCheck:
-    """What `check_robot` finds.
+    """The findings of `check_robot`.
 
     Attributes:
         name, fingerprint: of the robot.
@@ -46,7 +46,7 @@ class RobotCheck:
         torque_limits: joint → largest torque of its motor [N·m].
         without_motor: joints that nothing drives.
         soles, legs, posture: see there.
-        both_feet: what standing asks of the motors.
+        both_feet: the torques that standing needs.
         one_foot: foot → the same with the other foot lifted; None where no posture was found in
             which the CoM is over that foot.
         sole_contacts: foot → at how many points it touches the ground in MuJoCo.

@@ -1,4 +1,4 @@
-"""What will go wrong with a robot, and what helps."""
+"""Faults of a robot that will keep it from standing or walking, and their remedies."""
 
 from __future__ import annotations
 

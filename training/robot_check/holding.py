@@ -1,4 +1,4 @@
-"""Which share of its torque limits a robot needs to hold a posture: inverse dynamics at rest."""
+"""The fraction of its torque limits that holds a posture: inverse dynamics at rest."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from poise.envs.robots.robot import Robot
 
 @dataclass(frozen=True)
 class Holding:
-    """What holding a posture asks of the motors.
+    """The torques that hold a posture, as a fraction of the motors' limits.
 
     Attributes:
         torque_fraction: the largest |τ|/τ_max of all motors, for the forces of the ground that make
@@ -28,7 +28,7 @@ class Holding:
 
     @property
     def possible(self) -> bool:
-        """Whether the motors hold it."""
+        """True where the motors can hold the posture."""
         return self.torque_fraction is not None and self.torque_fraction <= 1.0
 
 
@@ -76,5 +76,5 @@ def _corner_jacobians(robot: Robot, data: mujoco.MjData, sole: int) -> np.ndarra
 
 
 def _rounding(robot: Robot) -> float:
-    """What a row may be off, as the solver of the linear program leaves it [N, N·m]."""
+    """The error of a row that the solver of the linear program may leave [N, N·m]."""
     return 1e-6 * robot.units.moment

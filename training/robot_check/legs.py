@@ -1,4 +1,4 @@
-"""What the joints of a leg can do: how far its knee is bent, about which axes its ankle turns."""
+"""The joints of a leg: how far its knee is bent, and the axes that its ankle turns about."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far the CoP gets from a standing robot's CoM, and which push that stops."""
+"""The reach of the CoP from a standing robot's CoM, and the push that it stops."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What of a robot touches what in the standing posture: bodies each other, soles the ground."""
+"""Contacts in the standing posture: of bodies with each other, of soles with the ground."""
 
 from __future__ import annotations
 

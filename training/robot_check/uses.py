@@ -1,4 +1,4 @@
-"""Which packaged controllers take a robot."""
+"""The packaged controllers that take a robot."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The form of summary.json: what is written and what is read.
 
-Impulses are N·s, lengths m, rates and gains shares; an `Interval` is [low, high] of 95 %. null is
-"no such value"; a key that a suite does not measure is left out.
+Impulses are N·s, lengths m, rates and gains fractions; an `Interval` is [low, high] of 95 %. null
+is "no such value"; a key that a suite does not measure is left out.
 """
 
 # without `from __future__ import annotations`: TypedDict must see which keys are required
@@ -60,8 +60,10 @@ class Angle(TypedDict):
 
 
 class Sector(Angle):
-    """Random pushes within 22.5° of a direction: the share of the limit at which half of them are
-    recovered."""
+    """Random pushes within 22.5° of a direction.
+
+    `fraction50` is the fraction of the limit at which half of them are recovered.
+    """
 
     trials: int
     recovered: int
@@ -159,7 +161,7 @@ class Eurobench(TypedDict):
 
 
 class Fractions(TypedDict, total=False):
-    """The share of the limit at which half of the random pushes are recovered."""
+    """The fraction of the limit at which half of the random pushes are recovered."""
 
     fraction_of: str
     fraction50: float

@@ -17,7 +17,7 @@ from scipy import signal
 
 CUTOFF = 10.0  # [Hz] of the second-order Butterworth low-pass
 QUIET_SWAY = 0.015  # [rad/s] below which the body has recovered
-FALLS = 0.3  # share of falls at which a level is lost
+FALLS = 0.3  # fraction of falls at which a level is lost
 RUNS = 10  # of a level, at least
 
 # The protocol's human of medium size.

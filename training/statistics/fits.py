@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import expit
 
-# Where the weak prior puts the scale s of the logistic curve, as a share of the mean impulse.
+# Where the weak prior puts the scale s of the logistic curve, as a fraction of the mean impulse.
 PRIOR_SCALE = 0.05
 LOG_9 = float(np.log(9.0))  # logit of 0.9
 MAX_ITERATIONS = 60

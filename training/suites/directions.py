@@ -72,7 +72,7 @@ class Envelope(Part):
             low, high = (draw.robot.mass * j for j in self.impulses)
         else:
             limit = draw.limits.ankle(angle, draw.standard.push_duration)
-            low, high = (share * limit for share in self.fractions)
+            low, high = (fraction * limit for fraction in self.fractions)
         return low, high
 
     def _rough(self, first: Sequence[Trial], recovered: Sequence[bool], angle: float) -> float:

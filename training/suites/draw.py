@@ -84,8 +84,8 @@ class Draw:
         for angle, low, high, count in ranges:
             for part in range(count):
                 here = number + len(trials)
-                share = (part + generator(self.seed, here).uniform()) / count
-                push = self.push(angle, low + share * (high - low))
+                fraction = (part + generator(self.seed, here).uniform()) / count
+                push = self.push(angle, low + fraction * (high - low))
                 trials.append(self.trial(here, [push], part="envelope", stage=stage))
         return trials
 
@@ -93,10 +93,10 @@ class Draw:
         """(direction, fraction) with one of each in each of `count` equal parts, shuffled."""
         rng = np.random.default_rng(np.random.SeedSequence([self.seed, number, 2]))
         angles = 360.0 * (np.arange(count) + rng.uniform(size=count)) / count
-        shares = (rng.permutation(count) + rng.uniform(size=count)) / count
+        places = (rng.permutation(count) + rng.uniform(size=count)) / count
         low, high = fractions
         return [
-            (float(a), float(low + u * (high - low))) for a, u in zip(angles, shares, strict=True)
+            (float(a), float(low + u * (high - low))) for a, u in zip(angles, places, strict=True)
         ]
 
     def height(self, body: str) -> float:

@@ -42,7 +42,7 @@ class Cell:
     count: int = 1
 
     def push(self, draw: Draw, angle: float, fraction: float) -> Push:
-        """A push of a share of the ankle limit for its duration."""
+        """A push of a fraction of the ankle limit for its duration."""
         duration = draw.standard.push_duration if self.duration is None else self.duration
         push = draw.push(angle, fraction * draw.limits.ankle(angle, duration))
         body = self.body or push.body
@@ -101,7 +101,7 @@ class Mix(Part):
     friction: Range = field(default=(0.4, 1.0), metadata={"above": 0.0})
     delay: tuple[float, ...] = field(default=(0.0,), metadata={"min": 0.0, "max": 0.1})
     mass_error: Range = field(default=(-0.1, 0.1), metadata={"above": -1.0, "max": 1.0})
-    repeated: float = field(default=0.25, metadata={"min": 0.0, "max": 1.0})  # share pushed twice
+    repeated: float = field(default=0.25, metadata={"min": 0.0, "max": 1.0})  # are pushed twice
 
     def __post_init__(self) -> None:
         for name in ("fractions", "duration", "height", "friction", "mass_error"):

@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from poise.baselines.controller import told_by
+from poise.baselines.controller import as_base_controller
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.stepping.config import StepLimits
 from poise.baselines.stepping.controller import SteppingController
@@ -21,7 +21,7 @@ from .agents import Agent
 from .push_limits import PushLimits
 from .trial import Outcome
 
-STEPPING = 0.1  # share of recoveries with a step, from which a controller is one that steps
+STEPPING = 0.1  # fraction of recoveries with a step, from which a controller is one that steps
 COUNTS: dict[str, float] = {"1": 1, "2": 2, "inf": np.inf}  # steps, by their name in summary.json
 DRAWN = {"1": "one-step limit", "2": "two-step limit"}
 ROOM = 2.5  # times all else in a plot: what lies further out is cut off
@@ -66,8 +66,11 @@ class NStepLimit:
         return mass * omega * d * duration_factor(omega, duration)
 
     def add_to(self, figures: EnvelopeFigures, duration: float) -> None:
-        """Complete the figures of an envelope: in each of its `directions` r, l and T_s, the limits
-        of `COUNTS` and the share of each that J50 is; over all directions the shares' means."""
+        """Complete the figures of an envelope.
+
+        Each of its `directions` gets r, l and T_s, the limits of `COUNTS` and the fraction of each
+        that J50 is; the envelope gets the fractions' means over all directions.
+        """
         for entry in figures["directions"]:
             angle = entry["direction"]
             entry["step_reach"], entry["step_length"] = self.reach(angle), self.length(angle)
@@ -76,8 +79,8 @@ class NStepLimit:
             found = {f"step_share_{n}": entry["j50"] / limits[f"step_limit_{n}"] for n in COUNTS}
             entry.update(cast(Direction, limits | found))
         entries = cast(list[dict[str, float]], figures["directions"])
-        shares = {name: [entry[f"step_share_{name}"] for entry in entries] for name in COUNTS}
-        means = {f"step_share_{name}_mean": float(np.mean(shares[name])) for name in COUNTS}
+        fractions = {name: [entry[f"step_share_{name}"] for entry in entries] for name in COUNTS}
+        means = {f"step_share_{name}_mean": float(np.mean(fractions[name])) for name in COUNTS}
         figures.update(cast(EnvelopeFigures, means))
 
 
@@ -107,7 +110,7 @@ def _own_limits(agent: Agent) -> StepLimits | None:
     env = agent.env
     if not isinstance(env, ResidualBalanceEnv):
         return None
-    controller = told_by(env.controller, env.robot).unwrapped
+    controller = as_base_controller(env.controller, env.robot).unwrapped
     return controller.step_limits if isinstance(controller, SteppingController) else None
 
 

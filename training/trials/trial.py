@@ -79,7 +79,7 @@ class Outcome:
         max_slide: largest distance of a sole from where it started.
         energy: ∫ Σ |τ q̇| dt [J].
         peak_torque: largest |τ| over its limit.
-        saturation: share of motors and ticks at the limit.
+        saturation: fraction of motors and ticks at the limit.
         solver_failures: ticks at which the QP was not solved.
         mean_abs_action: mean |action| after the first second.
         com_drift: without a push, largest horizontal distance of the CoM from where it was after

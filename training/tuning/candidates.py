@@ -43,7 +43,7 @@ class TuningPushes:
         if not self.directions:
             raise ValueError("directions: must be one or more")
         if not self.levels or min(self.levels) <= 0.0:
-            raise ValueError("levels: must be one or more shares above 0")
+            raise ValueError("levels: must be one or more fractions above 0")
 
     def draw(self, seed: int, robot: Robot, limits: np.ndarray) -> list[Trial]:
         """Trials, direction by direction; directions are jittered, so that all angles occur.

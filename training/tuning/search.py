@@ -41,7 +41,7 @@ class TuneConfig:
         policy: a policy on top of the candidates counts too, by `policy_share` of the whole.
         in_place: a foot that moves is no recovery.
         generations, population, spread: of CMA-ES; spread is the first standard deviation, as a
-            share of each range.
+            fraction of each range.
     """
 
     controller: str
@@ -233,10 +233,10 @@ class _Search:
         return found.shape in sizes and bool(np.all((found >= 0.0) & (found <= 1.0)))
 
     def _take(self, units: list[np.ndarray], values: list[list[list[float]]]) -> None:
-        share = self.config.policy_share if values[1][0] else 0.0
+        fraction = self.config.policy_share if values[1][0] else 0.0
         scores = np.zeros(len(units))
         shape = (len(units), len(self.limits[0]), len(self.config.pushes.levels))
-        for agent, weight in enumerate((1.0 - share, share)):
+        for agent, weight in enumerate((1.0 - fraction, fraction)):
             if values[agent][0]:
                 found = np.reshape(values[agent], shape)
                 scores += weight * found.mean(axis=(1, 2))

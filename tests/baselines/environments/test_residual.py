@@ -9,7 +9,8 @@ import pytest
 
 from poise.baselines.controller import Targets
 from poise.baselines.environments.policy_step import gate_opening
-from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.environments.scales import ResidualScales
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.targets import Motion, update_targets
 from poise.baselines.registry import controller_config, load_controller

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
+from poise.baselines.environments.scales import StepScales
+from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.stepping.guidance import copy_reference, guide_com
 from poise.configs.errors import ConfigError
 from poise.envs.sensors.delayed import DelayedState
@@ -182,7 +183,7 @@ def test_observation_tells_of_the_step():
     seen = dict(zip(names, env.episode.observation, strict=True))
     controller, state = env.controller, env.simulation.state
     assert [seen["swing.left"], seen["swing.right"]] == [controller.foot == 0, controller.foot == 1]
-    assert seen["phase.share"] == pytest.approx(controller.swing.time / controller.swing.duration)
+    assert seen["phase.fraction"] == pytest.approx(controller.swing.time / controller.swing.duration)
     assert seen["steps.count"] == 1.0 and seen["time_left.t"] > 0.0
     cos, sin = state.heading
     axes, half = np.array([[cos, -sin], [sin, cos]]), 0.5 * env.robot.height_com

@@ -157,7 +157,7 @@ def test_targets_may_be_moved_too():
     """Scales put entries before those of the motors, which move what they move elsewhere."""
     env = ResidualWholeEnv(robot(), residual={"com": 0.1}, **SHORT)
     plain = ResidualBalanceEnv(robot(), residual={"com": 0.1, "cop": 0.0}, **SHORT)
-    motors = [robot().model.actuator(i).name for i in range(robot().model.nu)]
+    motors = robot().motor_names
     assert env.action_names == ("com_x", "com_y", *motors, "authority")
     action = np.zeros(env.action_space.shape)
     action[:2] = 0.3, -0.2

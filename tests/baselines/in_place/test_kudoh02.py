@@ -49,7 +49,7 @@ def test_the_rule_and_its_hysteresis(standing):
     shares = []
     for _ in range(6):
         at(0.01)
-        shares.append(controller._share)
+        shares.append(controller._qp_fraction)
     np.testing.assert_allclose(shares, [0.8, 0.6, 0.4, 0.2, 0.0, 0.0], atol=1e-12)
     np.testing.assert_array_equal(at(0.01), pd)
     controller.reset()

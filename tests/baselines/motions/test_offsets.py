@@ -1,7 +1,6 @@
 """One order of what may be added to a controller's choices."""
 
-from poise.baselines.environments.residual import ResidualScales
-from poise.baselines.environments.stepping import StepScales
+from poise.baselines.environments.scales import ResidualScales, StepScales
 from poise.baselines.motions import offsets
 from poise.baselines.stepping.controller import StepOffsets
 

@@ -272,7 +272,7 @@ def test_a_simulation_that_diverged_is_a_fall(robot: Robot, own: Path) -> None:
         ({"action_joints": [1, 23]}, ("action_joints: must be different places in 23 joints",)),
         ({"action_joints": [0, 1]}, ("does not take",)),
         ({"action_clip": [[-1.0, 1.0]]}, ("action_clip: has 1 pairs for 23",)),
-        ({"policy_period": 0.0213}, ("policy_period: 0.0213 s is no whole number",)),
+        ({"policy_period": 0.0213}, ("policy_period: 0.0213 s is not a whole number",)),
         ({"policy_period": 0.0}, ("policy_period: must be above 0",)),
         ({"command": [0.0]}, ("command: must be a list of 3",)),
         ({"speed": 1.0}, ("speed: unknown field", "policy_period")),

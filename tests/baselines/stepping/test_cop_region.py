@@ -10,6 +10,7 @@ from poise.envs.maths.pendulum import capture_distance, drifted
 from poise.envs.maths.polygons import clipped
 from poise.envs.maths.vectors import turn
 from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.robot import load_robot
 from tests.support import stepping_reference as readable
 from tests.support.shared import robot
 
@@ -111,15 +112,20 @@ def generic_feet(rng):
     return feet @ turn(yaw).T + rng.normal(size=2), yaw
 
 
-def test_reach_of_two_soles_is_the_hull_of_all_shares():
+def both_soles(region, feet, yaw):
+    """Points that two soles reach under all fractions of the load (n, 2)."""
+    return np.vstack([
+        load * feet[0] + (1.0 - load) * feet[1] + sums @ turn(yaw).T
+        for load, sums in zip(LOAD_FRACTIONS, region.arrays.sums, strict=True)
+    ])  # fmt: skip
+
+
+def test_reach_of_two_soles_is_the_hull_of_all_loads():
     """The corners that Qhull finds, no others: their mean is where the robot comes to rest."""
     region, rng = CopRegion(robot()), np.random.default_rng(5)
     for _ in range(20):
         feet, yaw = generic_feet(rng)
-        cloud = np.vstack([
-            share * feet[0] + (1.0 - share) * feet[1] + sums @ turn(yaw).T
-            for share, sums in zip(LOAD_FRACTIONS, region.arrays.sums, strict=True)
-        ])  # fmt: skip
+        cloud = both_soles(region, feet, yaw)
         expected = cloud[ConvexHull(cloud).vertices]
         corners = region.both(feet, yaw)
         order, other = np.lexsort(corners.T.round(9)), np.lexsort(expected.T.round(9))
@@ -127,6 +133,20 @@ def test_reach_of_two_soles_is_the_hull_of_all_shares():
         edges = np.roll(corners, -1, axis=0) - corners
         ahead = np.roll(edges, -1, axis=0)
         assert np.all(edges[:, 0] * ahead[:, 1] - edges[:, 1] * ahead[:, 0] > 0.0)
+
+
+@pytest.mark.parametrize("name", ["humanoid", "compact"])
+def test_reach_of_two_soles_along_the_axes(name):
+    """Feet that face along x: points of one upright edge differ in x by rounding."""
+    region, rng = CopRegion(load_robot(name)), np.random.default_rng(7)
+    for _ in range(20):
+        feet = rng.uniform(-0.2, 0.2, (2, 2)) + np.array([[0.0, 0.2], [0.0, -0.2]])
+        feet[1, 0] = feet[0, 0] + rng.uniform(-1e-15, 1e-15)
+        expected = ConvexHull(both_soles(region, feet, 0.0))
+        corners = region.both(feet, 0.0)
+        found = ConvexHull(corners)
+        assert len(found.vertices) == len(corners)
+        assert found.volume == pytest.approx(expected.volume, rel=1e-9)  # in the plane, the area
 
 
 def test_distance_beyond_the_reach_is_that_of_the_readable_form():

@@ -262,7 +262,7 @@ def test_largest_excursions_are_kept():
 
 
 def test_ticks_account_for_power_and_saturation():
-    """Energy is Σ|τ q̇| dt, saturation the share of motors at their limit."""
+    """Energy is Σ|τ q̇| dt, saturation the fraction of motors at their limit."""
     simulation = generic_state()
     r = robot()
     e = new_episode(1)

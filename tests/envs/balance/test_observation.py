@@ -23,7 +23,7 @@ def terms_of(r, actions, names=None):
     """The terms of a robot, by default those that are on."""
     sizes = {
         "joints": r.joint_names,
-        "motors": tuple(r.model.actuator(i).name for i in range(r.model.nu)),
+        "motors": r.motor_names,
         "feet": tuple(sole.name for sole in r.soles),
         "actions": actions,
     }

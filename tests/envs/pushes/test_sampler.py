@@ -73,7 +73,7 @@ def test_magnitude_does_not_disturb_the_other_draws(robot, sampler):
 
 
 def test_probability_of_no_push(robot, sampler):
-    """no_push is the share of episodes without a push."""
+    """no_push is the fraction of episodes without a push."""
     rng = np.random.default_rng(0)
     sampler = replace(sampler, no_push=0.3)
     quiet = [not sampler.sample(rng, robot) for _ in range(1000)]

@@ -6,9 +6,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from poise.baselines.environments.residual import ResidualBalanceEnv, ResidualScales
-from poise.baselines.environments.stepping import ResidualStepEnv, StepScales
-from poise.baselines.environments.whole import ResidualWholeEnv, WholeScales
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.environments.scales import ResidualScales, StepScales, WholeScales
+from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.configs.errors import ConfigError
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.terms import TERMS

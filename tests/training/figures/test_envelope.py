@@ -144,7 +144,7 @@ def test_series_differ_without_colour(tmp_path):
 
 
 def test_dots_are_falls_with_wilson_bars(tmp_path, figures):
-    """With few distinct impulses each is a dot at its share of falls, with its Wilson interval."""
+    """With few distinct impulses each is a dot at its rate of falls, with its Wilson interval."""
     impulse = np.repeat([10.0, 14.0], [10, 20])
     recovered = np.r_[np.ones(9), 0, np.ones(5), np.zeros(15)]
     fall_probability(tmp_path / "a.png", {"a": (impulse, recovered)})

@@ -280,7 +280,7 @@ def test_a_damaged_run_is_not_resumed(run, spoil):
 
 
 def test_the_curriculum_grows_the_pushes(tmp_path, monkeypatch):
-    """The largest push starts small and reaches its size after its share of the run."""
+    """The largest push starts small and reaches its size after its fraction of the run."""
     largest = []
     start = schedules.CurriculumCallback._on_rollout_start
 

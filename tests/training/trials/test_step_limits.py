@@ -182,7 +182,7 @@ def test_the_envelope_of_one_that_steps_is_measured_by_the_step_limits() -> None
 def test_an_evaluation_draws_and_prints_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The PNG gets the lines of the planner's limits, the table the mean share of one."""
+    """The PNG gets the lines of the planner's limits, the table the mean fraction of one."""
     drawn: dict[str, Any] = {}
     monkeypatch.setattr(evaluation, "Executor", InProcess)
     monkeypatch.setattr(InProcess, "stop_after", None)

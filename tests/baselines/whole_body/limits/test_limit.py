@@ -86,7 +86,7 @@ def test_optimality_conditions_with_limits():
 
 
 def test_the_gains_have_the_robot_s_units():
-    """A share of the motors' torques, zero without a motor; speeds in ω, times in 1/ω."""
+    """A fraction of the motors' torques, zero without a motor; speeds in ω, times in 1/ω."""
     robot, limits = robot_named("humanoid"), controller().limits
     torque, speed = limits["torque"].block, limits["joint-speed"].block
     names = [robot.joint_names[i] for i in torque.joints]
