@@ -94,7 +94,7 @@ def test_figures_of_a_result(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     """Those of this very policy, by its fingerprint; else one line."""
     run = str(finished_run())
     suite = tmp_path / "s.yaml"
-    suite.write_text(yaml.safe_dump({"duration": 0.4, "quiet": {"trials": 2}}))
+    suite.write_text(yaml.safe_dump({"duration": 1.1, "quiet": {"trials": 2}}))
     assert main(["evaluate", "zero", run, "--suite", str(suite), "--out", str(tmp_path / "r"),
                  "--workers", "1"]) == 0  # fmt: skip
     given = ["--result", str(tmp_path / "r"), "--licence", "mit"]

@@ -45,8 +45,9 @@ def test_sb3_loads_what_acts_as_the_policy() -> None:
     sides = [stored.policy.predict_values(each).detach().numpy() for each in (tensor, image)]
     np.testing.assert_allclose(values[0], 0.5 * (sides[0] + sides[1]), rtol=1e-4, atol=1e-4)
     assert model.num_timesteps == policy(SYMMETRIC).state["timesteps"]
-    model.set_env(normalize)
-    model.learn(model.n_steps * 2)  # it can go on learning
+    again = PPO.load(folder / ARCHIVE, env=normalize, device="cpu")
+    again.learn(2 * again.n_steps)  # it can go on learning
+    assert again.num_timesteps == 2 * again.n_steps
     venv.close()
 
 
