@@ -8,6 +8,7 @@ import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -35,7 +36,7 @@ def test_nothing_is_written_where_the_check_fails(
     assert list((tmp_path / "deep").iterdir()) == []
 
 
-def head_of(folder: Path) -> tuple[dict[str, object], str]:
+def head_of(folder: Path) -> tuple[dict[str, Any], str]:
     _, head, page = (folder / "README.md").read_text().split("---\n", 2)
     return yaml.safe_load(head), page
 
