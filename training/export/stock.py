@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.mirror import Mirror
@@ -18,8 +22,7 @@ from poise.training.learning.vec_env import ThreadedVecEnv
 
 from .check import compared, observations
 
-if TYPE_CHECKING:
-    from torch import Tensor
+Weights = dict[str, np.ndarray]  # by their names in SB3's state_dict
 
 NORMALISATION = "vec_normalize.pkl"  # the name that huggingface_sb3 gives it
 TOLERANCE = 1e-4  # of an action: SB3 computes with 32 bits
@@ -33,16 +36,18 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
     one that is twice as wide, and as symmetric. The optimizer begins anew. Raises PoiseError where
     what SB3 makes of an observation differs by more than `TOLERANCE`.
     """
+    import torch
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import VecNormalize
 
-    weights, config = _ordinary(read_weights(source / POLICY), policy)
+    stored = {name: values.numpy() for name, values in read_weights(source / POLICY).items()}
+    weights, config = _ordinary(stored, policy)
     normalize = VecNormalize(ThreadedVecEnv([env]), gamma=config.ppo.gamma)
     _set_statistics(normalize, source)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of a batch that one environment cannot fill
         model = make_model(config, normalize)
-        model.policy.load_state_dict(weights)
+        model.policy.load_state_dict({k: torch.as_tensor(v) for k, v in weights.items()})
         model.num_timesteps = int(policy.state["timesteps"])
         plain(model).save(folder / archive, exclude=LEFT_OUT)
     normalize.save(str(folder / NORMALISATION))
@@ -52,7 +57,7 @@ def write_stock(folder: Path, archive: str, policy: Policy, env: BalanceEnv, sou
     compared(actions, policy.predict(seen)[0], TOLERANCE, archive)
 
 
-def _ordinary(weights: dict[str, Tensor], policy: Policy) -> tuple[dict[str, Tensor], TrainConfig]:
+def _ordinary(weights: Weights, policy: Policy) -> tuple[Weights, TrainConfig]:
     """Weights and configuration of the policy as an ordinary one, in one environment."""
     ppo = replace(policy.config.ppo, n_envs=1, symmetric=False)
     if policy.mirrors is not None:
@@ -78,7 +83,7 @@ def _set_statistics(normalize: Any, source: Path) -> None:
     normalize.training = normalize.norm_reward = False
 
 
-def both_sides(weights: dict[str, Tensor], see: Mirror, do: Mirror) -> dict[str, Tensor]:
+def both_sides(weights: Mapping[str, np.ndarray], see: Mirror, do: Mirror) -> Weights:
     """The weights of an ordinary network that is the mean of f and of its mirror image.
 
     The first layer sees o by W and M_o o by W M_o; further ones treat both alike; the last one is
@@ -87,42 +92,23 @@ def both_sides(weights: dict[str, Tensor], see: Mirror, do: Mirror) -> dict[str,
     return {name: _both(name, values, see, do) for name, values in weights.items()}
 
 
-def _both(name: str, values: Tensor, see: Mirror, do: Mirror) -> Tensor:
+def _both(name: str, values: np.ndarray, see: Mirror, do: Mirror) -> np.ndarray:
     """One array of `both_sides`, by its name in SB3's state_dict."""
-    import torch
-
     if name == "log_std":
-        return 0.5 * (values + values[torch.as_tensor(do.order)])
+        return 0.5 * (values + values[do.order])
     if name.startswith("action_net."):
-        return _mean_of(values, _image_of_actions(values, do))
+        return _mean_of(values, do(values.T).T)
     if name.startswith("value_net."):
         return _mean_of(values, values)
-    if values.dim() == 1:
-        return torch.cat([values, values])
+    if values.ndim == 1:
+        return np.concatenate([values, values])
     if name.endswith("_net.0.weight"):
-        return torch.cat([values, _of_image(values, see)])
-    return torch.block_diag(values, values)
+        image = np.zeros_like(values)
+        image[:, see.order] = see.sign * values
+        return np.concatenate([values, image])
+    return block_diag(values, values)
 
 
-def _mean_of(values: Tensor, image: Tensor) -> Tensor:
+def _mean_of(values: np.ndarray, image: np.ndarray) -> np.ndarray:
     """A last layer, weight or bias, that gives the mean of two."""
-    import torch
-
-    return 0.5 * (torch.cat([values, image], 1) if values.dim() == 2 else values + image)
-
-
-def _image_of_actions(values: Tensor, do: Mirror) -> Tensor:
-    """M_a W, or M_a b."""
-    import torch
-
-    sign = torch.as_tensor(do.sign, dtype=values.dtype)
-    return sign.reshape(-1, *[1] * (values.dim() - 1)) * values[torch.as_tensor(do.order)]
-
-
-def _of_image(values: Tensor, see: Mirror) -> Tensor:
-    """W M_o."""
-    import torch
-
-    image = torch.zeros_like(values)
-    image[:, torch.as_tensor(see.order)] = values * torch.as_tensor(see.sign, dtype=values.dtype)
-    return image
+    return 0.5 * (np.concatenate([values, image], 1) if values.ndim == 2 else values + image)

@@ -8,6 +8,7 @@ import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -35,7 +36,7 @@ def test_nothing_is_written_where_the_check_fails(
     assert list((tmp_path / "deep").iterdir()) == []
 
 
-def head_of(folder: Path) -> tuple[dict[str, object], str]:
+def head_of(folder: Path) -> tuple[dict[str, Any], str]:
     _, head, page = (folder / "README.md").read_text().split("---\n", 2)
     return yaml.safe_load(head), page
 
@@ -94,7 +95,7 @@ def test_figures_of_a_result(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     """Those of this very policy, by its fingerprint; else one line."""
     run = str(finished_run())
     suite = tmp_path / "s.yaml"
-    suite.write_text(yaml.safe_dump({"duration": 0.4, "quiet": {"trials": 2}}))
+    suite.write_text(yaml.safe_dump({"duration": 1.1, "quiet": {"trials": 2}}))
     assert main(["evaluate", "zero", run, "--suite", str(suite), "--out", str(tmp_path / "r"),
                  "--workers", "1"]) == 0  # fmt: skip
     given = ["--result", str(tmp_path / "r"), "--licence", "mit"]
