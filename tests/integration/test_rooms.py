@@ -39,7 +39,7 @@ FLOORS = """
 15 training/figures, training/suites, training/tuning
 16 training/evaluation, training/qp_set, training/robot_check
 17 training/results
-18 training/report
+18 training/report, training/view
 19 training/cli
 20 envs, baselines, training
 """

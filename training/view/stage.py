@@ -1,0 +1,138 @@
+"""The scene: ground, robots side by side, their names and marks; the camera goes with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import viser
+
+from poise.envs.robots.robot import Robot
+from poise.envs.viewing.camera import Camera
+from poise.envs.viewing.overlays import Mark
+
+from .frames import Frame
+from .marks import Marks
+from .mouse import Pull, pull
+from .robots import Robots
+
+ROOT = "/world"  # of the scene, moved against the robot
+LANE = 1.7  # distance of robots side by side, over CoM height
+FOLLOW = 0.4  # [s] time constant with which the scene follows the robot
+CAMERA = Camera(azimuth=35.0, elevation=14.0, distance=4.0)
+LOOK_AT = 0.85  # height that the camera looks at, over CoM height
+FIELD_OF_VIEW = 32.0  # [deg], vertical
+NAME_AT = 2.05  # height of a robot's name above the ground, over CoM height
+LIGHT, DARK = (206, 209, 212), (90, 94, 100)  # lines on the ground
+BACKGROUND = {False: (255, 255, 255), True: (20, 21, 23)}  # dark → colour
+GROUND = {False: (232, 234, 236), True: (62, 66, 72)}  # dark → colour
+Grabbed = Callable[[str, Pull], None]  # phase of the drag, what it is now
+
+
+class Stage:
+    """What is seen of robots of one kind, one for each name.
+
+    Args:
+        server: whose scene it is.
+        robot: their kind.
+        names: above them.
+        grabbed: called while a body is dragged with the mouse, in the server's thread.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, robot: Robot, names: Sequence[str], grabbed: Grabbed
+    ):
+        self._server, self.robot, self._grabbed = server, robot, grabbed
+        size, count = robot.height_com, len(names)
+        middle = 0.5 * (count - 1)
+        self._offsets = np.array([[0.0, LANE * size * (middle - k), 0.0] for k in range(count)])
+        scene = server.scene
+        self._root = scene.add_frame(ROOT, show_axes=False)
+        self.robots = Robots(scene, ROOT, robot, count)
+        self.marks = Marks(scene, ROOT)
+        self._names = [
+            scene.add_label(f"{ROOT}/names/{k}", name, anchor="bottom-center")
+            for k, name in enumerate(names)
+        ]
+        self.pull: Pull | None = None  #: that is drawn
+        self.following = True
+        self._middle, self._time = np.zeros(3), np.inf
+        self._frames: Sequence[Frame] = ()
+        for mesh in self.robots.meshes:
+            mesh.handle.on_drag("left")(self._dragged(mesh.body))
+        _point_camera(server, size, count)
+
+    def show(self, frames: Sequence[Frame]) -> None:
+        """Show the robots and their marks, one frame for each."""
+        self._frames = frames
+        self._follow(frames)
+        found: list[tuple[Mark, np.ndarray]] = [
+            (mark, offset)
+            for frame, offset in zip(frames, self._offsets, strict=True)
+            for mark in frame.marks
+        ]
+        if self.pull is not None:
+            found.append((self.pull.mark(self.robot), np.zeros(3)))
+        with self._server.atomic():
+            self._root.position = -self._middle
+            self.robots.show(frames, self._offsets)
+            self.marks.show(found)
+            for label, frame, offset in zip(self._names, frames, self._offsets, strict=True):
+                up = np.array([0.0, 0.0, NAME_AT * self.robot.height_com])
+                label.position = frame.com * [1.0, 1.0, 0.0] + up + offset
+
+    def remove(self) -> None:
+        """Take everything out of the scene."""
+        self._root.remove()
+
+    def _follow(self, frames: Sequence[Frame]) -> None:
+        """Let the middle of the robots pull the scene's origin with a short delay."""
+        target = np.mean([frame.com for frame in frames], axis=0) * [1.0, 1.0, 0.0]
+        elapsed, self._time = frames[0].time - self._time, frames[0].time
+        if not self.following:
+            return
+        fraction = 1.0 if elapsed < 0.0 else 1.0 - np.exp(-elapsed / FOLLOW)
+        self._middle = self._middle + fraction * (target - self._middle)
+
+    def _dragged(self, body: int) -> Callable[[Any], Any]:
+        async def callback(event: Any) -> None:  # a coroutine: viser keeps these in order
+            side = event.instance_index or 0
+            if side >= len(self._frames):
+                return
+            shift = self._offsets[side] - self._middle
+            eye = np.asarray(event.client.camera.position) - shift
+            grabbed = np.asarray(event.start_position) - shift
+            ray = eye, np.asarray(event.end_position) - shift
+            found = pull(self.robot, self._frames[side], body, grabbed, ray)
+            shown = found._replace(start=found.start + self._offsets[side])
+            self._grabbed(event.phase, shown)
+
+        return callback
+
+
+def set_look(server: viser.ViserServer, dark: bool) -> None:
+    """Ground, light and theme of the page."""
+    server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
+    server.scene.configure_environment_map("studio", environment_intensity=0.15)
+    server.scene.add_grid(
+        "/ground", infinite_grid=True, cell_size=0.5, section_size=1.0, fade_distance=30.0,
+        cell_color=DARK if dark else LIGHT, section_color=DARK if dark else LIGHT,
+        plane_color=GROUND[dark], plane_opacity=0.6, shadow_opacity=0.25,
+    )  # fmt: skip
+
+
+def _point_camera(server: viser.ViserServer, size: float, count: int) -> None:
+    """The first view of a page; three robots are seen more from in front, and from further off."""
+    azimuth = np.radians(CAMERA.azimuth if count == 1 else 0.6 * CAMERA.azimuth)
+    elevation = np.radians(CAMERA.elevation)
+    distance = size * (CAMERA.distance + 1.3 * LANE * (count - 1))
+    away = np.array([
+        np.cos(elevation) * np.cos(azimuth),
+        np.cos(elevation) * np.sin(azimuth),
+        np.sin(elevation),
+    ])  # fmt: skip
+    look_at = np.array([0.0, 0.0, LOOK_AT * size])
+    server.initial_camera.look_at = look_at
+    server.initial_camera.position = look_at + distance * away
+    server.initial_camera.fov = np.radians(FIELD_OF_VIEW)
