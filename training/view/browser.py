@@ -10,10 +10,10 @@ import viser
 
 from poise.configs.errors import PoiseError
 from poise.envs.viewing.quantities import Quantity
+from poise.training.sessions.live import Play
+from poise.training.sessions.mouse import Pull
+from poise.training.sessions.pace import Pace
 
-from .live import Play
-from .mouse import Pull
-from .pace import Pace
 from .panel import OPACITY, Panel, Wishes
 from .plots import Plots
 from .saving import send_films, send_picture
@@ -57,6 +57,7 @@ class BrowserView:
         beside.set_width(300)
         server.gui.main_panel.dock_right()
         self.set_play(play)
+        server.on_client_connect(lambda client: self.stage.point_camera(client))
 
     def set_play(self, play: Play) -> None:
         """Show something else."""

@@ -11,10 +11,9 @@ import numpy as np
 
 from poise.envs.viewing.renderer import SceneRenderer
 from poise.envs.viewing.window import Viewer
-
-from .live import Live
-from .mouse import DURATION, WEIGHT, Pull, grabbed_point
-from .pace import Pace
+from poise.training.sessions.live import Live
+from poise.training.sessions.mouse import DURATION, WEIGHT, Pull, grabbed_point
+from poise.training.sessions.pace import Pace
 
 HELP = (
     "space: pause; right arrow: one step; backspace: reset; 8, 4, 5, 6: push forward, left, "

@@ -11,11 +11,11 @@ import viser
 from poise.envs.pushes.options import body_names
 from poise.envs.robots.robot import Robot
 from poise.envs.viewing.quantities import Quantity
+from poise.training.sessions.mouse import DURATION, WEIGHT
+from poise.training.sessions.session import MOST
 
 from .choices import NOBODY, controllers, robots
 from .marks import SHOWN
-from .mouse import DURATION, WEIGHT
-from .session import MOST
 
 SPEEDS = {"1×": 1.0, "1/2×": 0.5, "1/4×": 0.25, "1/10×": 0.1}  # label → simulated over real time
 OPACITY = 0.75  # of the robot, with which marks inside are seen

@@ -9,9 +9,8 @@ import viser
 from viser import uplot
 
 from poise.training.figures.style import look
-
-from .frames import VALUES
-from .live import Frames
+from poise.training.sessions.frames import VALUES
+from poise.training.sessions.live import Frames
 
 WIDTH = 6.0  # [s] shown
 HEIGHT = 150  # of a plot [pixels]

@@ -12,8 +12,7 @@ from mjviser.conversions import get_geom_texture_id, merge_geoms
 
 from poise.envs.robots.robot import Robot
 from poise.envs.viewing.appearance import looks
-
-from .frames import Frame
+from poise.training.sessions.frames import Frame
 
 AZIMUTH = 50.0  # of the lamp in the copy of the model, which viser does not use
 VISIBLE_GROUPS = 3  # of geoms, as in MuJoCo's own viewer

@@ -11,8 +11,7 @@ import viser
 from PIL import Image
 
 from poise.configs.errors import PoiseError
-
-from .live import Play
+from poise.training.sessions.live import Play
 
 TIMEOUT = 20.0  # [s] for a browser to draw a picture
 

@@ -11,16 +11,18 @@ import viser
 from poise.envs.robots.robot import Robot
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.overlays import Mark
+from poise.training.sessions.frames import Frame
+from poise.training.sessions.mouse import Pull, pull
 
-from .frames import Frame
 from .marks import Marks
-from .mouse import Pull, pull
 from .robots import Robots
 
 ROOT = "/world"  # of the scene, moved against the robot
 LANE = 1.7  # distance of robots side by side, over CoM height
 FOLLOW = 0.4  # [s] time constant with which the scene follows the robot
-CAMERA = Camera(azimuth=35.0, elevation=14.0, distance=4.0)
+CAMERA = Camera(azimuth=35.0, elevation=14.0)
+ALONE, TALL = 1.5, 2.4  # width and height that are seen of one robot, over CoM height
+PHONE = 576  # width [pixels] below which viser has the controls below
 LOOK_AT = 0.85  # height that the camera looks at, over CoM height
 FIELD_OF_VIEW = 32.0  # [deg], vertical
 NAME_AT = 2.05  # height of a robot's name above the ground, over CoM height
@@ -61,7 +63,9 @@ class Stage:
         self._frames: Sequence[Frame] = ()
         for mesh in self.robots.meshes:
             mesh.handle.on_drag("left")(self._dragged(mesh.body))
-        _point_camera(server, size, count)
+        server.initial_camera.fov = np.radians(FIELD_OF_VIEW)
+        for client in server.get_clients().values():
+            self.point_camera(client)
 
     def show(self, frames: Sequence[Frame]) -> None:
         """Show the robots and their marks, one frame for each."""
@@ -81,6 +85,14 @@ class Stage:
             for label, frame, offset in zip(self._names, frames, self._offsets, strict=True):
                 up = np.array([0.0, 0.0, NAME_AT * self.robot.height_com])
                 label.position = frame.com * [1.0, 1.0, 0.0] + up + offset
+
+    def point_camera(self, client: viser.ClientHandle) -> None:
+        """Let a page see all robots, whatever its form."""
+        seen, size = client.camera, self.robot.height_com
+        view = first_view(size, len(self._names), seen.aspect, seen.image_width < PHONE)
+        with client.atomic():
+            seen.fov = np.radians(FIELD_OF_VIEW)
+            seen.position, seen.look_at = view
 
     def remove(self) -> None:
         """Take everything out of the scene."""
@@ -122,17 +134,24 @@ def set_look(server: viser.ViserServer, dark: bool) -> None:
     )  # fmt: skip
 
 
-def _point_camera(server: viser.ViserServer, size: float, count: int) -> None:
-    """The first view of a page; three robots are seen more from in front, and from further off."""
-    azimuth = np.radians(CAMERA.azimuth if count == 1 else 0.6 * CAMERA.azimuth)
-    elevation = np.radians(CAMERA.elevation)
-    distance = size * (CAMERA.distance + 1.3 * LANE * (count - 1))
-    away = np.array([
-        np.cos(elevation) * np.cos(azimuth),
-        np.cos(elevation) * np.sin(azimuth),
-        np.sin(elevation),
-    ])  # fmt: skip
-    look_at = np.array([0.0, 0.0, LOOK_AT * size])
-    server.initial_camera.look_at = look_at
-    server.initial_camera.position = look_at + distance * away
-    server.initial_camera.fov = np.radians(FIELD_OF_VIEW)
+def first_view(
+    size: float, count: int, aspect: float, phone: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the camera is (3,), and what it looks at (3,) [m].
+
+    Several robots are seen more from in front. On a phone they stand above the controls.
+
+    Args:
+        size: height of the CoM [m].
+        count: of robots.
+        aspect: width over height of the page.
+        phone: whether the controls cover the lower part of it.
+    """
+    a = np.radians(CAMERA.azimuth if count == 1 else 0.6 * CAMERA.azimuth)
+    e = np.radians(CAMERA.elevation)
+    away = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    width = (LANE * (count - 1) + ALONE) * size
+    height = max(TALL * size * (2.0 if phone else 1.0), width / aspect)  # that is seen [m]
+    look_at = np.array([0.0, 0.0, LOOK_AT * size - (0.27 * height if phone else 0.0)])
+    distance = 0.5 * height / np.tan(0.5 * np.radians(FIELD_OF_VIEW))
+    return look_at + distance * away, look_at

@@ -15,12 +15,12 @@ from poise.configs.yaml_loader import Loader
 from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import Robot, load_robot
+from poise.training.sessions.live import Live, Play
+from poise.training.sessions.recorded import recorded_trial
+from poise.training.sessions.session import MOST, load_session
 from poise.training.trials.agents import check_name
 
-from .live import Live, Play
-from .recorded import recorded_trial
 from .server import check_installed, check_port, greeting, serving
-from .session import MOST, load_session
 
 DEFAULT = "feedback-step"
 Say = Callable[[str], object]
