@@ -21,6 +21,7 @@ from .stage import BACKGROUND, Stage, set_look
 
 FRAME = 1.0 / 30.0  # [s] between two pictures
 TELL = 0.25  # [s] between two looks at status and plots
+SETTLING = 10.0  # [s] after which the camera is the user's alone
 Load = Callable[[str, list[str]], Play]  # robot, controllers → what is played then
 Job = Callable[[], None]
 
@@ -46,7 +47,7 @@ class BrowserView:
         self._set_dark(dark)
         wishes = Wishes(
             pause=self.toggle, step=self.step, reset=self.reset, speed=self.set_speed,
-            seek=self.seek, push=self.push, load=self.load, show=self._show, follow=self._follow,
+            seek=self.seek, push=self.push, load=self.load, show=self.show, follow=self._follow,
             opacity=self._set_opacity, dark=self._set_dark,
             picture=self._picture, film=self._film,
         )  # fmt: skip
@@ -57,7 +58,7 @@ class BrowserView:
         beside.set_width(300)
         server.gui.main_panel.dock_right()
         self.set_play(play)
-        server.on_client_connect(lambda client: self.stage.point_camera(client))
+        server.on_client_connect(self._connected)
 
     def set_play(self, play: Play) -> None:
         """Show something else."""
@@ -65,8 +66,7 @@ class BrowserView:
             self.stage.remove()
             self.plots.remove()
         self.play = play
-        self.stage = Stage(self._server, play.robot, play.names, self._grabbed)
-        self.stage.robots.set_opacity(self._opacity)
+        self.stage = Stage(self._server, play.robot, play.names, self._grabbed, self._opacity)
         self.stage.marks.hidden, self.stage.following = self._hidden, self._following
         with self._tab:
             self.plots = Plots(self._server.gui, play.names)
@@ -185,6 +185,18 @@ class BrowserView:
         for client in self._server.get_clients().values():
             client.add_notification("Poise", text, auto_close_seconds=6.0, color=colour)  # type: ignore[call-overload]
 
+    def _connected(self, client: viser.ClientHandle) -> None:
+        """Show a new page all robots; again when its form changes, for panels are docked late."""
+        form, end = client.camera.aspect, time.monotonic() + SETTLING
+        self.stage.point_camera(client)
+
+        @client.camera.on_update
+        def _(camera: viser.CameraHandle) -> None:
+            nonlocal form
+            if abs(camera.aspect - form) > 1e-3 and time.monotonic() < end:
+                form = camera.aspect
+                self.stage.point_camera(client)
+
     def _grabbed(self, phase: str, pulled: Pull) -> None:
         """In the server's thread, while a body is dragged."""
         self.ask(self._pulled, phase, pulled)
@@ -196,7 +208,8 @@ class BrowserView:
         self.stage.pull = None
         self.push(pulled.fields(self.play.robot, self.play.yaw, float(self.panel.duration.value)))
 
-    def _show(self, quantity: Quantity, shown: bool) -> None:
+    def show(self, quantity: Quantity, shown: bool) -> None:
+        """Show the marks of a quantity, or hide them."""
         (self._hidden.discard if shown else self._hidden.add)(quantity)
 
     def _follow(self, follow: bool) -> None:

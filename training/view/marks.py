@@ -30,6 +30,7 @@ SHOWN: dict[Quantity, tuple[str, ...]] = {
     CONTACT_FORCE: ("contact force",),
     FOOTHOLD: ("foothold",),
 }
+ROOM = {"spheres": 2, "cylinders": 32, "heads": 10}  # mesh → instances for each robot
 HEAD = 0.3  # of an arrow's length, at most
 HEAD_WIDTH = 2.2  # over the radius of its shaft
 LIFT = 0.002  # [m] over the ground, so that what lies on it is not hidden by it
@@ -39,47 +40,36 @@ Placed = tuple[np.ndarray, np.ndarray, np.ndarray, Mark]  # start, end, scale, m
 class MarkSet:
     """All marks of one shape: instances of one mesh, as many as there is room for.
 
-    The number of instances only grows, and those that are not used have no size: to change it
-    costs the browser more than to move them.
+    Those that are not used have no size: to change their number, or how opaque they are, makes the
+    browser build all of them anew. So a mark that fades grows thin.
     """
 
-    def __init__(self, scene: viser.SceneApi, name: str, mesh: trimesh.Trimesh):
-        self._scene, self._name, self._mesh = scene, name, mesh
-        self._room = 0
-        self._handle: viser.BatchedMeshHandle | None = None
-
-    def show(self, placed: Sequence[Placed]) -> None:
-        """Show these and nothing else; each from its start to its end, scaled."""
-        if not placed and self._handle is None:
-            return
-        handle = self._make(len(placed)) if len(placed) > self._room else self._handle
-        assert handle is not None
-        positions, scales = np.zeros((self._room, 3)), np.zeros((self._room, 3))
-        wxyzs, colours = np.tile([1.0, 0, 0, 0], (self._room, 1)), np.zeros((self._room, 3))
-        opacities = np.ones(self._room)
-        for k, (start, end, scale, mark) in enumerate(placed):
-            positions[k], scales[k], wxyzs[k] = start, scale, _along(end - start)
-            colours[k], opacities[k] = np.multiply(mark.colour, 255.0), mark.opacity
-        handle.batched_positions, handle.batched_wxyzs = positions, wxyzs
-        handle.batched_scales, handle.batched_opacities = scales, opacities
-        handle.batched_colors = np.rint(colours).astype(np.uint8)
-
-    def _make(self, count: int) -> viser.BatchedMeshHandle:
-        self._room = 2 * count
-        self._handle = self._scene.add_batched_meshes_simple(
-            self._name, self._mesh.vertices, self._mesh.faces,
-            np.tile([1.0, 0.0, 0.0, 0.0], (self._room, 1)), np.zeros((self._room, 3)),
-            batched_scales=np.zeros((self._room, 3)), batched_opacities=np.ones(self._room),
-            batched_colors=np.zeros((self._room, 3), dtype=np.uint8),
+    def __init__(self, scene: viser.SceneApi, name: str, mesh: trimesh.Trimesh, room: int):
+        self._room = room
+        self.handle = scene.add_batched_meshes_simple(
+            name, mesh.vertices, mesh.faces,
+            np.tile([1.0, 0.0, 0.0, 0.0], (room, 1)), np.zeros((room, 3)),
+            batched_scales=np.zeros((room, 3)),
+            batched_colors=np.zeros((room, 3), dtype=np.uint8),
             lod="off", cast_shadow=False, receive_shadow=False,
         )  # fmt: skip
-        return self._handle
+
+    def show(self, placed: Sequence[Placed]) -> None:
+        """Show these and nothing else, as far as there is room."""
+        room = self._room
+        positions, scales = np.zeros((room, 3)), np.zeros((room, 3))
+        wxyzs, colours = np.tile([1.0, 0.0, 0.0, 0.0], (room, 1)), np.zeros((room, 3), np.uint8)
+        for k, (start, end, scale, mark) in enumerate(placed[:room]):
+            positions[k], scales[k] = start, scale * [mark.opacity, mark.opacity, 1.0]
+            wxyzs[k], colours[k] = _along(end - start), linear(mark.colour)
+        self.handle.batched_positions, self.handle.batched_wxyzs = positions, wxyzs
+        self.handle.batched_scales, self.handle.batched_colors = scales, colours
 
 
 class Marks:
-    """The marks of all robots below the scene's node `root`; `hidden` are not shown."""
+    """The marks of `count` robots below the scene's node `root`; `hidden` are not shown."""
 
-    def __init__(self, scene: viser.SceneApi, root: str):
+    def __init__(self, scene: viser.SceneApi, root: str, count: int):
         cylinder = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=24)
         cylinder.apply_translation([0.0, 0.0, 0.5])
         meshes = {
@@ -87,20 +77,21 @@ class Marks:
             "cylinders": cylinder,
             "heads": trimesh.creation.cone(radius=1.0, height=1.0, sections=24),
         }
-        self._sets = {
-            name: MarkSet(scene, f"{root}/marks/{name}", mesh) for name, mesh in meshes.items()
+        self.sets = {
+            name: MarkSet(scene, f"{root}/marks/{name}", mesh, count * ROOM[name])
+            for name, mesh in meshes.items()
         }
         self.hidden: set[Quantity] = set()
 
     def show(self, found: Iterable[tuple[Mark, np.ndarray]]) -> None:
         """Show marks, each moved by an offset (3,) [m]."""
         left_out = {name for quantity in self.hidden for name in SHOWN[quantity]}
-        placed: dict[str, list[Placed]] = {name: [] for name in self._sets}
+        placed: dict[str, list[Placed]] = {name: [] for name in self.sets}
         for mark, offset in found:
             if mark.name not in left_out:
                 for name, start, end, scale in PARTS[mark.shape](mark):
                     placed[name].append((start + offset, end + offset, scale, mark))
-        for name, each in self._sets.items():
+        for name, each in self.sets.items():
             each.show(placed[name])
 
 
@@ -133,6 +124,13 @@ def _arrow(mark: Mark) -> list[Part]:
 PARTS: dict[object, Callable[[Mark], list[Part]]] = {
     SPHERE: _sphere, DISC: _rod, BAR: _rod, ARROW: _arrow
 }  # fmt: skip
+
+
+def linear(colour: Sequence[float]) -> np.ndarray:
+    """A colour (3,) of 0 to 1 as viser's instances take it: uint8 in linear RGB, not in sRGB."""
+    c = np.asarray(colour, dtype=float)
+    light = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    return np.rint(255.0 * light).astype(np.uint8)
 
 
 def _along(vector: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ class Panel:
     """
 
     def __init__(self, gui: viser.GuiApi, ask: Ask, wishes: Wishes, live: bool, dark: bool):
-        self._gui, self._ask, self._wishes = gui, ask, wishes
+        self._gui, self._ask, self.wishes = gui, ask, wishes
         self.status = gui.add_markdown("")
         self._playing()
         with gui.add_folder("Push", visible=live):
@@ -88,19 +88,19 @@ class Panel:
     def _playing(self) -> None:
         gui = self._gui
         self.pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
-        self.pause.on_click(self._asked(lambda _: self._wishes.pause()))
+        self.pause.on_click(self._asked(lambda _: self.wishes.pause()))
         buttons = gui.add_button_group("Time", ("Step", "Reset"))
         buttons.on_click(self._asked(self._step_or_reset))
         speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
-        speed.on_update(self._asked(lambda e: self._wishes.speed(SPEEDS[_of(e, SPEEDS)])))
+        speed.on_update(self._asked(lambda e: self.wishes.speed(SPEEDS[_of(e, SPEEDS)])))
         self.timeline = gui.add_slider("Time [s]", 0.0, 0.02, 0.02, 0.0)
         self.timeline.on_update(self._asked(self._seek, users=True))
 
     def _step_or_reset(self, event: Any) -> None:
-        (self._wishes.step if event.target.value == "Step" else self._wishes.reset)()
+        (self.wishes.step if event.target.value == "Step" else self.wishes.reset)()
 
     def _seek(self, event: Any) -> None:
-        self._wishes.seek(float(event.target.value))
+        self.wishes.seek(float(event.target.value))
 
     def _pushing(self) -> None:
         gui = self._gui
@@ -112,7 +112,7 @@ class Panel:
         self.duration = gui.add_number("Duration [s]", DURATION, min=0.01, max=5.0, step=0.01)
         self.body = gui.add_dropdown("Body", ("torso",))
         button = gui.add_button("Push", icon=viser.Icon.HAND_MOVE, color="orange")
-        button.on_click(self._asked(lambda _: self._wishes.push(self.fields())))
+        button.on_click(self._asked(lambda _: self.wishes.push(self.fields())))
         gui.add_markdown("Or drag a body with the mouse, and let go: the arrow is the push.")
 
     def fields(self) -> dict[str, object]:
@@ -130,17 +130,18 @@ class Panel:
             gui.add_dropdown(f"Controller {k + 1}", names if k == 0 else (NOBODY, *names))
             for k in range(MOST)
         ]
-        gui.add_button("Load").on_click(self._asked(self._load))
+        gui.add_button("Load").on_click(self._asked(lambda _: self.load()))
 
-    def _load(self, _: object) -> None:
+    def load(self) -> None:
+        """Ask for the robot and the controllers that are chosen."""
         # the server takes any value from a page: only packaged names are loaded
         chosen = [choice.value for choice in self.controllers]
         names = [name for name in chosen if name in controllers()]
         if names and self.robot.value in robots():
-            self._wishes.load(self.robot.value, names)
+            self.wishes.load(self.robot.value, names)
 
     def _showing(self, dark: bool) -> None:
-        gui, wishes = self._gui, self._wishes
+        gui, wishes = self._gui, self.wishes
         for quantity in SHOWN:
             box = gui.add_checkbox(quantity.label, True)
             box.on_update(self._asked(lambda e, q=quantity: wishes.show(q, bool(e.target.value))))
@@ -152,7 +153,7 @@ class Panel:
         night.on_update(self._asked(lambda e: wishes.dark(bool(e.target.value))))
 
     def _saving(self) -> None:
-        gui, wishes = self._gui, self._wishes
+        gui, wishes = self._gui, self.wishes
         picture = gui.add_button("Picture (PNG)", icon=viser.Icon.CAMERA)
         picture.on_click(lambda e: wishes.picture(e.client_id))  # waits for the browser itself
         film = gui.add_button("Video (MP4)", icon=viser.Icon.MOVIE)

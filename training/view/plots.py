@@ -26,13 +26,20 @@ class Plots:
         series = (uplot.Series(label="t [s]"), *(_series(k, name) for k, name in enumerate(names)))
         axis = uplot.Axis(stroke=GREY, grid={"stroke": FAINT}, ticks={"stroke": FAINT})
         empty = tuple(np.zeros(1) for _ in series)
-        self._plots = {
+        plots = {
             name: gui.add_uplot(
                 empty, series, title=title, height=HEIGHT, axes=(axis, axis),
-                scales={"x": uplot.Scale(time=False)}, legend={"show": len(names) > 1},
+                scales={"x": uplot.Scale(time=False)},
+                legend={"show": len(names) > 1 and k == 0, "live": False},
             )
-            for name, title in VALUES.items()
+            for k, (name, title) in enumerate(VALUES.items())
         }  # fmt: skip
+        self._plots: dict[str, viser.GuiUplotHandle] = plots
+
+    @property
+    def handles(self) -> list[viser.GuiUplotHandle]:
+        """viser's handles, in the order of `VALUES`."""
+        return list(self._plots.values())
 
     def show(self, history: Sequence[Frames], at: int, period: float) -> None:
         """Draw what is up to frame `at`."""
@@ -48,7 +55,7 @@ class Plots:
 
     def remove(self) -> None:
         """Take them away."""
-        for plot in self._plots.values():
+        for plot in self.handles:
             plot.remove()
 
 

@@ -14,6 +14,8 @@ from poise.envs.robots.robot import Robot
 from poise.envs.viewing.appearance import looks
 from poise.training.sessions.frames import Frame
 
+from .marks import linear
+
 AZIMUTH = 50.0  # of the lamp in the copy of the model, which viser does not use
 VISIBLE_GROUPS = 3  # of geoms, as in MuJoCo's own viewer
 Mesh = viser.BatchedMeshHandle | viser.BatchedGlbHandle
@@ -35,10 +37,13 @@ class Robots:
         root: name of the node that they stand below.
         robot: their kind.
         count: of robots.
+        opacity: with less than 1, marks inside of them are seen; textures are always opaque.
     """
 
-    def __init__(self, scene: viser.SceneApi, root: str, robot: Robot, count: int):
-        self._scene, self._count = scene, count
+    def __init__(
+        self, scene: viser.SceneApi, root: str, robot: Robot, count: int, opacity: float = 1.0
+    ):
+        self._scene, self._opacity = scene, opacity
         self.model = looks(robot, 16, 16, AZIMUTH)
         self._still = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3))
         self.meshes = [
@@ -56,10 +61,10 @@ class Robots:
             mesh.handle.batched_wxyzs = quaternions[mesh.body]
 
     def set_opacity(self, opacity: float) -> None:
-        """Make the robots transparent, so that marks inside of them are seen; textures stay."""
+        """Make the robots transparent, or opaque again."""
         for mesh in self.meshes:
             if isinstance(mesh.handle, viser.BatchedMeshHandle):
-                mesh.handle.opacity = opacity if opacity < 1.0 else None
+                mesh.handle.opacity = _opacity(opacity)
 
     def remove(self) -> None:
         """Take the robots out of the scene."""
@@ -71,10 +76,16 @@ class Robots:
         wxyzs, positions = self._still
         if get_geom_texture_id(self.model, geoms[0]) >= 0:
             return self._scene.add_batched_meshes_trimesh(name, mesh, wxyzs, positions, lod="off")
-        colour = np.asarray(mesh.visual.vertex_colors)[0, :3]
+        colour = linear(np.asarray(mesh.visual.vertex_colors)[0, :3] / 255.0)
         return self._scene.add_batched_meshes_simple(
-            name, mesh.vertices, mesh.faces, wxyzs, positions, batched_colors=colour, lod="off"
-        )
+            name, mesh.vertices, mesh.faces, wxyzs, positions, batched_colors=colour, lod="off",
+            opacity=_opacity(self._opacity),
+        )  # fmt: skip
+
+
+def _opacity(opacity: float) -> float | None:
+    """As viser takes it: None is opaque, and drawn faster."""
+    return opacity if opacity < 1.0 else None
 
 
 def _parts(model: mujoco.MjModel, body: int) -> list[list[int]]:

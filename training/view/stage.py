@@ -40,10 +40,16 @@ class Stage:
         robot: their kind.
         names: above them.
         grabbed: called while a body is dragged with the mouse, in the server's thread.
+        opacity: of the robots.
     """
 
     def __init__(
-        self, server: viser.ViserServer, robot: Robot, names: Sequence[str], grabbed: Grabbed
+        self,
+        server: viser.ViserServer,
+        robot: Robot,
+        names: Sequence[str],
+        grabbed: Grabbed,
+        opacity: float = 1.0,
     ):
         self._server, self.robot, self._grabbed = server, robot, grabbed
         size, count = robot.height_com, len(names)
@@ -51,8 +57,8 @@ class Stage:
         self._offsets = np.array([[0.0, LANE * size * (middle - k), 0.0] for k in range(count)])
         scene = server.scene
         self._root = scene.add_frame(ROOT, show_axes=False)
-        self.robots = Robots(scene, ROOT, robot, count)
-        self.marks = Marks(scene, ROOT)
+        self.robots = Robots(scene, ROOT, robot, count, opacity)
+        self.marks = Marks(scene, ROOT, count)
         self._names = [
             scene.add_label(f"{ROOT}/names/{k}", name, anchor="bottom-center")
             for k, name in enumerate(names)
@@ -60,7 +66,7 @@ class Stage:
         self.pull: Pull | None = None  #: that is drawn
         self.following = True
         self._middle, self._time = np.zeros(3), np.inf
-        self._frames: Sequence[Frame] = ()
+        self.frames: Sequence[Frame] = ()  #: that are shown
         for mesh in self.robots.meshes:
             mesh.handle.on_drag("left")(self._dragged(mesh.body))
         server.initial_camera.fov = np.radians(FIELD_OF_VIEW)
@@ -69,7 +75,7 @@ class Stage:
 
     def show(self, frames: Sequence[Frame]) -> None:
         """Show the robots and their marks, one frame for each."""
-        self._frames = frames
+        self.frames = frames
         self._follow(frames)
         found: list[tuple[Mark, np.ndarray]] = [
             (mark, offset)
@@ -89,10 +95,10 @@ class Stage:
     def point_camera(self, client: viser.ClientHandle) -> None:
         """Let a page see all robots, whatever its form."""
         seen, size = client.camera, self.robot.height_com
-        view = first_view(size, len(self._names), seen.aspect, seen.image_width < PHONE)
+        eye, target = first_view(size, len(self._names), seen.aspect, seen.image_width < PHONE)
         with client.atomic():
             seen.fov = np.radians(FIELD_OF_VIEW)
-            seen.position, seen.look_at = view
+            seen.position, seen.look_at = eye, target
 
     def remove(self) -> None:
         """Take everything out of the scene."""
@@ -110,13 +116,13 @@ class Stage:
     def _dragged(self, body: int) -> Callable[[Any], Any]:
         async def callback(event: Any) -> None:  # a coroutine: viser keeps these in order
             side = event.instance_index or 0
-            if side >= len(self._frames):
+            if side >= len(self.frames):
                 return
             shift = self._offsets[side] - self._middle
             eye = np.asarray(event.client.camera.position) - shift
             grabbed = np.asarray(event.start_position) - shift
             ray = eye, np.asarray(event.end_position) - shift
-            found = pull(self.robot, self._frames[side], body, grabbed, ray)
+            found = pull(self.robot, self.frames[side], body, grabbed, ray)
             shown = found._replace(start=found.start + self._offsets[side])
             self._grabbed(event.phase, shown)
 
@@ -151,7 +157,7 @@ def first_view(
     e = np.radians(CAMERA.elevation)
     away = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     width = (LANE * (count - 1) + ALONE) * size
-    height = max(TALL * size * (2.0 if phone else 1.0), width / aspect)  # that is seen [m]
+    height = max(TALL * size * (2.3 if phone else 1.0), width / aspect)  # that is seen [m]
     look_at = np.array([0.0, 0.0, LOOK_AT * size - (0.27 * height if phone else 0.0)])
     distance = 0.5 * height / np.tan(0.5 * np.radians(FIELD_OF_VIEW))
     return look_at + distance * away, look_at
