@@ -26,6 +26,7 @@ PHONE = 576  # width [pixels] below which viser has the controls below
 LOOK_AT = 0.85  # height that the camera looks at, over CoM height
 FIELD_OF_VIEW = 32.0  # [deg], vertical
 NAME_AT = 2.05  # height of a robot's name above the ground, over CoM height
+SKY, SUN = 1.5, 1.9  # brightness: together, what faces up has its own colour
 LIGHT, DARK = (206, 209, 212), (90, 94, 100)  # lines on the ground
 BACKGROUND = {False: (255, 255, 255), True: (20, 21, 23)}  # dark → colour
 GROUND = {False: (232, 234, 236), True: (62, 66, 72)}  # dark → colour
@@ -132,7 +133,11 @@ class Stage:
 def set_look(server: viser.ViserServer, dark: bool) -> None:
     """Ground, light and theme of the page."""
     server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
-    server.scene.configure_environment_map("studio", environment_intensity=0.15)
+    server.scene.configure_default_lights(False)  # they bleach the colours that tell marks apart
+    server.scene.add_light_hemisphere("/light/sky", ground_color=(200, 200, 200), intensity=SKY)
+    server.scene.add_light_directional(
+        "/light/sun", intensity=SUN, cast_shadow=True, position=(2.5, 1.0, 5.0)
+    )
     server.scene.add_grid(
         "/ground", infinite_grid=True, cell_size=0.5, section_size=1.0, fade_distance=30.0,
         cell_color=DARK if dark else LIGHT, section_color=DARK if dark else LIGHT,
