@@ -97,14 +97,16 @@ class Browser:
                   clickCount=1, **held)  # fmt: skip
 
     def click(self, text: str) -> None:
-        """Click on the button that has this text."""
-        place = self.run(
-            "(() => {const b = [...document.querySelectorAll('button')].find("
-            f"b => b.innerText.trim() == {json.dumps(text)}); if (!b) return null;"
-            "b.scrollIntoView({block: 'center'}); const r = b.getBoundingClientRect();"
-            "return [r.x + r.width / 2, r.y + r.height / 2]})()"
+        """Click on the button that has this text, once there is one."""
+        button = (
+            "[...document.querySelectorAll('button')]"
+            f".find(b => b.innerText.trim() == {json.dumps(text)})"
         )
-        assert place, f"there is no button {text}"
+        self.wait(f"!!{button}")
+        place = self.run(
+            f"(b => {{b.scrollIntoView({{block: 'center'}}); const r = b.getBoundingClientRect();"
+            f"return [r.x + r.width / 2, r.y + r.height / 2]}})({button})"
+        )
         self.mouse("Pressed", *place)
         self.mouse("Released", *place)
 

@@ -6,6 +6,7 @@ import queue
 import time
 from collections.abc import Callable
 
+import numpy as np
 import viser
 
 from poise.configs.errors import PoiseError
@@ -21,7 +22,6 @@ from .stage import BACKGROUND, Stage, set_look
 
 FRAME = 1.0 / 30.0  # [s] between two pictures
 TELL = 0.25  # [s] between two looks at status and plots
-SETTLING = 10.0  # [s] after which the camera is the user's alone
 Load = Callable[[str, list[str]], Play]  # robot, controllers → what is played then
 Job = Callable[[], None]
 
@@ -186,16 +186,16 @@ class BrowserView:
             client.add_notification("Poise", text, auto_close_seconds=6.0, color=colour)  # type: ignore[call-overload]
 
     def _connected(self, client: viser.ClientHandle) -> None:
-        """Show a new page all robots; again when its form changes, for panels are docked late."""
-        form, end = client.camera.aspect, time.monotonic() + SETTLING
-        self.stage.point_camera(client)
+        """Show a new page all robots; again when its form changes, as panels are docked late, until
+        the user has moved the camera."""
+        form, eye = client.camera.aspect, self.stage.point_camera(client)
 
         @client.camera.on_update
         def _(camera: viser.CameraHandle) -> None:
-            nonlocal form
-            if abs(camera.aspect - form) > 1e-3 and time.monotonic() < end:
-                form = camera.aspect
-                self.stage.point_camera(client)
+            nonlocal form, eye
+            changed = abs(camera.aspect - form) > 1e-3
+            if changed and np.allclose(camera.position, eye, atol=1e-2):
+                form, eye = camera.aspect, self.stage.point_camera(client)
 
     def _grabbed(self, phase: str, pulled: Pull) -> None:
         """In the server's thread, while a body is dragged."""

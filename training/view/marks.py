@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 
 import numpy as np
 import trimesh
@@ -126,7 +127,8 @@ PARTS: dict[object, Callable[[Mark], list[Part]]] = {
 }  # fmt: skip
 
 
-def linear(colour: Sequence[float]) -> np.ndarray:
+@cache
+def linear(colour: tuple[float, ...]) -> np.ndarray:
     """A colour (3,) of 0 to 1 as viser's instances take it: uint8 in linear RGB, not in sRGB."""
     c = np.asarray(colour, dtype=float)
     light = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)

@@ -76,7 +76,7 @@ class Robots:
         wxyzs, positions = self._still
         if get_geom_texture_id(self.model, geoms[0]) >= 0:
             return self._scene.add_batched_meshes_trimesh(name, mesh, wxyzs, positions, lod="off")
-        colour = linear(np.asarray(mesh.visual.vertex_colors)[0, :3] / 255.0)
+        colour = linear(tuple(np.asarray(mesh.visual.vertex_colors)[0, :3] / 255.0))
         return self._scene.add_batched_meshes_simple(
             name, mesh.vertices, mesh.faces, wxyzs, positions, batched_colors=colour, lod="off",
             opacity=_opacity(self._opacity),

@@ -93,13 +93,14 @@ class Stage:
                 up = np.array([0.0, 0.0, NAME_AT * self.robot.height_com])
                 label.position = frame.com * [1.0, 1.0, 0.0] + up + offset
 
-    def point_camera(self, client: viser.ClientHandle) -> None:
-        """Let a page see all robots, whatever its form."""
+    def point_camera(self, client: viser.ClientHandle) -> np.ndarray:
+        """Let a page see all robots, whatever its form; returns where its camera is (3,) [m]."""
         seen, size = client.camera, self.robot.height_com
         eye, target = first_view(size, len(self._names), seen.aspect, seen.image_width < PHONE)
         with client.atomic():
             seen.fov = np.radians(FIELD_OF_VIEW)
             seen.position, seen.look_at = eye, target
+        return eye
 
     def remove(self) -> None:
         """Take everything out of the scene."""
