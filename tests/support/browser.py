@@ -91,8 +91,11 @@ class Browser:
             time.sleep(0.05)
 
     def mouse(self, kind: str, x: float, y: float, button: str = "left") -> None:
-        """Press, move or release the mouse at a place [pixels]: "Pressed", "Moved", "Released"."""
-        held = {"buttons": 0 if kind == "Released" else 1}
+        """Press, move or release the mouse at a place [pixels]: "Pressed", "Moved", "Released".
+
+        It is moved with the button held, or with "none".
+        """
+        held = {"buttons": int(kind != "Released" and button != "none")}
         self.call("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button=button,
                   clickCount=1, **held)  # fmt: skip
 

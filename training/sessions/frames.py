@@ -44,6 +44,16 @@ class Frame(NamedTuple):
     fall_time: float | None
 
 
+def between(first: Frame, second: Frame, fraction: float) -> Frame:
+    """Bodies between two frames, for slow motion; everything else is that of the second one."""
+    signs = np.where(np.sum(first.quaternions * second.quaternions, axis=1) < 0.0, -1.0, 1.0)
+    turned = (1.0 - fraction) * signs[:, None] * first.quaternions + fraction * second.quaternions
+    return second._replace(
+        positions=(1.0 - fraction) * first.positions + fraction * second.positions,
+        quaternions=turned / np.linalg.norm(turned, axis=1, keepdims=True),
+    )
+
+
 class Observer:
     """Makes the frames of an environment, which is only read."""
 

@@ -21,11 +21,12 @@ class Pace:
         self._clock, self._last = clock, clock()
         self.speed = 1.0  #: simulated over wall-clock seconds that is wanted
         self.wanted = self.played = 0.0  #: [s] that speed and clock asked for; that were played
-        self._owed = 0.0
+        self._owed, self._period = 0.0, 1.0
         self._recent: deque[tuple[float, float]] = deque()
 
     def due(self, period: float) -> int:
         """The number of steps of `period` [s] to play now; they count as played."""
+        self._period = period
         elapsed = self._elapsed() * self.speed
         self.wanted += elapsed
         self._owed = min(self._owed + elapsed, max(BACKLOG, period))
@@ -41,6 +42,11 @@ class Pace:
         """Let time pass that does not count: paused, or busy with something else."""
         self._elapsed()
         self._recent.clear()
+
+    @property
+    def phase(self) -> float:
+        """How much of the next step's time is over, 0 to 1 (with steps of `period` as of `due`)."""
+        return min(self._owed / self._period, 1.0)
 
     def until_due(self, period: float) -> float:
         """Wall-clock seconds until the next step is due."""

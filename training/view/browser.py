@@ -11,14 +11,15 @@ import viser
 
 from poise.configs.errors import PoiseError
 from poise.envs.viewing.quantities import Quantity
-from poise.training.sessions.live import Play
+from poise.training.sessions.frames import between
+from poise.training.sessions.live import Frames, Play
 from poise.training.sessions.mouse import Pull
 from poise.training.sessions.pace import Pace
 
 from .panel import OPACITY, Panel, Wishes
 from .plots import Plots
 from .saving import send_films, send_picture
-from .stage import BACKGROUND, Stage, set_look
+from .stage import BACKGROUND, PHONE, Stage, set_look
 
 FRAME = 1.0 / 30.0  # [s] between two pictures
 TELL = 0.25  # [s] between two looks at status and plots
@@ -43,6 +44,7 @@ class BrowserView:
         self._server, self._load, self._jobs = server, load, queue.SimpleQueue[Job]()
         self.pace, self.paused = Pace(), False
         self._opacity, self._hidden, self._following = OPACITY, set[Quantity](), True
+        self._phones: dict[int, bool] = {}  # page → whether its controls are below
         self._drawn = self._told = -1e9  # when the last picture and status were shown [s]
         self._set_dark(dark)
         wishes = Wishes(
@@ -57,16 +59,15 @@ class BrowserView:
         beside.dock_left()
         beside.set_width(300)
         server.gui.main_panel.dock_right()
-        self.set_play(play)
+        self._set_play(play)
         server.on_client_connect(self._connected)
 
-    def set_play(self, play: Play) -> None:
-        """Show something else."""
-        if hasattr(self, "stage"):
-            self.stage.remove()
-            self.plots.remove()
+    def _set_play(self, play: Play) -> None:
+        """Show this."""
         self.play = play
         self.stage = Stage(self._server, play.robot, play.names, self._grabbed, self._opacity)
+        for page, client in self._server.get_clients().items():
+            self.stage.point_camera(client, self._phones.get(page, False))
         self.stage.marks.hidden, self.stage.following = self._hidden, self._following
         with self._tab:
             self.plots = Plots(self._server.gui, play.names)
@@ -125,22 +126,30 @@ class BrowserView:
     def load(self, robot: str, names: list[str]) -> None:
         """Play other controllers, or another robot."""
         self._say(f"loading {', '.join(names)} …")
-        self.set_play(self._load(robot, names))
+        play = self._load(robot, names)
+        self.stage.remove()
+        self.plots.remove()
+        self._set_play(play)
         self.paused = False
+        self.pace.rest()
 
     def _advance(self) -> None:
         """The steps that are due."""
         if self.paused:
             self.pace.rest()
             return
-        for _ in range(self.pace.due(self.play.period)):
-            self.play.step()
+        try:
+            for _ in range(self.pace.due(self.play.period)):
+                self.play.step()
+        except Exception as error:  # a controller from outside may raise anything
+            self.paused = True
+            self._say(f"the controller raised {type(error).__name__}: {error}", "red")
         if self.play.ended:
             self.paused = True
 
     def _draw(self, now: float) -> None:
         self._drawn = now
-        self.stage.show(self.play.history[self.play.at])
+        self.stage.show(self._frames())
         if now - self._told >= TELL:
             self._told = now
             history = self.play.history
@@ -148,6 +157,14 @@ class BrowserView:
             self.panel.tell(self._status(), self.paused, at, first, last)
             self.panel.command.content = f"`{self.play.command}`"
             self.plots.show(history, self.play.at, self.play.period)
+
+    def _frames(self) -> Frames:
+        """What is shown now: in slow motion a place on the way to the last step's end."""
+        history, at = self.play.history, self.play.at
+        if self.paused or self.pace.speed >= 1.0 or at == 0:
+            return history[at]
+        pairs = zip(history[at - 1], history[at], strict=True)
+        return tuple(between(first, second, self.pace.phase) for first, second in pairs)
 
     def _changed(self) -> None:
         """Have the next picture show everything anew."""
@@ -188,14 +205,15 @@ class BrowserView:
     def _connected(self, client: viser.ClientHandle) -> None:
         """Show a new page all robots; again when its form changes, as panels are docked late, until
         the user has moved the camera."""
-        form, eye = client.camera.aspect, self.stage.point_camera(client)
+        self._phones[client.client_id] = phone = client.camera.image_width < PHONE
+        form, eye = client.camera.aspect, self.stage.point_camera(client, phone)
 
         @client.camera.on_update
         def _(camera: viser.CameraHandle) -> None:
             nonlocal form, eye
             changed = abs(camera.aspect - form) > 1e-3
             if changed and np.allclose(camera.position, eye, atol=1e-2):
-                form, eye = camera.aspect, self.stage.point_camera(client)
+                form, eye = camera.aspect, self.stage.point_camera(client, phone)
 
     def _grabbed(self, phase: str, pulled: Pull) -> None:
         """In the server's thread, while a body is dragged."""

@@ -71,8 +71,6 @@ class Stage:
         for mesh in self.robots.meshes:
             mesh.handle.on_drag("left")(self._dragged(mesh.body))
         server.initial_camera.fov = np.radians(FIELD_OF_VIEW)
-        for client in server.get_clients().values():
-            self.point_camera(client)
 
     def show(self, frames: Sequence[Frame]) -> None:
         """Show the robots and their marks, one frame for each."""
@@ -93,10 +91,10 @@ class Stage:
                 up = np.array([0.0, 0.0, NAME_AT * self.robot.height_com])
                 label.position = frame.com * [1.0, 1.0, 0.0] + up + offset
 
-    def point_camera(self, client: viser.ClientHandle) -> np.ndarray:
+    def point_camera(self, client: viser.ClientHandle, phone: bool) -> np.ndarray:
         """Let a page see all robots, whatever its form; returns where its camera is (3,) [m]."""
         seen, size = client.camera, self.robot.height_com
-        eye, target = first_view(size, len(self._names), seen.aspect, seen.image_width < PHONE)
+        eye, target = first_view(size, len(self._names), seen.aspect, phone)
         with client.atomic():
             seen.fov = np.radians(FIELD_OF_VIEW)
             seen.position, seen.look_at = eye, target

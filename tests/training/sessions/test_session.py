@@ -10,7 +10,7 @@ import pytest
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.pushes.push import Push
-from poise.training.sessions.frames import VALUES, Frame
+from poise.training.sessions.frames import VALUES, Frame, between
 from poise.training.sessions.live import KEPT, Live
 from poise.training.sessions.session import Session, load_session
 from poise.training.trials.agents import load_agent
@@ -137,6 +137,26 @@ def test_frames_tell_what_the_state_is(session: Session) -> None:
     assert frame.values["margin"] == state.support_distance(state.capture_point)
     names = {mark.name for mark in frame.marks}
     assert names >= {"com", "cop", "capture point", "support", "push", "contact force"}
+
+
+def test_slow_motion_is_between_two_frames(session: Session) -> None:
+    """Half of the way and half of the turn, the shorter way around; the ends are the frames."""
+    live = Live(session)
+    live.reset()
+    live.push(**LARGE)
+    for _ in range(10):
+        live.step()
+    first, second = live.history[-2][0], live.history[-1][0]
+    other = first._replace(quaternions=-first.quaternions)  # the same turns
+    for start in (first, other):
+        middle = between(start, second, 0.5)
+        assert np.allclose(middle.positions, 0.5 * (first.positions + second.positions))
+        cosines = [np.sum(middle.quaternions * f.quaternions, axis=1) for f in (first, second)]
+        assert np.allclose(np.abs(cosines[0]), np.abs(cosines[1])) and np.min(cosines[1]) > 0.98
+        assert np.allclose(np.linalg.norm(middle.quaternions, axis=1), 1.0)
+    assert np.allclose(between(first, second, 0.0).positions, first.positions)
+    assert np.array_equal(between(first, second, 1.0).quaternions.round(12),
+                          second.quaternions.round(12))  # fmt: skip
 
 
 def test_what_is_seen_changes_nothing(session: Session) -> None:
