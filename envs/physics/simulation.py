@@ -81,6 +81,7 @@ class Simulation(Copyable):
         self.clock = guarded_zeros(1, dtype=np.int64)
         self._count = guarded_zeros(1, dtype=np.int64)
         self.pushes: tuple[Push | Kick, ...] = ()
+        self.start_yaw = 0.0  #: of the heading frame at the reset [rad]
         self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
         self._world: World | None = None
         self.sensors = Program.of(())
@@ -127,7 +128,7 @@ class Simulation(Copyable):
     ) -> RobotState:
         """Start anew from `qpos` (nq,) and `qvel` (nv,): by default standing, at rest.
 
-        Push directions are relative to the heading at this moment.
+        Directions of pushes are relative to the heading at this moment.
         """
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:] = self.robot.standing_qpos if qpos is None else qpos
@@ -137,13 +138,17 @@ class Simulation(Copyable):
         mujoco.mj_forward(self.model, self.data)
         self.clock[0] = 0
         update_state(self.arrays, self.views, self.state_arrays)
+        self.start_yaw = self.state.heading_yaw
         self.set_pushes(pushes)
         return self.state
 
     def set_pushes(self, pushes: Sequence[Push | Kick]) -> None:
-        """Replace the schedule; starts are seconds since the reset."""
+        """Replace the schedule, at any time.
+
+        Starts are seconds since the reset, directions relative to the heading at the reset.
+        """
         self.pushes = tuple(pushes)
-        table = pack(self.pushes, self.robot, self.state.heading_yaw)
+        table = pack(self.pushes, self.robot, self.start_yaw)
         if len(table) > len(self.push_table):  # seldom: compiled code is bound to the table
             self.push_table = guarded_zeros((2 * len(table), TABLE_COLUMNS))
         self.push_table[:] = 0.0

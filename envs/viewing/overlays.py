@@ -8,9 +8,9 @@
 | capture point | blue disc, the largest |
 | support polygon | bluish green line around the soles |
 
-The colours are from Okabe and Ito's palette, told apart with any colour vision, and no two marks
-have both the same shape and the same size. Marks on the ground that coincide lie on each other,
-the largest lowest.
+Colours are those of `quantities.py`, and no two marks have both the same shape and the same size.
+Marks on the ground that coincide lie on each other, the largest lowest. `contact_forces.py` has
+one more mark, and a planned foothold is a sky blue disc (`foothold_mark`).
 """
 
 from __future__ import annotations
@@ -23,11 +23,7 @@ import numpy as np
 from poise.envs.physics.simulation import Simulation
 from poise.envs.pushes.table import BODY, DURATION, FORCE, KICK, KIND, NOTHING, POINT, START
 
-AMBER = (0.902, 0.624, 0.0)
-BLACK = (0.05, 0.05, 0.05)
-VERMILION = (0.835, 0.369, 0.0)
-BLUE = (0.0, 0.447, 0.698)
-GREEN = (0.0, 0.62, 0.451)
+from .quantities import CAPTURE_POINT, COM, COP, FOOTHOLD, PUSH, RGB, SUPPORT
 
 FADE = 0.3  # [s] for which a push stays visible after its end
 KICK_TIME = 0.1  # [s]: a kick is drawn as the force that gives its impulse in this time
@@ -45,7 +41,7 @@ class Mark(NamedTuple):
     start: np.ndarray  # (3,) centre, or where a bar or an arrow begins [m]
     end: np.ndarray  # (3,) where it ends [m]
     radius: float  # [m]
-    colour: tuple[float, float, float]
+    colour: RGB
     opacity: float = 1.0
 
 
@@ -54,12 +50,13 @@ def marks(simulation: Simulation) -> list[Mark]:
     state = simulation.state.copy()  # the support polygon is computed into the state's own arrays
     size = simulation.robot.height_com
     ground = [*state.com[:2], 0.0]
-    found = _polygon(state.support_polygon, 0.009 * size)
-    found.append(_disc("capture point", state.capture_point, 0.055 * size, 0.004 * size, BLUE))
+    found, blue = _polygon(state.support_polygon, 0.009 * size), CAPTURE_POINT.colour
+    found.append(_disc("capture point", state.capture_point, 0.055 * size, 0.004 * size, blue))
     if state.contact_wrench[2] > 1e-3 * state.mass * simulation.arrays.gravity:
-        found.append(_disc("cop", state.cop, 0.038 * size, 0.007 * size, VERMILION))
-    found.append(_disc("com on ground", np.array(ground), 0.018 * size, 0.010 * size, BLACK))
-    found.append(Mark("com", SPHERE, state.com, state.com, 0.04 * size, BLACK))
+        found.append(_disc("cop", state.cop, 0.038 * size, 0.007 * size, COP.colour))
+    black = COM.colour
+    found.append(_disc("com on ground", np.array(ground), 0.018 * size, 0.010 * size, black))
+    found.append(Mark("com", SPHERE, state.com, state.com, 0.04 * size, black))
     return found + push_arrows(simulation)
 
 
@@ -82,8 +79,13 @@ def push_arrows(simulation: Simulation) -> list[Mark]:
         fraction = (simulation.robot.mass / KICK_TIME if is_kick else 1.0) * force / weight
         length = size * float(np.clip(ARROW_GAIN * fraction, *ARROW_LENGTHS))
         tail = tip - length * vector / force
-        found.append(Mark("push", ARROW, tail, tip, 0.035 * size, AMBER, float(opacity)))
+        found.append(Mark("push", ARROW, tail, tip, 0.035 * size, PUSH.colour, float(opacity)))
     return found
+
+
+def foothold_mark(point: np.ndarray, size: float) -> Mark:
+    """The mark of a foothold (2,) that a controller means to step on; `size` is the CoM height."""
+    return _disc("foothold", point, 0.075 * size, 0.003 * size, FOOTHOLD.colour)
 
 
 def draw(scene: mujoco.MjvScene, found: list[Mark]) -> None:
@@ -106,7 +108,7 @@ def draw(scene: mujoco.MjvScene, found: list[Mark]) -> None:
         scene.ngeom += 1
 
 
-def _disc(name: str, point: np.ndarray, radius: float, height: float, colour: tuple) -> Mark:
+def _disc(name: str, point: np.ndarray, radius: float, height: float, colour: RGB) -> Mark:
     """A disc on the ground at `point` (2,) or (3,), which sticks out of it by `height`."""
     start = np.array([point[0], point[1], 0.0])
     return Mark(name, DISC, start, start + [0.0, 0.0, height], radius, colour)
@@ -116,6 +118,6 @@ def _polygon(vertices: np.ndarray, radius: float) -> list[Mark]:
     corners = np.column_stack([vertices, np.zeros(len(vertices))])
     ends = np.roll(corners, -1, axis=0)
     return [
-        Mark("support", BAR, start, end, radius, GREEN)
+        Mark("support", BAR, start, end, radius, SUPPORT.colour)
         for start, end in zip(corners, ends, strict=True)
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import mujoco
 import numpy as np
@@ -35,6 +35,7 @@ class SceneRenderer:
         width: of a frame [pixels].
         height: of a frame [pixels].
         camera: where it stands, or which camera of the model it is, see `find_camera`.
+        keys: called with the code of every key that is pressed in the viewer, in its thread.
 
     Raises:
         ConfigError: there is no such camera.
@@ -48,6 +49,7 @@ class SceneRenderer:
         width: int = 640,
         height: int = 480,
         camera: Camera | Mapping[str, object] | str | int | None = None,
+        keys: Callable[[int], object] | None = None,
     ):
         self.simulation = simulation
         self.camera = find_camera(camera, simulation.model)
@@ -58,7 +60,7 @@ class SceneRenderer:
         self.due = 0.0  # wall clock at which the next one is shown [s]
         self.scene = mujoco.MjvScene(self.model, MAX_GEOMS)
         self.screen = None if human else OffScreen(self.model, width, height)
-        self.viewer = Viewer(self.model, self.data) if human else None
+        self.viewer = Viewer(self.model, self.data, keys) if human else None
         self.view = self.viewer.handle.cam if self.viewer else mujoco.MjvCamera()
         point(self.view, self.camera, simulation.robot.height_com)
 

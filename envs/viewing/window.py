@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import threading
 import warnings
+from collections.abc import Callable
 
 import mujoco
 
@@ -14,11 +15,18 @@ from poise.configs.errors import PoiseError
 class Viewer:
     """A window on `model` and `data`; draw through `handle`, MuJoCo's own.
 
+    `keys` is called with the code of every key that is pressed, in the viewer's thread.
+
     Raises:
         PoiseError: there is no display, or MuJoCo cannot use it.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData):
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        keys: Callable[[int], object] | None = None,
+    ):
         running = set(threading.enumerate())
         try:
             import glfw
@@ -29,7 +37,7 @@ class Viewer:
                 if not glfw.init():  # the viewer's own thread would wait for ever
                     raise PoiseError("GLFW finds no display")
             self.handle = mujoco.viewer.launch_passive(
-                model, data, show_left_ui=False, show_right_ui=False
+                model, data, key_callback=keys, show_left_ui=False, show_right_ui=False
             )
         except (PoiseError, ImportError, RuntimeError) as error:
             raise PoiseError(

@@ -39,9 +39,10 @@ FLOORS = """
 15 training/figures, training/standalone, training/suites, training/tuning
 16 training/evaluation, training/qp_set, training/robot_check
 17 training/results
-18 training/export, training/report
-19 training/cli
-20 envs, baselines, training
+18 training/export, training/report, training/sessions
+19 training/view
+20 training/cli
+21 envs, baselines, training
 """
 FLOOR = {
     room: int(line.split()[0])

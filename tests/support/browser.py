@@ -16,15 +16,23 @@ from typing import Any
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
-FLAGS = ("--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu",
+FLAGS = ("--headless=new", "--remote-debugging-pipe", "--no-sandbox",
          "--no-first-run", "--disable-dev-shm-usage", "--hide-scrollbars")  # fmt: skip
+WITHOUT_GL = ("--disable-gpu",)
+SOFTWARE_GL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 class Browser:
-    """One page; use as a context. `errors` are its script errors and what it could not load."""
+    """One page; use as a context. `errors` are its script errors and what it could not load.
 
-    def __init__(self) -> None:
+    Args:
+        webgl: draw WebGL in software.
+        origin: of a server that it may ask for files, such as http://127.0.0.1:8080; None: nobody.
+    """
+
+    def __init__(self, webgl: bool = False, origin: str | None = None) -> None:
         assert CHROMIUM is not None
+        self._origins = ("file:", "data:", "about:", "blob:") + ((origin,) if origin else ())
         self._folder = tempfile.TemporaryDirectory(
             prefix="poise-browser-", ignore_cleanup_errors=True
         )
@@ -37,7 +45,8 @@ class Browser:
             os.dup2(write, 4)
 
         self._process = subprocess.Popen(
-            [CHROMIUM, *FLAGS, f"--user-data-dir={self._folder.name}"],
+            [CHROMIUM, *FLAGS, *(SOFTWARE_GL if webgl else WITHOUT_GL),
+             f"--user-data-dir={self._folder.name}"],
             preexec_fn=pipes, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         os.close(to_read)
@@ -62,17 +71,47 @@ class Browser:
         os.close(self._from)
         self._folder.cleanup()
 
-    def open(self, path: Path, width: int = 1280, height: int = 900, dark: bool = False) -> None:
-        """Load a file in a window of this size."""
+    def open(
+        self, page: Path | str, width: int = 1280, height: int = 900, dark: bool = False
+    ) -> None:
+        """Load a file, or an address, in a window of this size."""
+        url = page if isinstance(page, str) else page.resolve().as_uri()
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
                   deviceScaleFactor=1, mobile=width < 600)  # fmt: skip
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
-        self.call("Page.navigate", url=path.resolve().as_uri())
-        deadline = time.monotonic() + 30.0
-        while self.run("document.readyState + location.protocol") != "completefile:":
-            assert time.monotonic() < deadline, "the page does not load"
+        self.call("Page.navigate", url=url)
+        self.wait(f"document.readyState + location.protocol == 'complete{url.split(':')[0]}:'")
+
+    def wait(self, condition: str, seconds: float = 30.0) -> None:
+        """Wait until a JavaScript expression is true."""
+        deadline = time.monotonic() + seconds
+        while not self.run(condition):
+            assert time.monotonic() < deadline, f"the page does not come to {condition}"
             time.sleep(0.05)
+
+    def mouse(self, kind: str, x: float, y: float, button: str = "left") -> None:
+        """Press, move or release the mouse at a place [pixels]: "Pressed", "Moved", "Released".
+
+        It is moved with the button held, or with "none".
+        """
+        held = {"buttons": int(kind != "Released" and button != "none")}
+        self.call("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button=button,
+                  clickCount=1, **held)  # fmt: skip
+
+    def click(self, text: str) -> None:
+        """Click on the button that has this text, once there is one."""
+        button = (
+            "[...document.querySelectorAll('button')]"
+            f".find(b => b.innerText.trim() == {json.dumps(text)})"
+        )
+        self.wait(f"!!{button}")
+        place = self.run(
+            f"(b => {{b.scrollIntoView({{block: 'center'}}); const r = b.getBoundingClientRect();"
+            f"return [r.x + r.width / 2, r.y + r.height / 2]}})({button})"
+        )
+        self.mouse("Pressed", *place)
+        self.mouse("Released", *place)
 
     def run(self, script: str) -> Any:
         """The value of a JavaScript expression, awaited."""
@@ -119,5 +158,5 @@ class Browser:
             self.errors.append(str(params["args"]))
         elif method == "Network.requestWillBeSent":
             url = params["request"]["url"]
-            if not url.startswith(("file:", "data:", "about:")):
+            if not url.startswith(self._origins):
                 self.errors.append(f"asks for {url[:200]}")

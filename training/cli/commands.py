@@ -11,6 +11,7 @@ from poise.training.running.terminal import terminal
 from .arguments import Allow, Names, RobotName, Switch
 from .export import export
 from .results import compare, leaderboard, replay, report
+from .view import view
 
 if TYPE_CHECKING:
     from poise.training.running.summary import Summary
@@ -302,6 +303,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "benchmark": benchmark,
     "compare": compare,
     "leaderboard": leaderboard,
+    "view": view,
     "replay": replay,
     "report": report,
     "tune": tune,

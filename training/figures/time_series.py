@@ -10,7 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 from numpy.typing import ArrayLike
 
-from .style import AMBER, BLUE, GREEN, INK, ORANGE, legend_below, look, saved_figure
+from poise.envs.viewing.quantities import CAPTURE_POINT, COM, COP, PUSH, Quantity
+
+from .style import GREY, INK, legend_below, look, saved_figure
 
 FAR = 0.3  # beyond the support, not shown [m]
 
@@ -95,9 +97,9 @@ def trial_timeseries(
         PoiseError: the file cannot be written.
     """
     lines = {
-        "capture_point": ("capture point", ORANGE, (0, (5, 1.2)), 2.0),
-        "com": ("centre of mass", BLUE, "-", 2.0),
-        "cop": ("centre of pressure", GREEN, "-", 1.1),
+        "capture_point": (*_drawn(CAPTURE_POINT), (0, (5, 1.2)), 2.0),
+        "com": (*_drawn(COM), "-", 2.0),
+        "cop": (*_drawn(COP), "-", 1.1),
     }
     unknown = set(signals) - set(lines) - {"support", "torque"}
     if unknown:
@@ -128,7 +130,7 @@ def trial_timeseries(
                     1,
                     where=full,
                     step="mid",
-                    color=ORANGE,
+                    color=GREY,
                     alpha=0.35,
                     lw=0,
                     label="motor at its limit",
@@ -141,10 +143,16 @@ def trial_timeseries(
         axes[2].set_xlim(t[0], t[-1])
         for ax in axes:
             for start, duration in pushes:
-                ax.axvspan(start, start + duration, color=AMBER, alpha=0.35, lw=0, label="push")
+                ax.axvspan(start, start + duration, color=PUSH.hexadecimal, alpha=0.35, lw=0,
+                           label="push")  # fmt: skip
         figure.align_ylabels()
         axes[0].set_title(title)
         legend_below(figure)
+
+
+def _drawn(quantity: Quantity) -> tuple[str, str]:
+    """Name and colour."""
+    return quantity.label, quantity.hexadecimal
 
 
 def _series(ax: Axes, columns: Mapping[str, np.ndarray], x: str, name: str, index: int) -> None:

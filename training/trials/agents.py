@@ -62,27 +62,33 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
         ConfigError: no such controller, or one that is not valid or is for another robot; or one
             from outside that the user has not allowed, see `allowing`.
     """
+    check_name(name)
     if name == NO_CONTROL:
         return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
-    policies = packaged("policies")
-    theirs = is_policy(name)
-    if name in policies or (is_folder(name) and not theirs):
+    if name in packaged("policies") or (is_folder(name) and not is_policy(name)):
         return _policy(name, robot, overrides)
     if is_plugin(name) and not _is_controller(name, robot):
         return _outside_policy(name, robot, overrides)
-    names = [*packaged("controllers"), *packaged(RIVALS)]
-    found = is_file(name) and Path(name).suffix in (".yaml", ".yml")
-    if name not in names and not (found or theirs or is_plugin(name)):
+    config = controller_config(name)
+    env = ResidualBalanceEnv(robot, controller=config, **overrides)
+    return _idle(name, env, to_yaml(_wherever(config)))
+
+
+def check_name(name: str) -> None:
+    """Raise ConfigError, which lists what there is, unless a controller may be called so.
+
+    Nothing is loaded for that, and nothing compiled; what the name stands for may still be wrong.
+    """
+    names = (*packaged("controllers"), *packaged(RIVALS), *packaged("policies"), NO_CONTROL)
+    of_file = is_file(name) and Path(name).suffix in (".yaml", ".yml")
+    if not (name in names or of_file or is_folder(name) or is_policy(name) or is_plugin(name)):
         raise ConfigError(
             f"no such controller: {shown(name)}; give a name, a .yaml file of a controller, "
             "a folder written by poise train, an ONNX file or a folder with a deploy.yaml, or "
             "module:Class",
             field="controller",
-            choices=(*names, *policies, NO_CONTROL),
+            choices=names,
         )
-    config = controller_config(name)
-    env = ResidualBalanceEnv(robot, controller=config, **overrides)
-    return _idle(name, env, to_yaml(_wherever(config)))
 
 
 def _wherever(config: ControllerConfig) -> ControllerConfig:

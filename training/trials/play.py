@@ -20,24 +20,39 @@ AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bou
 Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
 
 
+class SteppedTrial:
+    """A trial that begins when this is made, and goes on step by step.
+
+    Attributes:
+        done: whether it has ended, by a fall or by time.
+    """
+
+    def __init__(self, agent: Agent, trial: Trial):
+        self._agent, self.done = agent, False
+        self._observation, _ = agent.env.reset(seed=trial.seed, options=trial.options)
+        if agent.begin is not None:
+            agent.begin()
+
+    def step(self) -> np.ndarray:
+        """Take a policy step; returns its action (na,). Raises what the controller raises."""
+        env, action = self._agent.env, self._agent.act(self._observation)
+        _, terminated, truncated = env.step_without_info(action)
+        self._observation = env.episode.observation.astype(np.float32)
+        self.done = terminated or truncated
+        return action
+
+
 def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome:
     """Play a trial to its end in the environment that the agent has."""
-    env = agent.env
-    observation, _ = env.reset(seed=trial.seed, options=trial.options)
-    if agent.begin is not None:
-        agent.begin()
+    env, stepped = agent.env, SteppedTrial(agent, trial)
     settled = Settled()
     touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
     sway = Sway() if trial.pushes else None
     watches = [each for each in (sway, watch) if each is not None]
-    done = False
-    while not done:
+    while not stepped.done:
         for each in watches:
             each(env)
-        action = agent.act(observation)
-        _, terminated, truncated = env.step_without_info(action)
-        observation = env.episode.observation.astype(np.float32)
-        done = terminated or truncated
+        action = stepped.step()
         touchdowns.update(env.simulation.state.contacts)
         settled.update(env, action)
     for each in watches:

@@ -46,7 +46,7 @@ def test_help_is_light() -> None:
     assert done.returncode == 0, done.stderr
     names = (
         *("train", "evaluate", "benchmark", "compare", "leaderboard", "replay", "demo", "tune"),
-        *("qp-set", "report", "robot", "list", "export"),
+        *("qp-set", "report", "robot", "list", "export", "view"),
     )
     for name in names:
         assert name in done.stdout

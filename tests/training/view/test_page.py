@@ -1,0 +1,275 @@
+"""training/view: the page in a real browser, the panel without one, the server."""
+
+from __future__ import annotations
+
+import base64
+import io
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from PIL import Image
+
+pytest.importorskip("viser", reason="not installed: pip install 'poise[view]'")
+pytest.importorskip("mjviser", reason="not installed: pip install 'poise[view]'")
+
+import viser
+
+from poise.configs.errors import ConfigError
+from poise.envs.viewing.quantities import COM
+from poise.training.sessions.live import Live, Play
+from poise.training.sessions.session import Session, load_session
+from poise.training.view import browser
+from poise.training.view.browser import BrowserView
+from poise.training.view.server import check_port, greeting, serving
+from poise.training.view.stage import FIELD_OF_VIEW, LANE, first_view
+from tests.support.browser import CHROMIUM, Browser
+from tests.support.shared import robot
+
+NAMES = ["momentum-qp", "zero"]
+HARMLESS = ("THREE.Clock: This module has been deprecated",)  # said by viser's own code
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    with serving("127.0.0.1", 0) as found:
+        yield found
+
+
+def load(name: str, names: list[str]) -> Play:
+    return Live(load_session(names, robot(name)), "poise view")
+
+
+@pytest.fixture(scope="module")
+def session() -> Session:
+    return load_session(NAMES[:1], robot())
+
+
+@pytest.fixture
+def view(server: viser.ViserServer, session: Session) -> BrowserView:
+    session.reset()
+    server.scene.reset()
+    server.gui.reset()
+    return BrowserView(server, Live(session, "poise view"), load)
+
+
+def run_until(view: BrowserView, condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    """Play until something is so."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it does not come to that"
+        view.run(0.05)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
+def test_a_browser_shows_it_and_pushes_it(
+    view: BrowserView, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page loads, the robot moves in it, the button and the mouse push it; no error."""
+    view.toggle()  # until the page is there
+    monkeypatch.setattr(browser, "FRAME", 0.2)  # what a processor can draw without a GPU
+    monkeypatch.setattr(browser, "TELL", 0.5)
+    server.scene.add_light_directional("/light/sun", intensity=2.0, position=(2.5, 1.0, 5.0))
+    page: dict[str, object] = {}
+    url = f"http://127.0.0.1:{server.get_port()}"
+    thread = threading.Thread(target=use, args=(url, view, page), daemon=True)
+    thread.start()
+    run_until(view, lambda: not thread.is_alive(), 300.0)
+    assert "failed" not in page, page["failed"]
+    wrong = [text for text in page["errors"] if not any(known in text for known in HARMLESS)]
+    assert wrong == []
+    before, after = page["pictures"]
+    moved = float(np.mean(np.any(before != after, axis=2)))
+    assert 0.002 < moved < 0.6  # the robot, not all of the scene
+    mouse, button = view.play.session.pushes
+    assert (button.body, button.direction, button.duration) == ("torso", 0.0, 0.1)
+    assert button.impulse == pytest.approx(0.5 * robot().mass, abs=0.1)
+    assert 3.0 < mouse.impulse < 30.0 and any(mouse.point)
+
+
+def use(url: str, view: BrowserView, page: dict[str, object]) -> None:
+    """What a user does, from a thread."""
+    session = view.play.session
+    try:
+        with Browser(webgl=True, origin=url) as chromium:
+            page["errors"] = chromium.errors
+            chromium.open(url, width=900, height=460)
+            chromium.wait("document.querySelectorAll('.uplot').length == 4", 100.0)
+            chromium.wait("document.body.innerText.includes('momentum-qp: on its feet')")
+            before = picture(chromium)
+            drag(chromium)  # which lets time go on
+            wait(lambda: len(session.pushes) == 1)
+            chromium.click("Push")
+            wait(lambda: len(session.pushes) == 2 and session.time > session.pushes[1].start + 0.4)
+            chromium.click("Pause")
+            wait(lambda: view.paused)
+            page["pictures"] = before, picture(chromium)
+    except BaseException as error:
+        page["failed"] = repr(error)
+        raise
+
+
+def wait(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+    """Wait until something is so, in another thread than the one that plays."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it does not come to that"
+        time.sleep(0.02)
+
+
+def picture(browser: Browser) -> np.ndarray:
+    """The scene without the panels, as the browser shows it."""
+    taken = browser.call("Page.captureScreenshot", format="png", clip={**box(browser), "scale": 1})
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(taken["data"]))).convert("RGB"))
+
+
+def box(browser: Browser) -> dict[str, float]:
+    """Where the scene is in the page [pixels]."""
+    return browser.run(
+        "(({x, y, width, height}) => ({x, y, width, height}))"
+        "(document.querySelector('canvas').getBoundingClientRect())"
+    )
+
+
+def drag(browser: Browser) -> None:
+    """Drag what is in the middle of the scene to the right."""
+    place = box(browser)
+    x, y = place["x"] + 0.5 * place["width"], place["y"] + 0.5 * place["height"]
+    browser.mouse("Moved", x, y, "none")
+    time.sleep(0.2)
+    browser.mouse("Pressed", x, y)
+    for k in range(1, 7):
+        browser.mouse("Moved", x + 10 * k, y)
+        time.sleep(0.1)
+    browser.mouse("Released", x + 60, y)
+
+
+def test_controls_ask_and_the_loop_does(view: BrowserView) -> None:
+    """Pause, step, seek, reset and push, each done between two steps."""
+    run_until(view, lambda: view.play.at > 5)
+    view.toggle()
+    at = view.play.at
+    view.run(0.1)
+    assert view.play.at == at and view.panel.pause.label == "Play"
+    view.ask(view.step)
+    view.run(0.1)
+    assert view.play.at == at + 1
+    view.ask(view.seek, 0.06)
+    view.run(0.1)
+    assert view.play.at == 3 and view.paused
+    assert view.stage.frames[0] is view.play.history[3][0]
+    view.ask(view.push, view.panel.fields())
+    run_until(view, lambda: len(view.play.session.pushes) == 1)
+    assert not view.paused and view.play.session.pushes[0].body == "torso"
+    view.ask(view.reset)
+    run_until(view, lambda: not view.play.session.pushes)
+    assert view.play.session.time < 1.0
+
+
+def test_a_wrong_push_is_no_end(view: BrowserView) -> None:
+    """What the page sends may be anything; the loop goes on."""
+    view.ask(view.push, {**view.panel.fields(), "body": "tail"})
+    view.ask(view.push, {**view.panel.fields(), "impulse": float("inf")})
+    view.run(0.2)
+    assert view.play.session.pushes == () and view.play.at > 1
+
+
+def test_other_controllers_are_loaded(view: BrowserView) -> None:
+    """The scene and the plots have a robot and a line for each."""
+    view.ask(view.load, "humanoid", NAMES)
+    run_until(view, lambda: len(view.play.names) == 2)
+    view.run(0.1)
+    handles = [mesh.handle for mesh in view.stage.robots.meshes]
+    assert all(len(handle.batched_positions) == 2 for handle in handles)
+    bodies = np.array([mesh.body for mesh in view.stage.robots.meshes])
+    for side, frame in enumerate(view.stage.frames):
+        shown = np.array([handle.batched_positions[side] for handle in handles])
+        offset = shown - frame.positions[bodies]
+        assert np.allclose(offset, offset[0], atol=1e-5)
+        assert (offset[0][1] > 0.3) == (side == 0)
+    assert all(len(plot.data) == 3 for plot in view.plots.handles)
+
+
+def test_only_packaged_names_are_loaded(view: BrowserView) -> None:
+    """A page that sends a path, or code, gets nothing."""
+    asked: list[object] = []
+    view.panel.wishes.load = lambda *names: asked.append(names)
+    view.panel.controllers[0].value = "os:system"
+    view.panel.load()
+    view.panel.controllers[0].value = "capture-step"
+    view.panel.robot.value = "../robot.yaml"
+    view.panel.load()
+    assert asked == []
+    view.panel.robot.value = "humanoid"
+    view.panel.load()
+    assert asked == [("humanoid", ["capture-step"])]
+
+
+def test_a_controller_that_raises_is_no_end(
+    view: BrowserView, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is paused, and can be begun anew."""
+
+    def fail() -> None:
+        raise ZeroDivisionError("of a controller")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(view.play, "step", fail)
+        run_until(view, lambda: view.paused)
+    view.toggle()
+    run_until(view, lambda: view.play.at > 2)
+
+
+def test_marks_can_be_hidden(view: BrowserView) -> None:
+    """Each quantity by itself: without the centre of mass there is no sphere."""
+    view.run(0.05)
+    spheres = view.stage.marks.sets["spheres"]
+    assert spheres.handle is not None and spheres.handle.batched_scales.any()
+    view.show(COM, False)
+    view.run(0.1)
+    assert not spheres.handle.batched_scales.any()
+
+
+def test_a_port_that_is_taken_is_told() -> None:
+    """And so is an address that there is not."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(ConfigError, match=f"port: {port} on 127.0.0.1 cannot be had"):
+            check_port("127.0.0.1", port)
+    with pytest.raises(ConfigError, match="port: must be from 0 to 65535, not 70000"):
+        check_port("127.0.0.1", 70000)
+    with pytest.raises(ConfigError, match=r"host: .*no.such.host"):
+        check_port("no.such.host.invalid", 0)
+
+
+def test_only_this_machine_sees_it(server: viser.ViserServer) -> None:
+    """It listens at the loopback address, says so, and makes no tunnel that a page asks for."""
+    assert "this machine alone" in greeting("127.0.0.1", 8080)[1]
+    assert "ssh -L 8080:localhost:8080" in greeting("127.0.0.1", 8080)[1]
+    assert "everybody" in greeting("0.0.0.0", 8080)[1]
+    assert server.get_host() == "127.0.0.1" and server.request_share_url() is None
+
+
+@pytest.mark.parametrize(
+    ("count", "aspect", "phone"),
+    [(1, 0.9, False), (3, 2.0, False), (3, 0.47, True), (1, 0.47, True)],
+)
+def test_the_first_view_has_all_robots(count: int, aspect: float, phone: bool) -> None:
+    """Heads and feet of all, above the controls on a phone."""
+    size = 1.0
+    eye, target = first_view(size, count, aspect, phone)
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up, half = np.cross(right, forward), np.tan(np.radians(FIELD_OF_VIEW / 2))
+    for side in range(count):
+        for height in (0.0, 1.9):
+            ray = np.array([0.0, LANE * (side - (count - 1) / 2), height]) - eye
+            x, y = ray @ right / (ray @ forward), ray @ up / (ray @ forward)
+            assert abs(x) < half * aspect and abs(y) < half
+            assert y > -0.25 * half or not phone

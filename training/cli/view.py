@@ -1,0 +1,84 @@
+"""The sub-command `view`: the robot in the browser or in a window, live or from a result."""
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from poise.configs.errors import ConfigError
+
+from .arguments import Allow, Switch
+
+Shown = Annotated[
+    tuple[str, ...],
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="CONTROLLER … | DIR", help_behavior_hint=""),
+]
+Pushes = Annotated[
+    tuple[str, ...],
+    tyro.conf.UseAppendAction,
+    tyro.conf.arg(
+        metavar="PUSH",
+        help="A push that is known beforehand, such as '{impulse: 20, direction: 90, body: torso, "
+        "duration: 0.1, start: 1}'; repeatable.",
+    ),
+]
+
+
+def view(
+    shown: Shown = (),
+    /,
+    *,
+    robot: str = "humanoid",
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    seed: int = 0,
+    push: Pushes = (),
+    trial: int | None = None,
+    controllers: tuple[str, ...] = (),
+    native: Switch = False,
+    seconds: float | None = None,
+    dark: Switch = False,
+    allow: Allow = (),
+) -> None:
+    """Show the robot in the browser, in real time, to be pushed; or a trial of a result.
+
+    Up to three controllers stand side by side and meet the same pushes: of a button, or of the
+    mouse, which drags a body. With --trial it is a trial of the result in DIR, with a timeline.
+    Needs pip install 'poise[view]', but for --native.
+
+    Args:
+        shown: controllers, feedback-step if not given; with --trial, a folder written by poise
+            evaluate or poise benchmark.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        host: address to serve at; the default can be reached from this machine alone.
+        port: of the page; 0 is any that is free.
+        seed: of the start, which is a little disturbed.
+        trial: a trial's number in trials.csv.
+        controllers: with --trial, up to three of those that took part; the last if not given.
+        native: MuJoCo's own window, of one controller; it needs a display.
+        seconds: end by itself after so long, and say how near to real time it was.
+        dark: a dark page.
+    """
+    from poise.envs.viewing.gl import choose_gl_backend
+
+    choose_gl_backend()
+    from poise.training.view.view import view, view_trial
+
+    if trial is None:
+        if controllers:
+            raise ConfigError("goes with --trial; without it, controllers stand before the flags",
+                              field="controllers")  # fmt: skip
+        view(
+            shown, robot=robot, host=host, port=port, seed=seed, pushes=push, native=native,
+            seconds=seconds, dark=dark, allow=allow,
+        )  # fmt: skip
+        return
+    if len(shown) != 1:
+        raise ConfigError("goes with one folder of a result", field="trial")
+    if native:
+        raise ConfigError("shows no recorded trial: leave out --trial or --native", field="native")
+    view_trial(
+        Path(shown[0]), trial, controllers, host=host, port=port, seconds=seconds, dark=dark,
+        allow=allow,
+    )  # fmt: skip

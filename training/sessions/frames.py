@@ -1,0 +1,104 @@
+"""What is seen of a robot at one moment: poses, marks, and the values that are plotted."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from poise.baselines.controller import BaseController
+from poise.baselines.stepping.controller import SteppingController
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.physics.simulation import Simulation
+from poise.envs.pushes.push import Push
+from poise.envs.viewing.contact_forces import ContactForces
+from poise.envs.viewing.overlays import Mark, foothold_mark, marks
+
+#: value of a frame → title of its plot
+VALUES = {
+    "speed": "speed of the centre of mass [m/s]",
+    "margin": "capture point inside the support [m]",
+    "torque": "largest torque over its limit",
+    "push": "push [N]",
+}
+
+
+class Frame(NamedTuple):
+    """A robot at one moment, world axes.
+
+    Attributes:
+        time: [s] after the reset.
+        positions, quaternions: (nbody, 3) [m] and (nbody, 4), w first, of the bodies.
+        com: (3,) centre of mass [m].
+        marks: of the quantities of `envs/viewing/quantities.py`.
+        values: of `VALUES`.
+        fall_time: when it fell [s]; None: it has not.
+    """
+
+    time: float
+    positions: np.ndarray
+    quaternions: np.ndarray
+    com: np.ndarray
+    marks: tuple[Mark, ...]
+    values: dict[str, float]
+    fall_time: float | None
+
+
+def between(first: Frame, second: Frame, fraction: float) -> Frame:
+    """Bodies between two frames, for slow motion; everything else is that of the second one."""
+    signs = np.where(np.sum(first.quaternions * second.quaternions, axis=1) < 0.0, -1.0, 1.0)
+    turned = (1.0 - fraction) * signs[:, None] * first.quaternions + fraction * second.quaternions
+    return second._replace(
+        positions=(1.0 - fraction) * first.positions + fraction * second.positions,
+        quaternions=turned / np.linalg.norm(turned, axis=1, keepdims=True),
+    )
+
+
+class Observer:
+    """Makes the frames of an environment, which is only read."""
+
+    def __init__(self, env: BalanceEnv):
+        self._env = env
+        self._forces = ContactForces(env.simulation)
+
+    def __call__(self, fall_time: float | None = None) -> Frame:
+        """The frame of this moment, of a robot that fell at `fall_time` [s]."""
+        env, simulation = self._env, self._env.simulation
+        if self._forces.simulation is not simulation:  # other conditions, another simulation
+            self._forces = ContactForces(simulation)
+        data = simulation.data
+        return Frame(
+            time=simulation.time,
+            positions=data.xpos.copy(),
+            quaternions=data.xquat.copy(),
+            com=simulation.state.com.copy(),
+            marks=(*marks(simulation), *self._forces.marks(), *_footholds(env)),
+            values=_values(simulation),
+            fall_time=fall_time,
+        )
+
+
+def _values(simulation: Simulation) -> dict[str, float]:
+    state = simulation.state.copy()  # the support polygon is computed into the state's own arrays
+    load = np.abs(simulation.views.ctrl) / simulation.robot.torque_limit
+    force = sum(
+        float(np.linalg.norm(push.force(simulation.time)))
+        for push in simulation.pushes
+        if isinstance(push, Push)
+    )
+    return {
+        "speed": float(np.linalg.norm(state.com_vel)),
+        "margin": state.support_distance(state.capture_point),
+        "torque": float(load.max()),
+        "push": force,
+    }
+
+
+def _footholds(env: BalanceEnv) -> list[Mark]:
+    """Where the controller's foot is to land, while it swings."""
+    controller = getattr(env, "controller", None)
+    inner = controller.unwrapped if isinstance(controller, BaseController) else None
+    if not isinstance(inner, SteppingController):
+        return []
+    step = inner.stepping()
+    return [foothold_mark(step.foothold, env.robot.height_com)] if step.foot >= 0 else []

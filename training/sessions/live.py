@@ -1,0 +1,159 @@
+"""What is played: a session that runs, or a trial that was recorded; both with their frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from poise.configs.errors import PoiseError
+from poise.envs.pushes.push import Push
+from poise.envs.robots.robot import Robot
+from poise.training.trials.agents import load_agent
+
+from .frames import Frame, Observer
+from .session import Session
+
+KEPT = 30.0  # [s] of a session that can be scrubbed through
+LONGEST_FILM = 60.0  # [s]
+Frames = tuple[Frame, ...]  # of all robots at one moment
+
+
+class Play(Protocol):
+    """Something with a timeline; `history[at]` is what is shown."""
+
+    names: list[str]  #: of the controllers
+    robot: Robot
+    period: float  #: between two frames [s]
+    history: Sequence[Frames]
+    at: int
+    live: bool  #: whether it can be pushed
+    yaw: float  #: of the heading at the reset, which directions are relative to [rad]
+    command: str  #: that shows the same again
+
+    @property
+    def ended(self) -> bool:
+        """Whether there is nothing more to play."""
+
+    def step(self) -> None:
+        """Go on by one frame."""
+
+    def reset(self) -> None:
+        """Go back to the start."""
+
+    def film(self, name: str, path: Path) -> None:
+        """Write an MP4 of one controller, from the start to now.
+
+        Raises PoiseError: nothing can be drawn or encoded here.
+        """
+
+    def push(self, **fields: object) -> Push:
+        """Push every robot now; raises ConfigError or PoiseError where that cannot be."""
+
+
+class Live:
+    """A session and the frames of its last seconds."""
+
+    live, ended = True, False
+
+    def __init__(self, session: Session, command: str = ""):
+        self.session, self._command = session, command
+        self.names, self.robot, self.period = session.names, session.robot, session.period
+        self._observers = [Observer(side.env) for side in session.sides]
+        self._begin()
+
+    @property
+    def command(self) -> str:
+        """The command that plays the same again: the same start and the same pushes."""
+        return self._command + "".join(f" --push '{_written(p)}'" for p in self.session.pushes)
+
+    @property
+    def yaw(self) -> float:
+        """Of the heading at the reset [rad]."""
+        return self.session.sides[0].env.simulation.start_yaw
+
+    def step(self) -> None:
+        """Play a step of every controller; what is shown is the present again."""
+        self.session.step()
+        self._observe()
+
+    def reset(self) -> None:
+        """Begin anew."""
+        self.session.reset()
+        self._begin()
+
+    def push(self, **fields: object) -> Push:
+        """Push every robot; see `Session.push`."""
+        return self.session.push(**fields)
+
+    def film(self, name: str, path: Path) -> None:
+        """Play the same again by another agent, and write an MP4 of it."""
+        from poise.training.figures.video import record
+
+        time, trial = self.session.time, self.session.trial
+        if not 0.0 < time <= LONGEST_FILM:
+            raise PoiseError(f"a video is of at most {LONGEST_FILM:g} s, begin anew by Reset")
+        agent = load_agent(name, self.robot, duration=time, pushes=None)
+        if agent.begin is not None:
+            agent.begin()
+        record(agent.env, agent.act, path, {"seed": trial.seed, "options": trial.options})
+
+    def _begin(self) -> None:
+        self.history: list[Frames] = []
+        self._observe()
+
+    def _observe(self) -> None:
+        sides = zip(self._observers, self.session.sides, strict=True)
+        self.history.append(tuple(see(side.fall_time) for see, side in sides))
+        del self.history[: -round(KEPT / self.period)]
+        self.at = len(self.history) - 1
+
+
+class Recorded:
+    """Frames that were recorded before; see `recorded_trial`."""
+
+    live, yaw = False, 0.0
+
+    def __init__(
+        self, names: list[str], robot: Robot, history: Sequence[Frames], period: float,
+        command: str, film: Callable[[str, Path], object],
+    ):  # fmt: skip
+        self.names, self.robot, self.period, self.command = names, robot, period, command
+        self.history, self.at, self._film = history, 0, film
+
+    @property
+    def ended(self) -> bool:
+        """Whether the last frame is shown."""
+        return self.at == len(self.history) - 1
+
+    def step(self) -> None:
+        """Show the next frame, if there is one."""
+        self.at = min(self.at + 1, len(self.history) - 1)
+
+    def reset(self) -> None:
+        """Show the first frame."""
+        self.at = 0
+
+    def film(self, name: str, path: Path) -> None:
+        """Write an MP4 of one controller."""
+        self._film(name, path)
+
+    def push(self, **fields: object) -> Push:
+        """Raises PoiseError: what is over cannot be pushed."""
+        raise PoiseError("a recorded trial cannot be pushed, what poise view CONTROLLER plays can")
+
+
+def _written(push: Push) -> str:
+    """A push as `--push` takes it, without what has its default."""
+    x, y, z = push.point
+    optional = {
+        "elevation": push.elevation or None,
+        "point": f"[{x}, {y}, {z}]" if any(push.point) else None,
+        "profile": None if push.profile == "square" else push.profile,
+    }
+    fields = {
+        "impulse": push.impulse, "direction": push.direction, "duration": push.duration,
+        "body": push.body, "start": push.start,
+        **{name: value for name, value in optional.items() if value is not None},
+    }  # fmt: skip
+    return "{" + ", ".join(f"{name}: {value}" for name, value in fields.items()) + "}"

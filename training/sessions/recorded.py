@@ -1,0 +1,81 @@
+"""A trial of a result, played again as `poise replay` does, as frames to scrub through."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from poise.envs.balance.base import BalanceEnv
+from poise.training.results.read import load_results
+from poise.training.results.replay import replay
+from poise.training.trials.trial import Outcome
+
+from .frames import Frame, Observer
+from .live import Frames, Recorded
+from .session import MOST
+
+
+class Recorder:
+    """Keeps the frames of a trial; hand it to `replay`."""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+        self.env: BalanceEnv | None = None
+        self._observer: Observer | None = None
+
+    def __call__(self, env: BalanceEnv) -> None:
+        if self._observer is None:
+            self.env, self._observer = env, Observer(env)
+        self.frames.append(self._observer(env.simulation.time if env.fallen else None))
+
+
+def recorded_trial(
+    folder: Path, trial: int, controllers: Sequence[str] = (), allow: str | Iterable[str] = ()
+) -> tuple[Recorded, list[str]]:
+    """A trial by up to three of the controllers that took part, side by side.
+
+    A trial that a robot fell in is over for it; it stays as it fell.
+
+    Args:
+        folder: written by `evaluate` or `benchmark`.
+        trial: its number in trials.csv.
+        controllers: of those that took part; none: the last one, as `replay`.
+        allow: controllers from outside that may run.
+
+    Returns:
+        the trial, and a line about each controller.
+
+    Raises:
+        ConfigError: as `replay`.
+    """
+    results = load_results(folder)
+    names = list(controllers[:MOST]) or [results.controllers[-1]]
+    for name in names:  # before the first is played
+        results.record(name, trial)
+    recorders, lines = [Recorder() for _ in names], []
+    for name, recorder in zip(names, recorders, strict=True):
+        done = replay(results, trial, name, watch=recorder, allow=allow)
+        differs = "differs from the record" if done.differences else "exactly as recorded"
+        lines.append(f"trial {trial}, {name}: {_end(done.outcome)}, {differs}")
+    env = recorders[0].env
+    assert env is not None
+    command = f"poise view {shlex.quote(str(folder))} --trial {trial} --controllers "
+
+    def film(name: str, path: Path) -> None:
+        replay(results, trial, name, video=path, allow=allow)
+
+    history = _side_by_side([recorder.frames for recorder in recorders])
+    return Recorded(
+        names, env.robot, history, env.config.policy_period,
+        command + " ".join(map(shlex.quote, names)), film,
+    ), lines  # fmt: skip
+
+
+def _end(outcome: Outcome) -> str:
+    return "recovered" if outcome.recovered else "fell" if outcome.fallen else "not quiet"
+
+
+def _side_by_side(films: Sequence[Sequence[Frame]]) -> list[Frames]:
+    longest = max(map(len, films))
+    return [tuple(film[min(k, len(film) - 1)] for film in films) for k in range(longest)]

@@ -1,0 +1,1 @@
+"""The robot in the browser or in MuJoCo's window: `poise view`."""

@@ -1,0 +1,250 @@
+"""The page and the loop that plays: time, what the user asks for, pictures."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from poise.configs.errors import PoiseError
+from poise.envs.viewing.quantities import Quantity
+from poise.training.sessions.frames import between
+from poise.training.sessions.live import Frames, Play
+from poise.training.sessions.mouse import Pull
+from poise.training.sessions.pace import Pace
+
+from .panel import OPACITY, Panel, Wishes
+from .plots import Plots
+from .saving import send_films, send_picture
+from .stage import BACKGROUND, PHONE, Stage, set_look
+
+FRAME = 1.0 / 30.0  # [s] between two pictures
+TELL = 0.25  # [s] between two looks at status and plots
+Load = Callable[[str, list[str]], Play]  # robot, controllers → what is played then
+Job = Callable[[], None]
+
+
+class BrowserView:
+    """Plays in a page until it is told to end.
+
+    Everything that is simulated happens in `run`, in the thread that calls it: what the page's
+    threads want is put into a queue and done between two steps.
+
+    Args:
+        server: of the page.
+        play: a session or a recorded trial.
+        load: makes another session.
+        dark: whether the page is dark to begin with.
+    """
+
+    def __init__(self, server: viser.ViserServer, play: Play, load: Load, dark: bool = False):
+        self._server, self._load, self._jobs = server, load, queue.SimpleQueue[Job]()
+        self.pace, self.paused = Pace(), False
+        self._opacity, self._hidden, self._following = OPACITY, set[Quantity](), True
+        self._phones: dict[int, bool] = {}  # page → whether its controls are below
+        self._drawn = self._told = -1e9  # when the last picture and status were shown [s]
+        self._set_dark(dark)
+        wishes = Wishes(
+            pause=self.toggle, step=self.step, reset=self.reset, speed=self.set_speed,
+            seek=self.seek, push=self.push, load=self.load, show=self.show, follow=self._follow,
+            opacity=self._set_opacity, dark=self._set_dark,
+            picture=self._picture, film=self._film,
+        )  # fmt: skip
+        self.panel = Panel(server.gui, self.ask, wishes, play.live, dark)
+        beside = server.gui.add_panel()
+        self._tab = beside.add_tab("Over time", viser.Icon.CHART_LINE)
+        beside.dock_left()
+        beside.set_width(300)
+        server.gui.main_panel.dock_right()
+        self._set_play(play)
+        server.on_client_connect(self._connected)
+
+    def _set_play(self, play: Play) -> None:
+        """Show this."""
+        self.play = play
+        self.stage = Stage(self._server, play.robot, play.names, self._grabbed, self._opacity)
+        for page, client in self._server.get_clients().items():
+            self.stage.point_camera(client, self._phones.get(page, False))
+        self.stage.marks.hidden, self.stage.following = self._hidden, self._following
+        with self._tab:
+            self.plots = Plots(self._server.gui, play.names)
+        self.panel.set_up(play.robot, play.names, play.live)
+        self._changed()
+
+    def ask(self, do: Callable[..., None], *arguments: object) -> None:
+        """Have something done between two steps; from any thread."""
+        self._jobs.put(lambda: do(*arguments))
+
+    def run(self, seconds: float | None = None) -> None:
+        """Play, for some seconds of the wall clock or until the process is stopped."""
+        end = time.monotonic() + (float("inf") if seconds is None else seconds)
+        self.pace = Pace()
+        while (now := time.monotonic()) < end:
+            self._advance()
+            if now - self._drawn >= FRAME:
+                self._draw(now)
+            self._wait(end)
+
+    def toggle(self) -> None:
+        """Pause, or go on; what has ended begins again."""
+        self.paused = not self.paused
+        if not self.paused and self.play.ended:
+            self.play.reset()
+        self._changed()
+
+    def step(self) -> None:
+        """Pause, and play one step."""
+        self.paused = True
+        self.play.step()
+        self._changed()
+
+    def reset(self) -> None:
+        """Begin anew."""
+        self.play.reset()
+        self._changed()
+
+    def set_speed(self, speed: float) -> None:
+        """Play `speed` simulated seconds in a second."""
+        self.pace.speed = speed
+
+    def seek(self, moment: float) -> None:
+        """Pause, and show what was at a moment [s]."""
+        history = self.play.history
+        self.paused = True
+        place = round((moment - history[0][0].time) / self.play.period)
+        self.play.at = min(max(place, 0), len(history) - 1)
+        self._changed()
+
+    def push(self, fields: dict[str, object]) -> None:
+        """Push every robot."""
+        self.play.push(**fields)
+        self.paused = False
+
+    def load(self, robot: str, names: list[str]) -> None:
+        """Play other controllers, or another robot."""
+        self._say(f"loading {', '.join(names)} …")
+        play = self._load(robot, names)
+        self.stage.remove()
+        self.plots.remove()
+        self._set_play(play)
+        self.paused = False
+        self.pace.rest()
+
+    def _advance(self) -> None:
+        """The steps that are due."""
+        if self.paused:
+            self.pace.rest()
+            return
+        try:
+            for _ in range(self.pace.due(self.play.period)):
+                self.play.step()
+        except Exception as error:  # a controller from outside may raise anything
+            self.paused = True
+            self._say(f"the controller raised {type(error).__name__}: {error}", "red")
+        if self.play.ended:
+            self.paused = True
+
+    def _draw(self, now: float) -> None:
+        self._drawn = now
+        self.stage.show(self._frames())
+        if now - self._told >= TELL:
+            self._told = now
+            history = self.play.history
+            at, first, last = (history[k][0].time for k in (self.play.at, 0, -1))
+            self.panel.tell(self._status(), self.paused, at, first, last)
+            self.panel.command.content = f"`{self.play.command}`"
+            self.plots.show(history, self.play.at, self.play.period)
+
+    def _frames(self) -> Frames:
+        """What is shown now: in slow motion a place on the way to the last step's end."""
+        history, at = self.play.history, self.play.at
+        if self.paused or self.pace.speed >= 1.0 or at == 0:
+            return history[at]
+        pairs = zip(history[at - 1], history[at], strict=True)
+        return tuple(between(first, second, self.pace.phase) for first, second in pairs)
+
+    def _changed(self) -> None:
+        """Have the next picture show everything anew."""
+        self._drawn = self._told = -1e9
+
+    def _status(self) -> str:
+        frames = self.play.history[self.play.at]
+        factor = "paused" if self.paused else f"**{self.pace.factor:.2f} × real time**"
+        if self.pace.speed != 1.0:
+            factor += f" at {self.pace.speed:g} ×"
+        lines = [f"{frames[0].time:.2f} s, {factor}"]
+        for name, frame in zip(self.play.names, frames, strict=True):
+            fell = None if frame.fall_time is None else f"fell at {frame.fall_time:.2f} s"
+            lines.append(f"`{name}`: {fell or 'on its feet'}")
+        return "  \n".join(lines)
+
+    def _wait(self, end: float) -> None:
+        """Do what is asked; or wait for it until the next step or picture is due."""
+        due = FRAME if self.paused else self.pace.until_due(self.play.period)
+        now = time.monotonic()
+        timeout = min(due, max(self._drawn + FRAME - now, 0.0), max(end - now, 0.0))
+        try:
+            job = self._jobs.get(timeout=timeout) if timeout > 0.0 else self._jobs.get_nowait()
+        except queue.Empty:
+            return
+        try:
+            job()
+        except PoiseError as error:
+            self._say(str(error), "red")
+        if not self.paused:
+            return
+        self.pace.rest()
+
+    def _say(self, text: str, colour: str | None = None) -> None:
+        for client in self._server.get_clients().values():
+            client.add_notification("Poise", text, auto_close_seconds=6.0, color=colour)  # type: ignore[call-overload]
+
+    def _connected(self, client: viser.ClientHandle) -> None:
+        """Show a new page all robots; again when its form changes, as panels are docked late, until
+        the user has moved the camera."""
+        self._phones[client.client_id] = phone = client.camera.image_width < PHONE
+        form, eye = client.camera.aspect, self.stage.point_camera(client, phone)
+
+        @client.camera.on_update
+        def _(camera: viser.CameraHandle) -> None:
+            nonlocal form, eye
+            changed = abs(camera.aspect - form) > 1e-3
+            if changed and np.allclose(camera.position, eye, atol=1e-2):
+                form, eye = camera.aspect, self.stage.point_camera(client, phone)
+
+    def _grabbed(self, phase: str, pulled: Pull) -> None:
+        """In the server's thread, while a body is dragged."""
+        self.ask(self._pulled, phase, pulled)
+
+    def _pulled(self, phase: str, pulled: Pull) -> None:
+        if phase != "end":
+            self.stage.pull = pulled
+            return
+        self.stage.pull = None
+        self.push(pulled.fields(self.play.robot, self.play.yaw, float(self.panel.duration.value)))
+
+    def show(self, quantity: Quantity, shown: bool) -> None:
+        """Show the marks of a quantity, or hide them."""
+        (self._hidden.discard if shown else self._hidden.add)(quantity)
+
+    def _follow(self, follow: bool) -> None:
+        self._following = self.stage.following = follow
+
+    def _set_opacity(self, opacity: float) -> None:
+        self._opacity = opacity
+        self.stage.robots.set_opacity(opacity)
+
+    def _set_dark(self, dark: bool) -> None:
+        self._dark = dark
+        set_look(self._server, dark)
+
+    def _picture(self, client: int) -> None:
+        send_picture(self._server, client, BACKGROUND[self._dark])
+
+    def _film(self, client: int) -> None:
+        self._say("writing the video; the simulation waits …")
+        send_films(self._server, client, self.play)
+        self.pace.rest()

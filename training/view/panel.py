@@ -1,0 +1,175 @@
+"""The controls beside the scene. They only ask: what is asked is done between two steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import viser
+
+from poise.envs.pushes.options import body_names
+from poise.envs.robots.robot import Robot
+from poise.envs.viewing.quantities import Quantity
+from poise.training.sessions.mouse import DURATION, WEIGHT
+from poise.training.sessions.session import MOST
+
+from .choices import NOBODY, controllers, robots
+from .marks import SHOWN
+
+SPEEDS = {"1×": 1.0, "1/2×": 0.5, "1/4×": 0.25, "1/10×": 0.1}  # label → simulated over real time
+OPACITY = 0.75  # of the robot, with which marks inside are seen
+Ask = Callable[..., None]  # has a function called with arguments, by the loop that plays
+
+
+@dataclass
+class Wishes:
+    """What the controls may ask for: functions of the loop that plays."""
+
+    pause: Callable[[], None]
+    step: Callable[[], None]
+    reset: Callable[[], None]
+    speed: Callable[[float], None]
+    seek: Callable[[float], None]
+    push: Callable[[dict[str, object]], None]
+    load: Callable[[str, list[str]], None]
+    show: Callable[[Quantity, bool], None]
+    opacity: Callable[[float], None]
+    follow: Callable[[bool], None]
+    dark: Callable[[bool], None]
+    picture: Callable[[int], None]
+    film: Callable[[int], None]
+
+
+class Panel:
+    """The main panel of the page.
+
+    Args:
+        gui: of the server.
+        ask: has a wish done by the loop; callbacks run in threads of the server.
+        wishes: what there is to ask for.
+        live: whether pushes and controllers can be chosen: not in a recorded trial.
+        dark: whether the page is dark to begin with.
+    """
+
+    def __init__(self, gui: viser.GuiApi, ask: Ask, wishes: Wishes, live: bool, dark: bool):
+        self._gui, self._ask, self.wishes = gui, ask, wishes
+        self.status = gui.add_markdown("")
+        self._playing()
+        with gui.add_folder("Push", visible=live):
+            self._pushing()
+        with gui.add_folder("Robot and controllers", expand_by_default=False, visible=live):
+            self._choosing()
+        with gui.add_folder("Show", expand_by_default=False):
+            self._showing(dark)
+        with gui.add_folder("Save", expand_by_default=False):
+            self._saving()
+
+    def set_up(self, robot: Robot, names: Sequence[str], live: bool) -> None:
+        """Offer what this robot has, and what is played by these controllers."""
+        bodies = body_names(robot)
+        self.body.options = bodies
+        self.body.value = "torso" if "torso" in bodies else bodies[0]
+        self.impulse.value = round(WEIGHT * robot.mass, 1)
+        if live and robot.name in self.robot.options:
+            self.robot.value = robot.name
+        for k, choice in enumerate(self.controllers):
+            name = names[k] if k < len(names) else NOBODY
+            choice.value = name if name in choice.options else NOBODY
+
+    def tell(self, text: str, paused: bool, at: float, first: float, last: float) -> None:
+        """Bring the status, the button and the timeline [s] up to date."""
+        self.status.content = text
+        self.pause.label = "Play" if paused else "Pause"
+        if last > first:
+            self.timeline.max, self.timeline.min = last, first
+            self.timeline.value = min(max(at, first), last)
+
+    def _playing(self) -> None:
+        gui = self._gui
+        self.pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
+        self.pause.on_click(self._asked(lambda _: self.wishes.pause()))
+        buttons = gui.add_button_group("Time", ("Step", "Reset"))
+        buttons.on_click(self._asked(self._step_or_reset))
+        speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
+        speed.on_update(self._asked(lambda e: self.wishes.speed(SPEEDS[_of(e, SPEEDS)])))
+        self.timeline = gui.add_slider("Time [s]", 0.0, 0.02, 0.02, 0.0)
+        self.timeline.on_update(self._asked(self._seek, users=True))
+
+    def _step_or_reset(self, event: Any) -> None:
+        (self.wishes.step if event.target.value == "Step" else self.wishes.reset)()
+
+    def _seek(self, event: Any) -> None:
+        self.wishes.seek(float(event.target.value))
+
+    def _pushing(self) -> None:
+        gui = self._gui
+        self.impulse = gui.add_number("Impulse [N·s]", 20.0, min=0.0, max=1000.0, step=1.0)
+        self.direction = gui.add_slider(
+            "Direction [°]", -180.0, 180.0, 5.0, 0.0,
+            hint="Counter-clockwise from forward: 0 forward, 90 left, 180 backward",
+        )  # fmt: skip
+        self.duration = gui.add_number("Duration [s]", DURATION, min=0.01, max=5.0, step=0.01)
+        self.body = gui.add_dropdown("Body", ("torso",))
+        button = gui.add_button("Push", icon=viser.Icon.HAND_MOVE, color="orange")
+        button.on_click(self._asked(lambda _: self.wishes.push(self.fields())))
+        gui.add_markdown("Or drag a body with the mouse, and let go: the arrow is the push.")
+
+    def fields(self) -> dict[str, object]:
+        """The push that the controls describe, as `parse_pushes` takes it, without a start."""
+        return {
+            "impulse": float(self.impulse.value), "direction": float(self.direction.value),
+            "duration": float(self.duration.value), "body": str(self.body.value),
+        }  # fmt: skip
+
+    def _choosing(self) -> None:
+        gui = self._gui
+        self.robot = gui.add_dropdown("Robot", robots())
+        names = controllers()
+        self.controllers = [
+            gui.add_dropdown(f"Controller {k + 1}", names if k == 0 else (NOBODY, *names))
+            for k in range(MOST)
+        ]
+        gui.add_button("Load").on_click(self._asked(lambda _: self.load()))
+
+    def load(self) -> None:
+        """Ask for the robot and the controllers that are chosen."""
+        # the server takes any value from a page: only packaged names are loaded
+        chosen = [choice.value for choice in self.controllers]
+        names = [name for name in chosen if name in controllers()]
+        if names and self.robot.value in robots():
+            self.wishes.load(self.robot.value, names)
+
+    def _showing(self, dark: bool) -> None:
+        gui, wishes = self._gui, self.wishes
+        for quantity in SHOWN:
+            box = gui.add_checkbox(quantity.label, True)
+            box.on_update(self._asked(lambda e, q=quantity: wishes.show(q, bool(e.target.value))))
+        opacity = gui.add_slider("Robot's opacity", 0.1, 1.0, 0.05, OPACITY)
+        opacity.on_update(self._asked(lambda e: wishes.opacity(float(e.target.value))))
+        follow = gui.add_checkbox("follow the robot", True)
+        follow.on_update(self._asked(lambda e: wishes.follow(bool(e.target.value))))
+        night = gui.add_checkbox("dark", dark)
+        night.on_update(self._asked(lambda e: wishes.dark(bool(e.target.value))))
+
+    def _saving(self) -> None:
+        gui, wishes = self._gui, self.wishes
+        picture = gui.add_button("Picture (PNG)", icon=viser.Icon.CAMERA)
+        picture.on_click(lambda e: wishes.picture(e.client_id))  # waits for the browser itself
+        film = gui.add_button("Video (MP4)", icon=viser.Icon.MOVIE)
+        film.on_click(self._asked(lambda e: wishes.film(e.client_id)))
+        self.command = gui.add_markdown("")
+
+    def _asked(self, do: Callable[[Any], None], users: bool = False) -> Callable[[Any], None]:
+        """A callback that has the loop call `do`; with `users` only for what a user has done."""
+
+        def callback(event: Any) -> None:
+            if not (users and event.client_id is None):
+                self._ask(do, event)
+
+        return callback
+
+
+def _of(event: Any, options: dict[str, float]) -> str:
+    """The chosen option; the first one for what no page of ours sends."""
+    return event.target.value if event.target.value in options else next(iter(options))

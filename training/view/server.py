@@ -1,0 +1,84 @@
+"""viser's server: on which address, and what it prints."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import socket
+import threading
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from poise.configs.errors import ConfigError, PoiseError
+
+if TYPE_CHECKING:
+    import viser
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+STOPPING = 0.3  # [s] that a server is given to end; then the end of the process ends it
+
+
+def check_installed() -> None:
+    """Raises PoiseError, which says how to install them, without viser and mjviser."""
+    try:
+        import mjviser  # noqa: F401
+        import viser  # noqa: F401
+    except ImportError as error:
+        raise PoiseError(
+            f"poise view needs the packages viser and mjviser ({error}): pip install "
+            "'poise[view]', in a checkout pip install -e '.[view]'; or --native, MuJoCo's window"
+        ) from None
+
+
+def check_port(host: str, port: int) -> None:
+    """Raises ConfigError where nothing can listen there; port 0 is any that is free."""
+    if not 0 <= port <= 65535:
+        raise ConfigError(f"must be from 0 to 65535, not {port}", field="port")
+    try:
+        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
+    except socket.gaierror as error:
+        raise ConfigError(f"no such address: {host} ({error.strerror})", field="host") from None
+    except OSError as error:
+        reason = f"{port} on {host} cannot be had ({error.strerror}); give another, or 0 for any"
+        raise ConfigError(reason, field="port") from None
+
+
+@contextlib.contextmanager
+def serving(host: str, port: int) -> Iterator[viser.ViserServer]:
+    """A server that ends with the block; raises ConfigError as `check_port`."""
+    check_port(host, port)
+    import viser
+
+    with _silent():
+        server = viser.ViserServer(host, port, label="Poise", verbose=False)
+    # A page could ask for a tunnel to the outside; nobody but the user decides who may look on.
+    server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
+    try:
+        yield server
+    finally:
+        with _silent():
+            ending = threading.Thread(target=server.stop, daemon=True)
+            ending.start()
+            ending.join(STOPPING)
+
+
+def greeting(host: str, port: int) -> list[str]:
+    """What is said at the start: the address, who can reach it, and how from elsewhere."""
+    url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
+    if host not in LOOPBACK:
+        return [url, f"reachable by everybody who can reach {host}: there is no password"]
+    return [
+        url,
+        "reachable from this machine alone; from another one: "
+        f"ssh -L {port}:localhost:{port} THIS_MACHINE, then http://localhost:{port} there",
+    ]
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """viser prints what `greeting` says better."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        yield
