@@ -38,7 +38,7 @@ class ProgressLines(Progress):
 
     _started = _due = -1.0  # [s], monotonic
 
-    def update(self, task_id: TaskID, **changes: Any) -> None:  # type: ignore[override]
+    def update(self, task_id: TaskID, **changes: Any) -> None:
         """As of `Progress`."""
         super().update(task_id, **changes)
         if self.disable or self.console.is_terminal:
