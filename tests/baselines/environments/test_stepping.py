@@ -183,7 +183,9 @@ def test_observation_tells_of_the_step():
     seen = dict(zip(names, env.episode.observation, strict=True))
     controller, state = env.controller, env.simulation.state
     assert [seen["swing.left"], seen["swing.right"]] == [controller.foot == 0, controller.foot == 1]
-    assert seen["phase.fraction"] == pytest.approx(controller.swing.time / controller.swing.duration)
+    assert seen["phase.fraction"] == pytest.approx(
+        controller.swing.time / controller.swing.duration
+    )
     assert seen["steps.count"] == 1.0 and seen["time_left.t"] > 0.0
     cos, sin = state.heading
     axes, half = np.array([[cos, -sin], [sin, cos]]), 0.5 * env.robot.height_com
