@@ -133,7 +133,7 @@ class ResidualBalanceEnv(BalanceEnv):
         step, source = self.arrays.timestep, "environment"
         self.control_substeps = whole_steps(period, step, "controller period", source)
         self.ticks = whole_steps(self.config.policy_period, period, "policy_period", source)
-        self._controller, self._told = controller, base
+        self._controller, self._base = controller, base
         # all others are called from Python, tick by tick
         self._compiled = isinstance(controller, CompiledController) and controller.compiled
         self._com_offset = float(base.com_offset)
@@ -152,7 +152,7 @@ class ResidualBalanceEnv(BalanceEnv):
         """
         return {
             **super().arguments(),
-            "controller": self._told.another(),
+            "controller": self._base.another(),
             "motion": self.motion,
             "residual": self.residual,
             "smoothing": self.smoothing,
@@ -246,7 +246,7 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def check(self) -> None:
         """See `BalanceEnv`; it is the controller's."""
-        self._told.check()
+        self._base.check()
 
     def tick(self) -> None:
         if self.compiled_step() is None:
@@ -262,7 +262,7 @@ class ResidualBalanceEnv(BalanceEnv):
             set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
         set_targets(a)
         ctrl[:] = self.controller.torques(self.state_source.state, self.targets)
-        wrench[:] = self._told.root_wrench
+        wrench[:] = self._base.root_wrench
         self._push_root(wrench)
         account_tick(self._account())
         sim.step(ctrl, self.control_substeps)
@@ -274,7 +274,7 @@ class ResidualBalanceEnv(BalanceEnv):
     def _end_in_python(self) -> None:
         """End the policy step, as `end_tick` does."""
         self.episode.ticks[0] = 0
-        self.episode.metrics[FAILURES] = self._told.failures
+        self.episode.metrics[FAILURES] = self._base.failures
         judge_step(self.step_end().judge)
         self._observe()
 
