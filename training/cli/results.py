@@ -72,7 +72,7 @@ def replay(
         trial: its number in trials.csv.
         controller: which of the evaluated ones; the last if not given. A video shows several side
             by side.
-        video: an MP4 or GIF file to write.
+        video: an MP4 or WebP file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
     """
     if video is not None:

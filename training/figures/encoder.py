@@ -16,8 +16,8 @@ CRF = 20  # quality of H.264, lower is better: 18 is visually lossless
 FORMS: dict[str, dict[str, Any]] = {
     ".mp4": {"codec": "libx264", "pix_fmt_out": "yuv420p",
              "output_params": ["-crf", str(CRF), "-movflags", "+faststart"]},
-    ".gif": {"codec": "gif", "pix_fmt_out": "rgb8",
-             "output_params": ["-vf", "split[a][b];[a]palettegen[p];[b][p]paletteuse"]},
+    ".webp": {"codec": "libwebp_anim", "pix_fmt_out": "yuv420p",
+              "output_params": ["-quality", "70", "-loop", "0"]},
 }  # fmt: skip
 
 

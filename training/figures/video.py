@@ -31,7 +31,7 @@ def record(
     size: tuple[int, int] = (640, 480),
     camera: Camera | str | int | None = None,
 ) -> dict[str, Any]:
-    """Play one episode and write it as an MP4 (H.264, yuv420p) that browsers play, or as a GIF.
+    """Play one episode and write it as an MP4 (H.264, yuv420p) that browsers play, or as a WebP.
 
     The file appears complete or not at all. Every n-th policy step is drawn, with n such that the
     video has about `fps` frames a second; drawing takes most of the time.
@@ -39,7 +39,7 @@ def record(
     Args:
         env: one of Poise's environments, wrapped or not, in any render mode.
         act: the action for an observation.
-        path: where to write, ending in .mp4 or .gif.
+        path: where to write, ending in .mp4 or .webp.
         reset_kwargs: `seed` and `options` of the reset.
         fps: frames a second that are wanted [1/s].
         slow_motion: how much longer the video takes than the episode.

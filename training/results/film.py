@@ -17,6 +17,7 @@ from .read import Results, load_results
 
 SIZE = (640, 480)  # [pixels] of one controller alone
 NARROW = (480, 480)  # of one of several
+WEBP_SIZE, WEBP_RATE = (320, 320), 12.5  # [1/s]; for pages, so small
 
 
 def film(
@@ -25,7 +26,7 @@ def film(
     controllers: Sequence[str],
     path: str | Path,
     *,
-    fps: float = 25.0,
+    fps: float | None = None,
     size: tuple[int, int] | None = None,
     allow: str | Iterable[str] = (),
 ) -> None:
@@ -37,9 +38,10 @@ def film(
         folder: written by `evaluate` or `benchmark`, or what `load_results` has read there.
         trial: its number in trials.csv; all of `controllers` have played it.
         controllers: names, from left to right.
-        path: of the video, ending in .mp4 or .gif.
-        fps: frames a second that are wanted [1/s].
-        size: width and height of each picture [pixels]; None: `SIZE`, or `NARROW` of several.
+        path: of the video, ending in .mp4 or .webp.
+        fps: frames a second that are wanted [1/s]; None: 25, of a WebP `WEBP_RATE`.
+        size: width and height of each picture [pixels]; None: `SIZE`, `NARROW` of several, of a WebP
+            `WEBP_SIZE`.
         allow: controllers from outside (``module:Class``) that may run.
 
     Raises:
@@ -47,7 +49,9 @@ def film(
         PoiseError: nothing can be drawn or encoded here, or the file cannot be written.
     """
     where = folder.folder if isinstance(folder, Results) else Path(folder)
-    size = size or (SIZE if len(controllers) == 1 else NARROW)
+    small = Path(path).suffix.lower() == ".webp"
+    size = size or (WEBP_SIZE if small else SIZE if len(controllers) == 1 else NARROW)
+    fps = fps or (WEBP_RATE if small else 25.0)
     with allowing(allow, source=where / SETTINGS), ExitStack() as stack:
         results = folder if isinstance(folder, Results) else load_results(where)
         episodes = {}

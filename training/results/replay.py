@@ -52,7 +52,7 @@ def replay(
         folder: written by `evaluate` or `benchmark`, or what `load_results` has read there.
         trial: its number in trials.csv.
         controller: one that took part; None: the last, which is the first if it is alone.
-        video: an MP4 or GIF file to write, see `film`.
+        video: an MP4 or WebP file to write, see `film`.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
         watch: called with the environment after the reset and after every step.
         allow: controllers from outside (``module:Class``) that may run.

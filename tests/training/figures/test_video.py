@@ -73,7 +73,7 @@ def test_place_that_cannot_be_written(can_render, env, tmp_path):
 @pytest.mark.parametrize(
     "name, options, text",
     [
-        ("a.avi", {}, r"\.mp4 or \.gif"),
+        ("a.avi", {}, r"\.mp4 or \.webp"),
         ("a.mp4", {"fps": 0.0}, "fps"),
         ("a.mp4", {"slow_motion": float("nan")}, "slow_motion"),
         ("a.mp4", {"size": (33, 32)}, "size"),

@@ -10,6 +10,7 @@ import yaml
 from poise.configs.errors import ConfigError
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate
+from poise.training.results.film import film
 from poise.training.results.replay import replay
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
@@ -91,3 +92,16 @@ def test_a_stopped_evaluation_cannot_be_replayed(folder: Path, tmp_path: Path) -
     (tmp_path / "settings.yaml").write_text((folder / "out/settings.yaml").read_text())
     with pytest.raises(ConfigError, match="no finished result: summary.json, trials.csv missing"):
         replay(tmp_path, 0)
+
+
+@pytest.mark.usefixtures("can_render")
+def test_several_controllers_are_filmed_side_by_side(folder: Path, tmp_path: Path) -> None:
+    """As an animation for pages, too: small, until the last one has ended."""
+    from PIL import Image
+
+    names = ["zero", str(folder / "soft.yaml")]
+    film(folder / "out", 2, names, tmp_path / "trial.webp", fps=5.0, size=(64, 48))
+    with Image.open(tmp_path / "trial.webp") as shown:
+        assert shown.size == (128, 48)
+        seconds = 0.2 * shown.n_frames
+    assert 1.6 <= seconds <= 2.0  # the suite's duration, and the first frame
