@@ -37,7 +37,7 @@ def measure(names: tuple[str, ...], seconds: float) -> tuple[float, list[float]]
                 delays.append(time.monotonic() - asked.pop())
 
         asked: list[float] = []
-        view.stage.show = shown  # type: ignore[method-assign]
+        view.stage.show = shown
 
         def push() -> None:
             for _ in range(int(seconds) - 1):

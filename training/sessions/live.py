@@ -25,11 +25,20 @@ class Play(Protocol):
     names: list[str]  #: of the controllers
     robot: Robot
     period: float  #: between two frames [s]
-    history: Sequence[Frames]
     at: int
     live: bool  #: whether it can be pushed
-    yaw: float  #: of the heading at the reset, which directions are relative to [rad]
-    command: str  #: that shows the same again
+
+    @property
+    def history(self) -> Sequence[Frames]:
+        """All moments that can be shown."""
+
+    @property
+    def yaw(self) -> float:
+        """Of the heading at the reset, which directions are relative to [rad]."""
+
+    @property
+    def command(self) -> str:
+        """The command that shows the same again."""
 
     @property
     def ended(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import time
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 import viser
@@ -198,9 +199,9 @@ class BrowserView:
             return
         self.pace.rest()
 
-    def _say(self, text: str, colour: str | None = None) -> None:
+    def _say(self, text: str, colour: Literal["red"] | None = None) -> None:
         for client in self._server.get_clients().values():
-            client.add_notification("Poise", text, auto_close_seconds=6.0, color=colour)  # type: ignore[call-overload]
+            client.add_notification("Poise", text, auto_close_seconds=6.0, color=colour)
 
     def _connected(self, client: viser.ClientHandle) -> None:
         """Show a new page all robots; again when its form changes, as panels are docked late, until

@@ -32,6 +32,7 @@ SHOWN: dict[Quantity, tuple[str, ...]] = {
     FOOTHOLD: ("foothold",),
 }
 ROOM = {"spheres": 2, "cylinders": 32, "heads": 10}  # mesh → instances for each robot
+NO_TURN = np.array([1.0, 0.0, 0.0, 0.0], np.float32)
 HEAD = 0.3  # of an arrow's length, at most
 HEAD_WIDTH = 2.2  # over the radius of its shaft
 LIFT = 0.002  # [m] over the ground, so that what lies on it is not hidden by it
@@ -58,8 +59,8 @@ class MarkSet:
     def show(self, placed: Sequence[Placed]) -> None:
         """Show these and nothing else, as far as there is room."""
         room = self._room
-        positions, scales = np.zeros((room, 3)), np.zeros((room, 3))
-        wxyzs, colours = np.tile([1.0, 0.0, 0.0, 0.0], (room, 1)), np.zeros((room, 3), np.uint8)
+        positions, scales = np.zeros((2, room, 3), np.float32)
+        wxyzs, colours = np.tile(NO_TURN, (room, 1)), np.zeros((room, 3), np.uint8)
         for k, (start, end, scale, mark) in enumerate(placed[:room]):
             positions[k], scales[k] = start, scale * [mark.opacity, mark.opacity, 1.0]
             wxyzs[k], colours[k] = _along(end - start), linear(mark.colour)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import viser
@@ -87,13 +88,13 @@ class Panel:
 
     def _playing(self) -> None:
         gui = self._gui
-        self.pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
+        self.pause: Any = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
         self.pause.on_click(self._asked(lambda _: self.wishes.pause()))
         buttons = gui.add_button_group("Time", ("Step", "Reset"))
         buttons.on_click(self._asked(self._step_or_reset))
         speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
         speed.on_update(self._asked(lambda e: self.wishes.speed(SPEEDS[_of(e, SPEEDS)])))
-        self.timeline = gui.add_slider("Time [s]", 0.0, 0.02, 0.02, 0.0)
+        self.timeline: Any = gui.add_slider("Time [s]", 0.0, 0.02, 0.02, 0.0)
         self.timeline.on_update(self._asked(self._seek, users=True))
 
     def _step_or_reset(self, event: Any) -> None:
@@ -104,13 +105,13 @@ class Panel:
 
     def _pushing(self) -> None:
         gui = self._gui
-        self.impulse = gui.add_number("Impulse [N·s]", 20.0, min=0.0, max=1000.0, step=1.0)
+        self.impulse: Any = gui.add_number("Impulse [N·s]", 20.0, min=0.0, max=1000.0, step=1.0)
         self.direction = gui.add_slider(
             "Direction [°]", -180.0, 180.0, 5.0, 0.0,
             hint="Counter-clockwise from forward: 0 forward, 90 left, 180 backward",
         )  # fmt: skip
         self.duration = gui.add_number("Duration [s]", DURATION, min=0.01, max=5.0, step=0.01)
-        self.body = gui.add_dropdown("Body", ("torso",))
+        self.body: Any = gui.add_dropdown("Body", ("torso",))
         button = gui.add_button("Push", icon=viser.Icon.HAND_MOVE, color="orange")
         button.on_click(self._asked(lambda _: self.wishes.push(self.fields())))
         gui.add_markdown("Or drag a body with the mouse, and let go: the arrow is the push.")
@@ -124,9 +125,9 @@ class Panel:
 
     def _choosing(self) -> None:
         gui = self._gui
-        self.robot = gui.add_dropdown("Robot", robots())
+        self.robot: Any = gui.add_dropdown("Robot", robots())
         names = controllers()
-        self.controllers = [
+        self.controllers: list[Any] = [
             gui.add_dropdown(f"Controller {k + 1}", names if k == 0 else (NOBODY, *names))
             for k in range(MOST)
         ]
@@ -144,7 +145,7 @@ class Panel:
         gui, wishes = self._gui, self.wishes
         for quantity in SHOWN:
             box = gui.add_checkbox(quantity.label, True)
-            box.on_update(self._asked(lambda e, q=quantity: wishes.show(q, bool(e.target.value))))
+            box.on_update(self._asked(partial(self._show, quantity)))
         opacity = gui.add_slider("Robot's opacity", 0.1, 1.0, 0.05, OPACITY)
         opacity.on_update(self._asked(lambda e: wishes.opacity(float(e.target.value))))
         follow = gui.add_checkbox("follow the robot", True)
@@ -152,13 +153,19 @@ class Panel:
         night = gui.add_checkbox("dark", dark)
         night.on_update(self._asked(lambda e: wishes.dark(bool(e.target.value))))
 
+    def _show(self, quantity: Quantity, event: Any) -> None:
+        self.wishes.show(quantity, bool(event.target.value))
+
     def _saving(self) -> None:
         gui, wishes = self._gui, self.wishes
         picture = gui.add_button("Picture (PNG)", icon=viser.Icon.CAMERA)
-        picture.on_click(lambda e: wishes.picture(e.client_id))  # waits for the browser itself
+        picture.on_click(self._draw)
         film = gui.add_button("Video (MP4)", icon=viser.Icon.MOVIE)
         film.on_click(self._asked(lambda e: wishes.film(e.client_id)))
         self.command = gui.add_markdown("")
+
+    def _draw(self, event: Any) -> None:
+        self.wishes.picture(event.client_id)  # waits for the browser, in a thread of the server
 
     def _asked(self, do: Callable[[Any], None], users: bool = False) -> Callable[[Any], None]:
         """A callback that has the loop call `do`; with `users` only for what a user has done."""

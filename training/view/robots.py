@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+import trimesh
 import viser
 from mjviser.conversions import get_geom_texture_id, merge_geoms
 
@@ -76,6 +77,7 @@ class Robots:
         wxyzs, positions = self._still
         if get_geom_texture_id(self.model, geoms[0]) >= 0:
             return self._scene.add_batched_meshes_trimesh(name, mesh, wxyzs, positions, lod="off")
+        assert isinstance(mesh.visual, trimesh.visual.ColorVisuals)
         colour = linear(tuple(np.asarray(mesh.visual.vertex_colors)[0, :3] / 255.0))
         return self._scene.add_batched_meshes_simple(
             name, mesh.vertices, mesh.faces, wxyzs, positions, batched_colors=colour, lod="off",

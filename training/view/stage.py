@@ -23,7 +23,7 @@ FOLLOW = 0.4  # [s] time constant with which the scene follows the robot
 CAMERA = Camera(azimuth=35.0, elevation=14.0)
 ALONE, TALL = 1.5, 2.4  # width and height that are seen of one robot, over CoM height
 PHONE = 576  # width [pixels] below which viser has the controls below
-LOOK_AT = 0.85  # height that the camera looks at, over CoM height
+LOOK_AT = 1.0  # height that the camera looks at, over CoM height
 FIELD_OF_VIEW = 32.0  # [deg], vertical
 NAME_AT = 2.05  # height of a robot's name above the ground, over CoM height
 SKY, SUN = 1.5, 1.9  # brightness: together, what faces up has its own colour

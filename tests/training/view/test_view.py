@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,6 +19,7 @@ import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError, PoiseError
+from poise.envs.balance.base import BalanceEnv
 from poise.envs.pushes.push import Push
 from poise.envs.viewing import window
 from poise.training.cli.entry import main
@@ -123,12 +125,16 @@ def test_a_trial_of_a_result_is_shown_as_it_was() -> None:
     lengths = []
     for side, name in enumerate((soft, "zero")):
         heights: list[float] = []
-        done = replay(folder, 2, name, watch=lambda env, h=heights: h.append(env.data.xpos[1, 2]))
+        done = replay(folder, 2, name, watch=partial(keep_height, heights))
         assert [frames[side].positions[1, 2] for frames in play.history[: len(heights)]] == heights
         assert play.history[-1][side].fall_time == done.outcome.fall_time
         lengths.append(len(heights))
     assert play.history[-1][1].fall_time is not None and len(play.history) == max(lengths)
     assert play.command.endswith(f"--trial 2 --controllers '{soft}' zero")
+
+
+def keep_height(heights: list[float], env: BalanceEnv) -> None:
+    heights.append(env.data.xpos[1, 2])
 
 
 def test_a_recorded_trial_plays_to_its_end_and_is_not_pushed() -> None:
@@ -206,6 +212,10 @@ def handle_of(opened: native.NativeView) -> FakeHandle:
     return opened.renderer.viewer.handle
 
 
+def pushes_of(opened: native.NativeView) -> list[Push]:
+    return list(opened.live.session.pushes)
+
+
 def test_the_window_is_played_by_keys(opened: native.NativeView) -> None:
     """Pause, one step, pushes in four directions, reset."""
     handle = handle_of(opened)
@@ -232,15 +242,15 @@ def test_the_window_s_mouse_pushes_when_it_lets_go(opened: native.NativeView) ->
     body = env.model.body("torso").id
     perturb.select, perturb.localpos[:] = body, [0.05, 0.0, 0.1]
     opened.advance()
-    assert opened.live.session.pushes == ()
+    assert pushes_of(opened) == []
     start = env.data.xpos[body] + env.data.xmat[body].reshape(3, 3) @ [0.05, 0.0, 0.1]
     perturb.active, perturb.refselpos[:] = 1, start + [0.0, 0.5, 0.3]
     opened.paused = True
     opened.advance()
-    assert opened.live.session.pushes == ()
+    assert pushes_of(opened) == []
     perturb.active = 0
     opened.advance()
-    (push,) = opened.live.session.pushes
+    (push,) = pushes_of(opened)
     assert isinstance(push, Push) and push.body == "torso"
     yaw = np.degrees(env.simulation.start_yaw)
     assert push.direction == pytest.approx(90.0 - yaw, abs=0.1)
