@@ -36,8 +36,9 @@ def test_sb3_loads_what_acts_as_the_policy() -> None:
     seen = observations(policy(SYMMETRIC), 500)
     actions, _ = model.predict(normalize.normalize_obs(seen), deterministic=True)
     np.testing.assert_allclose(actions, policy(SYMMETRIC).act(seen), atol=1e-4)
-    assert policy(SYMMETRIC).mirrors is not None
-    see, do = policy(SYMMETRIC).mirrors
+    mirrors = policy(SYMMETRIC).mirrors
+    assert mirrors is not None
+    see, do = mirrors
     other, _ = model.predict(normalize.normalize_obs(see(seen)), deterministic=True)
     np.testing.assert_allclose(do(other), actions, atol=1e-4)
     tensor, _ = model.policy.obs_to_tensor(normalize.normalize_obs(seen))
