@@ -15,11 +15,13 @@ import yaml
 
 from poise.configs.errors import PoiseError
 from poise.training.cli.entry import main
+from poise.training.evaluation import run as run_module
 from poise.training.export import export, libraries
 from poise.training.export.export import export_policy
 from poise.training.export.onnx_graph import onnx_bytes
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train
+from tests.support.evaluations import InProcess
 from tests.support.exported import SYMMETRIC, exported, policy, spoiled
 from tests.support.shared import finished_run, tiny_config
 
@@ -91,13 +93,16 @@ def test_figures_that_nobody_measured_are_not_told(bare: Path, tmp_path: Path) -
     assert json.loads((tmp_path / "out" / "results.json").read_text())["figures"] == []
 
 
-def test_figures_of_a_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_figures_of_a_result(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Those of this very policy, by its fingerprint; else one line."""
+    monkeypatch.setattr(run_module, "Executor", InProcess)
     run = str(finished_run())
     suite = tmp_path / "s.yaml"
     suite.write_text(yaml.safe_dump({"duration": 1.1, "quiet": {"trials": 2}}))
-    assert main(["evaluate", "zero", run, "--suite", str(suite), "--out", str(tmp_path / "r"),
-                 "--workers", "1"]) == 0  # fmt: skip
+    result = ["--suite", str(suite), "--out", str(tmp_path / "r")]
+    assert main(["evaluate", "zero", run, *result]) == 0
     given = ["--result", str(tmp_path / "r"), "--licence", "mit"]
     assert main(["export", run, "--out", str(tmp_path / "out"), *given]) == 0
     assert "differs from the policy by" in capsys.readouterr().out
