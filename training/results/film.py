@@ -40,7 +40,7 @@ def film(
         controllers: names, from left to right.
         path: of the video, ending in .mp4 or .webp.
         fps: frames a second that are wanted [1/s]; None: 25, of a WebP `WEBP_RATE`.
-        size: width and height of each picture [pixels]; None: `SIZE`, `NARROW` of several, of a WebP
+        size: width and height of each picture [pixels]; None: `SIZE`, `NARROW` of several, of WebP
             `WEBP_SIZE`.
         allow: controllers from outside (``module:Class``) that may run.
 
