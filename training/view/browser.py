@@ -195,9 +195,8 @@ class BrowserView:
             job()
         except PoiseError as error:
             self._say(str(error), "red")
-        if not self.paused:
-            return
-        self.pace.rest()
+        if self.paused:
+            self.pace.rest()
 
     def _say(self, text: str, colour: Literal["red"] | None = None) -> None:
         for client in self._server.get_clients().values():
