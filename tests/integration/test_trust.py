@@ -529,14 +529,15 @@ def test_kernels_are_compiled_apart_from_the_current_folder(
 
 #: calls that run or unpickle what a file holds → where the package makes them
 DANGEROUS = {
-    # Besides plugins: solvers of a fixed list, the files of one of our rooms, kernels that a pickle
-    # of ours names, public names.
+    # Besides plugins: solvers and libraries of fixed lists, the files of one of our rooms, kernels
+    # that a pickle of ours names, public names.
     "import_module": {
         "baselines/plugins.py",
         "baselines/solvers/registry.py",
         "configs/kinds.py",
         "envs/compiled/calls.py",
         "src/poise/lazy.py",
+        "training/export/libraries.py",
     },
     "exec_module": {"baselines/plugins.py"},
     "find_plugin": {"baselines/plugins.py", "training/trials/agents.py"},

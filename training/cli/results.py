@@ -80,17 +80,15 @@ def replay(
 
         choose_gl_backend()
     from poise.training.results.film import film
-    from poise.training.results.read import load_results
     from poise.training.results.replay import replay
 
     if plot is not None and len(controller) > 1:
         raise ConfigError("of one controller alone", field="plot")
-    results = load_results(folder)
-    names = controller or results.controllers[-1:]
-    for name in names:
-        _print_replay(replay(results, trial, name, plot=plot, allow=allow))
+    played = [replay(folder, trial, name, plot=plot, allow=allow) for name in controller or (None,)]
+    for done in played:
+        _print_replay(done)
     if video is not None:
-        film(results, trial, names, video, allow=allow)
+        film(folder, trial, [done.controller for done in played], video, allow=allow)
     for path in (video, plot):
         if path is not None:
             print(path)

@@ -61,9 +61,11 @@ def run(args: Sequence[str]) -> None:
     command = parse(args)
     out, allow = command.out, [*named(_peek(args).controller), *command.allow]
     if not command.seeds and not (out / SEEDS).exists():
-        if note := steps_note(command.settings, out, command.resume):
+        note = steps_note(command.settings, out, command.resume)
+        best = train(command.settings, out, command.resume, allow=allow)
+        if note:
             print(f"poise: {note}", file=sys.stderr)
-        print(train(command.settings, out, command.resume, allow=allow))
+        print(best)
         return
     train_seeds(
         command.settings, command.seeds, out, resume=command.resume, allow=allow,
@@ -73,7 +75,7 @@ def run(args: Sequence[str]) -> None:
 
 
 def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
-    """Where a run ends, if that is not at `config.steps`: steps come in whole rollouts."""
+    """Say where a run ends, if that is not at `config.steps`."""
     checkpoint = find_checkpoint(out / LAST) if resume else None
     done = 0 if checkpoint is None else int(read_state(checkpoint / STATE)["timesteps"])
     if done >= config.steps:
@@ -82,7 +84,7 @@ def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
     end = done + rollout * -(-(config.steps - done) // rollout)
     if end == config.steps:
         return ""
-    return f"steps come in rollouts of {rollout:,}: it ends at {end:,}"
+    return f"steps come in rollouts of {rollout:,}: it ended at {end:,}"
 
 
 def parse(args: Sequence[str]) -> Command:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import yaml
@@ -156,11 +157,9 @@ def _serve(
         browser = BrowserView(server, play, load, dark)
         for line in greeting(host, server.get_port()):
             say(line)
-        if seconds is None:
-            say("Ctrl-C ends it")
-        try:
+        with suppress(KeyboardInterrupt):
+            if seconds is None:
+                say("Ctrl-C ends it")
             browser.run(seconds)
-        except KeyboardInterrupt:
-            pass
         say(f"{browser.pace.total:.3f} × real time over {browser.pace.wanted:.1f} s")
         return browser.pace.total

@@ -1,4 +1,4 @@
-"""training/cli/train.py: what `poise train` says before it trains."""
+"""training/cli/train.py: what `poise train` says of its end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.support.shared import finished_run, tiny_config
 
 @pytest.mark.parametrize(
     ("steps", "note"),
-    [(192, ""), (193, "steps come in rollouts of 64: it ends at 256"), (64, "")],
+    [(192, ""), (193, "steps come in rollouts of 64: it ended at 256"), (64, "")],
 )
 def test_a_run_that_does_not_end_at_its_steps_says_so(
     tmp_path: Path, steps: int, note: str
@@ -29,4 +29,4 @@ def test_a_run_that_is_finished_says_so() -> None:
         f"{out} has 192 steps already; --steps says how many it is to have"
     )
     more = replace(tiny_config(), steps=200)
-    assert steps_note(more, out, resume=True).endswith("it ends at 256")
+    assert steps_note(more, out, resume=True).endswith("it ended at 256")
