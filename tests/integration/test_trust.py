@@ -31,6 +31,7 @@ from poise.envs.compiled import warmup
 from poise.training.cli.entry import main
 from poise.training.evaluation.evaluate import benchmark, evaluate
 from poise.training.evaluation.seed_groups import seed_groups
+from poise.training.export.export import export_policy
 from poise.training.learning.checkpoints import check_controller, controller_fingerprint
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
@@ -40,16 +41,19 @@ from poise.training.qp_set.export import write_qp_set
 from poise.training.report import page
 from poise.training.report.page import write_report
 from poise.training.results.compare import compare
+from poise.training.results.film import film
 from poise.training.results.leaderboard import write_leaderboard
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.running.executor import Executor
+from poise.training.standalone.controller import load_standalone
 from poise.training.trials.agents import load_agent
 from poise.training.trials.jobs import Job, Stage, play
 from poise.training.tuning.candidates import Candidate
 from poise.training.tuning.candidates import play as play_candidate
 from poise.training.tuning.gains import Gains
 from poise.training.tuning.search import TuneConfig, tune, tune_config
+from poise.training.view.view import view, view_trial
 from tests.support.report_folders import copied
 from tests.support.shared import robot, tiny_config
 from tests.support.trap import NAMES, Ground, allowed_there, loaded_there
@@ -143,6 +147,11 @@ LOADERS: dict[str, Callable[[Ground, str], Any]] = {
     "replay, of a policy": lambda g, n: replay(evaluation(g, str(policy(g, n))), 0),
     "replay, of a benchmark": lambda g, n: replay(finished(g, n), 0),
     "replay, of what was read": lambda g, n: replay(load_results(finished(g, n)), 0, n),
+    "film": lambda g, n: film(evaluation(g, n), 0, [n], g.here / "out.mp4"),
+    "view, a trial": lambda g, n: view_trial(evaluation(g, n), 0, port=0, seconds=0.1),
+    "view, a policy's folder": lambda g, n: view([str(policy(g, n))], port=0, seconds=0.1),
+    "export": lambda g, n: export_policy(str(policy(g, n)), g.here / "out"),
+    "standalone, a policy's folder": lambda g, n: load_standalone(str(policy(g, n))),
     "evaluate, a policy's folder": lambda g, n: evaluate([str(policy(g, n))], out=g.here / "out"),
     "evaluate, a folder of seeds": lambda g, n: evaluate([str(seeds(g, n))], out=g.here / "out"),
     "evaluate, YAML on YAML": lambda g, n: evaluate([NAMES["YAML on YAML"](g)], out=g.here / "out"),
@@ -183,6 +192,9 @@ COMMANDS: dict[str, Callable[[Ground, str], list[str]]] = {
     "evaluate": lambda g, n: ["evaluate", str(policy(g, n)), "--out", "out"],
     "benchmark": lambda g, n: ["benchmark", "--controllers", str(policy(g, n)), "--out", "out"],
     "replay": lambda g, n: ["replay", str(evaluation(g, n)), "--trial", "0"],
+    "view": lambda g, n: ["view", str(policy(g, n)), "--port", "0", "--seconds", "1"],
+    "view, a trial": lambda g, n: ["view", str(evaluation(g, n)), "--trial", "0", "--port", "0"],
+    "export": lambda g, n: ["export", str(policy(g, n)), "--out", "exported"],
     "replay, of its controller": lambda g, n: [
         "replay", str(evaluation(g, n)), "--trial", "0", "--controller", n,
     ],
