@@ -59,7 +59,7 @@ def demo(
 
 
 def _film(results: Results, console: Console) -> None:
-    """Film the hardest push that somebody recovers; where nothing can be drawn, say so."""
+    """Film the hardest push that the best one recovers; where nothing can be drawn, say so."""
     trial = hardest(results)
     if trial is None:
         return
@@ -78,7 +78,7 @@ def _film(results: Results, console: Console) -> None:
 
 
 def hardest(results: Results) -> int | None:
-    """The trial of the largest share of the ankle limit that the best controller recovers.
+    """The trial of the largest fraction of the ankle limit that the best controller recovers.
 
     All controllers have met it alike. None where there is no such trial.
     """

@@ -40,8 +40,8 @@ def film(
         controllers: names, from left to right.
         path: of the video, ending in .mp4 or .webp.
         fps: frames a second that are wanted [1/s]; None: 25, of a WebP `WEBP_RATE`.
-        size: width and height of each picture [pixels]; None: `SIZE`, `NARROW` of several, of WebP
-            `WEBP_SIZE`.
+        size: width and height of each picture [pixels]; None: `SIZE`, `NARROW` of several, of a
+            WebP `WEBP_SIZE`.
         allow: controllers from outside (``module:Class``) that may run.
 
     Raises:
