@@ -49,6 +49,8 @@ class Residual(Block):
     blend: float  # of the way that a policy step goes from the last action to the next
     gate: float  # [m] see `gate_opening`
     offsets: np.ndarray  # (9,), 13 with steps: see `update_targets`
+    torque_scale: np.ndarray  # (nu,) [N·m] what the last nu entries add by 1; (0,): they do not
+    torques: np.ndarray  # (nu,) [N·m] that they add
 
 
 @compiled
@@ -75,10 +77,21 @@ def gate_opening(r: Residual, s: StateArrays, motion: Motion, com_offset: float)
 def set_offsets(r: Residual, s: StateArrays, motion: Motion, com_offset: float, e: EpisodeArrays):
     """Offsets from the episode's action, which is smoothed first."""
     opened = gate_opening(r, s, motion, com_offset)
-    for a in range(r.moved.shape[0]):
-        if r.blend < 1.0:
+    first, motors = r.moved.shape[0], r.torque_scale.shape[0]
+    if r.blend < 1.0:
+        for a in range(first + motors):
             e.action[a] = e.last_action[a] + r.blend * (e.action[a] - e.last_action[a])
+    for a in range(first):
         r.offsets[r.moved[a]] = opened * r.scale[a] * e.action[a]
+    for i in range(motors):
+        r.torques[i] = opened * r.torque_scale[i] * e.action[first + i]
+
+
+@compiled
+def add_torques(r: Residual, limit: np.ndarray, ctrl: np.ndarray):
+    """Add the action's torques to `ctrl` (nu,), within ± `limit` (nu,) [N·m]."""
+    for i in range(r.torque_scale.shape[0]):
+        ctrl[i] = min(max(ctrl[i] + r.torques[i], -limit[i]), limit[i])
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +146,7 @@ def policy_tick(step: PolicyStep):
     call(step.kernel, step.tick)
     for i in range(views.ctrl.shape[0]):
         views.ctrl[i] = step.tau[robot.motor_dofs[i] - 6]
+    add_torques(a.residual, robot.torque_limit, views.ctrl)
     if step.soft_root:
         soft_root_force(s, w, views.qfrc_applied)
         m = e.metrics

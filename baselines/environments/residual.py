@@ -18,7 +18,7 @@ from poise.configs.numbers import whole_steps
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.base import BalanceEnv, EnvConfig
 from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, StepEnd, judge_step
-from poise.envs.balance.observation import mirror_terms
+from poise.envs.balance.observation import Term, mirror_terms
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Erased, Kernel, address_of
 from poise.envs.robots.mirror import Mirror
@@ -30,6 +30,7 @@ from .policy_step import (
     TargetInputs,
     TickAccount,
     account_tick,
+    add_torques,
     policy_tick,
     set_offsets,
     set_targets,
@@ -98,13 +99,14 @@ class ResidualBalanceEnv(BalanceEnv):
         given = {} if residual is None else to_dict(residual)
         self.residual = build(self.scales_class, given, "residual")
         self._moved = np.flatnonzero(list(self.residual.entries().values()))
-        if self.only_targets and len(self._moved) == 0:
+        if self.only_targets and len(self._moved) == 0 and self.residual.torque == 0.0:
             raise ConfigError("at least one scale must be above 0", field="residual")
         super().__init__(robot, config, render_mode=render_mode, **overrides)
         lag = build(Lag, to_dict({"smoothing": smoothing, "gate": gate}), "environment")
         self.smoothing, self.gate = lag.smoothing, lag.gate
         momentum = 10.0 * self.scales.momentum  # m h² ω
-        self._residual = make_residual(self.residual, lag, self.config.policy_period, momentum)
+        limit, period = np.array(self.robot.torque_limit), self.config.policy_period
+        self._residual = make_residual(self.residual, lag, period, momentum, limit)
         self._offsets = self._residual.offsets
         with allowing(named(controller)):  # the user hands it over, not a file
             self.controller = load_controller(controller, self.robot)
@@ -161,10 +163,13 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _action_names(self) -> tuple[str, ...]:
         names = list(self.residual.entries())
-        return tuple(names[i] for i in self._moved)
+        motors = self.robot.motor_names if self.residual.torque > 0.0 else ()
+        return (*(names[i] for i in self._moved), *motors)
 
     def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
-        return mirror_terms([action_term(name) for name in self.action_names], {})
+        names, targets = self.action_names, len(self._moved)
+        terms = [action_term(name) for name in names[:targets]]
+        return mirror_terms([*terms, Term("motors", names[targets:], "1", "", "motors")], parts)
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref
@@ -172,6 +177,7 @@ class ResidualBalanceEnv(BalanceEnv):
     def _begin(self) -> None:
         self.controller.reset(self.state_source.state)
         self._offsets[:] = 0.0
+        self._residual.torques[:] = 0.0
         set_targets(self._target_inputs())
 
     def _target_inputs(self) -> TargetInputs:
@@ -262,6 +268,7 @@ class ResidualBalanceEnv(BalanceEnv):
             set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
         set_targets(a)
         ctrl[:] = self.controller.torques(self.state_source.state, self.targets)
+        add_torques(a.residual, self.arrays.torque_limit, ctrl)
         wrench[:] = self._base.root_wrench
         self._push_root(wrench)
         account_tick(self._account())

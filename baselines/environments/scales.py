@@ -20,6 +20,8 @@ class ResidualScales:
     height: float = field(default=0.0, metadata={"min": 0.0})  # Δc_ref z [m]
     lean: float = field(default=0.0, metadata={"min": 0.0})  # of the root, about x and y [rad]
     momentum: float = field(default=0.0, metadata={"min": 0.0})  # L_ref x, y [m h² ω]
+    # of each motor, added to the controller's [its limit]
+    torque: float = field(default=0.0, metadata={"min": 0.0, "omit": "default"})
 
     def entries(self) -> dict[str, float]:
         """The scale of each target that can be moved, in the order of `motions/offsets.py`."""
@@ -63,12 +65,16 @@ class Lag:
 
 
 def make_residual(
-    scales: ResidualScales, lag: Lag, policy_period: float, momentum: float
+    scales: ResidualScales,
+    lag: Lag,
+    policy_period: float,
+    momentum: float,
+    torque_limit: np.ndarray,
 ) -> Residual:
     """The law by which an action becomes offsets: one entry for each scale above 0.
 
     In a policy step of T = `policy_period` [s] the residual goes 1 − e^(−T/τ) of the way to the
-    action. `momentum` [N·m·s] is the m h² ω of the robot.
+    action. `momentum` [N·m·s] is the m h² ω of the robot, `torque_limit` (nu,) [N·m] its motors'.
     """
     scale = np.array(list(scales.entries().values()))
     moved = np.flatnonzero(scale)
@@ -80,6 +86,8 @@ def make_residual(
         blend=float(blend),
         gate=lag.gate,
         offsets=guarded_zeros(len(scale)),
+        torque_scale=scales.torque * torque_limit if scales.torque > 0.0 else np.zeros(0),
+        torques=guarded_zeros(len(torque_limit) if scales.torque > 0.0 else 0),
     )
 
 
