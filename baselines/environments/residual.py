@@ -56,7 +56,8 @@ class ResidualBalanceEnv(BalanceEnv):
     Scales above 0 for `residual.height` [m] and `residual.lean` [rad] append `com_z` (the CoM's
     height) and `lean_x`, `lean_y` (a rotation of the root's target about the axes x and y); one for
     `residual.momentum` [m h² ω] appends `momentum_x` and `momentum_y`, angular momentum that the
-    posture is to carry. With `smoothing` τ > 0 [s] the targets follow the action as a first-order
+    posture is to carry. One for `residual.torque` [the motor's limit] appends an entry for each
+    motor, whose torque is added to the controller's, within the limit. With `smoothing` τ > 0 [s] the targets follow the action as a first-order
     lag, a ← a + (1 − e^(−T/τ)) (action − a) per policy step T; a then is what the observation and
     the rewards call the action. With `gate` d₀ > 0 [m] the residual is scaled by
     1 − exp(−(d/d₀)²), d the distance of the capture point from the reference's: at rest the

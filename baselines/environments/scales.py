@@ -55,6 +55,10 @@ class WholeScales(ResidualScales):
     com: float = field(default=0.0, metadata={"min": 0.0})  # Δc_ref x, y [m]
     cop: float = field(default=0.0, metadata={"min": 0.0})  # Δp_ref x, y [m]
 
+    def __post_init__(self) -> None:
+        if self.torque > 0.0:
+            raise ValueError("torque: must be 0, here the servos move them")
+
 
 @dataclass(frozen=True)
 class Lag:

@@ -56,7 +56,9 @@ def actions(env: BalanceEnv) -> list[Action]:
         authority = Action("authority", 2.0, "1, within 0 and 1")
         return [*residual, *_motors(motors, env.servos.reach, "rad"), authority]
     if isinstance(env, ResidualBalanceEnv):
-        return residual
+        added = env.residual.torque
+        limits = added * np.array(env.robot.torque_limit)
+        return [*residual, *(_motors(motors, limits, "N·m") if added > 0.0 else [])]
     if isinstance(env, PositionBalanceEnv):
         return _motors(motors, env.servos.reach, "rad")
     return _motors(motors, env.robot.torque_limit, "N·m")

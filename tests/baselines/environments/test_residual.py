@@ -114,6 +114,52 @@ def test_more_targets_can_be_moved():
         np.testing.assert_allclose(moved, 0.1 * np.eye(3)[k], atol=1e-9)
 
 
+def test_torques_are_added_within_the_limits_of_the_motors():
+    """τ = clip(τ_c + scale · a · τ_max, ± τ_max); entries of zero are the controller's, bitwise."""
+    env = ResidualBalanceEnv(robot(), residual={"torque": 0.4})
+    assert env.action_names[4:] == robot().motor_names
+    limit, found = np.array(robot().torque_limit), {}
+    action = np.zeros(len(env.action_names))
+    for value in (0.0, 0.5, 1.0):
+        env.reset(seed=0, options={"push": [], "noise": 0.0})
+        action[6], action[-1] = value, -value
+        env.set_action(action)
+        env.tick()
+        found[value] = env.simulation.data.ctrl.copy()
+    for value in (0.5, 1.0):
+        asked = found[0.0].copy()
+        asked[2] += 0.4 * value * limit[2]
+        asked[-1] -= 0.4 * value * limit[-1]
+        np.testing.assert_allclose(found[value], np.clip(asked, -limit, limit), atol=1e-12)
+    huge = ResidualBalanceEnv(robot(), residual={"torque": 3.0})
+    huge.reset(seed=0, options={"push": []})
+    huge.set_action(np.r_[np.zeros(4), np.ones(len(limit))])
+    huge.tick()
+    np.testing.assert_array_equal(huge.simulation.data.ctrl, limit)
+
+
+def test_added_torques_are_mirrored_and_the_same_from_python():
+    """A step mirrored is the mirror image of a step, by compiled ticks and by those of Python."""
+    ends, action = [], np.random.default_rng(0).uniform(-1.0, 1.0, 4 + robot().model.nu)
+    for compiled in (True, False):
+        env = ResidualBalanceEnv(robot(), residual={"torque": 0.4}, gate=0.05, smoothing=0.03)
+        env._compiled = compiled
+        env.reset(seed=1, options={"push": []})
+        for _ in range(5):
+            env.step(action)
+        ends.append(np.concatenate([env.simulation.data.qpos, env.simulation.data.qvel]))
+    np.testing.assert_array_equal(*ends)
+    observations, actions = env.mirrors()
+    found = []
+    for mirrored in (False, True):
+        env.reset(seed=0, options={"push": [], "noise": 0.0})
+        for _ in range(5):
+            env.step(action[actions.order] * actions.sign if mirrored else action)
+        found.append(env.episode.observation.copy())
+    image = found[0][observations.order] * observations.sign
+    np.testing.assert_allclose(found[1], image, atol=1e-4)  # as in test_mirror.py
+
+
 def test_scales_come_from_the_arguments():
     """A mapping and an object mean the same; wrong ones are refused."""
     for residual in ({"com": 0.1, "cop": 0.3}, ResidualScales(com=0.1, cop=0.3)):
