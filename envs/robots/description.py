@@ -64,11 +64,14 @@ class PostureDescription:
         keyframe: keyframe of the MJCF to start from; without it, the model's zero posture.
         unit: unit of the hinge angles in ``joints``; slide joints are in [m].
         joints: joint name, or pattern such as ``*_knee``, → position.
+        com: where the CoM is to stand: ``posture``, where this posture has it; ``controller``,
+            where the controller's gains put it, which were searched on this very robot.
     """
 
     keyframe: str | None = None
     unit: Literal["degree", "radian"] = "degree"
     joints: dict[str, float] = field(default_factory=dict)
+    com: Literal["posture", "controller"] = "posture"
 
 
 @dataclass(frozen=True)

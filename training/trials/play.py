@@ -87,8 +87,16 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
         mean_abs_action=settled.actions / settled.steps if settled.steps else None,
         com_drift=_finite(settled.drift) if settled.steps and not trial.pushes else None,
         final_speed=_finite(float(np.linalg.norm(env.simulation.state.com_vel))),
+        final_lean=_finite(lean(env)),
         root_force=_finite(m[episode.ROOT_FORCE]),
     )
+
+
+def lean(env: BalanceEnv) -> float:
+    """The tilt of the root from the standing posture, whatever the yaw [°]."""
+    standing = env.simulation.arrays.root_standing[2]
+    cosine = float(env.simulation.state.root_axes[2] @ standing)
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
 class Settled:
