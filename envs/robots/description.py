@@ -83,12 +83,17 @@ class OptionDescription:
         integrator: MuJoCo's integrator.
         solver: MuJoCo's constraint solver.
         friction: sliding friction coefficient of every geom; without it, the model's own.
+        cone: form of MuJoCo's friction cones; without it, the model's own.
+        impratio: how much stiffer friction is than the contact itself, so that feet that press
+            against each other do not creep apart; without it, the model's own, which is mostly 1.
     """
 
     timestep: float = field(default=0.002, metadata={"above": 0.0, "max": 0.01})
     integrator: Literal["implicitfast", "implicit", "Euler"] = "implicitfast"
     solver: Literal["Newton", "CG", "PGS"] = "Newton"
     friction: float | None = field(default=None, metadata={"above": 0.0, "max": 5.0})
+    cone: Literal["pyramidal", "elliptic"] | None = None
+    impratio: float | None = field(default=None, metadata={"above": 0.0, "max": 1e4})
 
 
 @dataclass(frozen=True)

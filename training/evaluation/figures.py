@@ -93,7 +93,7 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
         "mean_abs_action": over("mean_abs_action", np.mean),
         "mean_abs_action_max": over("mean_abs_action", np.max),
         "com_drift_max": over("com_drift", np.max),
-        "unpushed_slide_max": over("max_slide", np.max, unpushed),
+        "foot_drift_max": over("foot_drift", np.max),
         "unpushed_lean_max": over("final_lean", np.max, unpushed),
     }
 

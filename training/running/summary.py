@@ -50,7 +50,7 @@ class Counts(Rate, total=False):
     mean_abs_action: Number
     mean_abs_action_max: Number
     com_drift_max: Number
-    unpushed_slide_max: Number
+    foot_drift_max: Number
     unpushed_lean_max: Number
     root_force_max: Number
 

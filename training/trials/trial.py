@@ -84,6 +84,7 @@ class Outcome:
         mean_abs_action: mean |action| after the first second.
         com_drift: without a push, largest horizontal distance of the CoM from where it was after
             the first second.
+        foot_drift: the same of a sole.
         final_speed: |ċ| at the end [m/s].
         final_lean: of the root from the described posture at the end [°].
         root_force: largest force [N] that a soft root took from nowhere; 0 with a hard root.
@@ -108,6 +109,7 @@ class Outcome:
     solver_failures: int = 0
     mean_abs_action: float | None = None
     com_drift: float | None = None
+    foot_drift: float | None = None
     final_speed: float | None = None
     final_lean: float | None = None
     root_force: float | None = None

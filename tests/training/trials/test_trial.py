@@ -47,9 +47,10 @@ def test_a_small_push_is_recovered_and_a_huge_one_not(agent: Agent) -> None:
 
 
 def test_drift_counts_without_a_push(agent: Agent) -> None:
-    """An unpushed robot stays; its drift is measured from the first second on."""
+    """An unpushed robot stays, and its feet; drift is measured from the first second on."""
     quiet = run_trial(agent, Trial(0, 3))
     assert quiet.recovered and quiet.com_drift is not None and 0.0 < quiet.com_drift < 0.02
+    assert quiet.foot_drift is not None and 0.0 < quiet.foot_drift < 0.002
 
 
 def test_an_outcome_depends_on_the_trial_alone(agent: Agent) -> None:
