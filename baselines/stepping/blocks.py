@@ -147,6 +147,7 @@ class StepGains(Block):
     root_accel: float  # [rad/s²]
     swing_accel: float  # [rad/s²]
     joint_accel: float  # [rad/s²]
+    rest_ahead: float  # of ξ_ref from the middle of the region of both soles [m]
     period: float  # of a tick [s]
 
 

@@ -20,10 +20,11 @@ from poise.envs.robots.robot import Robot
 from .blocks import CaptureTick, RegionArrays, StepGains, StepMemory
 from .config import CaptureStepConfig, StepLimits
 from .controller import STANDING, Stepping, SteppingController
-from .cop_region import CopRegion
+from .cop_region import CopRegion, rest_ahead
 from .planner import StepPlanner
 from .recentring import recentring_arrays, stop_recentring
 from .swing import Swing, swing_gains, swing_task
+from .swing_speed import possible_limits
 from .tick import capture_tick
 
 
@@ -43,12 +44,21 @@ def check_qps(config: CaptureStepConfig) -> None:
         )
 
 
-def step_gains(robot: Robot, config: CaptureStepConfig, period: float) -> StepGains:
-    """The gains of `config` for one robot, whose controller ticks every `period` [s]."""
+def step_gains(
+    robot: Robot,
+    config: CaptureStepConfig,
+    period: float,
+    rest_ahead: float = 0.0,
+    steps: bool = True,
+) -> StepGains:
+    """The gains of `config` for one robot, whose controller ticks every `period` [s].
+
+    `rest_ahead` [m] as of `StepGains`; without `steps` no fall is a reason for one.
+    """
     c, units = config, robot.units
     h, omega = units.height, units.omega
     return StepGains(
-        step_margin=c.step_margin * h,
+        step_margin=c.step_margin * h if steps else np.inf,
         momentum_gain=c.momentum_gain * omega / units.force,
         restep_margin=c.restep_margin * h,
         gain=float(c.gain),
@@ -61,6 +71,7 @@ def step_gains(robot: Robot, config: CaptureStepConfig, period: float) -> StepGa
         root_accel=c.root_accel * omega**2,
         swing_accel=c.swing_accel * omega**2,
         joint_accel=c.joint_accel * omega**2,
+        rest_ahead=rest_ahead,
         period=period,
     )
 
@@ -88,9 +99,10 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     Stands by `qp`, bit for bit, until the capture point ξ leaves what the CoP can reach; then
     steps until it is inside again, and stays where it came to rest. In a step the CoM follows
     c̈ = ω² (c − p), p = ξ + k (ξ − ξ_ref) at most at the edge of the soles in contact [Koolen12,
-    Englsberger11], and the foothold follows ξ. The ticks are those of `tick.py`; they are
-    bound to `config` and `planner` when they are made. Raises ConfigError unless there are two
-    soles, and both QPs have a hard root and one period.
+    Englsberger11], and the foothold follows ξ. Steps stay within what the legs' motors can do; a
+    robot whose feet could not be down again in time never steps. The ticks are those of `tick.py`;
+    they are bound to `config` and `planner` when they are made. Raises ConfigError unless there are
+    two soles, and both QPs have a hard root and one period.
     """
 
     def __init__(self, robot: Robot, config: CaptureStepConfig | None = None):
@@ -104,7 +116,9 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         super().__init__(robot, self.config.qp)
         self.sets = ContactSets(robot, self.config.step_qp, self.config.torque_rate_limit)
         self.region = CopRegion(robot, self.config.region_fraction)
-        self.planner = self._planner(self.region)
+        limits = possible_limits(robot, self.config)
+        self.steps_possible = limits is not None
+        self.planner = self._planner(self.region, limits or self.config.limits)
         self.offsets = self.planner.offsets  #: what a policy adds
         self._swing = Swing(np.zeros(3), 0.0, self.config.swing, robot.units)
         self.recentring = recentring_arrays(robot, self.config.recentring)
@@ -118,9 +132,9 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         self._tick: CaptureTick | None = None
         self.reset()
 
-    def _planner(self, region: CopRegion) -> StepPlanner:
+    def _planner(self, region: CopRegion, limits: StepLimits) -> StepPlanner:
         c = self.config
-        return StepPlanner(self.robot, region, c.limits, c.foothold, c.feedback, c.falls, c.pivot)
+        return StepPlanner(self.robot, region, limits, c.foothold, c.feedback, c.falls, c.pivot)
 
     @property
     def failures(self) -> int:
@@ -138,9 +152,9 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         return self.qp.parameters
 
     @property
-    def step_limits(self) -> StepLimits:
-        """See `SteppingController`."""
-        return self.planner.limits
+    def step_limits(self) -> StepLimits | None:
+        """See `SteppingController`; None where the legs are too slow for any step."""
+        return self.planner.limits if self.steps_possible else None
 
     @property
     def compiled(self) -> bool:
@@ -232,7 +246,9 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             state=s,
             reference_in=targets.arrays(),
             reference_out=asked,
-            gains=step_gains(self.robot, self.config, self.period),
+            gains=step_gains(
+                self.robot, self.config, self.period, rest_ahead(self.region), self.steps_possible
+            ),
             search=self.planner.search(state),
             swing=self._swing.arrays,
             memory=self.memory,

@@ -157,7 +157,7 @@ class CopRegion(Copyable):
     def __init__(self, robot: Robot, fraction: float = 0.95):
         self.polygons = [fraction * sole.polygon for sole in robot.soles]
         self.limits = [ankle_limits(robot, i) for i in range(len(robot.soles))]
-        self._fraction = fraction
+        self.robot, self._fraction = robot, fraction
         self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
         self.middle = [polygon.mean(axis=0) for polygon in self.alone]
         if len(robot.soles) == 2:
@@ -207,3 +207,14 @@ class CopRegion(Copyable):
         out = np.empty(max(len(points) for points in rows))
         distances_beyond(self.arrays, rows[0], rows[1], yaw, rows[2], out)
         return out if max(np.ndim(v) for v in (first, second, xi)) > 1 else out[0]
+
+
+def rest_ahead(region: CopRegion) -> float:
+    """How far the CoM of the standing posture is ahead of the middle of both soles' region [m].
+
+    Zero for a robot that does not stand as described, see `PostureDescription`.
+    """
+    robot = region.robot
+    if robot.description.posture.com == "controller":
+        return 0.0
+    return float(robot.com_ahead - region.both(nominal_feet(robot), 0.0).mean(axis=0)[0])

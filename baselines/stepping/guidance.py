@@ -51,7 +51,8 @@ def guide_com(
 ) -> None:
     """References of CoM and CoP: c̈_ref = ω² (c − p + r) with p = ξ + k (ξ − ξ_ref).
 
-    p stays within `overreach` [m] of the CoP `region` (n, 2), whose middle is ξ_ref. The height
+    p stays within `overreach` [m] of the CoP `region` (n, 2), whose middle is ξ_ref, on both feet
+    moved by `rest_ahead` to where the posture has the CoM. The height
     over the `ground` [m] is what legs reach with the feet a stride (x, y) apart [m].
     """
     s, g, own, offsets, p = t.state, t.gains, t.reference_out, t.offsets, t.pair
@@ -60,6 +61,9 @@ def guide_com(
     for i in range(n):
         rest_x += region[i, 0] / n
         rest_y += region[i, 1] / n
+    if not t.memory.swinging[0]:
+        rest_x += cos * g.rest_ahead
+        rest_y += sin * g.rest_ahead
     if t.recentring.stage[0] == SHIFTING:
         rest_x, rest_y = t.recentring.capture_target[0], t.recentring.capture_target[1]
     x, y = turned(cos, sin, offsets[COM_X], offsets[COM_Y])

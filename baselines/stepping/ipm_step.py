@@ -10,7 +10,7 @@ from poise.envs.robots.robot import Robot
 
 from .blocks import Search
 from .capture_step import CaptureStep
-from .config import IPMStepConfig
+from .config import IPMStepConfig, StepLimits
 from .cop_region import CopRegion
 from .planner import StepPlanner
 from .search import clip_to_limits, to_step_frame, to_world, with_offsets
@@ -69,12 +69,12 @@ class IPMStep(CaptureStep):
     def __init__(self, robot: Robot, config: IPMStepConfig | None = None):
         super().__init__(robot, config or IPMStepConfig())
 
-    def _planner(self, region: CopRegion) -> StepPlanner:
+    def _planner(self, region: CopRegion, limits: StepLimits) -> StepPlanner:
         config = self.config
         if not isinstance(config, IPMStepConfig):
             raise TypeError(f"config must be an IPMStepConfig, not {type(config).__name__}")
         return EnergyPlanner(
-            self.robot, region, config.limits, config.foothold, config.feedback, config.falls,
+            self.robot, region, limits, config.foothold, config.feedback, config.falls,
             config.pivot,
             arc=config.arc,
         )  # fmt: skip

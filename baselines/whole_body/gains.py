@@ -42,7 +42,8 @@ class PostureTask:
 class CoMTask:
     """h_c = ‖A_P v̇ + Ȧ_P v − Ṗ_des‖², Ṗ_des = m (c̈_ref + s_c (c_ref − c) + d_c (ċ_ref − ċ)).
 
-    `offset` moves the default c_ref and p_ref forward of the middle of the soles, in h.
+    `offset` moves the default c_ref and p_ref forward of the middle of the soles, in h, on a robot
+    whose description has `posture.com: controller`; others stand as their posture has the CoM.
     """
 
     weight: float = _at_least(0.0, 3600.0)

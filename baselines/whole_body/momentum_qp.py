@@ -67,6 +67,17 @@ def prepare_rows(config: MomentumQPConfig) -> None:
         prepare("rows")
 
 
+def com_offset(robot: Robot, task: CoMTask) -> float:
+    """Where the CoM is to stand, forward of the middle of the soles [m].
+
+    A robot whose description says nothing else stands as described: the offset of gains that were
+    searched on another robot would make it lean.
+    """
+    if robot.description.posture.com == "posture":
+        return robot.com_ahead
+    return task.offset * robot.height_com
+
+
 class MomentumQP(CompiledController):
     """Tracks a posture, the CoM through linear and the CoP through angular momentum.
 
@@ -101,7 +112,7 @@ class MomentumQP(CompiledController):
             sum(limit.size for limit in self.limits.values()),
         )
         self.memory = allocate_memory(self.parameters.torque_limit)
-        self.com_offset = self.config.com.offset * robot.height_com
+        self.com_offset = com_offset(robot, self.config.com)
         self.solver = None
         if self.config.solver != COMPILED_SOLVER or self.config.solver_options:
             self.solver = make_solver(self.config.solver, **self.config.solver_options)

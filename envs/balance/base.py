@@ -79,7 +79,9 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         self.quiet_steps = int(np.ceil(self.config.fall.quiet_time / period - 1e-9))
         state = self.simulation.state
         self.scales = scales(self.arrays, state.support_polygon)
-        self.limits = episode_limits(self.config.fall, self.robot.height_com, self.max_steps)
+        self.limits = episode_limits(
+            self.config.fall, self.robot.height_com, self.max_steps, self.quiet_steps
+        )
         self.action_names = self._action_names()
         self.terms = self._observation_terms()  #: of which the observation is made
         size = sum(term.size for term in self.terms)
@@ -288,7 +290,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
     @property
     def recovered(self) -> bool:
-        """Upright and quiet for the last `quiet_time` seconds."""
+        """Upright, quiet and with feet at rest for the last `quiet_time` seconds."""
         return bool(self.episode.metrics[QUIET_STEPS] >= self.quiet_steps)
 
     def info(self) -> dict[str, Any]:

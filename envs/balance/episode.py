@@ -17,7 +17,7 @@ from .reward import Rewards, RewardView, RewardWeights, rewards, sum_rewards
 from .termination import Limits, has_diverged, has_fallen, uprightness
 
 (
-    QUIET_STEPS,  # policy steps in a row that were quiet
+    QUIET_STEPS,  # policy steps in a row that were quiet, with feet at rest
     FALLEN,  # 1 after a fall
     ENERGY,  # ∫ Σ |τ q̇| dt [J]
     PEAK_TORQUE,  # largest |τ|/τ_max
@@ -47,6 +47,7 @@ class EpisodeArrays(Block):
     metrics: np.ndarray  # (METRICS,)
     root_wrench: np.ndarray  # (6,) of a soft root in the last tick [N, N·m]
     sole_start: np.ndarray  # (nc, 2)
+    sole_rest: np.ndarray  # (nc, 2) where the soles were when the running quiet time began
     steps: np.ndarray  # (1,) int: policy steps since the reset
     running: np.ndarray  # (1,) int: whether there may be another one
     ticks: np.ndarray  # (1,) int: control ticks of the running policy step
@@ -63,6 +64,7 @@ def allocate_episode(actions: int, observations: int, terms: int, nc: int) -> Ep
         metrics=guarded_zeros(METRICS),
         root_wrench=guarded_zeros(6),
         sole_start=guarded_zeros((nc, 2)),
+        sole_rest=guarded_zeros((nc, 2)),
         steps=guarded_zeros(1, dtype=np.int64),
         running=guarded_zeros(1, dtype=np.int64),
         ticks=guarded_zeros(1, dtype=np.int64),
@@ -82,6 +84,7 @@ def begin_episode(s: StateArrays, e: EpisodeArrays):
     e.steps[0], e.running[0], e.ticks[0] = 0, 1, 0
     for i in range(s.sole_point.shape[0]):
         e.sole_start[i, 0], e.sole_start[i, 1] = s.sole_point[i, 0], s.sole_point[i, 1]
+    keep_rest(s, e)
 
 
 @compiled
@@ -165,14 +168,38 @@ def judge_step(j: Judge):
 
 
 @compiled
+def keep_rest(s: StateArrays, e: EpisodeArrays):
+    """Feet are to stay where they are now."""
+    for i in range(s.sole_point.shape[0]):
+        e.sole_rest[i, 0], e.sole_rest[i, 1] = s.sole_point[i, 0], s.sole_point[i, 1]
+
+
+@compiled
+def sole_distance(s: StateArrays, places: np.ndarray) -> float:
+    """Largest distance of a sole from its place (nc, 2) [m]."""
+    largest = 0.0
+    for i in range(places.shape[0]):
+        dx, dy = s.sole_point[i, 0] - places[i, 0], s.sole_point[i, 1] - places[i, 1]
+        largest = max(largest, np.sqrt(dx * dx + dy * dy))
+    return largest
+
+
+@compiled
 def record_quiet(j: Judge, fallen: bool):
-    """Count a step that was quiet: upright, slow, the CoM over the soles; or note its time."""
-    s, m = j.state, j.episode.metrics
+    """Count a step that was quiet: upright, slow, the CoM over the soles; or note its time.
+
+    Soles that have moved too far since the count began, or in its last `quiet_steps`, let it begin
+    again: a robot that skates is not at rest, however slow its CoM is.
+    """
+    s, e, m = j.state, j.episode, j.episode.metrics
     speed = np.sqrt(s.com_vel[0] ** 2 + s.com_vel[1] ** 2 + s.com_vel[2] ** 2)
     quiet = not fallen and speed < j.limits.quiet_speed
     quiet = quiet and uprightness(j.robot, s) > j.limits.quiet_cos_tilt
     quiet = quiet and support_distance(s, s.com[0], s.com[1]) > 0.0
-    m[QUIET_STEPS] = m[QUIET_STEPS] + 1.0 if quiet else 0.0
+    still = sole_distance(s, e.sole_rest) <= j.limits.quiet_slide
+    m[QUIET_STEPS] = m[QUIET_STEPS] + 1.0 if quiet and still else 0.0
+    if m[QUIET_STEPS] % j.limits.quiet_steps == 0.0:
+        keep_rest(s, e)
     if not quiet:
         m[LAST_MOVING] = j.clock[0] * j.robot.timestep
 
@@ -186,10 +213,7 @@ def record_excursions(s: StateArrays, e: EpisodeArrays):
     m[MAX_COM] = max(m[MAX_COM], np.sqrt(com_x * com_x + com_y * com_y))
     m[MAX_CAPTURE] = max(m[MAX_CAPTURE], np.sqrt(xi_x * xi_x + xi_y * xi_y))
     m[MIN_COP_MARGIN] = min(m[MIN_COP_MARGIN], support_distance(s, s.cop[0], s.cop[1]))
-    for i in range(e.sole_start.shape[0]):
-        dx = s.sole_point[i, 0] - e.sole_start[i, 0]
-        dy = s.sole_point[i, 1] - e.sole_start[i, 1]
-        m[MAX_SLIDE] = max(m[MAX_SLIDE], np.sqrt(dx * dx + dy * dy))
+    m[MAX_SLIDE] = max(m[MAX_SLIDE], sole_distance(s, e.sole_start))
 
 
 @dataclass(frozen=True, eq=False)

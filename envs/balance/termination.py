@@ -22,6 +22,8 @@ class FallLimits:
     quiet_speed: float = field(default=0.1, metadata={"above": 0.0})  # CoM [m/s]
     quiet_tilt: float = field(default=30.0, metadata={"above": 0.0, "max": 90.0})  # root [deg]
     quiet_time: float = field(default=1.0, metadata={"above": 0.0})  # [s]
+    # most that a sole moves in it [m]: recoveries of the default humanoid stay below 1 mm
+    quiet_slide: float = field(default=0.01, metadata={"min": 0.0, "omit": "default"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +35,14 @@ class Limits(Block):
     ground_contact: bool
     quiet_speed: float  # [m/s]
     quiet_cos_tilt: float
+    quiet_slide: float  # [m]
+    quiet_steps: int  # policy steps in a row that must be quiet
     max_steps: int  # of an episode
 
 
-def episode_limits(limits: FallLimits, height_com: float, max_steps: int) -> Limits:
+def episode_limits(
+    limits: FallLimits, height_com: float, max_steps: int, quiet_steps: int
+) -> Limits:
     """Numbers for compiled code; `height_com` [m] is that of the standing robot."""
     return Limits(
         height=limits.height * height_com,
@@ -44,6 +50,8 @@ def episode_limits(limits: FallLimits, height_com: float, max_steps: int) -> Lim
         ground_contact=limits.ground_contact,
         quiet_speed=limits.quiet_speed,
         quiet_cos_tilt=float(np.cos(np.radians(limits.quiet_tilt))),
+        quiet_slide=limits.quiet_slide,
+        quiet_steps=quiet_steps,
         max_steps=max_steps,
     )
 

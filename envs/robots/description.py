@@ -64,11 +64,14 @@ class PostureDescription:
         keyframe: keyframe of the MJCF to start from; without it, the model's zero posture.
         unit: unit of the hinge angles in ``joints``; slide joints are in [m].
         joints: joint name, or pattern such as ``*_knee``, → position.
+        com: where the CoM is to stand: ``posture``, where this posture has it; ``controller``,
+            where the controller's gains put it, which were searched on this very robot.
     """
 
     keyframe: str | None = None
     unit: Literal["degree", "radian"] = "degree"
     joints: dict[str, float] = field(default_factory=dict)
+    com: Literal["posture", "controller"] = "posture"
 
 
 @dataclass(frozen=True)
@@ -80,12 +83,17 @@ class OptionDescription:
         integrator: MuJoCo's integrator.
         solver: MuJoCo's constraint solver.
         friction: sliding friction coefficient of every geom; without it, the model's own.
+        cone: form of MuJoCo's friction cones; without it, the model's own.
+        impratio: how much stiffer friction is than the contact itself, so that feet that press
+            against each other do not creep apart; without it, the model's own, which is mostly 1.
     """
 
     timestep: float = field(default=0.002, metadata={"above": 0.0, "max": 0.01})
     integrator: Literal["implicitfast", "implicit", "Euler"] = "implicitfast"
     solver: Literal["Newton", "CG", "PGS"] = "Newton"
     friction: float | None = field(default=None, metadata={"above": 0.0, "max": 5.0})
+    cone: Literal["pyramidal", "elliptic"] | None = None
+    impratio: float | None = field(default=None, metadata={"above": 0.0, "max": 1e4})
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,10 @@ INTEGRATORS = {
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "Euler": mujoco.mjtIntegrator.mjINT_EULER,
 }
+CONES = {
+    "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL,
+    "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC,
+}
 SOLVERS = {
     "Newton": mujoco.mjtSolver.mjSOL_NEWTON,
     "CG": mujoco.mjtSolver.mjSOL_CG,
@@ -122,10 +126,17 @@ def add_contact_sensors(spec: mujoco.MjSpec, description: RobotDescription, grou
 
 
 def set_options(spec: mujoco.MjSpec, options: OptionDescription) -> None:
-    """Set time step, integrator, solver and friction; make room for rendered frames."""
+    """Set time step, integrator, solver and friction; make room for rendered frames.
+
+    What the description leaves out stays as the model has it.
+    """
     spec.option.timestep = options.timestep
     spec.option.integrator = INTEGRATORS[options.integrator]
     spec.option.solver = SOLVERS[options.solver]
+    if options.cone is not None:
+        spec.option.cone = CONES[options.cone]
+    if options.impratio is not None:
+        spec.option.impratio = options.impratio
     if options.friction is not None:
         for geom in spec.geoms:
             geom.friction[0] = options.friction

@@ -61,6 +61,7 @@ class Robot(Copyable):
         model: the compiled MuJoCo model.
         mass: total mass [kg].
         height_com: height of the centre of mass above the ground in the standing posture [m].
+        com_ahead: how far the centre of mass then is ahead of the middle of the soles [m].
         root_body_id: the floating body.
         ground_geom_id: the ground plane, z = 0.
         soles: one per foot, in the description's order.
@@ -82,6 +83,7 @@ class Robot(Copyable):
     model: mujoco.MjModel
     mass: float
     height_com: float
+    com_ahead: float
     root_body_id: int
     ground_geom_id: int
     soles: tuple[Sole, ...]
@@ -159,6 +161,7 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
         model=model,
         mass=float(model.body_subtreemass[root]),
         height_com=float(data.subtree_com[root, 2]),
+        com_ahead=float(data.subtree_com[root, 0]),
         root_body_id=root,
         ground_geom_id=ground,
         soles=soles,
@@ -195,7 +198,8 @@ def fingerprint(model: mujoco.MjModel, standing_qpos: np.ndarray) -> str:
     for array in [*(getattr(model, name) for name in names), standing_qpos]:
         rounded = np.round(np.asarray(array, dtype=float), 6) + 0.0  # + 0.0: no negative zeros
         digest.update(repr(rounded.tolist()).encode())
-    for name in ("timestep", "integrator", "solver", "cone", "gravity", "disableflags"):
+    names = ("timestep", "integrator", "solver", "cone", "gravity", "disableflags")
+    for name in names if model.opt.impratio == 1.0 else (*names, "impratio"):
         digest.update(repr(np.asarray(getattr(model.opt, name), dtype=float).tolist()).encode())
     return digest.hexdigest()
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.baselines.stepping.cop_region import DIRECTIONS, LOAD_FRACTIONS
+from poise.baselines.stepping.cop_region import DIRECTIONS, LOAD_FRACTIONS, rest_ahead
 from poise.baselines.stepping.feedback import LATER_STEP
 from poise.baselines.stepping.planner import StepPlan
 from poise.baselines.stepping.recentring import LOADING, SHIFTING
@@ -196,7 +196,11 @@ def guided(controller, state, targets, region, overreach, ground, stride, raised
     level, rate2 = controller.memory.level_frame, controller.planner.units.omega**2
     R, xi, p = level[:2, :2], state.capture_point, controller.sets.parameters
     r = controller.recentring
-    rest = r.capture_target if r.stage[0] == SHIFTING else region.mean(axis=0)
+    rest = region.mean(axis=0)
+    if controller.swing is None:
+        rest = rest + R @ [rest_ahead(controller.region), 0.0]
+    if r.stage[0] == SHIFTING:
+        rest = r.capture_target
     wanted = xi + c.gain * (xi - rest - R @ offsets.com)
     if r.stage[0] == LOADING:
         away = wanted - xi

@@ -61,6 +61,7 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
 def counts(outcomes: Sequence[Outcome]) -> Counts:
     """Counts of how trials ended, and medians of what was recorded."""
     standing = [outcome for outcome in outcomes if outcome.recovered]
+    unpushed = [outcome for outcome in outcomes if outcome.com_drift is not None]
     trials, fallen = len(outcomes), sum(outcome.fallen for outcome in outcomes)
     stood = sum(not outcome.fallen and outcome.error is None for outcome in outcomes)
 
@@ -92,6 +93,8 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
         "mean_abs_action": over("mean_abs_action", np.mean),
         "mean_abs_action_max": over("mean_abs_action", np.max),
         "com_drift_max": over("com_drift", np.max),
+        "foot_drift_max": over("foot_drift", np.max),
+        "unpushed_lean_max": over("final_lean", np.max, unpushed),
     }
 
 

@@ -124,6 +124,8 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         ("lost, won", lost),
         ("McNemar p", p_value),
         ("CoM drift [mm]", figure(lambda e: _number(e["com_drift_max"], ".1f", 1000.0))),
+        ("feet drift [mm]", figure(lambda e: _number(e["foot_drift_max"], ".1f", 1000.0))),
+        ("lean at the end [°]", figure(lambda e: _number(e["unpushed_lean_max"], ".2f"))),
         ("steps, mean", figure(lambda e: _number(e["steps_mean"] or None, ".1f"))),
         ("of one-step limit", figure(lambda e: f"{e['step_share_1_mean']:.2f}")),
         ("solver failures", figure(lambda e: f"{e['solver_failures'] or NONE}")),

@@ -19,7 +19,7 @@ from .one_leg import one_leg_qpos
 from .posture import PostureFigures, posture_figures
 from .stability import DirectionFigures, by_direction
 from .touching import SelfContact, self_contacts, sole_contacts
-from .uses import Uses, controllers_for
+from .uses import STEPPING, Uses, controllers_for
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,8 @@ def check_robot(robot: Robot | str | Path) -> RobotCheck:
     legs, touching, contacts = find_legs(robot), self_contacts(robot), sole_contacts(robot)
     both = holding(robot, robot.standing_qpos, range(len(robot.soles)))
     one = {sole.name: _on_one_foot(robot, i) for i, sole in enumerate(robot.soles)}
-    directions = by_direction(PushLimits(robot))
+    directions, uses = by_direction(PushLimits(robot)), controllers_for(robot)
+    never_step = uses[STEPPING].never_step
     return RobotCheck(
         name=robot.name,
         fingerprint=robot.fingerprint,
@@ -123,8 +124,8 @@ def check_robot(robot: Robot | str | Path) -> RobotCheck:
         sole_contacts=contacts,
         self_contacts=touching,
         directions=directions,
-        controllers=controllers_for(robot),
-        faults=find_faults(legs, touching, contacts, both, one, directions),
+        controllers=uses,
+        faults=find_faults(legs, touching, contacts, both, one, directions, never_step),
     )
 
 

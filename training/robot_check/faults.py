@@ -37,6 +37,7 @@ def find_faults(
     both_feet: Holding,
     one_foot: Mapping[str, Holding | None],
     directions: Sequence[DirectionFigures],
+    never_step: Sequence[str] = (),
 ) -> tuple[Fault, ...]:
     """The faults that figures of `RobotCheck` show, the worst kinds first."""
     return (
@@ -48,6 +49,7 @@ def find_faults(
         *_knees(legs),
         *_ankles(legs),
         *_one_foot(one_foot),
+        *_slow_legs(never_step),
     )
 
 
@@ -134,3 +136,13 @@ def _one_foot(one_foot: Mapping[str, Holding | None]) -> Iterator[Fault]:
                 f"{fraction:.0%} of the torque limit of {holding.joint}"
             )  # fmt: skip
             yield Fault("one foot", f"to stand on {foot} alone asks {asks}", stepping=True)
+
+
+def _slow_legs(never_step: Sequence[str]) -> Iterator[Fault]:
+    if never_step:
+        yield Fault(
+            "slow legs",
+            "against the damping of their joints the motors do not lift a foot and set it down in "
+            f"the longest step of {', '.join(never_step)}: feet stay in place with these",
+            stepping=True,
+        )

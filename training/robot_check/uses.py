@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.registry import ControllerConfig, controller_config, load_controller
+from poise.baselines.stepping.capture_step import CaptureStep
 from poise.baselines.stepping.config import CaptureStepConfig
 from poise.baselines.walking.simbicon import SimbiconConfig
 from poise.configs.errors import PoiseError
@@ -22,10 +23,12 @@ class Uses:
     Attributes:
         takes: those that take the robot.
         refused: name → why it does not.
+        never_step: those of `takes` whose feet stay, since its legs are too slow for their steps.
     """
 
     takes: tuple[str, ...]
     refused: dict[str, str]
+    never_step: tuple[str, ...] = ()
 
 
 def controllers_for(robot: Robot) -> dict[str, Uses]:
@@ -45,11 +48,14 @@ def _family(config: ControllerConfig) -> str | None:
 
 
 def _uses(robot: Robot, configs: dict[str, ControllerConfig]) -> Uses:
-    takes, refused = [], {}
+    takes, refused, never = [], {}, []
     for name, config in configs.items():
         try:
-            load_controller(config, robot)
-            takes.append(name)
+            controller = load_controller(config, robot)
         except PoiseError as error:
             refused[name] = str(error)
-    return Uses(tuple(takes), refused)
+            continue
+        takes.append(name)
+        if isinstance(controller, CaptureStep) and not controller.steps_possible:
+            never.append(name)
+    return Uses(tuple(takes), refused, tuple(never))

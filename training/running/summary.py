@@ -50,6 +50,8 @@ class Counts(Rate, total=False):
     mean_abs_action: Number
     mean_abs_action_max: Number
     com_drift_max: Number
+    foot_drift_max: Number
+    unpushed_lean_max: Number
     root_force_max: Number
 
 

@@ -86,33 +86,46 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
         solver_failures=int(m[episode.FAILURES]),
         mean_abs_action=settled.actions / settled.steps if settled.steps else None,
         com_drift=_finite(settled.drift) if settled.steps and not trial.pushes else None,
+        foot_drift=_finite(settled.foot_drift) if settled.steps and not trial.pushes else None,
         final_speed=_finite(float(np.linalg.norm(env.simulation.state.com_vel))),
+        final_lean=_finite(lean(env)),
         root_force=_finite(m[episode.ROOT_FORCE]),
     )
 
 
+def lean(env: BalanceEnv) -> float:
+    """The tilt of the root from the standing posture, whatever the yaw [°]."""
+    standing = env.simulation.arrays.root_standing[2]
+    cosine = float(env.simulation.state.root_axes[2] @ standing)
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
 class Settled:
-    """Actions and the drift of the CoM after the first second.
+    """Actions and the drift of the CoM and of the feet after the first second.
 
     Attributes:
         steps: policy steps after it.
         actions: sum of their mean |action|.
         drift: largest horizontal distance of the CoM from where it was then [m].
+        foot_drift: the same of a sole.
     """
 
     def __init__(self) -> None:
-        self.actions, self.steps, self.drift = 0.0, 0, 0.0
+        self.actions, self.steps, self.drift, self.foot_drift = 0.0, 0, 0.0, 0.0
         self._start: np.ndarray | None = None
 
     def update(self, env: BalanceEnv, action: np.ndarray) -> None:
         """Call it after every step."""
-        com = env.simulation.state.com[:2]
+        state = env.simulation.state
+        places = np.vstack([state.com[:2], state.sole_points[:, :2]])
         if env.steps == round(SETTLED / env.config.policy_period):
-            self._start = com.copy()
+            self._start = places
         elif self._start is not None:
             self.actions += float(np.mean(np.abs(action)))
             self.steps += 1
-            self.drift = max(self.drift, float(np.linalg.norm(com - self._start)))
+            ways = np.linalg.norm(places - self._start, axis=1)
+            self.drift = max(self.drift, float(ways[0]))
+            self.foot_drift = max(self.foot_drift, float(ways[1:].max()))
 
 
 def _finite(value: float) -> float | None:

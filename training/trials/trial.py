@@ -69,7 +69,7 @@ class Outcome:
     where a simulation has blown up.
 
     Attributes:
-        recovered: upright and quiet for the last second.
+        recovered: upright, quiet and with feet at rest for the last second.
         fallen: whether it fell; `fall_time` counts from the reset.
         recovery_time: from the start of the last push to the last moment that was not quiet.
         foot_displaced: a foot moved more than 5 cm; the column `stepped` of trials.csv.
@@ -84,7 +84,9 @@ class Outcome:
         mean_abs_action: mean |action| after the first second.
         com_drift: without a push, largest horizontal distance of the CoM from where it was after
             the first second.
+        foot_drift: the same of a sole.
         final_speed: |ċ| at the end [m/s].
+        final_lean: of the root from the described posture at the end [°].
         root_force: largest force [N] that a soft root took from nowhere; 0 with a hard root.
         sway, sway_recovery: body sway [rad] and recovery time by the sway's speed, of a recovered
             push, see `training/statistics/eurobench.py`.
@@ -107,7 +109,9 @@ class Outcome:
     solver_failures: int = 0
     mean_abs_action: float | None = None
     com_drift: float | None = None
+    foot_drift: float | None = None
     final_speed: float | None = None
+    final_lean: float | None = None
     root_force: float | None = None
     sway: float | None = None
     sway_recovery: float | None = None

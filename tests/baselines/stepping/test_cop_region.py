@@ -5,7 +5,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial import ConvexHull
 
-from poise.baselines.stepping.cop_region import LOAD_FRACTIONS, CopRegion, ankle_limits
+from poise.baselines.stepping.cop_region import (
+    LOAD_FRACTIONS,
+    CopRegion,
+    ankle_limits,
+    nominal_feet,
+    rest_ahead,
+)
 from poise.envs.maths.pendulum import capture_distance, drifted
 from poise.envs.maths.polygons import clipped
 from poise.envs.maths.vectors import turn
@@ -157,3 +163,12 @@ def test_distance_beyond_the_reach_is_that_of_the_readable_form():
         xi = feet.mean(axis=0) + rng.uniform(-0.3, 0.3, 2)
         found = region.beyond(feet[0], feet[1], yaw, xi)
         assert found == pytest.approx(readable.beyond(region, *feet, yaw, xi), abs=1e-9)
+
+
+def test_steps_end_where_the_posture_has_the_centre_of_mass():
+    """In the nominal stance the middle of the region and `rest_ahead` make the CoM's place."""
+    toddler = CopRegion(robot("toddler"))
+    middle = toddler.both(nominal_feet(robot("toddler")), 0.0).mean(axis=0)[0]
+    assert middle + rest_ahead(toddler) == pytest.approx(robot("toddler").com_ahead)
+    assert abs(rest_ahead(toddler)) > 0.01
+    assert rest_ahead(CopRegion(robot())) == 0.0  # its gains say where

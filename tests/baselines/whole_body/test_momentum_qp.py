@@ -274,3 +274,24 @@ def test_parameters_replaced_between_ticks_are_those_of_the_next(robot):
     qp.assembly(simulation.state, targets)
     qp.parameters = replace(qp.parameters)
     assert qp.assembly(simulation.state, targets).parameters is qp.parameters
+
+
+@pytest.mark.parametrize("name", ["compact", "tall"])
+def test_other_robots_stand_as_described(name):
+    """`com.offset` was searched on the default humanoid; others do not lean for it."""
+    env = ResidualBalanceEnv(name, duration=4.0, pushes=None)
+    env.reset(seed=3)
+    while env.episode.running[0]:
+        env.step_without_info(np.zeros(4))
+    state, standing = env.simulation.state, env.simulation.arrays.root_standing
+    assert np.degrees(np.arccos(state.root_axes[2] @ standing[2])) < 0.3
+    ahead = (state.com - state.origin)[:2] @ state.heading
+    assert ahead == pytest.approx(env.robot.com_ahead, abs=0.002)
+
+
+def test_the_offset_holds_where_the_description_leaves_it_to_the_controller(robot):
+    """As on the default humanoid."""
+    config = controller_config("momentum-qp")
+    assert MomentumQP(robot, config).com_offset == config.com.offset * robot.height_com
+    toddler = robot_named("toddler")
+    assert MomentumQP(toddler, config).com_offset == toddler.com_ahead

@@ -34,7 +34,7 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         e.action[:], e.last_action[:] = [0.5, -0.25, 0.0], [0.1, 0.1, -0.1]
     simulation.views.ctrl[:] = 0.0 if tau is None else tau
     simulation.clock[0] = round(time / simulation.arrays.timestep)
-    bounds = episode_limits(limits or FallLimits(), r.height_com, 100)
+    bounds = episode_limits(limits or FallLimits(), r.height_com, 100, 50)
     view = RewardView(
         robot=simulation.arrays,
         state=simulation.state_arrays,
@@ -172,7 +172,7 @@ def test_terms_without_weight_give_nothing():
 def fallen(simulation, **limits):
     return has_fallen(
         simulation.arrays, simulation.state_arrays,
-        episode_limits(FallLimits(**limits), simulation.robot.height_com, 100),
+        episode_limits(FallLimits(**limits), simulation.robot.height_com, 100, 50),
     )  # fmt: skip
 
 
@@ -239,6 +239,29 @@ def test_quiet_steps_count_and_start_again():
     s.com[0] += 0.5  # at rest, but not over the soles
     play(simulation, time=0.08, e=e)
     assert e.metrics[episode.QUIET_STEPS] == 0.0 and e.metrics[episode.LAST_MOVING] == 0.08
+
+
+def test_a_robot_that_skates_is_not_quiet():
+    """A sole that has moved by more than 1 cm lets the count begin again, and only the count."""
+    simulation = Simulation(robot())
+    s = simulation.state_arrays
+    _, e = play(simulation)
+    counts = []
+    for _ in range(4):
+        s.sole_point[1, 1] += 0.006
+        play(simulation, e=e)
+        counts.append(e.metrics[episode.QUIET_STEPS])
+    assert counts == [2.0, 0.0, 1.0, 0.0] and e.metrics[episode.LAST_MOVING] == 0.0
+
+
+def test_a_sole_may_creep():
+    """What counts is the way in the last second: 0.15 mm a step is less than 1 cm in 50 steps."""
+    simulation = Simulation(robot())
+    _, e = play(simulation)
+    for steps in range(2, 150):
+        simulation.state_arrays.sole_point[0, 0] += 0.00015
+        play(simulation, e=e)
+        assert e.metrics[episode.QUIET_STEPS] == steps
 
 
 def test_largest_excursions_are_kept():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -83,3 +84,18 @@ def test_wrong_ground(tmp_path: Path, change: dict, words: list[str]) -> None:
         load_robot(path)
     for word in [str(path), *words]:
         assert word in str(caught.value)
+
+
+def test_friction_may_be_stiffer_than_the_contact(tmp_path: Path) -> None:
+    """`cone` and `impratio` of the description are MuJoCo's; other dynamics, another robot."""
+    plain = load_robot(write_biped(tmp_path))
+    options = {"cone": "elliptic", "impratio": 50}
+    (tmp_path / "stiff").mkdir()
+    stiff = load_robot(write_biped(tmp_path / "stiff", options=options))
+    assert (plain.model.opt.impratio, stiff.model.opt.impratio) == (1.0, 50.0)
+    assert stiff.model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC != plain.model.opt.cone
+    (tmp_path / "round").mkdir()
+    prints = {robot.fingerprint for robot in (
+        plain, stiff, load_robot(write_biped(tmp_path / "round", options={"cone": "elliptic"})),
+    )}  # fmt: skip
+    assert len(prints) == 3

@@ -285,3 +285,14 @@ def test_unknown_robot_lists_names() -> None:
     """A robot that does not exist is refused with the names of those that do."""
     with pytest.raises(ConfigError, match=r"atlas.*compact, humanoid, .*tall, toddler, unitree_g1"):
         load_robot("atlas")
+
+
+def test_where_the_centre_of_mass_is_ahead_of_the_soles() -> None:
+    """As MuJoCo has it in the standing posture, whose soles are about the origin."""
+    for name in ("humanoid", "tall"):
+        robot = load_robot(name)
+        data = mujoco.MjData(robot.model)
+        data.qpos[:] = robot.standing_qpos
+        mujoco.mj_forward(robot.model, data)
+        com = data.subtree_com[robot.root_body_id]
+        assert robot.com_ahead == pytest.approx(com[0], abs=1e-12) and abs(com[0]) > 0.01

@@ -175,3 +175,13 @@ def test_plain_is_json_of_any_reader(limits: PushLimits) -> None:
     value = {"a": np.float64(1.5), "b": (np.int64(2), float("nan")), "c": [float("inf"), None]}
     assert plain(value) == {"a": 1.5, "b": [2, None], "c": [None, None]}
     json.dumps(plain(value), allow_nan=False)
+
+
+def test_feet_and_lean_of_a_robot_that_only_stands(limits: PushLimits) -> None:
+    """The largest of the trials without a push; of pushed ones there is none."""
+    quiet = [replace(OUTCOME, com_drift=0.0, foot_drift=d, final_lean=100.0 * d)
+             for d in (0.001, 0.03)]  # fmt: skip
+    entry = summarise([Trial(0, 0), Trial(1, 1)], {"a": quiet}, limits)[0]["a"]
+    assert entry["foot_drift_max"] == 0.03 and entry["unpushed_lean_max"] == 3.0
+    entry = summarise([Trial(0, 0)], {"a": [replace(OUTCOME, final_lean=2.0)]}, limits)[0]["a"]
+    assert entry["foot_drift_max"] is None and entry["unpushed_lean_max"] is None

@@ -184,3 +184,15 @@ def test_the_command_writes_figures_and_a_picture(
     with Image.open(picture) as image:
         pixels = np.asarray(image.convert("RGB"))
     assert pixels.shape[1] > 1000 and len(np.unique(pixels.reshape(-1, 3), axis=0)) > 500
+
+
+def test_legs_that_are_too_slow_for_a_step_are_warned_of(tmp_path: Path) -> None:
+    """By damping; controllers whose steps are too short for them are named, and only those."""
+    robot = load_robot(write_urdf(tmp_path))
+    robot.model.dof_damping[6:] = 60.0
+    found = check_robot(robot)
+    fault = next(fault for fault in found.faults if fault.kind == "slow legs")
+    never = found.controllers[STEPPING].never_step
+    assert fault.stepping and "capture-step" in never and "simbicon" not in never
+    assert all(name in fault.text for name in never)
+    assert set(never) <= set(found.controllers[STEPPING].takes)

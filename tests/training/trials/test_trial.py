@@ -6,12 +6,13 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import load_robot
 from poise.training.trials.agents import Agent, load_agent
-from poise.training.trials.play import run_trial
+from poise.training.trials.play import lean, run_trial
 from poise.training.trials.table import COLUMNS, trial_row
 from poise.training.trials.trial import Trial
 
@@ -46,9 +47,10 @@ def test_a_small_push_is_recovered_and_a_huge_one_not(agent: Agent) -> None:
 
 
 def test_drift_counts_without_a_push(agent: Agent) -> None:
-    """An unpushed robot stays; its drift is measured from the first second on."""
+    """An unpushed robot stays, and its feet; drift is measured from the first second on."""
     quiet = run_trial(agent, Trial(0, 3))
     assert quiet.recovered and quiet.com_drift is not None and 0.0 < quiet.com_drift < 0.02
+    assert quiet.foot_drift is not None and 0.0 < quiet.foot_drift < 0.002
 
 
 def test_an_outcome_depends_on_the_trial_alone(agent: Agent) -> None:
@@ -75,3 +77,15 @@ def test_the_row_has_all_columns_in_order(agent: Agent) -> None:
     assert line["trial"] == 4 and line["impulse"] == 60.0 and line["limit_fraction"] == 2.5
     without = trial_row(Trial(4, 1), "momentum-qp", outcome)
     assert tuple(without) == COLUMNS and without["body"] is None and without["fallen"] is True
+
+
+def test_lean_is_the_tilt_of_the_root_at_the_end(agent: Agent) -> None:
+    """Next to none at rest; that of a root that is turned by 5° about a horizontal axis."""
+    quiet = run_trial(agent, Trial(0, 3))
+    assert quiet.final_lean is not None and 0.0 < quiet.final_lean < 1.0
+    env = agent.env
+    env.reset(seed=3)
+    axes = env.simulation.state_arrays.root_axes
+    tilted = Rotation.from_euler("zy", [40.0, 5.0], degrees=True).as_matrix()
+    axes[:] = tilted @ env.simulation.arrays.root_standing
+    assert lean(env) == pytest.approx(5.0)

@@ -1,0 +1,155 @@
+"""The fastest swing that the joints of a leg can do, and the limits of steps that follow from it.
+
+A joint is as fast as its motor overcomes damping and friction with what the leg's weight and its
+springs leave of the torque limit:
+
+    |q̇| ≤ (τ_max − |τ_rest| − τ_friction)/damping
+
+A foot that goes from rest to rest on a polynomial of degree five is midway 15/8 times as fast as in
+the mean.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from scipy.optimize import linprog
+
+from poise.envs.physics.arrays import dof_chain
+from poise.envs.robots.robot import Robot
+
+from .config import CaptureStepConfig, StepLimits
+
+PEAK = 15.0 / 8.0  # of a speed over its mean, from rest to rest
+ROUNDS, STEP, CLOSE = 60, 0.05, 1e-6  # of the lift; most that a round turns a joint [rad]; [m]
+STILL = 1e-6  # [m/s] of a foot that its joints do not move at all
+ROLL, PITCH = 3, 4  # rows of a sole's Jacobian, after those of its place
+UNBOUNDED = 3  # status of a linear program
+
+
+class SwingSpeed(NamedTuple):
+    """Mean speeds that a foot can have in a swing [m/s], infinite where no joint bounds them."""
+
+    ahead: float
+    sideways: float
+    lift: float  #: up to the clearance of a step, or down from it
+
+
+@lru_cache(maxsize=16)
+def swing_speed(robot: Robot, clearance: float, torque_share: float = 1.0) -> SwingSpeed:
+    """The speeds of the slower foot, from the standing posture and with the root at rest.
+
+    Args:
+        clearance: by which the foot is lifted [m].
+        torque_share: fraction of the motors' limits that counts.
+    """
+    feet = [_foot_speed(robot, sole, clearance, torque_share) for sole in range(len(robot.soles))]
+    return SwingSpeed(*np.min(feet, axis=0).tolist())
+
+
+def possible_limits(robot: Robot, config: CaptureStepConfig) -> StepLimits | None:
+    """The limits of steps of `config` within what the legs can do; None: they can do no step.
+
+    The foot rises in `swing.lift` of the time and comes down in the rest. Where that takes longer
+    than `time_max` it would not land in time. Limits that do not bind are those given, to the bit.
+    """
+    c, h, omega = config, robot.height_com, robot.omega
+    speed = swing_speed(robot, c.swing.clearance * h, c.step_qp.torque.share)
+    if min(speed) <= STILL:
+        return None
+    shorter = min(c.swing.lift, 1.0 - c.swing.lift)
+    time = c.swing.clearance * h * omega / (shorter * speed.lift)
+    if time > c.limits.time_max:
+        return None
+    return replace(
+        c.limits,
+        speed=min(c.limits.speed, speed.ahead / (h * omega)),
+        side_speed=min(c.limits.side_speed, speed.sideways / (h * omega)),
+        time_min=max(c.limits.time_min, time),
+    )
+
+
+def _foot_speed(robot: Robot, sole: int, clearance: float, share: float) -> SwingSpeed:
+    """The speeds of one foot."""
+    model, data = robot.model, mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    dofs = np.array([dof for dof in dof_chain(model, robot.soles[sole].body_id) if dof >= 6])
+    way = _lift(robot, data, sole, dofs, clearance)
+    fastest = _joint_speeds(robot, data, dofs, share) / PEAK
+    rows = _jacobian(robot, data, sole, dofs)
+    lift = np.inf
+    if way is not None:
+        moving = np.abs(way) > 0.0
+        lift = clearance * np.min(fastest[moving] / np.abs(way[moving]))
+    return SwingSpeed(_fastest(rows, 0, fastest), _fastest(rows, 1, fastest), lift)
+
+
+def _joint_speeds(robot: Robot, data: mujoco.MjData, dofs: np.ndarray, share: float) -> np.ndarray:
+    """(n,) the speeds of the leg's joints at their torque limits in the posture of `data`."""
+    model = robot.model
+    mujoco.mj_forward(model, data)
+    limit = np.zeros(model.nv)
+    limit[robot.motor_dofs] = share * robot.torque_limit
+    resting = np.abs(data.qfrc_bias - data.qfrc_passive) + model.dof_frictionloss
+    left = np.maximum(limit - resting, 0.0)[dofs]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(left > 0.0, left / model.dof_damping[dofs], 0.0)
+
+
+def _lift(
+    robot: Robot, data: mujoco.MjData, sole: int, dofs: np.ndarray, clearance: float
+) -> np.ndarray | None:
+    """(n,) the way of the leg's joints that lifts the level sole; None if none is found."""
+    start, goal = data.qpos[dofs + 1].copy(), None
+    for _ in range(ROUNDS):
+        mujoco.mj_kinematics(robot.model, data)
+        mujoco.mj_comPos(robot.model, data)
+        place = _point(robot, data, sole)
+        goal = place + [0.0, 0.0, clearance] if goal is None else goal
+        if np.abs(goal - place).max() < CLOSE:
+            return data.qpos[dofs + 1] - start
+        rows = _jacobian(robot, data, sole, dofs)
+        rows[ROLL:] *= 0.1 * robot.height_com  # a leg that cannot keep the sole level turns it
+        wanted = np.concatenate([goal - place, np.zeros(3)])
+        change = np.linalg.lstsq(rows, wanted, rcond=1e-4)[0]
+        data.qpos[dofs + 1] += change * min(1.0, STEP / max(np.abs(change).max(), STEP))
+    return None
+
+
+def _fastest(rows: np.ndarray, axis: int, fastest: np.ndarray) -> float:
+    """The largest speed along an axis that joints no faster than `fastest` (n,) give the sole.
+
+    A linear program. The sole stays level, or turns where the leg has no joint for that; it may
+    turn about the vertical.
+    """
+    wanted, n = np.zeros(len(rows)), rows.shape[1]
+    wanted[axis] = -1.0
+    bounds = [(-v, v) if np.isfinite(v) else (None, None) for v in fastest.tolist()]
+    speed = 0.0
+    for kept in ([0, 1, 2, ROLL, PITCH], [0, 1, 2, PITCH], [0, 1, 2, ROLL], [0, 1, 2]):
+        found = linprog(
+            c=[*np.zeros(n), -1.0],
+            A_eq=np.column_stack([rows[kept], wanted[kept]]),
+            b_eq=np.zeros(len(kept)),
+            bounds=[*bounds, (0.0, None)],
+        )
+        speed = np.inf if found.status == UNBOUNDED else float(-found.fun)
+        if speed > STILL:
+            break
+    return speed
+
+
+def _jacobian(robot: Robot, data: mujoco.MjData, sole: int, dofs: np.ndarray) -> np.ndarray:
+    """(6, n) of a sole's reference point, its place and then its turn; the robot faces along x."""
+    rows = np.zeros((6, robot.model.nv))
+    place = _point(robot, data, sole)
+    mujoco.mj_jac(robot.model, data, rows[:3], rows[3:], place, robot.soles[sole].body_id)
+    return rows[:, dofs]
+
+
+def _point(robot: Robot, data: mujoco.MjData, sole: int) -> np.ndarray:
+    """(3,) a sole's reference point [m]."""
+    foot = robot.soles[sole]
+    return data.xpos[foot.body_id] + data.xmat[foot.body_id].reshape(3, 3) @ foot.position
