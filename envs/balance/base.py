@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 
 from poise.configs.errors import PoiseError
-from poise.configs.numbers import seed_number, whole_steps
+from poise.configs.numbers import real_array, seed_number, whole_steps
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Program, run
 from poise.envs.physics.arrays import RobotArrays
@@ -20,7 +20,7 @@ from poise.envs.sensors.sensed import SensedRobot
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.rendered import RenderedEnv
 
-from .action import checked_action
+from .action import checked_action, take_action
 from .config import EnvConfig as EnvConfig
 from .config import env_config
 from .docstrings import filled
@@ -239,9 +239,10 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
         Raises ConfigError as `check_action` does.
         """
-        vector = self.check_action(action)
-        self.episode.last_action[:] = self.episode.action
-        self.episode.action[:] = np.clip(vector, -1.0, 1.0)
+        vector, e = real_array(action), self.episode
+        fits = vector is not None and vector.shape == e.action.shape
+        if not (fits and take_action(vector.astype(float), e.last_action, e.action)):
+            self.check_action(action)  # raises, and names what is wrong
 
     def check_action(self, action: np.ndarray) -> np.ndarray:
         """Return `action` as numbers, see `checked_action`."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import real_array, whole_number
+from poise.envs.balance.action import BEYOND
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.episode import FALLEN, EpisodeArrays
 from poise.envs.compiled.calls import CompiledStep
@@ -180,7 +181,7 @@ class EnvBatch(Copyable):
                 f"has shape {vectors.shape}, expected {record.action.shape}", field="action"
             )
         vectors = vectors[live].astype(float, copy=False)
-        good = np.abs(vectors) <= 1.0 + 1e-6  # NaN is not
+        good = np.abs(vectors) <= 1.0 + BEYOND  # NaN is not
         if not good.all():
             for env, vector in zip(np.array(self.envs, dtype=object)[live], vectors, strict=True):
                 env.check_action(vector)  # raises, and names the entries

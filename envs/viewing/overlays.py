@@ -8,8 +8,9 @@
 | capture point | blue disc, the largest |
 | support polygon | bluish green line around the soles |
 
-Colours are those of `quantities.py`, and no two marks have both the same shape and the same size.
-Marks on the ground that coincide lie on each other, the largest lowest. `contact_forces.py` has
+Sizes are in heights of the CoM, as the camera's distance is: the smallest mark is ten pixels wide
+in a picture of 640 by 480. Colours are those of `quantities.py`, and no two marks have both the
+same shape and the same size. Marks on the ground that coincide lie on each other, the largest lowest. `contact_forces.py` has
 one more mark, and a planned foothold is a sky blue disc (`foothold_mark`).
 """
 
@@ -50,12 +51,12 @@ def marks(simulation: Simulation) -> list[Mark]:
     state = simulation.state.copy()  # the support polygon is computed into the state's own arrays
     size = simulation.robot.height_com
     ground = [*state.com[:2], 0.0]
-    found, blue = _polygon(state.support_polygon, 0.009 * size), CAPTURE_POINT.colour
-    found.append(_disc("capture point", state.capture_point, 0.055 * size, 0.004 * size, blue))
+    found, blue = _polygon(state.support_polygon, 0.013 * size), CAPTURE_POINT.colour
+    found.append(_disc("capture point", state.capture_point, 0.065 * size, 0.004 * size, blue))
     if state.contact_wrench[2] > 1e-3 * state.mass * simulation.arrays.gravity:
-        found.append(_disc("cop", state.cop, 0.038 * size, 0.007 * size, COP.colour))
+        found.append(_disc("cop", state.cop, 0.046 * size, 0.007 * size, COP.colour))
     black = COM.colour
-    found.append(_disc("com on ground", np.array(ground), 0.018 * size, 0.010 * size, black))
+    found.append(_disc("com on ground", np.array(ground), 0.026 * size, 0.010 * size, black))
     found.append(Mark("com", SPHERE, state.com, state.com, 0.04 * size, black))
     return found + push_arrows(simulation)
 
@@ -85,7 +86,7 @@ def push_arrows(simulation: Simulation) -> list[Mark]:
 
 def foothold_mark(point: np.ndarray, size: float) -> Mark:
     """The mark of a foothold (2,) that a controller means to step on; `size` is the CoM height."""
-    return _disc("foothold", point, 0.075 * size, 0.003 * size, FOOTHOLD.colour)
+    return _disc("foothold", point, 0.085 * size, 0.003 * size, FOOTHOLD.colour)
 
 
 def draw(scene: mujoco.MjvScene, found: list[Mark]) -> None:

@@ -27,6 +27,7 @@ from .processes import Running, kill
 BAR = 2.0  # [s]
 LONGEST = 25.0  # [s] into a command, which is about how long a cold one compiles
 ENDING = ("replay", "report")  # before the latest moment
+SHOWING = ("view",)  # are meant to be ended by Ctrl-C
 HOUR = 10**7  # more trials or steps than anybody waits for
 
 
@@ -64,6 +65,7 @@ def long_commands(room: Path) -> dict[str, list[str]]:
         "demo": ["demo", "--out", "OUT", "--workers", "2"],
         "replay": ["replay", str(finished), "--trial", "0", "--video", "OUT/a.mp4"],
         "report": ["report", str(finished), "--out", "OUT/report.html"],
+        "view": ["view", "zero", "--port", "0"],
         **cold,
     }
 
@@ -93,6 +95,7 @@ def _measure(
         left += running.left(0.0)
         early = code == -number and not out.exists()  # Python itself was still starting
         done = code == 0 and name in ENDING  # it was writing its last words
+        done |= code == 0 and name in SHOWING and number == signal.SIGINT
         if not (ended or early or done) and (code != 128 + number or "Traceback" in running.output):
             odd += 1
             print(

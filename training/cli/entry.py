@@ -100,6 +100,8 @@ def _run(args: list[str]) -> int:
     if args == ["--version"]:
         print(f"poise {poise.__version__}")
         return 0
+    if args[:1] == ["--print-completion"]:  # tyro's own flag has a longer name
+        args = ["--tyro-print-completion", *args[1:]]
     if args and not args[0].startswith("-") and args[0] not in COMMANDS:
         raise _unknown(args[0])
     if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass

@@ -176,5 +176,5 @@ def robot_figures(limits: PushLimits) -> RobotFigures:
         "height_com": robot.height_com,
         "omega": robot.omega,
         "human_com_height": HUMAN_COM_HEIGHT,
-        "ankle_limit": [(float(a), limits.ankle(float(a), 0.1)) for a in range(0, 360, 5)],
+        "ankle_limit": [(float(a), limits.ankle(float(a), 0.1)) for a in limits.around(5.0)],
     }

@@ -40,9 +40,10 @@ def draw_plots(
                 for name, own in shown.items()}  # fmt: skip
         fraction = {name: pushes(own)[1] / ankle_limits(own, limits) for name, own in shown.items()}
         fine, duration = np.arange(0.0, 360.0, 2.0), plan.suite.push_duration
-        limit = [limits.ankle(d, duration) for d in fine]
+        around = limits.around(2.0)
+        limit = [limits.ankle(d, duration) for d in around]
         lines = _step_lines(steps or {}, fine, duration)
-        polar_envelope(polar, _bands(fits), ankle_limit=(fine, limit), step_limits=lines)
+        polar_envelope(polar, _bands(fits), ankle_limit=(around, limit), step_limits=lines)
     else:
         fits = {name: sectors(own) for name, own in shown.items()}
         fraction = {name: fractions(own) for name, own in shown.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
@@ -99,9 +100,8 @@ def _load(source: Path, allow: str | Iterable[str]) -> tuple[Policy, BalanceEnv]
 
 def _name(policy: str | Path) -> str:
     """The policy's name: of a run, that of its folder."""
-    path = Path(policy)
-    inner = path.parent.name if path.name in ("best", "last") else path.name
-    return inner or path.resolve().name
+    path = Path(os.path.abspath(policy))  # not resolved: a link's name is as good as another
+    return path.parent.name if path.name in ("best", "last") else path.name
 
 
 def _write_networks(folder: Path, policy: Policy, env: BalanceEnv) -> float:

@@ -20,6 +20,8 @@ from poise.configs.files import write_atomic
 # says, for prints in grey.
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 AMBER = "#E69F00"
+SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY)  # in the order in which they are given
+MANY = (*SERIES, "#6250B5", "#B3263E")  # where there is room for more: violet and crimson
 INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
 
 RC: dict[Any, Any] = {
@@ -77,12 +79,11 @@ def look(index: int) -> Look:
 
     Colours repeat after six, with other markers; after 36 everything repeats.
     """
-    colours = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY)
     lines = ("-", "-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)), ":")
     markers = ("o", "s", "^", "D", "v", "P")
-    k, turn = index % len(colours), index // len(colours)
-    other = (k + turn) % len(colours)
-    return Look(colours[k], lines[other], markers[other])  # type: ignore[arg-type]
+    k, turn = index % len(SERIES), index // len(SERIES)
+    other = (k + turn) % len(SERIES)
+    return Look(SERIES[k], lines[other], markers[other])  # type: ignore[arg-type]
 
 
 @contextmanager

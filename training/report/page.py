@@ -15,6 +15,7 @@ from poise.baselines.allowance import allowing
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
+from poise.envs.viewing.quantities import PUSH, SUPPORT
 from poise.training.evaluation.tables import assisted
 from poise.training.results.read import Record, Results, load_results
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
@@ -23,6 +24,7 @@ from poise.training.running.terminal import print_paths
 from . import factors, plots, words
 from . import tables as report_tables
 from .cells import Download, download
+from .palette import CARDS, variables
 from .svg import swatch
 from .time_chart import signals_csv, time_plot
 from .worst_trials import AFTER, Exhibit, Film, can_draw, choose_exhibits, film, frame_times
@@ -117,6 +119,9 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         trials=_trials(results),
         summary_file=_summary_file(results),
         crowded=len(order) > CROWD,
+        colours={scheme: variables(scheme) for scheme in CARDS},
+        push=PUSH.hexadecimal,
+        support=SUPPORT.hexadecimal,
     )  # fmt: skip
 
 

@@ -13,9 +13,11 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import ArrayLike
 
+from poise.training.figures.style import MANY
+
 DIRECTIONS = ("forward", "forward left", "left", "backward left", "backward", "backward right",
               "right", "forward right")  # fmt: skip
-COLOURS = 8  # classes s0 … s7 of the style sheet
+COLOURS = len(MANY)  # classes s0, s1, … of the style sheet
 DASHES = ("", "7 3", "2 3")  # of the first eight series, the next eight, …
 MARKERS = ("circle", "square", "up", "diamond", "down", "plus")
 MARKER_PATHS = {

@@ -100,7 +100,9 @@ class Live:
         from poise.training.figures.video import record
 
         time, trial = self.session.time, self.session.trial
-        if not 0.0 < time <= LONGEST_FILM:
+        if time == 0.0:
+            raise PoiseError("nothing has been played that a video could show")
+        if time > LONGEST_FILM:
             raise PoiseError(f"a video is of at most {LONGEST_FILM:g} s, begin anew by Reset")
         agent = load_agent(name, self.robot, duration=time, pushes=None)
         if agent.begin is not None:

@@ -6,6 +6,9 @@ import shlex
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
@@ -47,10 +50,12 @@ def recorded_trial(
         the trial, and a line about each controller.
 
     Raises:
-        ConfigError: as `replay`.
+        ConfigError: as `replay`; more than three controllers.
     """
+    if len(controllers) > MOST:
+        raise ConfigError(f"at most {MOST} stand side by side", field="controllers")
     results = load_results(folder)
-    names = list(controllers[:MOST]) or [results.controllers[-1]]
+    names = list(controllers) or [results.controllers[-1]]
     for name in names:  # before the first is played
         results.record(name, trial)
     recorders, lines = [Recorder() for _ in names], []
@@ -58,16 +63,16 @@ def recorded_trial(
         done = replay(results, trial, name, watch=recorder, allow=allow)
         differs = "differs from the record" if done.differences else "exactly as recorded"
         lines.append(f"trial {trial}, {name}: {_end(done.outcome)}, {differs}")
-    env = recorders[0].env
-    assert env is not None
+    envs = [recorder.env for recorder in recorders if recorder.env is not None]
+    period = min(env.config.policy_period for env in envs)
     command = f"poise view {shlex.quote(str(folder))} --trial {trial} --controllers "
 
     def film(name: str, path: Path) -> None:
         replay(results, trial, name, video=path, allow=allow)
 
-    history = _side_by_side([recorder.frames for recorder in recorders])
+    history = _side_by_side([recorder.frames for recorder in recorders], period)
     return Recorded(
-        names, env.robot, history, env.config.policy_period,
+        names, envs[0].robot, history, period,
         command + " ".join(map(shlex.quote, names)), film,
     ), lines  # fmt: skip
 
@@ -76,6 +81,10 @@ def _end(outcome: Outcome) -> str:
     return "recovered" if outcome.recovered else "fell" if outcome.fallen else "not quiet"
 
 
-def _side_by_side(films: Sequence[Sequence[Frame]]) -> list[Frames]:
-    longest = max(map(len, films))
-    return [tuple(film[min(k, len(film) - 1)] for film in films) for k in range(longest)]
+def _side_by_side(films: Sequence[Sequence[Frame]], period: float) -> list[Frames]:
+    """Frames every `period` [s], of each film the last one until then: their steps may differ."""
+    count = round(max(film[-1].time for film in films) / period) + 1
+    moments = period * np.arange(count) + 1e-9
+    places = [np.searchsorted([f.time for f in film], moments, "right") - 1 for film in films]
+    pairs = list(zip(films, places, strict=True))
+    return [tuple(film[place[k]] for film, place in pairs) for k in range(count)]

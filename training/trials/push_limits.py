@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, resolve, write_atomic
@@ -44,6 +46,16 @@ class PushLimits:
     def margin(self, direction: float) -> float:
         """δ(θ) [m] of the standing posture, `direction` in degrees."""
         return self.standing.support_margin(direction)
+
+    def around(self, spacing: float) -> np.ndarray:
+        """Directions (n,) [deg] from 0 to below 360, every `spacing` and at every corner.
+
+        A corner is one of the standing support polygon, seen from the CoM: δ(θ) has its peaks
+        there, which a line through evenly spaced directions would cut off.
+        """
+        rays = self.standing.support_polygon - self.standing.com[:2]
+        angles = np.arctan2(rays[:, 1], rays[:, 0]) - self.standing.heading_yaw
+        return np.union1d(np.arange(0.0, 360.0, spacing), np.degrees(angles) % 360.0)
 
     def ankle(self, direction: float, duration: float) -> float:
         """Impulse J [N·s] of a square push that the ankles alone hold."""

@@ -139,14 +139,23 @@ class BrowserView:
         if self.paused:
             self.pace.rest()
             return
-        try:
-            for _ in range(self.pace.due(self.play.period)):
-                self.play.step()
-        except Exception as error:  # a controller from outside may raise anything
-            self.paused = True
-            self._say(f"the controller raised {type(error).__name__}: {error}", "red")
+        self._attempt(self._play_due)
         if self.play.ended:
             self.paused = True
+
+    def _play_due(self) -> None:
+        for _ in range(self.pace.due(self.play.period)):
+            self.play.step()
+
+    def _attempt(self, job: Job) -> None:
+        """Do something; what it raises is told, and no end of the page."""
+        try:
+            job()
+        except PoiseError as error:
+            self._say(str(error), "red")
+        except Exception as error:  # a controller from outside, or a page that is not ours
+            self.paused = True
+            self._say(f"{type(error).__name__}: {error}", "red")
 
     def _draw(self, now: float) -> None:
         self._drawn = now
@@ -191,10 +200,7 @@ class BrowserView:
             job = self._jobs.get(timeout=timeout) if timeout > 0.0 else self._jobs.get_nowait()
         except queue.Empty:
             return
-        try:
-            job()
-        except PoiseError as error:
-            self._say(str(error), "red")
+        self._attempt(job)
         if self.paused:
             self.pace.rest()
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
+from poise.configs.errors import PoiseError
 from poise.envs.viewing.renderer import SceneRenderer
 from poise.envs.viewing.window import Viewer
 from poise.training.sessions.live import Live
@@ -20,15 +21,18 @@ HELP = (
     "backward, right; or double-click on a body, then drag with Ctrl and the right button"
 )
 SPACE, RIGHT, BACKSPACE = 32, 262, 259  # GLFW's codes
-DIRECTIONS = {"8": 0.0, "4": 90.0, "5": 180.0, "6": -90.0}  # key → of a push [deg]
+DIRECTIONS = {ord("8"): 0.0, ord("4"): 90.0, ord("5"): 180.0, ord("6"): -90.0}  # key → push [deg]
 WAIT = 0.02  # [s] between two pictures while it is paused
 
 
 class NativeView:
-    """Plays a session of one controller in MuJoCo's window until that is closed."""
+    """Plays a session of one controller in MuJoCo's window until that is closed.
 
-    def __init__(self, live: Live):
-        self.live, self.paused, self.pace = live, False, Pace()
+    `say` is given what cannot be done, line by line.
+    """
+
+    def __init__(self, live: Live, say: Callable[[str], object] = print):
+        self.live, self.paused, self.pace, self._say = live, False, Pace(), say
         self._keys = queue.SimpleQueue[int]()  # pressed, in the window's thread
         simulation = live.session.sides[0].env.simulation
         self.renderer = SceneRenderer(simulation, human=True, keys=self._keys.put)
@@ -63,16 +67,23 @@ class NativeView:
             self.live.step()
         elif key == BACKSPACE:
             self.live.reset()
-        elif (direction := DIRECTIONS.get(chr(key))) is not None:
-            robot = self.live.robot
-            self.live.push(impulse=WEIGHT * robot.mass, direction=direction, duration=DURATION)
+        elif (direction := DIRECTIONS.get(key)) is not None:
+            impulse = WEIGHT * self.live.robot.mass
+            self._push({"impulse": impulse, "direction": direction, "duration": DURATION})
 
     def _follow_mouse(self) -> None:
         viewer = self.renderer.viewer
         found = None if viewer is None else self._pulled(viewer)
         if found is None and self._pull is not None:
-            self.live.push(**self._pull.fields(self.live.robot, self.live.yaw, DURATION))
+            self._push(self._pull.fields(self.live.robot, self.live.yaw, DURATION))
         self._pull = found
+
+    def _push(self, fields: dict[str, object]) -> None:
+        """Push the robot; a push that cannot be is told, and no end of the window."""
+        try:
+            self.live.push(**fields)
+        except PoiseError as error:
+            self._say(str(error))
 
     def _pulled(self, viewer: Viewer) -> Pull | None:
         """The body that MuJoCo's window drags, if it is one of the robot's."""
@@ -92,7 +103,7 @@ def run_native(live: Live, seconds: float | None, say: Callable[[str], object]) 
 
     Raises PoiseError without a display.
     """
-    view = NativeView(live)
+    view = NativeView(live, say)
     say(HELP)
     try:
         view.run(seconds)

@@ -63,8 +63,8 @@ def view(
     names = list(controllers) or [DEFAULT]
     _check(names, robot, seconds, native)
     if not native:
-        check_installed()
         check_port(host, port)
+        check_installed()
     loaded = load_robot(robot)
     planned = [push for text in pushes for push in _read_pushes(text, loaded)]
 
@@ -108,10 +108,9 @@ def view_trial(
     Raises:
         ConfigError, PoiseError: as `view` and `replay`.
     """
-    if len(controllers) > MOST:
-        raise ConfigError(f"at most {MOST} stand side by side", field="controllers")
-    check_installed()
+    _check_seconds(seconds)
     check_port(host, port)
+    check_installed()
     play, lines = recorded_trial(Path(folder), trial, controllers, allow)
     for line in lines:
         say(line)
@@ -123,11 +122,15 @@ def _check(names: Sequence[str], robot: str, seconds: float | None, native: bool
     if len(names) > (1 if native else MOST):
         most = "one controller is shown by --native" if native else f"at most {MOST} side by side"
         raise ConfigError(f"{most}, not {len(names)}", field="controllers")
-    if seconds is not None and not seconds > 0.0:
-        raise ConfigError(f"must be above 0, not {seconds}", field="seconds")
+    _check_seconds(seconds)
     resolve("robots", robot)
     for name in names:
         check_name(name)
+
+
+def _check_seconds(seconds: float | None) -> None:
+    if seconds is not None and not seconds > 0.0:
+        raise ConfigError(f"must be above 0, not {seconds}", field="seconds")
 
 
 def _read_pushes(text: str, robot: Robot) -> list[Push]:

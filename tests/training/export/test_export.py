@@ -38,6 +38,17 @@ def test_nothing_is_written_where_the_check_fails(
     assert list((tmp_path / "deep").iterdir()) == []
 
 
+def test_a_policy_has_the_name_of_its_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However its folder is named on the command line."""
+    best = tmp_path / "run" / "best"
+    best.mkdir(parents=True)
+    monkeypatch.chdir(best)
+    assert {export._name(path) for path in (best, ".", "../best", "..", best / "..")} == {"run"}
+    monkeypatch.chdir(best.parent)
+    assert {export._name(path) for path in ("best", "./best/", ".")} == {"run"}
+    assert export._name("residual-step") == "residual-step"
+
+
 def head_of(folder: Path) -> tuple[dict[str, Any], str]:
     _, head, page = (folder / "README.md").read_text().split("---\n", 2)
     return yaml.safe_load(head), page

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
@@ -28,6 +29,21 @@ def test_the_ankle_limit_is_the_formula_of_the_standing_posture(robot: Robot) ->
     assert limits.ankle(0.0, 0.1) == expected
     assert limits.margin(90.0) == pytest.approx(limits.margin(270.0), abs=2e-3)
     assert limits.ankle(0.0, 0.3) > expected
+
+
+def test_directions_around_the_robot_have_the_corners(robot: Robot) -> None:
+    """Where the limit has its peaks; evenly spaced directions alone would cut them off."""
+    limits = PushLimits(robot)
+    around = limits.around(5.0)
+    assert set(range(0, 360, 5)) <= set(around) and np.all(np.diff(around) > 0.0)
+    assert around[0] >= 0.0 and around[-1] < 360.0
+    peak = max(limits.margin(angle) for angle in np.arange(0.0, 360.0, 0.1))
+    assert max(map(limits.margin, around)) >= peak
+    assert max(map(limits.margin, np.arange(0.0, 360.0, 5.0))) < max(map(limits.margin, around))
+    rays = limits.standing.support_polygon - limits.standing.com[:2]
+    found = [limits.margin(angle) for angle in around]
+    for length in np.linalg.norm(rays, axis=1):
+        assert np.min(np.abs(np.array(found) - length)) < 1e-9
 
 
 def test_fractions_are_of_the_ankle_limit_or_of_the_table(robot: Robot) -> None:

@@ -229,6 +229,27 @@ def test_a_controller_that_raises_is_no_end(
     run_until(view, lambda: view.play.at > 2)
 
 
+def test_whatever_a_button_raises_is_no_end(
+    view: BrowserView, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A controller that raises in a single step, a page that sends what no page of ours does."""
+    told: list[str] = []
+    monkeypatch.setattr(view, "_say", lambda text, *_: told.append(text))
+
+    def fail() -> None:
+        raise ZeroDivisionError("of a controller")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(view.play, "step", fail)
+        view.ask(view.step)
+        view.run(0.1)
+    view.ask(view.seek, float("nan"))
+    view.run(0.1)
+    assert told[0] == "ZeroDivisionError: of a controller" and told[1].startswith("ValueError")
+    view.toggle()
+    run_until(view, lambda: view.play.at > 2)
+
+
 def test_marks_can_be_hidden(view: BrowserView) -> None:
     """Each quantity by itself: without the centre of mass there is no sphere."""
     view.run(0.05)

@@ -24,8 +24,9 @@ from poise.envs.pushes.push import Push
 from poise.envs.viewing import window
 from poise.training.cli.entry import main
 from poise.training.results.replay import replay
+from poise.training.sessions import live as live_module
 from poise.training.sessions.live import Live
-from poise.training.sessions.recorded import recorded_trial
+from poise.training.sessions.recorded import _side_by_side, recorded_trial
 from poise.training.sessions.session import load_session
 from poise.training.view import native, view
 from tests.endurance.processes import heed_interrupts
@@ -50,6 +51,7 @@ PUSH = "{impulse: 20, direction: 90, body: torso, start: 0.1}"
         (["zero", "--controllers", "zero"], "controllers: goes with --trial"),
         (["nowhere", "--trial", "3"], "nowhere: no such folder"),
         (["--trial", "3"], "trial: goes with one folder"),
+        (["nowhere", "--trial", "3", "--seconds", "0"], "seconds: must be above 0, not 0.0"),
     ],
 )
 def test_what_cannot_be_shown_is_one_line(
@@ -150,14 +152,32 @@ def test_a_recorded_trial_plays_to_its_end_and_is_not_pushed() -> None:
         play.push(impulse=1.0)
     with pytest.raises(ConfigError, match="'pid' took no part"):
         recorded_trial(finished("random"), 0, ["pid"])
+    with pytest.raises(ConfigError, match="controllers: at most 3 stand side by side"):
+        recorded_trial(finished("random"), 0, ["zero"] * 4)
+
+
+def test_films_of_other_steps_are_seen_at_one_time() -> None:
+    """A policy may step every 40 ms beside one that steps every 20 ms; what is over stays."""
+    still = recorded_trial(finished("random"), 0)[0].history[0][0]
+    films = [
+        [still._replace(time=0.02 * k) for k in range(4)],
+        [still._replace(time=0.04 * k) for k in range(3)],
+    ]
+    times = [[frame.time for frame in both] for both in _side_by_side(films, 0.02)]
+    expected = [[0.0, 0.0], [0.02, 0.0], [0.04, 0.04], [0.06, 0.04], [0.06, 0.08]]
+    assert np.allclose(times, expected)
 
 
 @pytest.mark.usefixtures("can_render")
-def test_a_session_is_filmed_from_its_start(tmp_path: Path) -> None:
+def test_a_session_is_filmed_from_its_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With its pushes, up to now, at the robot's own speed."""
     import imageio_ffmpeg
 
     live = Live(load_session(["zero"], robot(), 0))
+    with pytest.raises(PoiseError, match="nothing has been played"):
+        live.film("zero", tmp_path / "b.mp4")
     for _ in range(10):
         live.step()
     live.push(impulse=5.0)
@@ -166,8 +186,8 @@ def test_a_session_is_filmed_from_its_start(tmp_path: Path) -> None:
     live.film("zero", tmp_path / "a.mp4")
     _, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "a.mp4"))
     assert seconds == pytest.approx(0.42, abs=0.03)
-    live.reset()
-    with pytest.raises(PoiseError, match="a video is of at most 60 s"):
+    monkeypatch.setattr(live_module, "LONGEST_FILM", 0.3)
+    with pytest.raises(PoiseError, match="a video is of at most 0.3 s"):
         live.film("zero", tmp_path / "b.mp4")
 
 
@@ -228,6 +248,7 @@ def test_the_window_is_played_by_keys(opened: native.NativeView) -> None:
     handle.keys(native.RIGHT)
     opened.run(0.05)
     assert opened.live.session.time == pytest.approx(before + 0.02)
+    handle.keys(-1)  # GLFW's code of a key that it does not know
     for key in "8456x":
         handle.keys(ord(key))
     opened.run(0.05)
@@ -256,6 +277,18 @@ def test_the_window_s_mouse_pushes_when_it_lets_go(opened: native.NativeView) ->
     yaw = np.degrees(env.simulation.start_yaw)
     assert push.direction == pytest.approx(90.0 - yaw, abs=0.1)
     assert push.impulse == pytest.approx(robot().mass * 0.5 / robot().height_com, rel=1e-3)
+
+
+def test_a_push_that_cannot_be_is_no_end_of_the_window(
+    opened: native.NativeView, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(**_: object) -> Push:
+        raise ConfigError("no body ''", field="body")
+
+    monkeypatch.setattr(opened.live, "push", refuse)
+    handle_of(opened).keys(ord("8"))
+    opened.run(0.05)
+    assert capsys.readouterr().out == "body: no body ''\n" and opened.live.session.time > 0.0
 
 
 def test_a_window_that_is_closed_ends_it(opened: native.NativeView) -> None:
