@@ -7,6 +7,8 @@ from poise.baselines.stepping.blocks import CaptureTick
 from poise.baselines.stepping.ipm_step import energy_foothold
 from poise.baselines.stepping.swing import time_left
 from poise.baselines.stepping.tick import capture_tick
+from poise.baselines.walking.tick import walk_tick
+from poise.baselines.walking.walk import Walk
 from poise.baselines.whole_body.momentum_qp import (
     MomentumQP,
     MomentumQPConfig,
@@ -124,3 +126,13 @@ def planner() -> None:
     address_of(energy_foothold, tick.search)
     time_left(tick.swing)
     env.bind(tick, NO_KERNEL)
+
+
+def walking() -> None:
+    """The gait of a controller that walks."""
+    env = ResidualStepEnv(duration=0.1, controller="walk")
+    env.reset(seed=0)
+    walk = env.controller
+    assert isinstance(walk, Walk)
+    blocks = walk.blocks(env.simulation.state, env.targets)
+    address_of(walk_tick, walk.around(blocks))
