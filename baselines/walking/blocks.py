@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.stepping.blocks import CaptureTick, Search, StepMemory, SwingArrays
+from poise.baselines.stepping.blocks import CaptureTick, StepMemory, SwingArrays
 from poise.envs.compiled.block import Block
 
 
@@ -42,9 +42,9 @@ class Gait(Block):
 class WalkTick(Block):
     """All that a tick of `Walk` works on."""
 
-    capture: CaptureTick
+    capture: CaptureTick  # while it stands, and catches falls from there
+    walk: CaptureTick  # the same memory, with the QPs, the swing and the limits of the gait
     gait: Gait
-    search: Search  # with the limits of the gait
     stance: np.ndarray  # (2,) scratch: the middle of what the stance sole reaches [m]
     swinging: np.ndarray  # (2,) scratch: the same of the other one
 

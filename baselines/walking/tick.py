@@ -15,7 +15,6 @@ from poise.baselines.motions.offsets import (
     FOOTHOLD_Y,
     TIME,
 )
-from poise.baselines.stepping.blocks import CaptureTick
 from poise.baselines.stepping.cop_region import (
     distance_beyond,
     double_support_region,
@@ -36,6 +35,7 @@ from poise.baselines.stepping.tick import (
     has_landed,
     solve_contacts,
 )
+from poise.baselines.whole_body.tick import ContactTick
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.polygons import find_nearest
 from poise.envs.maths.vectors import along, copy_into, turned
@@ -66,20 +66,25 @@ def is_commanded(g: Gait) -> bool:
 
 
 @compiled
+def go_on_from(contacts: ContactTick, torques: np.ndarray) -> None:
+    """Let the next tick change these `torques` (nv−6,) of the last one no more than it may."""
+    copy_into(torques, contacts.applied)
+    copy_into(torques, contacts.memory.torques)
+    contacts.follows[0] = 1
+
+
+@compiled
 def start_walking(t: WalkTick) -> None:
     """Begin to shift the weight to the foot that is not to swing first."""
-    c, g, m = t.capture, t.gait, t.capture.memory
-    if m.steps[0] == 0:
-        before = c.standing.problem.workspace
-        copy_into(before.tau, c.on_both.applied)
-        copy_into(before.tau, c.on_both.memory.torques)
-        c.on_both.follows[0] = 1
+    c, g, m = t.walk, t.gait, t.walk.memory
+    before = c.standing.problem.workspace.tau if m.steps[0] == 0 else t.capture.on_both.applied
+    go_on_from(c.on_both, before)
     if m.recovering[0] == 0:
         g.yaw[0] = np.arctan2(c.state.heading[1], c.state.heading[0])
     else:
         g.yaw[0] = np.arctan2(m.level_frame[1, 0], m.level_frame[0, 0])
     stop_recentring(c.recentring)
-    first = 0 if g.command[1] * t.search.foot_sign[0] > 0.0 else 1
+    first = 0 if g.command[1] * t.walk.search.foot_sign[0] > 0.0 else 1
     m.foot[0], m.recovering[0], m.corners[0] = 1 - first, 1, 0
     g.walking[0], g.starting[0], g.clock[0], g.step_clock[0] = 1, 1, 0.0, -1.0
     for a in range(3):
@@ -90,17 +95,17 @@ def start_walking(t: WalkTick) -> None:
 @compiled
 def follow_command(t: WalkTick) -> None:
     """Let velocity and heading follow the command."""
-    g, dt = t.gait, t.capture.gains.period
+    g, dt = t.gait, t.walk.gains.period
     for a in range(3):
         most = dt * (g.turn_acceleration if a == 2 else g.acceleration)
         g.velocity[a] += min(max(g.command[a] - g.velocity[a], -most), most)
     for a in range(2):
         g.planned[a] = g.velocity[a] + g.error[a]
     g.yaw[0] += dt * g.velocity[2]
-    cos, sin, level = np.cos(g.yaw[0]), np.sin(g.yaw[0]), t.capture.memory.level_frame
+    cos, sin, level = np.cos(g.yaw[0]), np.sin(g.yaw[0]), t.walk.memory.level_frame
     set_level_frame(level, cos, sin)
-    for q in (t.search, t.capture.search):
-        q.heading[0], q.heading[1] = level[0, 0], level[1, 0]
+    q = t.walk.search
+    q.heading[0], q.heading[1] = level[0, 0], level[1, 0]
     if g.step_clock[0] >= 0.0:
         g.step_clock[0] += dt
 
@@ -110,14 +115,14 @@ def step_width(t: WalkTick) -> float:
     """W [m]: wider where steps to the side need it, so that the feet do not meet."""
     g = t.gait
     way = abs(g.velocity[1]) * (g.step_time + g.transfer_time)
-    return max(g.width, t.search.width_min + way + ROOM)
+    return max(g.width, t.walk.search.width_min + way + ROOM)
 
 
 @compiled
 def offset_from(t: WalkTick, swinging: int) -> tuple[float, float]:
     """b [m], in the world, where `swinging` is the next foot to swing; a policy moves it."""
-    c, g, level = t.capture, t.gait, t.capture.memory.level_frame
-    outward = t.search.foot_sign[swinging] * step_width(t)
+    c, g, level = t.walk, t.gait, t.walk.memory.level_frame
+    outward = t.walk.search.foot_sign[swinging] * step_width(t)
     x, y = gait_offset(
         c.state.omega[0], g.step_time, g.transfer_time, g.planned[0], g.planned[1], outward
     )
@@ -127,20 +132,23 @@ def offset_from(t: WalkTick, swinging: int) -> tuple[float, float]:
 @compiled
 def put_middle(t: WalkTick, foot: int, out: np.ndarray) -> None:
     """The middle of what a sole reaches, in the world, into `out` (2,) [m]."""
-    level, middle = t.capture.memory.level_frame, t.search.region.middle[foot]
+    level, middle = t.walk.memory.level_frame, t.walk.search.region.middle[foot]
     x, y = turned(level[0, 0], level[1, 0], middle[0], middle[1])
-    point = t.capture.state.sole_point[foot]
+    point = t.walk.state.sole_point[foot]
     out[0], out[1] = point[0] + x, point[1] + y
 
 
 @compiled
-def ask_for(c: CaptureTick, height: float, ground: float, x: float, y: float) -> None:
-    """The targets of a tick with the CoP at (x, y): c̈ = ω² (c − p), the CoM's height held."""
-    s, own, offsets = c.state, c.reference_out, c.offsets
+def ask_for(t: WalkTick, ground: float, stride_x: float, stride_y: float, p: np.ndarray) -> None:
+    """The targets of a tick with the CoP at `p` (≥ 2,): c̈ = ω² (c − p), and the height that the
+    legs reach over the `ground` with the feet a stride (x, y) apart [m]."""
+    c, s, own, offsets = t.walk, t.walk.state, t.walk.reference_out, t.walk.offsets
+    half, length = 0.25 * (stride_x * stride_x + stride_y * stride_y), c.gains.leg_length
+    height = min(t.gait.height, np.sqrt(max(length * length - half, 0.0)))
     cos, sin = c.memory.level_frame[0, 0], c.memory.level_frame[1, 0]
     dx, dy = turned(cos, sin, offsets[COP_X], offsets[COP_Y])
     rate = s.omega[0] * s.omega[0]
-    own.cop[0], own.cop[1] = x + dx, y + dy
+    own.cop[0], own.cop[1] = p[0] + dx, p[1] + dy
     for a in range(2):
         own.com[a], own.com_vel[a] = s.com[a], s.com_vel[a]
         own.com_acc[a] = rate * (s.com[a] - own.cop[a])
@@ -152,11 +160,11 @@ def ask_for(c: CaptureTick, height: float, ground: float, x: float, y: float) ->
 @compiled
 def shift_cop(t: WalkTick, p: np.ndarray) -> bool:
     """The CoP that brings ξ to where the first swing can begin, into `p`; whether it is there."""
-    c, g, xi = t.capture, t.gait, t.capture.state.capture_point
+    c, g, xi = t.walk, t.gait, t.walk.state.capture_point
     new = c.memory.foot[0]
     put_middle(t, new, t.stance)
     level = c.memory.level_frame
-    outward = t.search.foot_sign[1 - new] * step_width(t)
+    outward = t.walk.search.foot_sign[1 - new] * step_width(t)
     x, y = gait_offset(c.state.omega[0], g.step_time, g.transfer_time, 0.0, 0.0, outward)
     x, y = turned(level[0, 0], level[1, 0], x, y)
     x, y = xi[0] - t.stance[0] - x, xi[1] - t.stance[1] - y
@@ -167,7 +175,7 @@ def shift_cop(t: WalkTick, p: np.ndarray) -> bool:
 @compiled
 def transfer_cop(t: WalkTick, p: np.ndarray) -> bool:
     """The CoP on its way to the sole that has landed, into `p`; whether it has arrived."""
-    c, g, omega = t.capture, t.gait, t.capture.state.omega[0]
+    c, g, omega = t.walk, t.gait, t.walk.state.omega[0]
     new, xi = c.memory.foot[0], c.state.capture_point
     put_middle(t, new, t.stance)
     offset = offset_from(t, 1 - new)
@@ -186,7 +194,7 @@ def transfer_cop(t: WalkTick, p: np.ndarray) -> bool:
 @compiled
 def limit_loads(t: WalkTick, fraction: float) -> None:
     """Let the load go to the foot that has landed, and leave the other one."""
-    c = t.capture
+    c = t.walk
     weight, new = c.robot.mass * c.robot.gravity, c.memory.foot[0]
     c.on_both.load_limits[new] = weight * (FIRST_LOAD + LOADED * fraction)
     c.on_both.load_limits[1 - new] = weight * max(UNLOADED * (1.0 - fraction), LEAST_LOAD)
@@ -196,10 +204,10 @@ def limit_loads(t: WalkTick, fraction: float) -> None:
 @compiled
 def transfer_tick(t: WalkTick) -> bool:
     """A tick on both feet; True instead of torques where the next foot lifts off now."""
-    c, g, m = t.capture, t.gait, t.capture.memory
+    c, g, m = t.walk, t.gait, t.walk.memory
     feet, level, p = c.state.sole_point, m.level_frame, c.pair
     m.corners[0] = double_support_region(
-        t.search.region, feet, level[0, 0], level[1, 0], c.cloud, m.region
+        t.walk.search.region, feet, level[0, 0], level[1, 0], c.cloud, m.region
     )
     c.on_both.limited[0] = 0
     ready = shift_cop(t, c.vector) if g.starting[0] else transfer_cop(t, c.vector)
@@ -207,7 +215,8 @@ def transfer_tick(t: WalkTick) -> bool:
     if ready:
         return True
     find_nearest(m.region[: m.corners[0]], c.vector, p)
-    ask_for(c, g.height, 0.5 * (feet[0, 2] + feet[1, 2]), p[0], p[1])
+    ground = 0.5 * (feet[0, 2] + feet[1, 2])
+    ask_for(t, ground, feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1], p)
     solve_contacts(c, c.on_both)
     return False
 
@@ -215,7 +224,7 @@ def transfer_tick(t: WalkTick) -> bool:
 @compiled
 def lift_off(t: WalkTick) -> None:
     """Begin the swing of the foot that did not step last."""
-    c, m = t.capture, t.capture.memory
+    c, m = t.walk, t.walk.memory
     foot = 1 - m.foot[0]
     m.steps[0] += 1
     m.foot[0], m.swinging[0], m.load_fraction[0], m.corners[0] = foot, 1, 0.0, 0
@@ -227,7 +236,7 @@ def lift_off(t: WalkTick) -> None:
 @compiled
 def touch_down(t: WalkTick) -> None:
     """End a swing, and sum up how far the velocity of the last step was off."""
-    g, m, feet = t.gait, t.capture.memory, t.capture.state.sole_point
+    g, m, feet = t.gait, t.walk.memory, t.walk.state.sole_point
     m.swinging[0], m.clock[0], g.clock[0] = 0, 0.0, 0.0
     x, y = 0.5 * (feet[0, 0] + feet[1, 0]), 0.5 * (feet[0, 1] + feet[1, 1])
     if g.step_clock[0] > 0.0:
@@ -243,12 +252,12 @@ def touch_down(t: WalkTick) -> None:
 @compiled
 def plan_cop(t: WalkTick) -> None:
     """The CoP of the stance sole that brings ξ to the end of a regular step, into `gait.cop`."""
-    c, g, omega = t.capture, t.gait, t.capture.state.omega[0]
+    c, g, omega = t.walk, t.gait, t.walk.state.omega[0]
     foot, level, xi = c.memory.foot[0], c.memory.level_frame, c.state.capture_point
     stance = c.state.sole_point[1 - foot]
-    n = single_support_region(t.search.region, 1 - foot, stance, level[0, 0], level[1, 0], c.corners)
+    n = single_support_region(t.walk.search.region, 1 - foot, stance, level[0, 0], level[1, 0], c.corners)
     put_middle(t, 1 - foot, t.stance)
-    period, outward = g.step_time + g.transfer_time, t.search.foot_sign[foot] * step_width(t)
+    period, outward = g.step_time + g.transfer_time, t.walk.search.foot_sign[foot] * step_width(t)
     step = turned(
         level[0, 0], level[1, 0], period * g.planned[0], outward + period * g.planned[1]
     )
@@ -265,7 +274,7 @@ def plan_cop(t: WalkTick) -> None:
 def foothold_after(t: WalkTick, time: float) -> float:
     """The foothold for a touchdown after `time` [s], into `search.foothold`; how far limits keep it
     from the one desired [m]."""
-    c, g, q, omega = t.capture, t.gait, t.search, t.capture.state.omega[0]
+    c, g, q, omega = t.walk, t.gait, t.walk.search, t.walk.state.omega[0]
     foot, xi = c.memory.foot[0], c.state.capture_point
     factor, growth = transfer_factor(omega, g.transfer_time), np.exp(omega * time)
     offset = offset_from(t, 1 - foot)
@@ -284,7 +293,7 @@ def foothold_after(t: WalkTick, time: float) -> float:
 @compiled
 def plan_foothold(t: WalkTick) -> None:
     """Lead the swing to the foothold and the time that cost least."""
-    c, g, q, w = t.capture, t.gait, t.search, t.capture.swing
+    c, g, q, w = t.walk, t.gait, t.walk.search, t.walk.swing
     foot, planned = c.memory.foot[0], time_left(c.swing)
     q.foot[0] = foot
     put_middle(t, foot, t.swinging)
@@ -312,12 +321,13 @@ def plan_foothold(t: WalkTick) -> None:
 @compiled
 def swing_tick(t: WalkTick) -> None:
     """A tick on one foot."""
-    c, g, w = t.capture, t.gait, t.capture.swing
+    c, g, w = t.walk, t.gait, t.walk.swing
     foot = c.memory.foot[0]
     plan_cop(t)
     if time_left(w) > FROZEN:
         plan_foothold(t)
-    ask_for(c, g.height, c.state.sole_point[1 - foot, 2], g.cop[0], g.cop[1])
+    stance = c.state.sole_point[1 - foot]
+    ask_for(t, stance[2], w.foothold[0] - stance[0], w.foothold[1] - stance[1], g.cop)
     advance_swing(w, c.gains.period)
     contacts = c.on_second if foot == 0 else c.on_first
     contacts.limited[0] = 0
@@ -327,7 +337,7 @@ def swing_tick(t: WalkTick) -> None:
 @compiled
 def has_stopped(t: WalkTick) -> bool:
     """Return whether the walk is over: nothing is asked for, and ξ is held by both soles."""
-    c, g, v = t.capture, t.gait, t.gait.velocity
+    c, g, v = t.walk, t.gait, t.gait.velocity
     if is_commanded(g) or np.sqrt(v[0] * v[0] + v[1] * v[1]) > g.speed_margin:
         return False
     if g.starting[0]:
@@ -336,7 +346,7 @@ def has_stopped(t: WalkTick) -> bool:
         return False
     feet, level, xi = c.state.sole_point, c.memory.level_frame, c.state.capture_point
     outside = distance_beyond(
-        t.search.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1],
+        t.walk.search.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1],
         level[0, 0], level[1, 0], xi[0], xi[1],
     )  # fmt: skip
     return outside < 0.0
@@ -346,30 +356,44 @@ def has_stopped(t: WalkTick) -> bool:
 def stop_walking(t: WalkTick) -> None:
     """Hand over to the steps that catch a fall and lead back to the nominal stance."""
     t.gait.walking[0] = 0
-    t.capture.memory.clock[0], t.capture.memory.corners[0] = 0.0, 0
+    t.walk.memory.clock[0], t.walk.memory.corners[0] = 0.0, 0
+    go_on_from(t.capture.on_both, t.walk.on_both.applied)
+
+
+@compiled
+def count_failures(t: WalkTick) -> None:
+    """Count the ticks that no QP could solve."""
+    c = t.capture
+    failures = c.standing.memory.failures[0] + c.on_both.memory.failures[0]
+    c.failures[0] = failures + t.walk.on_both.memory.failures[0]
+
+
+@compiled
+def gait_tick(t: WalkTick) -> bool:
+    """A tick of the walk; False instead of torques where it is over."""
+    m = t.walk.memory
+    follow_command(t)
+    copy_reference(t.walk)
+    if m.swinging[0] and has_landed(t.walk):
+        touch_down(t)
+    if not m.swinging[0]:
+        if has_stopped(t):
+            stop_walking(t)
+            return False
+        if transfer_tick(t):
+            lift_off(t)
+    if m.swinging[0]:
+        swing_tick(t)
+    return True
 
 
 @compiled
 def walk_tick(t: WalkTick) -> None:
     """One tick of `Walk`: `tau` holds torques, unless `to_python` says that Python must."""
-    c, g, m = t.capture, t.gait, t.capture.memory
-    if not g.walking[0]:
-        if m.swinging[0] or not is_commanded(g):
-            capture_tick(c)
-            return
+    g = t.gait
+    t.capture.to_python[0] = 0
+    if not g.walking[0] and is_commanded(g) and not t.capture.memory.swinging[0]:
         start_walking(t)
-    c.to_python[0] = 0
-    follow_command(t)
-    copy_reference(c)
-    if m.swinging[0] and has_landed(c):
-        touch_down(t)
-    if not m.swinging[0]:
-        if has_stopped(t):
-            stop_walking(t)
-            capture_tick(c)
-            return
-        if transfer_tick(t):
-            lift_off(t)
-    if m.swinging[0]:
-        swing_tick(t)
-    c.failures[0] = c.standing.memory.failures[0] + c.on_both.memory.failures[0]
+    if not g.walking[0] or not gait_tick(t):
+        capture_tick(t.capture)
+    count_failures(t)

@@ -6,8 +6,11 @@ import numpy as np
 
 from poise.baselines.controller import Targets
 from poise.baselines.stepping.blocks import CaptureTick, Search
-from poise.baselines.stepping.capture_step import CaptureStep
+from poise.baselines.stepping.capture_step import CaptureStep, check_qps
+from poise.baselines.stepping.config import StepLimits
+from poise.baselines.stepping.swing import swing_gains, swing_task
 from poise.baselines.warmup import prepare
+from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.pendulum import Units
@@ -52,6 +55,22 @@ def allocate_gait(config: GaitConfig, units: Units) -> Gait:
     )
 
 
+def limited(search: Search, limits: StepLimits, units: Units) -> Search:
+    """The same search within other limits."""
+    h, omega = units.height, units.omega
+    return replace(
+        search,
+        ahead=limits.ahead * h,
+        behind=limits.behind * h,
+        width_min=limits.width_min * h,
+        width_max=limits.width_max * h,
+        speed=limits.speed * h * omega,
+        side_speed=limits.side_speed * h * omega,
+        time_min=limits.time_min / omega,
+        time_max=limits.time_max / omega,
+    )
+
+
 class Walk(CaptureStep):
     """Walks at a commanded velocity by footholds that lead the capture point [Englsberger11].
 
@@ -65,7 +84,10 @@ class Walk(CaptureStep):
     def __init__(self, robot: Robot, config: WalkConfig | None = None):
         config = config or WalkConfig()
         prepare("contacts", "planner", "walking")
-        self.gait = allocate_gait(config.gait, robot.units)
+        gait = self._gait_config = config.gait
+        check_qps(config, gait__qp=gait.qp)
+        self.gait = allocate_gait(gait, robot.units)
+        self.gait_sets = ContactSets(robot, gait.qp, gait.torque_rate_limit)
         self._walk_tick: WalkTick | None = None
         super().__init__(robot, config)
 
@@ -83,9 +105,15 @@ class Walk(CaptureStep):
     def command(self, command: GaitCommand) -> None:
         self.gait.command[:] = command.array()
 
+    @property
+    def failures(self) -> int:
+        """See `CaptureStep`; those of the gait count, too."""
+        return super().failures + self.gait_sets.failures
+
     def reset(self, state: RobotState | None = None) -> None:
         """Forget the last trial, its command too."""
         super().reset(state)
+        self.gait_sets.reset()
         for member in self.gait.members():
             if isinstance(member, np.ndarray):
                 member[...] = 0
@@ -98,27 +126,40 @@ class Walk(CaptureStep):
         """The same around the block of `capture_tick`."""
         known = self._walk_tick
         if known is None or known.capture is not capture:
-            search = self._limited(capture.search)
-            pair = guarded_zeros(2)
-            known = WalkTick(capture, self.gait, search, pair, guarded_zeros(2))
+            walk, pair = self._of_gait(capture), guarded_zeros(2)
+            known = WalkTick(capture, walk, self.gait, pair, guarded_zeros(2))
             self._walk_tick = known
         return known
 
-    def _limited(self, search: Search) -> Search:
-        """The search with the limits of the gait."""
-        assert isinstance(self.config, WalkConfig)
-        limits, h, omega = self.config.gait.limits, self.robot.height_com, self.robot.omega
-        return replace(
-            search,
-            ahead=limits.ahead * h,
-            behind=limits.behind * h,
-            width_min=limits.width_min * h,
-            width_max=limits.width_max * h,
-            speed=limits.speed * h * omega,
-            side_speed=limits.side_speed * h * omega,
-            time_min=limits.time_min / omega,
-            time_max=limits.time_max / omega,
+    def _of_gait(self, capture: CaptureTick) -> CaptureTick:
+        """A block with the same memory, and the QPs, the swing and the limits of the gait."""
+        gait, units = self._gait_config, self.robot.units
+        h, omega, task = units.height, units.omega, swing_gains(self.qp.arrays, gait.swing)
+        asked, way, axes = capture.reference_out, self._swing.reference, self.memory.level_frame
+        on_first, on_second, on_both = (
+            self.gait_sets.sets[soles].bind(
+                capture.state, asked, self.gait_sets,
+                [swing_task(foot, way, axes, task) for foot in swinging],
+            )
+            for soles, swinging in (((0,), (1,)), ((1,), (0,)), ((0, 1), ()))
+        )  # fmt: skip
+        gains = replace(
+            capture.gains,
+            leg_length=gait.leg_length * h,
+            root_accel=gait.root_accel * omega**2,
+            swing_accel=gait.swing_accel * omega**2,
+            joint_accel=gait.joint_accel * omega**2,
         )
+        swing = replace(
+            capture.swing,
+            apex=gait.swing.clearance * h,
+            lift=gait.swing.lift,
+            landing_speed=gait.swing.landing_speed * h * omega,
+        )
+        return replace(
+            capture, gains=gains, swing=swing, search=limited(capture.search, gait.limits, units),
+            on_first=on_first, on_second=on_second, on_both=on_both,
+        )  # fmt: skip
 
     def compiled_tick(
         self, state: RobotState, targets: Targets
