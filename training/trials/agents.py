@@ -11,6 +11,7 @@ import numpy as np
 from poise.baselines.allowance import is_plugin
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.plugins import find_plugin, make_plugin, plugin_config
 from poise.baselines.policy_files.config import PolicyFileConfig
@@ -134,6 +135,7 @@ TRAINING = (
 ENVIRONMENTS = {
     "residual": ResidualBalanceEnv,
     "step": ResidualStepEnv,
+    "walk": ResidualWalkEnv,
     "whole": ResidualWholeEnv,
     "torque": TorqueBalanceEnv,
     "position": PositionBalanceEnv,
