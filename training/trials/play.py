@@ -12,14 +12,13 @@ from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
 
 from .agents import Agent
-from .gait_figures import Walk
+from .gait_figures import AIR_TIME, Walk
 from .gait_record import WalkRecord
 from .signals import Sway
 from .trial import Outcome, Trial
 
 FOOT_DISPLACED = 0.05  # [m]
 SETTLED = 1.0  # [s] after which actions and drift count
-AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
 
 
