@@ -15,8 +15,9 @@ from .gait_record import WalkArrays
 AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 SETTLING = 4.0  # [s] after a change of the command, from which strides are compared with it
 SPEED_TOLERANCE, YAW_TOLERANCE = 0.05, np.radians(5.0)  # [m/s], [rad] of a walk that has recovered
+FALLING = 1.0  # [s] before a fall, in which strides tell of the fall
 STOPPED = 1.0  # [s] without a touchdown, after which a robot does not walk any more
-WAY = 0.5  # [m] below which a cost of transport says nothing
+SLOW = 0.1  # [m/s] below which a cost of transport says nothing
 WINDOW = 4  # steps, two strides, by which the end of a walk is judged
 
 
@@ -59,11 +60,15 @@ class Walk:
         velocity: (k − 2, 3) of the stride that ends with touchdown 2, 3, …: ahead, left [m/s], turn
             [rad/s].
         wanted: (k − 2, 3) the command at its end.
-        settled: (k − 2,) whether the command was the same all the time, and for 4 s before.
+        settled: (k − 2,) whether the command was the same all the time, and for 4 s before, and it
+            ends a second or more before a fall.
     """
 
-    def __init__(self, record: WalkArrays, commands: Sequence[TimedCommand]):
+    def __init__(
+        self, record: WalkArrays, commands: Sequence[TimedCommand], fall_time: float | None = None
+    ):
         self.record, self.commands = record, commands
+        until = np.inf if fall_time is None else fall_time - FALLING
         self.landed = touchdowns(record)
         rows = self.landed.row
         spans = list(zip(rows[:-2], rows[2:], strict=True))
@@ -72,6 +77,7 @@ class Walk:
         self.wanted = np.array(wanted).reshape(-1, 3)
         begun = [self._changed(record.time[row]) for row in rows[2:]]
         self.settled = record.time[rows[:-2]] >= np.array(begun) + SETTLING
+        self.settled &= record.time[rows[2:]] <= until
 
     def mean_velocity(self, first: int, last: int) -> np.ndarray:
         """(3,) ahead, left [m/s] and turn [rad/s] from row to row."""
@@ -156,8 +162,8 @@ class Walk:
         return {"step_length": _mean(length), "step_width": _mean(width), "step_time": _mean(time)}
 
     def _costs(self) -> dict[str, float | None]:
-        """∫ Σ |τ q̇| dt over distance [J/m] from the first settled stride to the last, and of the
-        positive work alone."""
+        """∫ Σ |τ q̇| dt over the way [J/m] from the first settled stride to the last, and of the
+        positive work alone; None below 0.1 m/s."""
         r, rows = self.record, self.landed.row
         ends = np.flatnonzero(self.settled) + 2
         names = ("energy_per_metre", "work_per_metre")
@@ -168,7 +174,9 @@ class Walk:
         way = float(np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
         last = first + 2 * (len(points) - 1)
         spent = [each[rows[last]] - each[rows[first]] for each in (r.energy, r.work)]
-        return {n: float(e) / way if way > WAY else None for n, e in zip(names, spent, strict=True)}
+        if way < SLOW * (r.time[rows[last]] - r.time[rows[first]]):
+            return dict.fromkeys(names)
+        return {name: float(each) / way for name, each in zip(names, spent, strict=True)}
 
     def _knees(self) -> dict[str, float | None]:
         """Mean and largest |τ|/m [N·m/kg] of the stance leg's knee on one foot."""

@@ -75,7 +75,7 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
     (`Walk.as_commanded`); there is no time of recovery then, and no drift.
     """
-    walk = Walk(record.arrays(), trial.commands)
+    walk = Walk(record.arrays(), trial.commands, outcome.fall_time)
     figures = {name: _finite_or_none(value) for name, value in walk.figures().items()}
     weight = env.robot.mass * float(np.linalg.norm(env.model.opt.gravity))
     for name, per_metre in (

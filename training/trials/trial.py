@@ -103,7 +103,7 @@ class Outcome:
             push, see `training/statistics/eurobench.py`.
         speed_ahead, speed_left, turn_rate: means over the strides of a walk [m/s, rad/s]. A stride
             is two steps; those count, for this and what follows, that begin 4 s or more after the
-            last change of the command.
+            last change of the command and end a second or more before a fall.
         speed_error, speed_error_rms: mean and root mean square over the strides of the distance
             of their velocity from the command [m/s].
         turn_error_rms: root mean square over the strides of the turn's error [rad/s].
