@@ -87,6 +87,12 @@ def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
     return config
 
 
+def walking_controllers() -> list[str]:
+    """The packaged controllers that walk."""
+    found = {name: controller_config(name) for name in packaged("controllers")}
+    return [name for name, config in found.items() if isinstance(config, WalkConfig)]
+
+
 def load_controller(
     controller: str | Path | Mapping[str, object] | ControllerConfig | Controller, robot: Robot
 ) -> Controller:

@@ -30,6 +30,7 @@ from .hand_over import whole_tick
 from .policy_step import policy_tick
 from .residual import ResidualBalanceEnv
 from .stepping import ResidualStepEnv
+from .walking import ResidualWalkEnv
 from .whole import ResidualWholeEnv
 
 
@@ -130,9 +131,10 @@ def planner() -> None:
 
 def walking() -> None:
     """The gait of a controller that walks."""
-    env = ResidualStepEnv(duration=0.1, controller="walk")
+    env = ResidualWalkEnv(duration=0.1)
     env.reset(seed=0)
     walk = env.controller
     assert isinstance(walk, Walk)
-    blocks = walk.blocks(env.simulation.state, env.targets)
-    address_of(walk_tick, walk.around(blocks))
+    tick = walk.around(walk.blocks(env.simulation.state, env.targets))
+    address_of(walk_tick, tick)
+    env.bind(tick, NO_KERNEL)
