@@ -11,18 +11,22 @@ __all__ = [
     "BaseController",
     "CaptureStep",
     "CaptureStepConfig",
+    "CommandSampler",
     "CompiledController",
     "Controller",
+    "GaitCommand",
     "MomentumQP",
     "MomentumQPConfig",
     "ReferenceMotion",
     "ResidualBalanceEnv",
     "ResidualScales",
     "ResidualStepEnv",
+    "ResidualWalkEnv",
     "ResidualWholeEnv",
     "StepScales",
     "SteppingController",
     "Targets",
+    "WalkingController",
     "WholeScales",
     "WrappedController",
     "load_controller",
@@ -40,12 +44,16 @@ if TYPE_CHECKING:
     from poise.baselines.environments.residual import ResidualBalanceEnv
     from poise.baselines.environments.scales import ResidualScales, StepScales, WholeScales
     from poise.baselines.environments.stepping import ResidualStepEnv
+    from poise.baselines.environments.walking import ResidualWalkEnv
     from poise.baselines.environments.whole import ResidualWholeEnv
     from poise.baselines.motions.motion import ReferenceMotion, load_motion
     from poise.baselines.registry import load_controller
     from poise.baselines.stepping.capture_step import CaptureStep
     from poise.baselines.stepping.config import CaptureStepConfig
     from poise.baselines.stepping.controller import SteppingController
+    from poise.baselines.walking.command import GaitCommand
+    from poise.baselines.walking.controller import WalkingController
+    from poise.baselines.walking.schedule import CommandSampler
     from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 else:
     __getattr__, __dir__ = lazy(
@@ -61,12 +69,16 @@ else:
             "environments.residual": ("ResidualBalanceEnv",),
             "environments.scales": ("ResidualScales", "StepScales", "WholeScales"),
             "environments.stepping": ("ResidualStepEnv",),
+            "environments.walking": ("ResidualWalkEnv",),
             "environments.whole": ("ResidualWholeEnv",),
             "motions.motion": ("ReferenceMotion", "load_motion"),
             "registry": ("load_controller",),
             "stepping.capture_step": ("CaptureStep",),
             "stepping.config": ("CaptureStepConfig",),
             "stepping.controller": ("SteppingController",),
+            "walking.command": ("GaitCommand",),
+            "walking.controller": ("WalkingController",),
+            "walking.schedule": ("CommandSampler",),
             "whole_body.momentum_qp": ("MomentumQP", "MomentumQPConfig"),
         },
     )

@@ -16,7 +16,9 @@ from poise.baselines.policy_files.reading import is_policy, policy_config, polic
 from poise.baselines.stepping.capture_step import CaptureStep
 from poise.baselines.stepping.config import CaptureStepConfig, IPMStepConfig
 from poise.baselines.stepping.ipm_step import IPMStep
+from poise.baselines.walking.config import WalkConfig
 from poise.baselines.walking.simbicon import Simbicon, SimbiconConfig
+from poise.baselines.walking.walk import Walk
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged, resolve
@@ -31,7 +33,7 @@ from .plugins import PluginConfig, PluginController, plugin_config
 ControllerConfig = (
     MomentumQPConfig | PDConfig | StablePDConfig | JacobianTransposeConfig | Kudoh02Config
     | Macchietto09Config | CapturePointConfig | LQRLIPConfig | LIPMPCConfig | PluginConfig
-    | CaptureStepConfig | IPMStepConfig | SimbiconConfig | PolicyFileConfig
+    | CaptureStepConfig | IPMStepConfig | WalkConfig | SimbiconConfig | PolicyFileConfig
 )  # fmt: skip
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration).
@@ -48,6 +50,7 @@ KINDS: dict[str, tuple[type, type]] = {
     "outside": (PluginConfig, PluginController),
     "capture-step": (CaptureStepConfig, CaptureStep),
     "ipm-step": (IPMStepConfig, IPMStep),
+    "walk": (WalkConfig, Walk),
     "simbicon": (SimbiconConfig, Simbicon),
     "policy-file": (PolicyFileConfig, PolicyFile),
 }
@@ -82,6 +85,12 @@ def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
             ],
         )
     return config
+
+
+def walking_controllers() -> list[str]:
+    """The packaged controllers that walk."""
+    found = {name: controller_config(name) for name in packaged("controllers")}
+    return [name for name, config in found.items() if isinstance(config, WalkConfig)]
 
 
 def load_controller(

@@ -7,6 +7,8 @@ from poise.baselines.stepping.blocks import CaptureTick
 from poise.baselines.stepping.ipm_step import energy_foothold
 from poise.baselines.stepping.swing import time_left
 from poise.baselines.stepping.tick import capture_tick
+from poise.baselines.walking.tick import walk_tick
+from poise.baselines.walking.walk import Walk
 from poise.baselines.whole_body.momentum_qp import (
     MomentumQP,
     MomentumQPConfig,
@@ -28,6 +30,7 @@ from .hand_over import whole_tick
 from .policy_step import policy_tick
 from .residual import ResidualBalanceEnv
 from .stepping import ResidualStepEnv
+from .walking import ResidualWalkEnv
 from .whole import ResidualWholeEnv
 
 
@@ -123,4 +126,15 @@ def planner() -> None:
     address_of(capture_tick, tick)
     address_of(energy_foothold, tick.search)
     time_left(tick.swing)
+    env.bind(tick, NO_KERNEL)
+
+
+def walking() -> None:
+    """The gait of a controller that walks."""
+    env = ResidualWalkEnv(duration=0.1)
+    env.reset(seed=0)
+    walk = env.controller
+    assert isinstance(walk, Walk)
+    tick = walk.around(walk.blocks(env.simulation.state, env.targets))
+    address_of(walk_tick, tick)
     env.bind(tick, NO_KERNEL)

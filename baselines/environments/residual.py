@@ -1,6 +1,7 @@
 """`poise/ResidualBalance-v0`: the action moves the targets of a momentum QP."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,16 @@ from poise.baselines.allowance import allowing, named
 from poise.baselines.controller import CompiledController, Controller, Targets, as_base_controller
 from poise.baselines.motions.motion import ReferenceMotion, load_motion
 from poise.baselines.motions.targets import motion_arrays
-from poise.baselines.registry import ControllerConfig, load_controller
+from poise.baselines.registry import ControllerConfig, load_controller, walking_controllers
+from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.controller import WalkingController
+from poise.baselines.walking.schedule import (
+    Follower,
+    TimedCommand,
+    empty_timetable,
+    follow_timetable,
+    parse_commands,
+)
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_steps
@@ -19,8 +29,9 @@ from poise.configs.schema import build, to_dict
 from poise.envs.balance.base import BalanceEnv, EnvConfig
 from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, StepEnd, judge_step
 from poise.envs.balance.observation import Term, mirror_terms
+from poise.envs.balance.start import RESET_OPTIONS
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import CompiledStep, Erased, Kernel, address_of
+from poise.envs.compiled.calls import CompiledStep, Erased, Kernel, Program, address_of
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
@@ -67,6 +78,10 @@ class ResidualBalanceEnv(BalanceEnv):
 
     It does not know the push. The reference is that of `motion`.
 
+    A controller that walks follows `command`, a `GaitCommand` that may be set at any time; the
+    option "command" of `reset` sets it from the start on: a mapping with `ahead`, `left` [m/s] and
+    `turn` [rad/s], or a list of them, each from its `start` [s] on.
+
     <rewards>
 
     <start>
@@ -82,6 +97,7 @@ class ResidualBalanceEnv(BalanceEnv):
 
     scales_class: type[ResidualScales] = ResidualScales  #: whose fields `residual` has
     only_targets = True  #: the action moves targets and nothing else
+    option_names = (*RESET_OPTIONS, "command")  #: of `reset`
 
     def __init__(
         self,
@@ -137,6 +153,9 @@ class ResidualBalanceEnv(BalanceEnv):
         self.control_substeps = whole_steps(period, step, "controller period", source)
         self.ticks = whole_steps(self.config.policy_period, period, "policy_period", source)
         self._controller, self._base = controller, base
+        decides = base.unwrapped
+        self._walker = decides if isinstance(decides, WalkingController) else None
+        self._timetable = empty_timetable()
         # all others are called from Python, tick by tick
         self._compiled = isinstance(controller, CompiledController) and controller.compiled
         self._com_offset = float(base.com_offset)
@@ -175,8 +194,52 @@ class ResidualBalanceEnv(BalanceEnv):
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref
 
-    def _begin(self) -> None:
+    @property
+    def command(self) -> GaitCommand | None:
+        """What a controller that walks is told to do now; None for one that does not walk.
+
+        Setting it ends the commands of the reset. Raises ConfigError for a controller that does not
+        walk.
+        """
+        return None if self._walker is None else self._walker.command
+
+    @command.setter
+    def command(self, command: GaitCommand | Mapping[str, float]) -> None:
+        if not isinstance(command, GaitCommand):
+            command = build(GaitCommand, to_dict(command), "command")
+        walker = self._expect_walker("environment")
+        self._timetable.clear()
+        walker.command = command
+
+    def _expect_walker(self, source: str) -> WalkingController:
+        """The controller; raises ConfigError for one that does not walk."""
+        if self._walker is None:
+            kind = type(self._base.unwrapped).__name__
+            raise ConfigError(f"the controller {kind} does not walk; give one that does",
+                              source=source, field="command",
+                              choices=walking_controllers())  # fmt: skip
+        return self._walker
+
+    def _commands(self, options: Mapping[str, Any]) -> Sequence[TimedCommand]:
+        """The commands of an episode that begins with these options."""
+        return parse_commands(options["command"]) if "command" in options else ()
+
+    def _begin_walk(self, options: Mapping[str, Any]) -> None:
+        commands = self._commands(options)
+        if "command" in options:
+            self._expect_walker("reset")
+        self._timetable.fill(commands)
+        if self._walker is not None:
+            follow_timetable(self._follower(self._walker))
+
+    def _follower(self, walker: WalkingController) -> Follower:
+        """The block by which the controller is told its commands."""
+        clock = self.simulation.clock
+        return Follower(self._timetable, clock, self.arrays.timestep, walker.gait.command)
+
+    def _begin(self, options: Mapping[str, Any]) -> None:
         self.controller.reset(self.state_source.state)
+        self._begin_walk(options)
         self._offsets[:] = 0.0
         self._residual.torques[:] = 0.0
         set_targets(self._target_inputs())
@@ -239,7 +302,13 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _end_of_tick(self, tick: Block) -> StepEnd:
         """The end of a policy step of the controller whose compiled tick works on `tick`."""
-        return self.step_end()
+        return replace(self.step_end(), report=Program.of(self._reports(tick)))
+
+    def _reports(self, tick: Any) -> list[tuple[Callable[..., None], Block]]:
+        """The kernels that follow a judged policy step, before it is observed."""
+        if self._walker is None:
+            return []
+        return [(follow_timetable, self._follower(self._walker))]
 
     def advance(self) -> None:
         step = self.compiled_step()
@@ -284,6 +353,8 @@ class ResidualBalanceEnv(BalanceEnv):
         self.episode.ticks[0] = 0
         self.episode.metrics[FAILURES] = self._base.failures
         judge_step(self.step_end().judge)
+        if self._walker is not None:
+            follow_timetable(self._follower(self._walker))
         self._observe()
 
     def _account(self) -> TickAccount:

@@ -1,6 +1,6 @@
 """`poise/ResidualStep-v0`: the action moves the targets and the steps of a stepping controller."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,10 +13,8 @@ from poise.baselines.registry import ControllerConfig
 from poise.baselines.stepping.controller import SteppingController
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
-from poise.envs.balance.episode import StepEnd
 from poise.envs.balance.observation import View
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import Program
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
@@ -96,9 +94,9 @@ class ResidualStepEnv(ResidualBalanceEnv):
         self._step_report[:] = self.stepper.stepping().entries()
         super()._observe()
 
-    def _end_of_tick(self, tick: Any) -> StepEnd:
+    def _reports(self, tick: Any) -> list[tuple[Callable[..., None], Block]]:
         reporter = StepReporter(tick.memory, tick.swing, self._step_report)
-        return replace(self.step_end(), report=Program.of([(report_steps, reporter)]))
+        return [*super()._reports(tick), (report_steps, reporter)]
 
     def info(self) -> dict[str, Any]:
         """The entries of `ResidualBalanceEnv`, and the number of steps."""

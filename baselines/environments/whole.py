@@ -116,8 +116,8 @@ class ResidualWholeEnv(ResidualBalanceEnv):
         motors = Term("motors", self.action_names[len(targets) : -1], "1", "", "motors")
         return mirror_terms([*targets, motors, action_term("authority")], parts)
 
-    def _begin(self) -> None:
-        super()._begin()
+    def _begin(self, options: Mapping[str, Any]) -> None:
+        super()._begin(options)
         self._memory[:] = 0.0
         self._callback.error = None
 

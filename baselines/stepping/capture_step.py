@@ -8,7 +8,12 @@ from poise.baselines.controller import CompiledController, Outputs, Targets
 from poise.baselines.solvers.problem import Solver
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
-from poise.baselines.whole_body.momentum_qp import COMPILED_SOLVER, AroundQP, momentum_tick
+from poise.baselines.whole_body.momentum_qp import (
+    COMPILED_SOLVER,
+    AroundQP,
+    MomentumQPConfig,
+    momentum_tick,
+)
 from poise.baselines.whole_body.parameters import QPParameters
 from poise.baselines.whole_body.tick import contact_tick
 from poise.configs.errors import ConfigError
@@ -28,20 +33,26 @@ from .swing_speed import possible_limits
 from .tick import capture_tick
 
 
-def check_qps(config: CaptureStepConfig) -> None:
-    """Raises ConfigError for what the QPs of a controller that steps cannot be."""
-    for name, qp in (("qp", config.qp), ("step_qp", config.step_qp)):
+def check_qps(config: CaptureStepConfig, **further: MomentumQPConfig) -> None:
+    """Raises ConfigError for what the QPs of a controller that steps cannot be.
+
+    `further` ones have the name of their field, with a double underscore for a point.
+    """
+    stepping = {"step_qp": config.step_qp, **further}
+    for name, qp in {"qp": config.qp, **stepping}.items():
+        name = name.replace("__", ".")
         if qp.root != "hard":
             raise ConfigError(f"must be 'hard', not {qp.root!r}", field=f"{name}.root")
-    if config.step_qp.solver != COMPILED_SOLVER:
-        raise ConfigError(
-            f"must be {COMPILED_SOLVER!r}, not {config.step_qp.solver!r}", field="step_qp.solver"
-        )
-    if config.step_qp.period != config.qp.period:
-        raise ConfigError(
-            f"must be that of qp, {config.qp.period}, not {config.step_qp.period}",
-            field="step_qp.period",
-        )
+    for name, qp in stepping.items():
+        name = name.replace("__", ".")
+        if qp.solver != COMPILED_SOLVER:
+            raise ConfigError(
+                f"must be {COMPILED_SOLVER!r}, not {qp.solver!r}", field=f"{name}.solver"
+            )
+        if qp.period != config.qp.period:
+            raise ConfigError(
+                f"must be that of qp, {config.qp.period}, not {qp.period}", field=f"{name}.period"
+            )
 
 
 def step_gains(

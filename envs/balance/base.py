@@ -11,6 +11,7 @@ from poise.configs.errors import PoiseError
 from poise.configs.numbers import real_array, seed_number, whole_steps
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Program, run
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.simulation import Simulation, World
 from poise.envs.pushes.push import PushInfo, push_info
@@ -37,7 +38,7 @@ from .episode import (
 from .info import step_info
 from .observation import Term, Terms, View, mirror_terms, observer, scales
 from .reward import REWARD_TERMS
-from .start import chosen_pushes, chosen_start, reset_options
+from .start import RESET_OPTIONS, chosen_pushes, chosen_start, reset_options
 from .termination import episode_limits
 from .terms import TERMS
 
@@ -48,6 +49,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     observation_space: spaces.Box
     action_space: spaces.Box
     known_terms: ClassVar[Terms] = TERMS  #: of which `observation` chooses
+    option_names: ClassVar[tuple[str, ...]] = RESET_OPTIONS  #: of `reset`
 
     def __init_subclass__(cls, **arguments: object) -> None:
         super().__init_subclass__(**arguments)
@@ -154,7 +156,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         """The block that judges the policy steps of this environment."""
         return make_judge(
             self.simulation.world(), self.episode, self.scales, self.limits,
-            self.config.reward, self._references()[0],
+            self.config.reward, self._references()[0], self._velocity_error(),
         )  # fmt: skip
 
     def step_end(self) -> StepEnd:
@@ -182,7 +184,11 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         """Joint positions and velocities (nj,) that the observation is relative to."""
         raise NotImplementedError
 
-    def _begin(self) -> None:
+    def _velocity_error(self) -> np.ndarray:
+        """(3,) how far a walk is from its command, see `RewardView`; here nothing walks."""
+        return guarded_zeros(3)
+
+    def _begin(self, options: Mapping[str, Any]) -> None:
         """Prepare the subclass for a new episode; the simulation has just been reset."""
 
     def advance(self) -> None:
@@ -219,7 +225,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         Raises ConfigError naming the option that is unknown or wrong, and what it may be.
         """
         self.episode.running[0] = 0  # until this one has succeeded
-        options = reset_options(options)
+        options = reset_options(options, self.option_names)
         super().reset(seed=seed_number(seed))
         rng = self.np_random
         qpos, qvel = chosen_start(self.simulation, self.config.noise, options, rng)
@@ -228,7 +234,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         self.simulation.set_pushes(pushes)
         begin_episode(self.simulation.state_arrays, self.episode)
         self.state_source.reset()
-        self._begin()
+        self._begin(options)
         self._observe()
         if self.render_mode == "human":
             self.render()

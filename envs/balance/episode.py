@@ -31,8 +31,9 @@ from .termination import Limits, has_diverged, has_fallen, uprightness
     ROOT_MOMENT,  # largest moment of a soft root [N·m]
     LAST_MOVING,  # time of the last policy step that was not quiet [s]
     FAILURES,  # control ticks at which the controller's solver failed
-) = range(14)
-METRICS = 14
+    POSITIVE_WORK,  # ∫ Σ max(τ q̇, 0) dt [J]
+) = range(15)
+METRICS = 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +94,16 @@ def record_tick(
 ):
     """Account for one control tick with motor torques `tau` (nu,) at speeds `qvel` (nv,)."""
     m = e.metrics
-    power, saturated = 0.0, 0.0
+    power, positive, saturated = 0.0, 0.0, 0.0
     for i in range(tau.shape[0]):
-        power += abs(tau[i] * qvel[robot.motor_dofs[i]])
+        work = tau[i] * qvel[robot.motor_dofs[i]]
+        power += abs(work)
+        positive += max(work, 0.0)
         load = abs(tau[i]) / robot.torque_limit[i]
         m[PEAK_TORQUE] = max(m[PEAK_TORQUE], load)
         saturated += 1.0 if load > 0.999 else 0.0
     m[ENERGY] += power * period
+    m[POSITIVE_WORK] += positive * period
     m[SATURATED] += saturated / tau.shape[0]
     m[TICKS] += 1.0
 
@@ -124,12 +128,14 @@ def make_judge(
     limits: Limits,
     weights: RewardWeights,
     q_ref: np.ndarray,
+    velocity_error: np.ndarray,
 ) -> Judge:
     """Return the block that judges the policy steps of an environment.
 
     Args:
         weights: of the reward's terms.
         q_ref: (nj,) joint positions of the reference [rad].
+        velocity_error: (3,) see `RewardView`.
     """
     view = RewardView(
         robot=world.robot,
@@ -140,6 +146,7 @@ def make_judge(
         views=world.views,
         action=episode.action,
         last_action=episode.last_action,
+        velocity_error=velocity_error,
     )
     return Judge(
         robot=world.robot,

@@ -33,6 +33,8 @@ class RewardView(Block):
     views: SimViews  # whose `ctrl` (nu,) are the torques of the last control tick [N·m]
     action: np.ndarray  # (na,)
     last_action: np.ndarray  # (na,) of the policy step before
+    # (3,) of a walk's last stride from its command: ahead, left [m/s], turn [rad/s]
+    velocity_error: np.ndarray
 
 
 @compiled
@@ -146,6 +148,13 @@ def slip_cost(v: RewardView) -> float:
 
 
 @compiled
+def command_followed(v: RewardView) -> float:
+    x, y, turn = v.velocity_error[0], v.velocity_error[1], v.velocity_error[2]
+    way, spin = 0.1 * v.scales.velocity, 0.05 * v.scales.omega
+    return np.exp(-(x * x + y * y) / way**2 - (turn / spin) ** 2)
+
+
+@compiled
 def fall_cost(v: RewardView) -> float:
     return -1.0
 
@@ -201,6 +210,11 @@ class RewardWeights:
     slip: float = _term(
         0.0, slip_cost,
         "−mean min((ṗ_xy / 0.2 ω h)², 1) of the soles, 0 of those in the air", "no divergence",
+    )  # fmt: skip
+    tracking: float = _term(
+        0.0, command_followed,
+        "exp(−(|Δv| / 0.02 ω h)² − (Δψ̇ / 0.05 ω)²), of a walk's last stride from its command",
+        "no fall",
     )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """The start of an episode: a disturbed standing posture, and the pushes that will come."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -52,17 +52,15 @@ def disturbed_start(
     return qpos, qvel
 
 
-def reset_options(options: object) -> dict[str, Any]:
-    """Return the options of a reset; {} for None.
+def reset_options(options: object, known: Sequence[str] = RESET_OPTIONS) -> dict[str, Any]:
+    """Return the options of a reset, all of which are among `known`; {} for None.
 
     Raises ConfigError naming the option that is unknown, and what there is.
     """
     chosen = option_mapping(options)
     for name in chosen:
-        if name not in RESET_OPTIONS:
-            raise ConfigError(
-                "unknown option", source="reset", field=str(name), choices=RESET_OPTIONS
-            )
+        if name not in known:
+            raise ConfigError("unknown option", source="reset", field=str(name), choices=known)
     return chosen
 
 

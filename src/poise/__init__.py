@@ -1,8 +1,8 @@
 """Poise keeps a simulated humanoid on its feet while it is pushed.
 
 Importing it registers the environments ``poise/TorqueBalance-v0``, ``poise/PositionBalance-v0``,
-``poise/ResidualBalance-v0``, ``poise/ResidualStep-v0`` and ``poise/ResidualWhole-v0`` with
-Gymnasium, and loads neither torch nor numba nor MuJoCo.
+``poise/ResidualBalance-v0``, ``poise/ResidualStep-v0``, ``poise/ResidualWalk-v0`` and
+``poise/ResidualWhole-v0`` with Gymnasium, and loads neither torch nor numba nor MuJoCo.
 """
 
 from __future__ import annotations
@@ -59,6 +59,11 @@ register(
     "poise/ResidualStep-v0",
     entry_point="poise.baselines.environments.stepping:ResidualStepEnv",
     vector_entry_point="poise.baselines.environments.stepping:vector_env",
+)
+register(
+    "poise/ResidualWalk-v0",
+    entry_point="poise.baselines.environments.walking:ResidualWalkEnv",
+    vector_entry_point="poise.baselines.environments.walking:vector_env",
 )
 register(
     "poise/ResidualWhole-v0",

@@ -15,6 +15,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 import poise  # noqa: F401  (registers the environments)
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
@@ -22,6 +23,7 @@ from poise.envs.balance.torque import TorqueBalanceEnv
 IDS = {
     "poise/ResidualBalance-v0": ResidualBalanceEnv,
     "poise/ResidualStep-v0": ResidualStepEnv,
+    "poise/ResidualWalk-v0": ResidualWalkEnv,
     "poise/ResidualWhole-v0": ResidualWholeEnv,
     "poise/TorqueBalance-v0": TorqueBalanceEnv,
     "poise/PositionBalance-v0": PositionBalanceEnv,

@@ -126,6 +126,7 @@ def test_import_poise_is_light() -> None:
         "poise/PositionBalance-v0",
         "poise/ResidualBalance-v0",
         "poise/ResidualStep-v0",
+        "poise/ResidualWalk-v0",
         "poise/ResidualWhole-v0",
     ],
 )

@@ -12,6 +12,7 @@ from .arguments import Allow, Names, RobotName, Switch
 from .export import export
 from .results import compare, leaderboard, replay, report
 from .view import view
+from .walk import walk
 
 if TYPE_CHECKING:
     from poise.training.running.summary import Summary
@@ -303,6 +304,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "benchmark": benchmark,
     "compare": compare,
     "leaderboard": leaderboard,
+    "walk": walk,
     "view": view,
     "replay": replay,
     "report": report,

@@ -37,6 +37,7 @@ from .played import (
     sectors,
     won,
 )
+from .walking import phase_figures, walk_levels
 
 
 def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None) -> Entry:
@@ -49,6 +50,10 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
     }
     if directional := part(played, *DIRECTIONAL):
         entry.update(envelope(directional, plan.limits, steps))
+    if pushed := part(played, "walk_push"):
+        entry["phases"] = phase_figures(pushed, entry)
+    if walks := walk_levels(played, plan.suite.duration):
+        entry["walks"] = walks
     if random := part(played, "random"):
         entry.update(_fractions(random, plan.limits))
     if factors := factor_figures(part(played, "factors"), plan.standard):

@@ -14,7 +14,7 @@ from poise.training.trials.trial import Outcome, Trial
 
 Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers
 RATED = "mix"  # the part that the counts are of, where a suite has it
-DIRECTIONAL = ("envelope", "grid")  # parts that J50 of each direction is fitted to
+DIRECTIONAL = ("envelope", "grid", "walk_push")  # parts that J50 of each direction is fitted to
 SECTOR = 45.0  # [deg] in which random directions are counted together
 
 

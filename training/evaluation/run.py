@@ -26,7 +26,7 @@ from poise.training.running.terminal import print_paths, progress_bar
 from poise.training.suites.draw import MOST_TRIALS
 from poise.training.suites.plan import Plan
 from poise.training.suites.suite import load_suite
-from poise.training.trials.agents import Agent
+from poise.training.trials.agents import Agent, check_walks
 from poise.training.trials.jobs import Job, Stage, play
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import NStepLimit, curves, stepping_limits
@@ -71,6 +71,9 @@ class Run:
         prepare()
         self.stage = Stage(robot, self.suite.duration, self.suite.noise)
         self.agents = {name: self.stage.load(name, self.robot) for name in names}
+        if self.suite.walks:
+            for name, agent in self.agents.items():
+                check_walks(name, agent, f"suite {suite}")
         self.settings = Settings(
             format=FORMAT,
             suite_name=str(suite),

@@ -11,6 +11,7 @@ from rich.table import Table
 from poise.training.running.summary import Entry, Interval, Summary
 
 from .seed_groups import seed_lines
+from .walk_tables import walk_tables
 
 NONE = "–"
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
@@ -76,6 +77,8 @@ def print_summary(summary: Summary, console: Console) -> None:
         place = str(rank[name] or NONE)
         table.add_row(place, escape(name), *(text(name) for _, text in columns))
     console.print(table)
+    for each in walk_tables(summary):
+        console.print(each)
     if summary["pairs"]:
         console.print(_pairs(summary))
     for line in seed_lines(summary["seeds"]):

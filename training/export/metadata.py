@@ -22,6 +22,7 @@ from poise.training.learning.policy import Policy
 IDS = {
     "residual": "poise/ResidualBalance-v0",
     "step": "poise/ResidualStep-v0",
+    "walk": "poise/ResidualWalk-v0",
     "whole": "poise/ResidualWhole-v0",
     "torque": "poise/TorqueBalance-v0",
     "position": "poise/PositionBalance-v0",

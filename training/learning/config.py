@@ -8,8 +8,10 @@ from poise.baselines.environments.hand_over import HandOverConfig
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales, StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import controller_config
+from poise.baselines.walking.schedule import CommandSampler
 from poise.configs.files import resolve
 from poise.configs.schema import build, on_base, read_yaml
 from poise.envs.balance.base import BalanceEnv, EnvConfig
@@ -88,14 +90,15 @@ class TrainConfig:
     """A policy that moves a controller's targets, its steps too, or gives the torques itself.
 
     With `action` "step" the environment is `poise/ResidualStep-v0`, and `step_residual` is what an
-    action adds instead of `residual`; with "whole" it is `poise/ResidualWhole-v0`, with these
+    action adds instead of `residual`; with "walk" `poise/ResidualWalk-v0`, with these too and
+    the `command` that it is given; with "whole" it is `poise/ResidualWhole-v0`, with these
     `servos` and `hand_over` and no `residual`. With "torque" it is `poise/TorqueBalance-v0`, with
     "position" `poise/PositionBalance-v0` with these `servos`; then controller, motion, both
     residuals, smoothing and gate are not used.
     """
 
     robot: str = "humanoid"
-    action: Literal["residual", "step", "whole", "torque", "position"] = "residual"
+    action: Literal["residual", "step", "walk", "whole", "torque", "position"] = "residual"
     controller: str = "momentum-qp"
     motion: str = "standing"
     seed: int = field(default=0, metadata={"min": 0, "max": MOST_SEED})
@@ -106,6 +109,7 @@ class TrainConfig:
     env: EnvConfig = field(default_factory=EnvConfig)
     residual: ResidualScales = field(default_factory=ResidualScales)
     step_residual: StepScales = field(default_factory=StepScales)
+    command: CommandSampler = field(default_factory=CommandSampler, metadata={"omit": "default"})
     servos: ServoConfig = field(default_factory=ServoConfig)
     hand_over: HandOverConfig = field(default_factory=HandOverConfig, metadata={"omit": "default"})
     # of the training episodes [s]; None: the robot's. What is trained plays in the robot's own
@@ -132,6 +136,9 @@ class TrainConfig:
         kinds: dict[str, tuple[type[ResidualBalanceEnv], dict[str, Any]]] = {
             "residual": (ResidualBalanceEnv, {"residual": self.residual}),
             "step": (ResidualStepEnv, {"residual": self.step_residual}),
+            "walk": (
+                ResidualWalkEnv, {"residual": self.step_residual, "command": self.command}
+            ),
             "whole": (ResidualWholeEnv, {"servos": self.servos, "hand_over": self.hand_over}),
         }
         kind, own = kinds[self.action]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from .holding import Holding
-from .legs import Leg
+from poise.training.trials.legs import Leg
 from .stability import DirectionFigures
 from .touching import SelfContact
 

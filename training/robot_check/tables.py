@@ -10,7 +10,7 @@ from rich.table import Table
 
 from .check import RobotCheck
 from .holding import Holding
-from .legs import Leg
+from poise.training.trials.legs import Leg
 from .posture import Difference
 
 EVERY = 2  # of the directions, in the table

@@ -8,7 +8,7 @@ import mujoco
 
 from poise.envs.robots.robot import Robot
 
-from .legs import standing_data
+from poise.training.trials.legs import standing_data
 
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 

@@ -162,6 +162,51 @@ class Eurobench(TypedDict):
     margins: list[MarginFigures]
 
 
+class WalkMeans(TypedDict, total=False):
+    """Means over the trials of a level, see `Outcome`."""
+
+    speed_ahead: Number
+    speed_left: Number
+    turn_rate: Number
+    speed_error: Number
+    speed_error_rms: Number
+    turn_error_rms: Number
+    step_length: Number
+    step_width: Number
+    step_time: Number
+    cost_of_transport: Number
+    positive_cost_of_transport: Number
+    knee_mean: Number
+    knee_peak: Number
+    circle_error: Number
+    foot_slide: Number
+
+
+class WalkLevel(Rate, WalkMeans, total=False):
+    """Trials that walk by one command, one course, or kicked alike."""
+
+    part: str
+    level: str
+    fallen: int
+    never_fell_rate: float
+    never_fell_ci95: Interval
+    minutes: float
+    falls_per_minute: float
+    falls_per_minute_ci95: Interval
+
+
+class PhaseJ50(TypedDict):
+    """Pushes that begin in an eighth of a stride; `phase` is its middle, 0 where the left foot
+    lands."""
+
+    phase: float
+    trials: int
+    recovered: int
+    j50: float
+    j50_ci95: Interval
+    j50_bound: Bound
+
+
 class Fractions(TypedDict, total=False):
     """The fraction of the limit at which half of the random pushes are recovered."""
 
@@ -185,6 +230,8 @@ class Entry(Played, Counts, EnvelopeFigures, Fractions, total=False):
     fingerprint: str
     factors: list[Factor]
     eurobench: Eurobench
+    walks: list[WalkLevel]
+    phases: list[PhaseJ50]
 
 
 class Paired(TypedDict, total=False):

@@ -41,6 +41,24 @@ class SeedAggregate:
     tasks: int
 
 
+def poisson_interval(count: int, confidence: float = 0.95) -> Interval:
+    """Garwood's exact interval of the mean of a Poisson distribution that gave `count`.
+
+        (χ²_{α/2}(2 count) / 2, χ²_{1−α/2}(2 count + 2) / 2),   α = 1 − confidence
+
+    Divided by the time in which so many were counted, it is that of their rate.
+
+    Raises:
+        ValueError: a negative count, or confidence outside (0, 1).
+    """
+    if count < 0:
+        raise ValueError(f"count must not be negative, got {count}")
+    check_confidence(confidence)
+    tail = 0.5 * (1.0 - confidence)
+    low = 0.0 if count == 0 else 0.5 * float(stats.chi2.ppf(tail, 2 * count))
+    return Interval(low, 0.5 * float(stats.chi2.ppf(1.0 - tail, 2 * count + 2)))
+
+
 def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> Interval:
     """Wilson score interval of a proportion.
 

@@ -10,9 +10,10 @@ from typing import ClassVar, Self, TypedDict, Unpack
 import mujoco
 import numpy as np
 
+from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.balance.config import StartNoise
 from poise.envs.pushes.options import check_body
-from poise.envs.pushes.push import Push
+from poise.envs.pushes.push import Kick, Push
 from poise.envs.pushes.sampler import Range, push_bodies
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.trial import Conditions, Trial
@@ -37,13 +38,15 @@ class Standard:
 
 
 class Marks(TypedDict, total=False):
-    """Fields that say which place a trial has in its suite, and its conditions."""
+    """Fields that say which place a trial has in its suite, its conditions, and how it walks."""
 
     part: str
     stage: int
     factor: str | None
     level: str | None
     conditions: Conditions
+    commands: tuple[TimedCommand, ...]
+    kicks: tuple[Kick, ...]
 
 
 class Draw:

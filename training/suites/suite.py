@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from .directions import Envelope, Grid, Margin
 from .draw import Part, Standard
 from .factors import Factors, Mix
 from .random import Quiet, Random, Sequence
+from .walking import WALKING, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
 
 
 @dataclass(frozen=True)
@@ -30,10 +31,17 @@ class Suite(Standard):
     random: Random | None = None
     sequence: Sequence | None = None
     quiet: Quiet | None = None
+    walk: Walk | None = field(default=None, metadata={"omit": "default"})
+    velocity: Velocity | None = field(default=None, metadata={"omit": "default"})
+    walk_push: WalkPush | None = field(default=None, metadata={"omit": "default"})
+    walk_kick: WalkKick | None = field(default=None, metadata={"omit": "default"})
+    walk_repeated: WalkRepeated | None = field(default=None, metadata={"omit": "default"})
 
     def __post_init__(self) -> None:
         if not self.parts:
             raise ValueError(f"needs one part or more: {', '.join(PARTS)}")
+        if self.walk_push is not None and (self.envelope or self.grid):
+            raise ValueError("walk_push: J50 is that of a walk or of standing, not of both")
 
     @property
     def parts(self) -> dict[str, Part]:
@@ -44,7 +52,12 @@ class Suite(Standard):
     @property
     def paired(self) -> bool:
         """True if trials depend on who takes part."""
-        return self.envelope is not None and self.envelope.paired
+        return any(part is not None and part.paired for part in (self.envelope, self.walk_push))
+
+    @property
+    def walks(self) -> bool:
+        """True if it is for controllers that walk alone."""
+        return any(name in WALKING for name in self.parts)
 
     def resized(self, trials: int) -> Suite:
         """The suite with another number of trials in its only part; of several parts, with at most

@@ -11,11 +11,12 @@ import numpy as np
 from poise.baselines.allowance import is_plugin
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.plugins import find_plugin, make_plugin, plugin_config
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.reading import RIVALS, is_policy
-from poise.baselines.registry import ControllerConfig, controller_config
+from poise.baselines.registry import ControllerConfig, controller_config, walking_controllers
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged
 from poise.configs.reading import is_file, is_folder
@@ -91,6 +92,14 @@ def check_name(name: str) -> None:
         )
 
 
+def check_walks(name: str, agent: Agent, source: str) -> None:
+    """Raise ConfigError unless the controller of an agent walks; `source` is what asks for it."""
+    env = agent.env
+    if not isinstance(env, ResidualBalanceEnv) or env.command is None:
+        raise ConfigError(f"the controller {shown(name)} does not walk", source=source,
+                          field="controller", choices=walking_controllers())  # fmt: skip
+
+
 def _wherever(config: ControllerConfig) -> ControllerConfig:
     """The same for a policy's files in any folder: their digest tells them apart."""
     if isinstance(config, PolicyFileConfig):
@@ -134,6 +143,7 @@ TRAINING = (
 ENVIRONMENTS = {
     "residual": ResidualBalanceEnv,
     "step": ResidualStepEnv,
+    "walk": ResidualWalkEnv,
     "whole": ResidualWholeEnv,
     "torque": TorqueBalanceEnv,
     "position": PositionBalanceEnv,

@@ -7,16 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from poise.baselines.stepping.cop_region import foot_signs
 from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
 
 from .agents import Agent
+from .gait_figures import AIR_TIME, Walk
+from .gait_record import WalkRecord
 from .signals import Sway
 from .trial import Outcome, Trial
 
 FOOT_DISPLACED = 0.05  # [m]
 SETTLED = 1.0  # [s] after which actions and drift count
-AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
 
 
@@ -47,8 +49,9 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     env, stepped = agent.env, SteppedTrial(agent, trial)
     settled = Settled()
     touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
-    sway = Sway() if trial.pushes else None
-    watches = [each for each in (sway, watch) if each is not None]
+    sway = Sway() if trial.pushes and not trial.commands else None
+    walk = WalkRecord() if trial.commands else None
+    watches = [each for each in (sway, walk, watch) if each is not None]
     while not stepped.done:
         for each in watches:
             each(env)
@@ -58,10 +61,38 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     for each in watches:
         each(env)
     outcome = _outcome(env, trial, settled, touchdowns.count)
+    if walk is not None:
+        return walked(env, trial, outcome, walk)
     if sway is None or not outcome.recovered:
         return outcome
     body, recovery = sway.of(trial.pushes[0], env.config.policy_period)
     return replace(outcome, sway=body, sway_recovery=recovery)
+
+
+def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
+    """The outcome of a trial with commands, with the figures of its walk.
+
+    Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
+    (`Walk.as_commanded`); there is no time of recovery then, and no drift.
+    """
+    walk = Walk(record.arrays(), trial.commands, outcome.fall_time)
+    figures = {name: _finite_or_none(value) for name, value in walk.figures().items()}
+    weight = env.robot.mass * float(np.linalg.norm(env.model.opt.gravity))
+    for name, per_metre in (
+        ("cost_of_transport", "energy_per_metre"),
+        ("positive_cost_of_transport", "work_per_metre"),
+    ):
+        cost = figures.pop(per_metre)
+        figures[name] = None if cost is None else cost / weight
+    starts = [push.start for push in (*trial.pushes, *trial.kicks)]
+    first = min(starts, default=None)
+    left = int(np.argmax(foot_signs(env.robot)))
+    phase = None if first is None else walk.phase_at(first, left)
+    outcome = replace(outcome, **figures, push_phase=phase, com_drift=None, recovery_time=None)
+    if trial.commands[-1].array().any():
+        recovered = not env.fallen and walk.as_commanded(first)
+        outcome = replace(outcome, recovered=recovered)
+    return outcome
 
 
 def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -> Outcome:
@@ -130,6 +161,10 @@ class Settled:
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+def _finite_or_none(value: float | None) -> float | None:
+    return None if value is None else _finite(value)
 
 
 class Touchdowns:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
+from poise.baselines.walking.schedule import TimedCommand
 from poise.configs.errors import ConfigError
 from poise.configs.reading import parse_json
 from poise.configs.schema import build
-from poise.envs.pushes.push import Push
+from poise.envs.pushes.push import Kick, Push
 
 from .trial import Conditions, Outcome, Trial
 
@@ -22,16 +24,20 @@ PUSH_COLUMNS = (
 CONDITION_COLUMNS = tuple(Conditions.__dataclass_fields__)
 CASE_COLUMNS = (
     *("trial", "controller", "seed", "stage", "part", "factor", "level"),
-    *(*PUSH_COLUMNS, *CONDITION_COLUMNS, "limit_fraction", "later"),
+    *(*PUSH_COLUMNS, *CONDITION_COLUMNS, "limit_fraction", "later", "commands", "kicks"),
 )
 OUTCOME_COLUMNS = tuple(
     "stepped" if name == "foot_displaced" else name for name in Outcome.__dataclass_fields__
 )
 COLUMNS = (*CASE_COLUMNS, *OUTCOME_COLUMNS)
+MANY: dict[str, type] = {"commands": TimedCommand, "kicks": Kick}  # fields of a trial, as JSON
 
 
 def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell]:
-    """The line of a trial and a controller; `later` has the pushes after the first, as JSON."""
+    """The line of a trial and a controller.
+
+    `later` has the pushes after the first as JSON, `commands` and `kicks` all of these.
+    """
     later = [asdict(push) for push in trial.pushes[1:]]
     return {
         "trial": trial.number,
@@ -45,8 +51,13 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
         **asdict(trial.conditions),
         "limit_fraction": trial.limit_fraction,
         "later": json.dumps(later) if later else None,
+        **{name: _many(getattr(trial, name)) for name in MANY},
         **outcome_cells(outcome),
     }
+
+
+def _many(items: Sequence[Any]) -> str | None:
+    return json.dumps([asdict(item) for item in items]) if items else None
 
 
 def outcome_cells(outcome: Outcome) -> dict[str, Cell]:
@@ -67,6 +78,10 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
     try:
         later = parse_json(line["later"]) if line["later"] else []
         pushes = [_read_push(line)] if line["body"] else []
+        many = {
+            name: tuple(build(kind, item, str(path)) for item in parse_json(line[name] or "[]"))
+            for name, kind in MANY.items()
+        }
         return Trial(
             number=int(line["trial"]),
             seed=int(line["seed"]),
@@ -81,6 +96,8 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
             stage=int(line["stage"]),
             factor=line["factor"] or None,
             level=line["level"] or None,
+            commands=many["commands"],
+            kicks=many["kicks"],
         )
     except (ValueError, TypeError) as error:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None

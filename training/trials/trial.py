@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from poise.envs.pushes.push import Push
+from poise.baselines.walking.schedule import TimedCommand
+from poise.envs.pushes.push import Kick, Push
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class Trial:
         stage: 2 if it was chosen by the outcome of earlier ones.
         factor: which factor the trial varies; "standard" for the case they are compared with.
         level: the factor's value, as text.
+        commands: that a controller that walks follows, in the order of time; none: it stands.
+        kicks: sudden changes of the root's velocity.
     """
 
     number: int
@@ -51,6 +55,13 @@ class Trial:
     stage: int = 1
     factor: str | None = None
     level: str | None = None
+    commands: tuple[TimedCommand, ...] = ()
+    kicks: tuple[Kick, ...] = ()
+
+    @property
+    def command(self) -> TimedCommand | None:
+        """The last command, or None where the robot only stands."""
+        return self.commands[-1] if self.commands else None
 
     @property
     def push(self) -> Push | None:
@@ -58,9 +69,10 @@ class Trial:
         return self.pushes[0] if self.pushes else None
 
     @property
-    def options(self) -> dict[str, list[Push]]:
+    def options(self) -> dict[str, Any]:
         """The argument `options` of the environment's `reset`."""
-        return {"push": list(self.pushes)}
+        pushes = {"push": [*self.pushes, *self.kicks]}
+        return {**pushes, "command": list(self.commands)} if self.commands else pushes
 
 
 @dataclass(frozen=True)
@@ -69,7 +81,8 @@ class Outcome:
     where a simulation has blown up.
 
     Attributes:
-        recovered: upright, quiet and with feet at rest for the last second.
+        recovered: upright, quiet and with feet at rest for the last second; of a walk that goes on,
+            not fallen, and in the last two strides as commanded, see `Walk.as_commanded`.
         fallen: whether it fell; `fall_time` counts from the reset.
         recovery_time: from the start of the last push to the last moment that was not quiet.
         foot_displaced: a foot moved more than 5 cm; the column `stepped` of trials.csv.
@@ -90,6 +103,22 @@ class Outcome:
         root_force: largest force [N] that a soft root took from nowhere; 0 with a hard root.
         sway, sway_recovery: body sway [rad] and recovery time by the sway's speed, of a recovered
             push, see `training/statistics/eurobench.py`.
+        speed_ahead, speed_left, turn_rate: means over the strides of a walk [m/s, rad/s]. A stride
+            is two steps; those count, for this and what follows, that begin 4 s or more after the
+            last change of the command and end a second or more before a fall.
+        speed_error, speed_error_rms: mean and root mean square over the strides of the distance
+            of their velocity from the command [m/s].
+        turn_error_rms: root mean square over the strides of the turn's error [rad/s].
+        step_length, step_width, step_time: means over the steps [m, m, s], of a sole that lands
+            from the other one, along the heading and across it.
+        cost_of_transport: ∫ Σ |τ q̇| dt / (m g d), d the way; `positive_cost_of_transport` of the
+            work Σ max(τ q̇, 0) alone.
+        knee_mean, knee_peak: |τ|/m of the stance leg's knee on one foot [N·m/kg], at the ends of
+            policy steps.
+        circle_error: of one command that is a circle, largest distance of the walk from it.
+        foot_slide: largest way of a sole that bears the robot alone.
+        push_phase: phase of the stride at the start of the first push or kick: 0 where the left
+            foot lands, 0.5 where the right one does.
         error: what the controller raised, on one line; the trial then counts as not recovered.
     """
 
@@ -115,6 +144,22 @@ class Outcome:
     root_force: float | None = None
     sway: float | None = None
     sway_recovery: float | None = None
+    speed_ahead: float | None = None
+    speed_left: float | None = None
+    turn_rate: float | None = None
+    speed_error: float | None = None
+    speed_error_rms: float | None = None
+    turn_error_rms: float | None = None
+    step_length: float | None = None
+    step_width: float | None = None
+    step_time: float | None = None
+    cost_of_transport: float | None = None
+    positive_cost_of_transport: float | None = None
+    knee_mean: float | None = None
+    knee_peak: float | None = None
+    circle_error: float | None = None
+    foot_slide: float | None = None
+    push_phase: float | None = None
     error: str | None = None
 
 

@@ -9,6 +9,7 @@ import pytest
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales, StepScales, WholeScales
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.configs.errors import ConfigError
 from poise.envs.balance.position import PositionBalanceEnv
@@ -78,6 +79,21 @@ def test_a_mirrored_trial(kind, even):
     np.testing.assert_allclose(seen(one), other, atol=1e-4)
     assert np.mean(abs(one - other).max(axis=0) > 0.02) > 0.6  # not the same trial again
     assert env.info().get("steps", 1) == 1
+
+
+def test_a_mirrored_walk(even):
+    """Told to go to the other side, with the actions mirrored, it starts with the other foot."""
+    env = ResidualWalkEnv(even, duration=3.0, pushes=None, residual=StepScales(trigger=0.03, **BODY))
+    seen, done = env.mirrors()
+    rng = np.random.default_rng(3)
+    actions = np.repeat(rng.uniform(-0.1, 0.1, (10, *env.action_space.shape)), 10, axis=0)
+    start = {"qpos": even.standing_qpos, "qvel": np.zeros(27)}
+    one = observed(env, actions, command={"ahead": 0.2, "left": 0.1, "turn": 0.1}, **start)
+    assert env.info()["steps"] >= 2
+    mirrored = {"ahead": 0.2, "left": -0.1, "turn": -0.1}
+    other = observed(env, done(actions), command=mirrored, **start)
+    np.testing.assert_allclose(seen(one), other, atol=1e-3)
+    assert np.mean(abs(one - other).max(axis=0) > 0.02) > 0.6
 
 
 def test_every_term_has_its_image(even):

@@ -1,4 +1,4 @@
-"""training/robot_check/legs.py and one_leg.py."""
+"""training/trials/legs.py and training/robot_check/one_leg.py."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from poise.baselines.stepping.config import SwingTask
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.robot_check.legs import find_legs
+from poise.training.trials.legs import find_legs
 from poise.training.robot_check.one_leg import one_leg_qpos
 from tests.support.small_biped import JOINTS, LEG, write_biped
 from tests.support.small_urdf import write_urdf

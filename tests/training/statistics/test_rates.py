@@ -11,6 +11,7 @@ from poise.training.statistics.rates import (
     iqm,
     mcnemar,
     percentile_interval,
+    poisson_interval,
     seed_aggregate,
     wilson_interval,
 )
@@ -170,3 +171,19 @@ def test_eta_refuses_a_limit_or_mass_of_nothing(mass, limit):
     """Mass and limits must be positive."""
     with pytest.raises(ValueError, match="positive"):
         eta(16.0, mass, limit)
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 120])
+def test_poisson_matches_its_definition(count):
+    """At the ends of the interval, so many or more, and so many or fewer, have 2.5 % each."""
+    low, high = poisson_interval(count)
+    assert stats.poisson.cdf(count, high) == pytest.approx(0.025)
+    assert low == 0.0 if count == 0 else stats.poisson.sf(count - 1, low) == pytest.approx(0.025)
+
+
+def test_poisson_refuses_a_negative_count():
+    """As it refuses a confidence that is no probability."""
+    with pytest.raises(ValueError, match="count must not be negative"):
+        poisson_interval(-1)
+    with pytest.raises(ValueError, match="confidence"):
+        poisson_interval(1, 95.0)

@@ -56,7 +56,9 @@ def test_every_packaged_suite_gives_as_many_trials_as_it_says(
     assert first(suite, limits, 7) == Plan(suite, limits, 7, ["a"]).first
     other = first(suite, limits, 8)
     assert not {trial.seed for trial in other} & {trial.seed for trial in plan.first}
-    if name not in ("grid", "wide-grid", "quiet", "repeated"):
+    if name not in ("grid", "wide-grid", "quiet", "repeated") and not (
+        suite.walks and name != "walk-push"
+    ):
         parts = ("margin",)  # whose pushes are the same for any seed
         pushes = [{trial.push.impulse for trial in trials if trial.part not in parts}
                   for trials in (other, plan.first)]  # fmt: skip

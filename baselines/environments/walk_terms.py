@@ -1,0 +1,157 @@
+"""What is known of a walk: its strides as they were, and the terms that tell a policy of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.baselines.stepping.blocks import StepMemory
+from poise.baselines.walking.blocks import Gait
+from poise.envs.balance.observation import GROUND, Terms
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.maths.vectors import along
+from poise.envs.physics.kinematics import StateArrays
+
+from .step_terms import PHASE, STEP_TERMS, StepView
+
+# entries of what is told of a walk
+WALKING, SIDE, CYCLE = range(3)  # 1 while it walks; the foot it stands on next; phase of the step
+WALK_REPORTED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Strides(Block):
+    """The last three lift-offs of a walk, and how far the stride between them was off."""
+
+    when: np.ndarray  # (3,) times of the lift-offs, the latest first [s]
+    where: np.ndarray  # (3, 3) the CoM along the ground [m] and the heading [rad] then
+    count: np.ndarray  # (1,) int: lift-offs since the walk began
+    steps: np.ndarray  # (1,) int: steps begun since the reset, when this was looked at last
+    error: np.ndarray  # (3,) mean velocity less the command: ahead, left [m/s], turn [rad/s]
+
+    def clear(self) -> None:
+        """Forget the walk."""
+        for member in (self.when, self.where, self.count, self.steps, self.error):
+            member[...] = 0
+
+
+def no_strides() -> Strides:
+    """The strides of a walk that has not begun."""
+    return Strides(
+        when=guarded_zeros(3),
+        where=guarded_zeros((3, 3)),
+        count=guarded_zeros(1, dtype=np.int64),
+        steps=guarded_zeros(1, dtype=np.int64),
+        error=guarded_zeros(3),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class WalkReporter(Block):
+    """What a walk is told by, and what is told of it."""
+
+    gait: Gait
+    memory: StepMemory
+    state: StateArrays  # the true one
+    clock: np.ndarray  # (1,) int: physics steps since the reset
+    timestep: float  # [s]
+    steps: np.ndarray  # (7,) see `Stepping.entries`
+    strides: Strides
+    report: np.ndarray  # (3,)
+
+
+@compiled
+def keep_lift_off(r: WalkReporter):
+    """Put the lift-off that has just been before the two that came last."""
+    t, s = r.strides, r.state
+    for i in (2, 1):
+        t.when[i] = t.when[i - 1]
+        for a in range(3):
+            t.where[i, a] = t.where[i - 1, a]
+    t.when[0] = r.clock[0] * r.timestep
+    t.where[0, 0], t.where[0, 1] = s.com[0], s.com[1]
+    t.where[0, 2] = np.arctan2(s.heading[1], s.heading[0])
+    t.count[0] += 1
+
+
+@compiled
+def measure_stride(r: WalkReporter):
+    """The error of the stride, two steps, between the last lift-off and the one before its own."""
+    t, g = r.strides, r.gait
+    time = t.when[0] - t.when[2]
+    x, y = (t.where[0, 0] - t.where[2, 0]) / time, (t.where[0, 1] - t.where[2, 1]) / time
+    yaw = g.yaw[0] - 0.5 * time * g.velocity[2]  # of the heading in the middle of the stride
+    x, y = along(np.cos(yaw), np.sin(yaw), x, y)
+    turned = t.where[0, 2] - t.where[2, 2]
+    turned = np.arctan2(np.sin(turned), np.cos(turned))
+    t.error[0], t.error[1] = x - g.velocity[0], y - g.velocity[1]
+    t.error[2] = turned / time - g.velocity[2]
+
+
+@compiled
+def report_walk(r: WalkReporter):
+    """Keep the strides, and fill `report`; `steps` must be up to date.
+
+    Before the first stride the error is 0, and before the first step what is asked for.
+    """
+    t, g, m = r.strides, r.gait, r.memory
+    r.report[WALKING], r.report[SIDE], r.report[CYCLE] = g.walking[0], -1.0, 0.0
+    if not g.walking[0]:
+        t.count[0], t.steps[0] = 0, m.steps[0]
+        for a in range(3):
+            t.error[a] = -g.command[a]
+        return
+    if m.steps[0] > t.steps[0]:
+        t.steps[0] = m.steps[0]
+        keep_lift_off(r)
+        for a in range(3):
+            t.error[a] = 0.0
+        if t.count[0] >= 3:
+            measure_stride(r)
+    if g.starting[0]:
+        return
+    swinging = m.swinging[0] != 0
+    r.report[SIDE] = 1.0 - m.foot[0] if swinging else m.foot[0]
+    part = g.step_time / (g.step_time + g.transfer_time)
+    rest = min(g.clock[0] / g.transfer_time, 1.0)
+    r.report[CYCLE] = part * r.steps[PHASE] if swinging else part + (1.0 - part) * rest
+
+
+@dataclass(frozen=True, eq=False)
+class WalkView(Block):
+    """The block of a term about walking: what it reads, and the place that it fills."""
+
+    steps: StepView
+    gait: Gait
+    report: np.ndarray  # (3,)
+
+
+WALK_TERMS = Terms(STEP_TERMS, WalkView)  #: by name; those of every environment that steps first
+
+
+@WALK_TERMS.add(GROUND, "0.2 ω h", "velocity that is commanded, ahead and to the left", "vector")
+def command_velocity(t: WalkView):
+    seen = t.steps.seen
+    for a in range(2):
+        seen.out[a] = t.gait.command[a] / seen.scales.velocity
+
+
+@WALK_TERMS.add(("z",), "0.2 ω", "turn that is commanded, to the left", "turn")
+def command_turn(t: WalkView):
+    seen = t.steps.seen
+    seen.out[0] = t.gait.command[2] / (0.2 * seen.scales.omega)
+
+
+@WALK_TERMS.add(("sin", "cos"), "1", "phase of the step, 0 at its lift-off; 0, 0: none", "number")
+def gait_phase(t: WalkView):
+    seen, angle = t.steps.seen, 2.0 * np.pi * t.report[CYCLE]
+    walks = 1.0 if t.report[SIDE] >= 0.0 else 0.0
+    seen.out[0], seen.out[1] = walks * np.sin(angle), walks * np.cos(angle)
+
+
+@WALK_TERMS.add("feet", "1", "1 where the foot bears the robot, or is about to, else 0", "feet")
+def stance(t: WalkView):
+    out = t.steps.seen.out
+    for i in range(out.shape[0]):
+        out[i] = 1.0 if int(t.report[SIDE]) == i else 0.0

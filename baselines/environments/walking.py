@@ -1,0 +1,168 @@
+"""`poise/ResidualWalk-v0`: the action moves the targets and the steps of a controller that walks."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from poise.baselines.controller import Controller, as_base_controller
+from poise.baselines.registry import ControllerConfig, walking_controllers
+from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.controller import WalkingController
+from poise.baselines.walking.schedule import CommandSampler, TimedCommand, command_sampler
+from poise.configs.errors import ConfigError
+from poise.envs.balance.config import EnvConfig
+from poise.envs.balance.observation import View
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.robots.robot import Robot
+from poise.envs.vector.vector_env import make_vector_env
+
+from .step_terms import StepView
+from .stepping import ResidualStepEnv
+from .walk_terms import (
+    WALK_REPORTED,
+    WALK_TERMS,
+    WalkReporter,
+    WalkView,
+    no_strides,
+    report_walk,
+)
+
+SPEED_TOLERANCE = 0.036  # [ω h] of the last stride of a walk that goes on as it should
+
+
+class ResidualWalkEnv(ResidualStepEnv):
+    """Walk as commanded, pushed or not, by moving the targets and the steps of a planner.
+
+    `ResidualStepEnv` around a controller that walks. Zero is the controller alone, bit for bit.
+
+    Action: Box(−1, 1, (7,)), heading frame.
+
+    | index | name | 1 adds | to |
+    | --- | --- | --- | --- |
+    | 0 | com_x | `residual.com`, 0.1 m | b, where ξ is to be from the new sole: forward |
+    | 1 | com_y | `residual.com`, 0.1 m | the same, left |
+    | 2 | cop_x | `residual.cop`, 0.05 m | CoP target, forward |
+    | 3 | cop_y | `residual.cop`, 0.05 m | CoP target, left |
+    | 4 | foothold_x | `residual.foothold`, 0.15 m | foothold, forward, within the step's limits |
+    | 5 | foothold_y | `residual.foothold`, 0.15 m | foothold, left, within the step's limits |
+    | 6 | time | `residual.time`, 0.08 s | time from lift-off to touchdown |
+
+    `height`, `lean`, `momentum` and `trigger` are those of `ResidualStepEnv`.
+
+    Observation: <observation>
+
+    It does not know the push. Pushes have the axes of the start. The reference is that of `motion`.
+
+    Info: besides those of `ResidualStepEnv`, "command" (3,) [m/s, m/s, rad/s] and
+    "velocity_error" (3,) of the last stride, which `reward.tracking` is of. "is_success" is to
+    walk within 0.1 m/s of the command (of the humanoid, 0.036 ω h), or to rest where that is zero.
+
+    Arguments: as of `ResidualStepEnv`, with a `controller` that walks, and `command`: a
+    `GaitCommand`, a mapping of `ahead`, `left` [m/s] and `turn` [rad/s] or of ranges [lo, hi] of
+    these, which are drawn from at the reset and, with `interval` [s], every so often; see
+    `CommandSampler`. The option "command" of `reset` takes its place in that episode.
+    `config` is `configs/envs/walking.yaml` by default.
+
+    Version history: v0, first release.
+    """
+
+    known_terms = WALK_TERMS
+
+    def __init__(
+        self,
+        robot: str | Path | Robot = "humanoid",
+        config: EnvConfig | str | Path | Mapping | None = "walking",
+        *,
+        controller: str | Path | Mapping | ControllerConfig | Controller = "walk",
+        command: CommandSampler | GaitCommand | Mapping | None = None,
+        **arguments: Any,
+    ):
+        self.command_sampler = CommandSampler() if command is None else command_sampler(command)
+        self._walk_report = guarded_zeros(WALK_REPORTED)
+        self._strides = no_strides()
+        super().__init__(robot, config, controller=controller, **arguments)
+
+    @ResidualStepEnv.controller.setter  # type: ignore[attr-defined]
+    def controller(self, controller: Controller) -> None:
+        """The controller whose targets and steps the action moves.
+
+        Raises ConfigError as `ResidualStepEnv` does, and for one that does not walk.
+        """
+        walker = as_base_controller(controller, self.robot).unwrapped
+        if not isinstance(walker, WalkingController):
+            raise ConfigError("does not walk", field="controller", choices=walking_controllers())
+        ResidualStepEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
+        self.walker = walker  #: the controller that walks, of which `controller` may be a wrapper
+
+    def arguments(self) -> dict[str, Any]:
+        """The arguments that make another environment like this one; robot and motion are shared.
+
+        Raises ConfigError as `ResidualBalanceEnv` does.
+        """
+        return {**super().arguments(), "command": self.command_sampler}
+
+    def _commands(self, options: Mapping[str, Any]) -> Sequence[TimedCommand]:
+        if "command" in options:
+            return super()._commands(options)
+        return self.command_sampler.sample(self.np_random, self.config.duration)
+
+    def _velocity_error(self) -> np.ndarray:
+        return self._strides.error
+
+    def _begin(self, options: Mapping[str, Any]) -> None:
+        super()._begin(options)
+        self._strides.clear()
+
+    def _view(self, kind: type[Block], out: np.ndarray) -> Block:
+        if kind is not WalkView:
+            return super()._view(kind, out)
+        view = super()._view(View, out)
+        assert isinstance(view, View)
+        steps = StepView(view, self._step_report)
+        return WalkView(steps, self.walker.gait, self._walk_report)
+
+    def _reporter(self) -> WalkReporter:
+        walker, simulation = self.walker, self.simulation
+        return WalkReporter(
+            gait=walker.gait,
+            memory=walker.memory,
+            state=simulation.state_arrays,
+            clock=simulation.clock,
+            timestep=self.arrays.timestep,
+            steps=self._step_report,
+            strides=self._strides,
+            report=self._walk_report,
+        )
+
+    def _reports(self, tick: Any) -> list[tuple[Callable[..., None], Block]]:
+        return [*super()._reports(tick), (report_walk, self._reporter())]
+
+    def _observe(self) -> None:
+        self._step_report[:] = self.stepper.stepping().entries()
+        report_walk(self._reporter())
+        super()._observe()
+
+    @property
+    def recovered(self) -> bool:
+        """Walking as commanded in the last stride; at rest, where nothing is commanded."""
+        if not self.walker.gait.command.any():
+            return super().recovered
+        most = SPEED_TOLERANCE * self.scales.omega * self.scales.height
+        strides = self._strides
+        close = np.hypot(*strides.error[:2]) <= most
+        return bool(strides.count[0] >= 3 and close and not self.fallen)
+
+    def info(self) -> dict[str, Any]:
+        """The entries of `ResidualStepEnv`, the command and how far the walk is from it."""
+        return {
+            **super().info(),
+            "command": self.walker.gait.command.copy(),
+            "velocity_error": self._strides.error.copy(),
+        }
+
+
+vector_env = partial(make_vector_env, ResidualWalkEnv)  # for gymnasium.make_vec

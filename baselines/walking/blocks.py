@@ -1,0 +1,59 @@
+"""The blocks that the kernels of walking work on; SI units, arrays of one entry are numbers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.baselines.stepping.blocks import CaptureTick, StepMemory, SwingArrays
+from poise.envs.compiled.block import Block
+
+
+@dataclass(frozen=True, eq=False)
+class Gait(Block):
+    """A `GaitConfig` in SI units, the command, and how far the walk is."""
+
+    step_time: float  # T, from lift-off to touchdown [s]
+    transfer_time: float  # T_d, on both feet [s]
+    width: float  # W [m]
+    height: float  # of the CoM [m]
+    acceleration: float  # [m/s²]
+    turn_acceleration: float  # [rad/s²]
+    correction: float
+    correction_limit: float  # [m/s]
+    time_price: float  # [m/s]
+    transfer_gain: float
+    start_radius: float  # [m]
+    start_time: float  # [s]
+    speed_margin: float  # [m/s]
+    command: np.ndarray  # (3,) velocity ahead, left [m/s], turn [rad/s] that are asked for
+    velocity: np.ndarray  # (3,) the same, which follow the command
+    error: np.ndarray  # (2,) what the sum of the velocity's errors adds to it [m/s]
+    planned: np.ndarray  # (2,) the velocity with it [m/s]
+    yaw: np.ndarray  # (1,) of the heading [rad]
+    walking: np.ndarray  # (1,) int: 1 from the first shift of weight until the walk has stopped
+    starting: np.ndarray  # (1,) int: 1 until the first foot lifts off
+    clock: np.ndarray  # (1,) since both feet are down [s]
+    cop: np.ndarray  # (2,) that was asked for last on one foot [m]
+    middle: np.ndarray  # (2,) between the soles at the last touchdown [m]
+    step_clock: np.ndarray  # (1,) since then [s]; < 0: there was none
+
+
+@dataclass(frozen=True, eq=False)
+class WalkTick(Block):
+    """All that a tick of `Walk` works on."""
+
+    capture: CaptureTick  # while it stands, and catches falls from there
+    walk: CaptureTick  # the same memory, with the QPs, the swing and the limits of the gait
+    gait: Gait
+    stance: np.ndarray  # (2,) scratch: the middle of what the stance sole reaches [m]
+    swinging: np.ndarray  # (2,) scratch: the same of the other one
+
+    @property
+    def memory(self) -> StepMemory:
+        """The memory of its steps."""
+        return self.capture.memory
+
+    @property
+    def swing(self) -> SwingArrays:
+        """The way of the swinging foot."""
+        return self.capture.swing

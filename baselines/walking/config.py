@@ -1,0 +1,50 @@
+"""The configuration of the controllers that walk; numbers have the units of `stepping/config.py`."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from poise.baselines.stepping.config import CaptureStepConfig, StepLimits, SwingTask
+from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+
+POSITIVE, NOT_NEGATIVE = {"above": 0.0}, {"min": 0.0}
+
+
+@dataclass(frozen=True)
+class GaitConfig:
+    """The gait: its times, its width, how it follows a command, and the QP of its ticks."""
+
+    step_time: float = field(default=1.2, metadata=POSITIVE)  # from lift-off to touchdown
+    transfer_time: float = field(default=0.28, metadata=POSITIVE)  # on both feet
+    width: float = field(default=0.254, metadata=POSITIVE)  # between the soles
+    height: float = field(default=0.966, metadata=POSITIVE)  # of the CoM, where legs reach
+    leg_length: float = field(default=1.04, metadata=POSITIVE)  # that limits it in a long step
+    acceleration: float = field(default=0.041, metadata=POSITIVE)  # of the velocity [g]
+    turn_acceleration: float = field(default=0.08, metadata=POSITIVE)  # of the turn [ω²]
+    # what is planned is the velocity that is asked for, and so much of the error of each step summed
+    correction: float = field(default=0.3, metadata=NOT_NEGATIVE)
+    correction_limit: float = field(default=0.09, metadata=NOT_NEGATIVE)  # [h ω]
+    time_price: float = field(default=0.018, metadata=NOT_NEGATIVE)  # of another step time [h ω]
+    transfer_gain: float = field(default=1.0, metadata=NOT_NEGATIVE)  # of ξ's error on both feet
+    start_radius: float = field(default=0.025, metadata=POSITIVE)  # of ξ before the first step
+    start_time: float = field(default=5.0, metadata=POSITIVE)  # then it begins anyway
+    speed_margin: float = field(default=0.01, metadata=NOT_NEGATIVE)  # slower is standing [h ω]
+    torque_rate_limit: float = field(default=0.6, metadata=POSITIVE)  # as in `CaptureStepConfig`
+    root_accel: float = field(default=60.0, metadata=POSITIVE)
+    swing_accel: float = field(default=14.0, metadata=POSITIVE)
+    joint_accel: float = field(default=100.0, metadata=POSITIVE)
+    limits: StepLimits = field(
+        default_factory=lambda: StepLimits(
+            ahead=1.1, behind=0.9, width_min=0.19, width_max=0.9, speed=1.3, side_speed=1.2,
+            time_min=0.7, time_max=2.0,
+        )
+    )  # fmt: skip
+    swing: SwingTask = field(default_factory=SwingTask)
+    qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+
+
+@dataclass(frozen=True)
+class WalkConfig(CaptureStepConfig):
+    """`capture-step` that walks with this `gait` while it is told to."""
+
+    kind: Literal["walk"] = "walk"  # type: ignore[assignment]
+    gait: GaitConfig = field(default_factory=GaitConfig)

@@ -1,0 +1,25 @@
+"""The interface of a controller that walks: the command that it follows, and its gait."""
+
+from typing import Protocol, runtime_checkable
+
+from poise.baselines.stepping.blocks import StepMemory
+
+from .blocks import Gait
+from .command import GaitCommand
+
+
+@runtime_checkable
+class WalkingController(Protocol):
+    """What a controller that walks has, besides what every controller has.
+
+    `gait` and `memory` are the blocks that its compiled ticks work on. Compiled code may write
+    `gait.command`, which is `command` as an array.
+    """
+
+    command: GaitCommand  #: that it follows; may be set at any time
+    gait: Gait  #: with the command, and the velocity that follows it
+    memory: StepMemory  #: of its steps
+
+    @property
+    def walking(self) -> bool:
+        """True from the first shift of weight until the walk has stopped."""

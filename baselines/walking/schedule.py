@@ -1,0 +1,164 @@
+"""Commands over time: read from what a caller wrote, drawn at random, followed by compiled code."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+
+import numpy as np
+
+from poise.configs.errors import ConfigError, shown
+from poise.configs.schema import build, to_dict
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.pushes.sampler import Range
+
+from .command import GaitCommand
+
+MOST_COMMANDS = 256  # of an episode
+SOON = 1e-9  # [s] by which times may round
+
+
+@dataclass(frozen=True)
+class TimedCommand(GaitCommand):
+    """A command that holds from `start` [s] after the reset until the next one."""
+
+    start: float = field(default=0.0, metadata={"min": 0.0})
+
+
+@dataclass(frozen=True)
+class CommandSampler:
+    """Commands that an environment draws; every range [lo, hi] is drawn from uniformly.
+
+    The first one holds from the reset on; with an `interval` [s] another one is drawn after each,
+    at most 256 in an episode. Equal ends are a fixed command.
+    """
+
+    ahead: Range = (0.5, 0.5)  # [m/s]
+    left: Range = (0.0, 0.0)  # [m/s]
+    turn: Range = (0.0, 0.0)  # [rad/s]
+    interval: Range | None = field(default=None, metadata={"above": 0.0})  # [s]
+
+    def __post_init__(self) -> None:
+        for name in ("ahead", "left", "turn", "interval"):
+            pair = getattr(self, name)
+            if pair is not None and pair[0] > pair[1]:
+                raise ValueError(f"{name}: the range [{pair[0]}, {pair[1]}] must not decrease")
+
+    def sample(self, rng: np.random.Generator, duration: float) -> tuple[TimedCommand, ...]:
+        """The commands of an episode of `duration` [s]; the same for the same generator state."""
+        drawn, start = [self._draw(rng, 0.0)], 0.0
+        while self.interval is not None and len(drawn) < MOST_COMMANDS:
+            start += rng.uniform(*self.interval)
+            if start >= duration:
+                break
+            drawn.append(self._draw(rng, start))
+        return tuple(drawn)
+
+    def _draw(self, rng: np.random.Generator, start: float) -> TimedCommand:
+        ahead, left, turn = (float(rng.uniform(*r)) for r in (self.ahead, self.left, self.turn))
+        return TimedCommand(ahead, left, turn, start)
+
+
+def command_sampler(value: object) -> CommandSampler:
+    """A sampler from itself, from a `GaitCommand`, or from a mapping of ranges or numbers.
+
+    Raises ConfigError naming the field that is not valid, and what there is.
+    """
+    if isinstance(value, CommandSampler):
+        return value
+    if isinstance(value, GaitCommand):
+        value = {name: getattr(value, name) for name in ("ahead", "left", "turn")}
+    if not isinstance(value, Mapping):
+        raise ConfigError(
+            f"must be a command or ranges of commands, not {shown(value)}",
+            field="command",
+            choices=[each.name for each in fields(CommandSampler)],
+        )
+    data = {str(key): to_dict(entry) for key, entry in value.items()}
+    alone = (int, float)
+    ranges = {
+        key: [entry, entry] if isinstance(entry, alone) and key != "interval" else entry
+        for key, entry in data.items()
+    }
+    return build(CommandSampler, ranges, "command")
+
+
+def parse_commands(value: object, source: str = "reset: command") -> tuple[TimedCommand, ...]:
+    """Commands from one mapping, one `GaitCommand`, or a list of them in the order of `start`.
+
+    A mapping has the keys `ahead`, `left` [m/s], `turn` [rad/s] and `start` [s after the reset],
+    all 0 where they are left out; [] is to stand.
+
+    Raises ConfigError naming `source`, the field and the choices for an unknown key, a number that
+    is not finite, and times that do not increase.
+    """
+    given = [value] if isinstance(value, (Mapping, GaitCommand)) else value
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise ConfigError(f"must be a mapping or a list of them, not {shown(value)}", source=source)
+    commands = tuple(_parse_one(each, source) for each in given)
+    if any(a.start >= b.start for a, b in zip(commands, commands[1:], strict=False)):
+        raise ConfigError("must increase from command to command", source=source, field="start")
+    if len(commands) > MOST_COMMANDS:
+        raise ConfigError(f"at most {MOST_COMMANDS} commands", source=source)
+    return commands
+
+
+def _parse_one(item: object, source: str) -> TimedCommand:
+    data = asdict(item) if isinstance(item, GaitCommand) else item
+    if not isinstance(data, Mapping):
+        raise ConfigError(f"must be a mapping, not {shown(item)}", source=source,
+                          choices=TimedCommand.__dataclass_fields__)  # fmt: skip
+    return build(TimedCommand, {str(k): to_dict(v) for k, v in data.items()}, source)
+
+
+@dataclass(frozen=True, eq=False)
+class Timetable(Block):
+    """The commands of an episode as compiled code reads them."""
+
+    start: np.ndarray  # (256,) [s]; infinite behind the last one
+    commands: np.ndarray  # (256, 3)
+    following: np.ndarray  # (1,) int: the row that comes next
+
+    def fill(self, commands: Sequence[TimedCommand]) -> None:
+        """Take the commands of an episode that begins."""
+        self.clear()
+        for i, command in enumerate(commands):
+            self.start[i], self.commands[i] = command.start, command.array()
+
+    def clear(self) -> None:
+        """Leave the command as it is."""
+        self.start[:] = np.inf
+        self.following[0] = 0
+
+
+def empty_timetable() -> Timetable:
+    """A timetable without a command."""
+    table = Timetable(
+        start=guarded_zeros(MOST_COMMANDS),
+        commands=guarded_zeros((MOST_COMMANDS, 3)),
+        following=guarded_zeros(1, dtype=np.int64),
+    )
+    table.clear()
+    return table
+
+
+@dataclass(frozen=True, eq=False)
+class Follower(Block):
+    """The block of `follow_timetable`."""
+
+    timetable: Timetable
+    clock: np.ndarray  # (1,) int: physics steps since the reset
+    timestep: float  # [s]
+    command: np.ndarray  # (3,) of the controller's gait
+
+
+@compiled
+def follow_timetable(f: Follower):
+    """Tell the controller the command that the time has come for."""
+    table = f.timetable
+    now, i = f.clock[0] * f.timestep + SOON, table.following[0]
+    while i < table.start.shape[0] and table.start[i] <= now:
+        for a in range(3):
+            f.command[a] = table.commands[i, a]
+        i += 1
+    table.following[0] = i

@@ -1,0 +1,177 @@
+"""Walking at a commanded velocity, and standing as `capture-step` does where none is asked for."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from poise.baselines.controller import Targets
+from poise.baselines.stepping.blocks import CaptureTick, Search
+from poise.baselines.stepping.capture_step import CaptureStep, check_qps
+from poise.baselines.stepping.config import StepLimits
+from poise.baselines.stepping.swing import swing_gains, swing_task
+from poise.baselines.warmup import prepare
+from poise.baselines.whole_body.contact_sets import ContactSets
+from poise.envs.compiled.calls import Kernel, address_of
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.maths.pendulum import Units
+from poise.envs.physics.state import RobotState
+from poise.envs.robots.robot import Robot
+
+from .blocks import Gait, WalkTick
+from .command import GaitCommand
+from .config import GaitConfig, WalkConfig
+from .tick import walk_tick
+
+
+def allocate_gait(config: GaitConfig, units: Units) -> Gait:
+    """The gait of `config` for a robot with these units, at rest."""
+    c, h, omega = config, units.height, units.omega
+    whole = np.int64
+    return Gait(
+        step_time=c.step_time / omega,
+        transfer_time=c.transfer_time / omega,
+        width=c.width * h,
+        height=c.height * h,
+        acceleration=c.acceleration * h * omega**2,
+        turn_acceleration=c.turn_acceleration * omega**2,
+        correction=float(c.correction),
+        correction_limit=c.correction_limit * h * omega,
+        time_price=c.time_price * h * omega,
+        transfer_gain=float(c.transfer_gain),
+        start_radius=c.start_radius * h,
+        start_time=c.start_time / omega,
+        speed_margin=c.speed_margin * h * omega,
+        command=guarded_zeros(3),
+        velocity=guarded_zeros(3),
+        error=guarded_zeros(2),
+        planned=guarded_zeros(2),
+        yaw=guarded_zeros(1),
+        walking=guarded_zeros(1, whole),
+        starting=guarded_zeros(1, whole),
+        clock=guarded_zeros(1),
+        cop=guarded_zeros(2),
+        middle=guarded_zeros(2),
+        step_clock=guarded_zeros(1),
+    )
+
+
+def limited(search: Search, limits: StepLimits, units: Units) -> Search:
+    """The same search within other limits."""
+    h, omega = units.height, units.omega
+    return replace(
+        search,
+        ahead=limits.ahead * h,
+        behind=limits.behind * h,
+        width_min=limits.width_min * h,
+        width_max=limits.width_max * h,
+        speed=limits.speed * h * omega,
+        side_speed=limits.side_speed * h * omega,
+        time_min=limits.time_min / omega,
+        time_max=limits.time_max / omega,
+    )
+
+
+class Walk(CaptureStep):
+    """Walks at a commanded velocity by footholds that lead the capture point [Englsberger11].
+
+    Without a command it is `capture-step` with the same gains, bit for bit. With one it shifts its
+    weight and walks: each foothold puts the capture point where the gait has it at lift-off
+    (`dcm.py`), so that a push moves the foothold and the walk goes on. When the command is zero
+    again it walks until both soles hold the capture point, and stands. Raises ConfigError as
+    `CaptureStep` does.
+    """
+
+    def __init__(self, robot: Robot, config: WalkConfig | None = None):
+        config = config or WalkConfig()
+        prepare("contacts", "planner", "walking")
+        gait = self._gait_config = config.gait
+        check_qps(config, gait__qp=gait.qp)
+        self.gait = allocate_gait(gait, robot.units)
+        self.gait_sets = ContactSets(robot, gait.qp, gait.torque_rate_limit)
+        self._walk_tick: WalkTick | None = None
+        super().__init__(robot, config)
+
+    @property
+    def walking(self) -> bool:
+        """True from the first shift of weight until the walk has stopped."""
+        return bool(self.gait.walking[0])
+
+    @property
+    def command(self) -> GaitCommand:
+        """The velocity and turn that are asked for; may be set at any time."""
+        return GaitCommand(*self.gait.command.tolist())
+
+    @command.setter
+    def command(self, command: GaitCommand) -> None:
+        self.gait.command[:] = command.array()
+
+    @property
+    def failures(self) -> int:
+        """See `CaptureStep`; those of the gait count, too."""
+        return super().failures + self.gait_sets.failures
+
+    def reset(self, state: RobotState | None = None) -> None:
+        """Forget the last trial, its command too."""
+        super().reset(state)
+        self.gait_sets.reset()
+        for member in self.gait.members():
+            if isinstance(member, np.ndarray):
+                member[...] = 0
+
+    def walk_tick(self, state: RobotState, targets: Targets) -> WalkTick:
+        """The block that the kernel `walk_tick` works on."""
+        return self.around(self.tick(state, targets))
+
+    def around(self, capture: CaptureTick) -> WalkTick:
+        """The same around the block of `capture_tick`."""
+        known = self._walk_tick
+        if known is None or known.capture is not capture:
+            walk, pair = self._of_gait(capture), guarded_zeros(2)
+            known = WalkTick(capture, walk, self.gait, pair, guarded_zeros(2))
+            self._walk_tick = known
+        return known
+
+    def _of_gait(self, capture: CaptureTick) -> CaptureTick:
+        """A block with the same memory, and the QPs, the swing and the limits of the gait."""
+        gait, units = self._gait_config, self.robot.units
+        h, omega, task = units.height, units.omega, swing_gains(self.qp.arrays, gait.swing)
+        asked, way, axes = capture.reference_out, self._swing.reference, self.memory.level_frame
+        on_first, on_second, on_both = (
+            self.gait_sets.sets[soles].bind(
+                capture.state, asked, self.gait_sets,
+                [swing_task(foot, way, axes, task) for foot in swinging],
+            )
+            for soles, swinging in (((0,), (1,)), ((1,), (0,)), ((0, 1), ()))
+        )  # fmt: skip
+        gains = replace(
+            capture.gains,
+            leg_length=gait.leg_length * h,
+            root_accel=gait.root_accel * omega**2,
+            swing_accel=gait.swing_accel * omega**2,
+            joint_accel=gait.joint_accel * omega**2,
+        )
+        swing = replace(
+            capture.swing,
+            apex=gait.swing.clearance * h,
+            lift=gait.swing.lift,
+            landing_speed=gait.swing.landing_speed * h * omega,
+        )
+        return replace(
+            capture, gains=gains, swing=swing, search=limited(capture.search, gait.limits, units),
+            on_first=on_first, on_second=on_second, on_both=on_both,
+        )  # fmt: skip
+
+    def compiled_tick(
+        self, state: RobotState, targets: Targets
+    ) -> tuple[Kernel[WalkTick], WalkTick]:
+        """Return the kernel that compiled code calls instead of `torques`, and its block."""
+        tick = self.walk_tick(state, targets)
+        return address_of(walk_tick, tick), tick
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        """Joint torques (nu,) [N·m] for the next `period`."""
+        tick = self.walk_tick(state, targets)
+        walk_tick(tick)
+        if tick.capture.to_python[0]:
+            return self.qp.torques(state, targets)
+        return self.tau[self._motors]

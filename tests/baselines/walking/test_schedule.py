@@ -1,0 +1,91 @@
+"""baselines/walking/schedule.py: commands that a caller writes, that are drawn, and when."""
+
+import numpy as np
+import pytest
+
+from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.schedule import (
+    MOST_COMMANDS,
+    CommandSampler,
+    Follower,
+    TimedCommand,
+    command_sampler,
+    empty_timetable,
+    follow_timetable,
+    parse_commands,
+)
+from poise.configs.errors import ConfigError
+
+
+def test_one_command_or_a_list_of_them():
+    """A mapping, a `GaitCommand` and a list say the same; what is left out is 0."""
+    expected = (TimedCommand(0.5, 0.0, 0.1, 0.0),)
+    assert parse_commands({"ahead": 0.5, "turn": 0.1}) == expected
+    assert parse_commands(GaitCommand(0.5, turn=0.1)) == expected
+    assert parse_commands([{"ahead": 0.5, "turn": 0.1, "start": 0}]) == expected
+    assert parse_commands([]) == ()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"ahead": float("nan")}, "reset: command: ahead: must be a finite number, not nan"),
+        ({"speed": 1.0}, r"speed: unknown field \(choices: ahead, left, turn, start\)"),
+        ({"start": -1.0}, "start: must be at least 0.0, not -1.0"),
+        ([{}, {}], "start: must increase from command to command"),
+        ("fast", "must be a mapping or a list of them, not 'fast'"),
+        ([3], "must be a mapping, not 3"),
+        ([{"start": float(k)} for k in range(MOST_COMMANDS + 1)], "at most 256 commands"),
+    ],
+)
+def test_bad_commands(given, said):
+    with pytest.raises(ConfigError, match=said):
+        parse_commands(given)
+
+
+def test_numbers_and_ranges_make_a_sampler():
+    """A number is a range of no width; a `GaitCommand` is a fixed command."""
+    assert command_sampler({"ahead": 0.4}) == CommandSampler((0.4, 0.4))
+    assert command_sampler(GaitCommand(0.1, 0.2, 0.3)) == CommandSampler(
+        (0.1, 0.1), (0.2, 0.2), (0.3, 0.3)
+    )
+    with pytest.raises(ConfigError, match="command: ahead: the range .* must not decrease"):
+        command_sampler({"ahead": [0.5, 0.2]})
+    with pytest.raises(ConfigError, match=r"must be a command or ranges of commands, not 0.5"):
+        command_sampler(0.5)
+    with pytest.raises(ConfigError, match="command: interval: must be a list, not 3"):
+        command_sampler({"interval": 3})
+
+
+def test_commands_are_drawn_from_the_ranges():
+    """The first at the reset, the others an interval apart, none after the end; all within."""
+    sampler = CommandSampler((0.2, 0.8), (-0.1, 0.1), (-0.3, 0.3), (2.0, 5.0))
+    drawn = sampler.sample(np.random.default_rng(4), 60.0)
+    assert drawn == sampler.sample(np.random.default_rng(4), 60.0)
+    starts = np.array([command.start for command in drawn])
+    assert starts[0] == 0.0 and starts[-1] < 60.0 and 12 <= len(drawn) <= 30
+    assert np.all((np.diff(starts) >= 2.0) & (np.diff(starts) <= 5.0))
+    values = np.array([command.array() for command in drawn])
+    assert np.all(np.abs(values - [0.5, 0.0, 0.0]) <= [0.3, 0.1, 0.3])
+    assert len(np.unique(values[:, 0])) == len(drawn)
+    assert len(CommandSampler().sample(np.random.default_rng(4), 60.0)) == 1
+    assert len(sampler.sample(np.random.default_rng(4), 1e6)) == MOST_COMMANDS
+
+
+def test_a_command_comes_at_its_time():
+    """The latest whose time has come; an empty timetable leaves what was set by hand."""
+    clock, command = np.zeros(1, dtype=np.int64), np.zeros(3)
+    table = empty_timetable()
+    follower = Follower(table, clock, 0.002, command)
+    command[:] = 7.0
+    follow_timetable(follower)
+    assert command[0] == 7.0
+    table.fill([TimedCommand(0.1), TimedCommand(0.2, start=0.5), TimedCommand(0.3, start=0.502)])
+    seen = []
+    for clock[0] in (0, 249, 250, 251, 400):
+        follow_timetable(follower)
+        seen.append(command[0])
+    assert seen == [0.1, 0.1, 0.2, 0.3, 0.3]
+    command[:] = 9.0
+    follow_timetable(follower)  # each is told once
+    assert command[0] == 9.0

@@ -1,0 +1,115 @@
+"""Walking at a commanded velocity, from standing and back."""
+
+import numpy as np
+import pytest
+
+from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.registry import load_controller
+from poise.baselines.walking.command import GaitCommand
+from poise.configs.errors import ConfigError
+from tests.support.shared import robot
+
+PERIOD = 0.02
+STILL = GaitCommand()
+
+
+def walk(*commands, push=(), seed=0, controller="walk"):
+    """Play (seconds, command) after each other; heading (n, 2), CoM (n, 3), and the environment."""
+    env = ResidualStepEnv(controller=controller, duration=60.0)
+    env.reset(seed=seed, options={"push": list(push)})
+    action, heading, com = np.zeros(len(env.action_names)), [], []
+    for seconds, command in commands:
+        if controller == "walk":
+            env.controller.command = command
+        for _ in range(round(seconds / PERIOD)):
+            _, _, fallen, _, _ = env.step(action)
+            heading.append(env.simulation.state.heading.copy())
+            com.append(env.simulation.state.com.copy())
+            if fallen:
+                return np.array(heading), np.array(com), env
+    return np.array(heading), np.array(com), env
+
+
+def speed(com, seconds):
+    """Mean velocity (2,) [m/s] of the last seconds."""
+    n = round(seconds / PERIOD)
+    return (com[-1, :2] - com[-1 - n, :2]) / seconds
+
+
+@pytest.mark.parametrize("impulse", [0.0, 26.0])
+def test_without_a_command_it_is_feedback_step_bit_for_bit(impulse):
+    push = {"impulse": impulse, "direction": 30.0, "start": 0.3, "duration": 0.1}
+    ends = [
+        walk((2.5, STILL), push=[push], controller=name)[1] for name in ("walk", "feedback-step")
+    ]
+    np.testing.assert_array_equal(*ends)
+
+
+@pytest.mark.parametrize("ahead, left", [(0.3, 0.0), (0.8, 0.0), (-0.4, 0.0), (0.0, 0.25)])
+def test_it_walks_at_the_velocity_that_is_asked_for(ahead, left):
+    _, com, env = walk((8.0, GaitCommand(ahead, left)), seed=3)
+    assert not env.fallen and env.controller.walking
+    period = env.controller.gait.step_time + env.controller.gait.transfer_time
+    error = speed(com, round(4.0 / period / 2) * 2 * period) - [ahead, left]
+    assert np.linalg.norm(error) < 0.05
+
+
+def test_it_turns():
+    heading, _, env = walk((6.0, GaitCommand(0.3, 0.0, 0.4)), seed=1)
+    yaw = np.unwrap(np.arctan2(heading[:, 1], heading[:, 0]))
+    assert not env.fallen
+    assert (yaw[-1] - yaw[-101]) / (100 * PERIOD) == pytest.approx(0.4, abs=0.1)
+
+
+def test_it_stops_and_stands():
+    _, com, env = walk((4.0, GaitCommand(0.5)), (4.0, STILL), seed=2)
+    steps = env.controller.steps
+    assert not env.controller.walking and not env.fallen
+    assert np.linalg.norm(speed(com, 0.5)) < 0.1
+    assert steps > 8
+
+
+def test_a_command_that_is_taken_back_before_the_first_step_is_no_step():
+    _, com, env = walk((0.06, GaitCommand(0.5)), (1.0, STILL))
+    assert env.controller.steps == 0 and not env.controller.walking
+
+
+def test_it_walks_on_after_a_push():
+    push = {"impulse": 12.0, "direction": 180.0, "start": 3.1, "duration": 0.1}
+    _, com, env = walk((8.0, GaitCommand(0.5)), push=[push], seed=4)
+    assert not env.fallen
+    assert speed(com, 2.0)[0] == pytest.approx(0.5, abs=0.06)
+
+
+def test_a_reset_forgets_the_command():
+    _, _, env = walk((2.0, GaitCommand(0.5)))
+    assert env.controller.command == GaitCommand(0.5)
+    env.reset(seed=0)
+    assert env.controller.command == STILL and not env.controller.walking
+
+
+def test_compiled_and_python_ticks_are_the_same_bits():
+    ends = []
+    for compiled in (True, False):
+        env = ResidualStepEnv(controller="walk", duration=3.0)
+        env.reset(seed=5, options={"push": []})
+        env.controller.command = GaitCommand(0.4, 0.1, 0.2)
+        env._compiled = env._compiled and compiled
+        for _ in range(100):
+            env.step(np.zeros(len(env.action_names)))
+        ends.append(np.concatenate([env.simulation.data.qpos, env.simulation.data.qvel]))
+    np.testing.assert_array_equal(*ends)
+
+
+def test_a_command_is_of_finite_numbers():
+    with pytest.raises(ConfigError, match=r"command\.left.*finite"):
+        GaitCommand(0.1, np.nan)
+
+
+def test_the_gait_has_the_units_of_the_robot():
+    """Lengths in h, times in 1/ω: a controller of another robot has the same gait, scaled."""
+    gaits = [load_controller("walk", robot(name)).gait for name in ("humanoid", "tall")]
+    units = [robot(name).units for name in ("humanoid", "tall")]
+    for name, power in (("width", 1.0), ("step_time", 0.5), ("time_price", 0.5)):
+        ratio = (units[1].height / units[0].height) ** power
+        assert getattr(gaits[1], name) / getattr(gaits[0], name) == pytest.approx(ratio)

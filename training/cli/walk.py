@@ -1,0 +1,53 @@
+"""The sub-command `walk`: one walk at a command, its figures, a video."""
+
+import math
+from pathlib import Path
+
+from poise.configs.errors import ConfigError
+
+from .arguments import Allow
+
+
+def walk(
+    *,
+    speed: float = 0.5,
+    left: float = 0.0,
+    turn: float = 0.0,
+    duration: float = 20.0,
+    push: str | None = None,
+    push_at: float = 6.0,
+    seed: int = 0,
+    robot: str = "humanoid",
+    controller: str = "walk",
+    video: Path | None = None,
+    allow: Allow = (),
+) -> None:
+    """Walk at a commanded speed, pushed or not, and say how well: speed, steps, cost, falls.
+
+    Args:
+        speed: ahead [m/s]; below 0 it walks backward.
+        left: sideways [m/s].
+        turn: to the left [deg/s].
+        duration: of the walk [s].
+        push: an impulse [N·s] and a direction [deg, 0 ahead, 90 left] such as 20@90, for 0.1 s.
+        push_at: when it is pushed [s].
+        seed: of the start, which is a little disturbed.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        controller: one that walks: a name, a .yaml file, or a folder written by poise train.
+        video: an MP4 or WebP file to write.
+    """
+    if not all(math.isfinite(value) for value in (duration, push_at)) or duration <= 0.0:
+        raise ConfigError(f"must be above 0 and finite, not {duration:g}", field="duration")
+    from poise.envs.viewing.gl import choose_gl_backend
+
+    if video is not None:
+        choose_gl_backend()
+    from poise.training.sessions.walk import walk
+
+    walk(speed, left=left, turn=math.radians(turn), duration=duration, controller=controller,
+         robot=robot, push=push, push_at=push_at, seed=seed, video=video, say=_say,
+         allow=allow)  # fmt: skip
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)

@@ -1,0 +1,158 @@
+"""One walk: played, told in lines while it goes on, filmed, and its figures in words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from poise.baselines.allowance import allows
+from poise.baselines.walking.schedule import parse_commands
+from poise.configs.errors import ConfigError, shown
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.pushes.options import parse_pushes
+from poise.envs.pushes.push import Push
+from poise.envs.pushes.sampler import push_bodies
+from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.viewing.camera import Camera, beside
+from poise.training.figures.encoder import FORMS
+from poise.training.figures.video import record
+from poise.training.trials.agents import Agent, check_walks, load_agent
+from poise.training.trials.play import run_trial
+from poise.training.trials.trial import Outcome, Trial
+
+EVERY = 5.0  # [s] between lines about a walk
+PUSH = re.compile(r"(?P<impulse>[^@]+)@(?P<direction>[^@]+)")
+Say = Callable[[str], object]  # prints a line
+
+
+@allows("controller")
+def walk(
+    speed: float = 0.5,
+    *,
+    left: float = 0.0,
+    turn: float = 0.0,
+    duration: float = 20.0,
+    controller: str = "walk",
+    robot: str = "humanoid",
+    push: str | None = None,
+    push_at: float = 6.0,
+    seed: int = 0,
+    video: str | Path | None = None,
+    say: Say = print,
+    allow: str | Iterable[str] = (),
+) -> Outcome:
+    """Play one walk at a command and tell of it in lines; returns its outcome.
+
+    Args:
+        speed, left: of the command [m/s].
+        turn: of the command [rad/s].
+        duration: of the walk [s].
+        controller: one that walks, as `load_agent` takes it.
+        robot: a packaged robot or a path to its description.
+        push: impulse [N·s] and direction [deg], such as "20@90", of a push of 0.1 s; None: none.
+        push_at: the start of the push [s].
+        seed: of the start, which is a little disturbed.
+        video: an MP4 or WebP file to write.
+        say: what prints the lines.
+        allow: controllers from outside (``module:Class``) that may run.
+
+    Raises:
+        ConfigError: a number, a name or a file that is not valid; a controller that does not walk.
+        PoiseError: nothing can be drawn or encoded here, or the file cannot be written.
+    """
+    if video is not None and Path(video).suffix.lower() not in FORMS:
+        raise ConfigError(f"the name of a video must end in {' or '.join(FORMS)}", source=video)
+    if seed < 0:
+        raise ConfigError(f"must be at least 0, not {seed}", field="seed")
+    loaded = load_robot(robot)
+    commands = parse_commands({"ahead": speed, "left": left, "turn": turn}, "command")
+    pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
+    agent = load_agent(controller, loaded, duration=duration, pushes=None)
+    check_walks(controller, agent, "walk")
+    trial = Trial(0, seed, pushes, commands=commands)
+    command = commands[0]
+    say(f"{controller}, {loaded.name}: {command.ahead:g} m/s ahead, {command.left:g} left, "
+        f"{np.degrees(command.turn):g} °/s for {duration:g} s")  # fmt: skip
+    outcome = run_trial(agent, trial, Told(say))
+    for line in lines(outcome, trial, agent):
+        say(line)
+    if video is not None:
+        _film(agent, trial, video)
+        say(str(video))
+    return outcome
+
+
+def parse_push(text: str, start: float, duration: float, robot: Robot) -> Push:
+    """The push of 0.1 s that "20@90" means: 20 N·s towards 90°, of the robot's first push body.
+
+    Raises ConfigError for another form, numbers out of range, and a start after the `duration`.
+    """
+    found = PUSH.fullmatch(text.strip())
+    try:
+        numbers = {name: float(value) for name, value in found.groupdict().items()} if found else {}
+    except ValueError:
+        numbers = {}
+    if not numbers:
+        raise ConfigError(f"must be an impulse and a direction such as 20@90, not {shown(text)}",
+                          field="push")  # fmt: skip
+    if not 0.0 <= start < duration:
+        raise ConfigError(f"must be within the {duration:g} s of the walk, not {start:g}",
+                          field="push_at")  # fmt: skip
+    fields = {**numbers, "start": start, "body": push_bodies(robot)[0]}
+    (push,) = parse_pushes(fields, robot)
+    assert isinstance(push, Push)  # a kick has no impulse
+    return push
+
+
+class Told:
+    """Tells every few seconds how far a walk is; hand it to `run_trial`."""
+
+    def __init__(self, say: Say):
+        self._say, self._due = say, EVERY
+        self._last: tuple[float, np.ndarray] | None = None
+
+    def __call__(self, env: BalanceEnv) -> None:
+        time, place = env.simulation.time, env.simulation.state.com[:2]
+        if self._last is None:
+            self._last = time, place.copy()
+        if time < self._due - 1e-9:
+            return
+        before, start = self._last
+        speed = float(np.linalg.norm(place - start)) / (time - before)
+        self._say(f"{time:6.1f} s  {speed:.2f} m/s")
+        self._last, self._due = (time, place.copy()), self._due + EVERY
+
+
+def lines(outcome: Outcome, trial: Trial, agent: Agent) -> Iterator[str]:
+    """The figures of a walk in words."""
+    o, end = outcome, agent.env.simulation.time
+    yield f"fell after {o.fall_time:.1f} s" if o.fallen else f"upright after {end:.0f} s"
+    if not o.fallen:
+        yield "the last two strides are " + ("as commanded" if o.recovered else "not as commanded")
+    if o.speed_ahead is not None and o.speed_left is not None and o.turn_rate is not None:
+        yield (f"speed: {o.speed_ahead:.3f} m/s ahead, {o.speed_left:.3f} left, "
+               f"{np.degrees(o.turn_rate):.1f} °/s; error {o.speed_error:.3f}, "
+               f"RMS {o.speed_error_rms:.3f} m/s")  # fmt: skip
+    if o.step_length is not None:
+        yield (f"steps: {o.steps}, {o.step_length:.3f} m long, {o.step_width:.3f} m wide, "
+               f"{o.step_time:.2f} s each")  # fmt: skip
+    if o.cost_of_transport is not None:
+        yield (f"cost of transport: {o.cost_of_transport:.2f}, of positive work "
+               f"{o.positive_cost_of_transport:.2f}")  # fmt: skip
+    if o.knee_mean is not None:
+        yield f"knee of the stance leg: {o.knee_mean:.2f} N·m/kg, at most {o.knee_peak:.2f}"
+    for push in trial.pushes:
+        at = "" if o.push_phase is None else f", at {o.push_phase:.2f} of the stride"
+        yield f"push: {push.impulse:g} N·s towards {push.direction:g}° at {push.start:g} s{at}"
+
+
+def _film(agent: Agent, trial: Trial, path: str | Path) -> None:
+    """Play the walk once more, and film it."""
+    if agent.begin is not None:
+        agent.begin()
+    camera = Camera() if trial.push is None else beside(trial.push.direction)
+    start = {"seed": trial.seed, "options": trial.options}
+    record(agent.env, agent.act, path, start, camera=camera)

@@ -1,0 +1,240 @@
+"""The figures of a walk: its speed against the command, its steps, what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.schedule import TimedCommand
+
+from .gait_record import WalkArrays
+
+AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
+SETTLING = 4.0  # [s] after a change of the command, from which strides are compared with it
+SPEED_TOLERANCE, YAW_TOLERANCE = 0.05, np.radians(5.0)  # [m/s], [rad] of a walk that has recovered
+FALLING = 1.0  # [s] before a fall, in which strides tell of the fall
+STOPPED = 1.0  # [s] without a touchdown, after which a robot does not walk any more
+SLOW = 0.1  # [m/s] below which a cost of transport says nothing
+WINDOW = 4  # steps, two strides, by which the end of a walk is judged
+
+
+@dataclass(frozen=True)
+class Touchdowns:
+    """The touchdowns of a walk, in the order of time.
+
+    Attributes:
+        row: (k,) of the record.
+        foot: (k,) which one landed.
+    """
+
+    row: np.ndarray
+    foot: np.ndarray
+
+
+def touchdowns(record: WalkArrays) -> Touchdowns:
+    """Touchdowns of feet that were in the air for 0.08 s."""
+    found: list[tuple[int, int]] = []
+    for foot in range(record.down.shape[1]):
+        down = record.down[:, foot]
+        lifted = np.flatnonzero(down[:-1] & ~down[1:]) + 1
+        landed = np.flatnonzero(~down[:-1] & down[1:]) + 1
+        for row in landed:
+            before = lifted[lifted < row]
+            if len(before) and record.time[row] - record.time[before[-1]] >= AIR_TIME - 1e-9:
+                found.append((int(row), foot))
+    rows = np.array(sorted(found), dtype=int).reshape(-1, 2)
+    return Touchdowns(rows[:, 0], rows[:, 1])
+
+
+class Walk:
+    """A recorded walk and the commands that it was to follow.
+
+    Velocities are means over a stride, two steps from touchdown to touchdown, of the CoM along the
+    mean heading of that stride.
+
+    Attributes:
+        landed: its touchdowns.
+        velocity: (k − 2, 3) of the stride that ends with touchdown 2, 3, …: ahead, left [m/s], turn
+            [rad/s].
+        wanted: (k − 2, 3) the command at its end.
+        settled: (k − 2,) whether the command was the same all the time, and for 4 s before, and it
+            ends a second or more before a fall.
+    """
+
+    def __init__(
+        self, record: WalkArrays, commands: Sequence[TimedCommand], fall_time: float | None = None
+    ):
+        self.record, self.commands = record, commands
+        until = np.inf if fall_time is None else fall_time - FALLING
+        self.landed = touchdowns(record)
+        rows = self.landed.row
+        spans = list(zip(rows[:-2], rows[2:], strict=True))
+        self.velocity = np.array([self.mean_velocity(*span) for span in spans]).reshape(-1, 3)
+        wanted = [self.command_at(record.time[row]).array() for row in rows[2:]]
+        self.wanted = np.array(wanted).reshape(-1, 3)
+        begun = [self._changed(record.time[row]) for row in rows[2:]]
+        self.settled = record.time[rows[:-2]] >= np.array(begun) + SETTLING
+        self.settled &= record.time[rows[2:]] <= until
+
+    def mean_velocity(self, first: int, last: int) -> np.ndarray:
+        """(3,) ahead, left [m/s] and turn [rad/s] from row to row."""
+        r = self.record
+        time, yaw = r.time[last] - r.time[first], self.mean_yaw(first, last)
+        x, y = (r.com[last] - r.com[first]) / time
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        return np.array([
+            cos * x + sin * y, cos * y - sin * x, (r.yaw[last] - r.yaw[first]) / time
+        ])  # fmt: skip
+
+    def mean_yaw(self, first: int, last: int) -> float:
+        """Mean heading from row to row [rad]."""
+        return float(np.mean(self.record.yaw[first:last]))
+
+    def command_at(self, time: float) -> GaitCommand:
+        """The command that holds at a time [s]."""
+        past = [each for each in self.commands if each.start <= time + 1e-9]
+        return past[-1] if past else GaitCommand()
+
+    def _changed(self, time: float) -> float:
+        """The start of the command that holds at a time [s]."""
+        return max((each.start for each in self.commands if each.start <= time + 1e-9), default=0.0)
+
+    def turned(self, first: float, last: float) -> float:
+        """The turn that is commanded from one time to another [rad]."""
+        changes = [each.start for each in self.commands if first < each.start < last]
+        times = [first, *changes, last]
+        return sum(
+            (b - a) * self.command_at(a).turn for a, b in zip(times[:-1], times[1:], strict=True)
+        )
+
+    def as_commanded(self, pushed: float | None = None) -> bool:
+        """Whether the last two strides follow the command: within 0.05 m/s and 5°.
+
+        Four steps between touchdowns, the last one in the last second; their mean velocity along
+        their mean heading is compared with the command. Their heading is compared with that of the
+        two strides before the first push, at `pushed` [s], or, without one, before themselves; by
+        then it should have turned as commanded.
+        """
+        rows, r = self.landed.row, self.record
+        before = len(rows) - 1 - WINDOW
+        if pushed is not None:
+            before = int(np.sum(r.time[rows] <= pushed)) - 1
+        if len(rows) <= WINDOW or before < WINDOW or r.time[-1] - r.time[rows[-1]] > STOPPED:
+            return False
+        now, then = (rows[-1 - WINDOW], rows[-1]), (rows[before - WINDOW], rows[before])
+        wanted = self.command_at(r.time[-1])
+        off = self.mean_velocity(*now)[:2] - [wanted.ahead, wanted.left]
+        middles = [0.5 * (r.time[a] + r.time[b]) for a, b in (then, now)]
+        turn = self.mean_yaw(*now) - self.mean_yaw(*then) - self.turned(*middles)
+        return bool(np.hypot(*off) <= SPEED_TOLERANCE and abs(turn) <= YAW_TOLERANCE)
+
+    def figures(self) -> dict[str, float | None]:
+        """The figures of an `Outcome`, of the strides and steps that are settled."""
+        velocity, error = self.velocity[self.settled], (self.velocity - self.wanted)[self.settled]
+        off, turn = np.linalg.norm(error[:, :2], axis=1), error[:, 2]
+        return {
+            "speed_ahead": _mean(velocity[:, 0]),
+            "speed_left": _mean(velocity[:, 1]),
+            "turn_rate": _mean(velocity[:, 2]),
+            "speed_error": _mean(off),
+            "speed_error_rms": _root_mean_square(off),
+            "turn_error_rms": _root_mean_square(turn),
+            **self._steps(),
+            **self._costs(),
+            **self._knees(),
+            "circle_error": self._circle_error(),
+            "foot_slide": self._slide(),
+        }
+
+    def _steps(self) -> dict[str, float | None]:
+        """Mean length, width [m] and time [s] of the steps that end settled strides."""
+        r, rows, feet = self.record, self.landed.row, self.landed.foot
+        steps = []
+        for k in np.flatnonzero(self.settled) + 2:
+            way = r.feet[rows[k], feet[k]] - r.feet[rows[k], 1 - feet[k]]
+            yaw = self.mean_yaw(rows[k - 2], rows[k])
+            ahead, left = np.cos(yaw) * way + np.sin(yaw) * np.array([way[1], -way[0]])
+            steps.append((ahead, abs(left), r.time[rows[k]] - r.time[rows[k - 1]]))
+        length, width, time = np.array(steps).reshape(-1, 3).T
+        return {"step_length": _mean(length), "step_width": _mean(width), "step_time": _mean(time)}
+
+    def _costs(self) -> dict[str, float | None]:
+        """∫ Σ |τ q̇| dt over the way [J/m] from the first settled stride to the last, and of the
+        positive work alone; None below 0.1 m/s."""
+        r, rows = self.record, self.landed.row
+        ends = np.flatnonzero(self.settled) + 2
+        names = ("energy_per_metre", "work_per_metre")
+        if not len(ends):
+            return dict.fromkeys(names)
+        first, last = ends[0] - 2, ends[-1]
+        points = r.com[rows[first : last + 1 : 2]]
+        way = float(np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+        last = first + 2 * (len(points) - 1)
+        spent = [each[rows[last]] - each[rows[first]] for each in (r.energy, r.work)]
+        if way < SLOW * (r.time[rows[last]] - r.time[rows[first]]):
+            return dict.fromkeys(names)
+        return {name: float(each) / way for name, each in zip(names, spent, strict=True)}
+
+    def _knees(self) -> dict[str, float | None]:
+        """Mean and largest |τ|/m [N·m/kg] of the stance leg's knee on one foot."""
+        r, ends = self.record, self.landed.row[2:][self.settled]
+        single = r.down.sum(axis=1) == 1
+        single[: ends[0] if len(ends) else None] = False
+        load = r.knees[single, np.argmax(r.down[single], axis=1)]
+        known = load[np.isfinite(load)]
+        return {
+            "knee_mean": _mean(known),
+            "knee_peak": float(known.max()) if len(known) else None,
+        }
+
+    def _slide(self) -> float | None:
+        """Largest way of a sole on the ground while the other one is in the air [m]."""
+        r, worst = self.record, 0.0
+        for foot in range(r.down.shape[1]):
+            alone = r.down[:, foot] & (r.down.sum(axis=1) == 1)
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], alone, [0]]).astype(int)))
+            for first, last in edges.reshape(-1, 2):
+                ways = r.feet[first:last, foot] - r.feet[first, foot]
+                worst = max(worst, float(np.linalg.norm(ways, axis=1).max()))
+        return worst if len(self.landed.row) else None
+
+    def _circle_error(self) -> float | None:
+        """Largest distance of the settled walk, averaged over strides, from the circle that is
+        commanded, wherever that fits best [m]; None unless one command is a circle."""
+        turning = [each for each in self.commands if each.turn and np.hypot(each.ahead, each.left)]
+        rows, ends = self.landed.row, np.flatnonzero(self.settled) + 2
+        if len(self.commands) != 1 or not turning or len(ends) < 3:
+            return None
+        command = turning[0]
+        radius = np.hypot(command.ahead, command.left) / abs(command.turn)
+        points = np.array([self.record.com[rows[k - 2] : rows[k]].mean(axis=0) for k in ends])
+        centre = points.mean(axis=0)
+        for _ in range(200):
+            away = points - centre
+            away /= np.linalg.norm(away, axis=1, keepdims=True)
+            centre = np.mean(points - radius * away, axis=0)
+        return float(np.max(np.abs(np.linalg.norm(points - centre, axis=1) - radius)))
+
+    def phase_at(self, time: float, left: int) -> float | None:
+        """The phase of the stride at a time [s]: 0 where the `left` foot lands, ½ the other one.
+
+        Between touchdowns it goes on at the pace of the step before. None before the third one.
+        """
+        rows, feet, times = self.landed.row, self.landed.foot, self.record.time
+        past = int(np.sum(times[rows] <= time))
+        if past < 3:
+            return None
+        last, step = times[rows[past - 1]], times[rows[past - 1]] - times[rows[past - 2]]
+        part = min((time - last) / step, 1.0 - 1e-9)
+        return float(0.5 * part + (0.0 if feet[past - 1] == left else 0.5))
+
+
+def _mean(values: np.ndarray) -> float | None:
+    return float(np.mean(values)) if len(values) else None
+
+
+def _root_mean_square(values: np.ndarray) -> float | None:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else None
