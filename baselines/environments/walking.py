@@ -1,4 +1,4 @@
-"""`poise/ResidualWalk-v0`: the action moves the targets and the steps of a controller that walks."""
+"""`poise/ResidualWalk-v0`: the action moves targets and steps of a controller that walks."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
+from itertools import pairwise
 
 import numpy as np
 
@@ -96,7 +97,7 @@ def parse_commands(value: object, source: str = "reset: command") -> tuple[Timed
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise ConfigError(f"must be a mapping or a list of them, not {shown(value)}", source=source)
     commands = tuple(_parse_one(each, source) for each in given)
-    if any(a.start >= b.start for a, b in zip(commands, commands[1:], strict=False)):
+    if any(a.start >= b.start for a, b in pairwise(commands)):
         raise ConfigError("must increase from command to command", source=source, field="start")
     if len(commands) > MOST_COMMANDS:
         raise ConfigError(f"at most {MOST_COMMANDS} commands", source=source)
