@@ -70,7 +70,7 @@ def test_it_stops_and_stands():
 
 
 def test_a_command_that_is_taken_back_before_the_first_step_is_no_step():
-    _, _, env = walk((0.06, GaitCommand(0.5)), (1.0, STILL))
+    _, _, env = walk((PERIOD, GaitCommand(0.5)), (1.0, STILL))
     assert env.controller.steps == 0 and not env.controller.walking
 
 
