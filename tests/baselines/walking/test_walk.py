@@ -13,10 +13,10 @@ PERIOD = 0.02
 STILL = GaitCommand()
 
 
-def walk(*commands, push=(), seed=0, controller="walk"):
+def walk(*commands, push=(), seed=0, noise=1.0, controller="walk"):
     """Play (seconds, command) after each other; heading (n, 2), CoM (n, 3), and the environment."""
     env = ResidualStepEnv(controller=controller, duration=60.0)
-    env.reset(seed=seed, options={"push": list(push)})
+    env.reset(seed=seed, options={"push": list(push), "noise": noise})
     action, heading, com = np.zeros(len(env.action_names)), [], []
     for seconds, command in commands:
         if controller == "walk":
@@ -70,7 +70,7 @@ def test_it_stops_and_stands():
 
 
 def test_a_command_that_is_taken_back_before_the_first_step_is_no_step():
-    _, _, env = walk((PERIOD, GaitCommand(0.5)), (1.0, STILL))
+    _, _, env = walk((PERIOD, GaitCommand(0.5)), (1.0, STILL), noise=0.0)
     assert env.controller.steps == 0 and not env.controller.walking
 
 
