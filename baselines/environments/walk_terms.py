@@ -6,6 +6,7 @@ import numpy as np
 
 from poise.baselines.stepping.blocks import StepMemory
 from poise.baselines.walking.blocks import Gait
+from poise.baselines.walking.tick import step_time
 from poise.envs.balance.observation import GROUND, Terms
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
@@ -113,7 +114,7 @@ def report_walk(r: WalkReporter):
         return
     swinging = m.swinging[0] != 0
     r.report[SIDE] = 1.0 - m.foot[0] if swinging else m.foot[0]
-    part = g.step_time / (g.step_time + g.transfer_time)
+    part = step_time(g) / (step_time(g) + g.transfer_time)
     rest = min(g.clock[0] / g.transfer_time, 1.0)
     r.report[CYCLE] = part * r.steps[PHASE] if swinging else part + (1.0 - part) * rest
 

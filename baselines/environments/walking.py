@@ -1,4 +1,4 @@
-"""`poise/ResidualWalk-v0`: the action moves the targets and the steps of a controller that walks."""
+"""`poise/ResidualWalk-v0`: the action moves targets and steps of a controller that walks."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -149,7 +149,7 @@ class ResidualWalkEnv(ResidualStepEnv):
     @property
     def recovered(self) -> bool:
         """Walking as commanded in the last stride; at rest, where nothing is commanded."""
-        if not self.walker.gait.command.any():
+        if not self.walker.gait.command[:3].any():
             return super().recovered
         most = SPEED_TOLERANCE * self.scales.omega * self.scales.height
         strides = self._strides
@@ -160,7 +160,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         """The entries of `ResidualStepEnv`, the command and how far the walk is from it."""
         return {
             **super().info(),
-            "command": self.walker.gait.command.copy(),
+            "command": self.walker.gait.command[:3].copy(),
             "velocity_error": self._strides.error.copy(),
         }
 

@@ -1,1 +1,1 @@
-"""Controllers that never stop stepping."""
+"""Controllers that walk."""

@@ -12,9 +12,9 @@ from poise.envs.compiled.block import Block
 class Gait(Block):
     """A `GaitConfig` in SI units, the command, and how far the walk is."""
 
-    step_time: float  # T, from lift-off to touchdown [s]
+    step_time: float  # T, from lift-off to touchdown, unless the command says it [s]
     transfer_time: float  # T_d, on both feet [s]
-    width: float  # W [m]
+    width: float  # W, unless the command says it [m]
     height: float  # of the CoM [m]
     acceleration: float  # [m/s²]
     turn_acceleration: float  # [rad/s²]
@@ -25,8 +25,8 @@ class Gait(Block):
     start_radius: float  # [m]
     start_time: float  # [s]
     speed_margin: float  # [m/s]
-    command: np.ndarray  # (3,) velocity ahead, left [m/s], turn [rad/s] that are asked for
-    velocity: np.ndarray  # (3,) the same, which follow the command
+    command: np.ndarray  # (5,) see `GaitCommand.array`
+    velocity: np.ndarray  # (3,) ahead, left, turn, which follow the command
     error: np.ndarray  # (2,) what the sum of the velocity's errors adds to it [m/s]
     planned: np.ndarray  # (2,) the velocity with it [m/s]
     yaw: np.ndarray  # (1,) of the heading [rad]

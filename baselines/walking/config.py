@@ -1,4 +1,4 @@
-"""The configuration of the controllers that walk; numbers have the units of `stepping/config.py`."""
+"""The configuration of controllers that walk; numbers have the units of `stepping/config.py`."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -20,7 +20,7 @@ class GaitConfig:
     leg_length: float = field(default=1.04, metadata=POSITIVE)  # that limits it in a long step
     acceleration: float = field(default=0.041, metadata=POSITIVE)  # of the velocity [g]
     turn_acceleration: float = field(default=0.08, metadata=POSITIVE)  # of the turn [ω²]
-    # what is planned is the velocity that is asked for, and so much of the error of each step summed
+    # what is planned is the velocity asked for, and so much of the sum of each step's error
     correction: float = field(default=0.3, metadata=NOT_NEGATIVE)
     correction_limit: float = field(default=0.09, metadata=NOT_NEGATIVE)  # [h ω]
     time_price: float = field(default=0.018, metadata=NOT_NEGATIVE)  # of another step time [h ω]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
+from itertools import pairwise
 
 import numpy as np
 
@@ -86,8 +87,8 @@ def command_sampler(value: object) -> CommandSampler:
 def parse_commands(value: object, source: str = "reset: command") -> tuple[TimedCommand, ...]:
     """Commands from one mapping, one `GaitCommand`, or a list of them in the order of `start`.
 
-    A mapping has the keys `ahead`, `left` [m/s], `turn` [rad/s] and `start` [s after the reset],
-    all 0 where they are left out; [] is to stand.
+    A mapping has the keys of `GaitCommand`, and `start` [s after the reset], 0 where it is left
+    out; [] is to stand.
 
     Raises ConfigError naming `source`, the field and the choices for an unknown key, a number that
     is not finite, and times that do not increase.
@@ -96,7 +97,7 @@ def parse_commands(value: object, source: str = "reset: command") -> tuple[Timed
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise ConfigError(f"must be a mapping or a list of them, not {shown(value)}", source=source)
     commands = tuple(_parse_one(each, source) for each in given)
-    if any(a.start >= b.start for a, b in zip(commands, commands[1:], strict=False)):
+    if any(a.start >= b.start for a, b in pairwise(commands)):
         raise ConfigError("must increase from command to command", source=source, field="start")
     if len(commands) > MOST_COMMANDS:
         raise ConfigError(f"at most {MOST_COMMANDS} commands", source=source)
@@ -116,7 +117,7 @@ class Timetable(Block):
     """The commands of an episode as compiled code reads them."""
 
     start: np.ndarray  # (256,) [s]; infinite behind the last one
-    commands: np.ndarray  # (256, 3)
+    commands: np.ndarray  # (256, 5)
     following: np.ndarray  # (1,) int: the row that comes next
 
     def fill(self, commands: Sequence[TimedCommand]) -> None:
@@ -135,7 +136,7 @@ def empty_timetable() -> Timetable:
     """A timetable without a command."""
     table = Timetable(
         start=guarded_zeros(MOST_COMMANDS),
-        commands=guarded_zeros((MOST_COMMANDS, 3)),
+        commands=guarded_zeros((MOST_COMMANDS, 5)),
         following=guarded_zeros(1, dtype=np.int64),
     )
     table.clear()
@@ -149,7 +150,7 @@ class Follower(Block):
     timetable: Timetable
     clock: np.ndarray  # (1,) int: physics steps since the reset
     timestep: float  # [s]
-    command: np.ndarray  # (3,) of the controller's gait
+    command: np.ndarray  # (5,) of the controller's gait
 
 
 @compiled
@@ -158,7 +159,7 @@ def follow_timetable(f: Follower):
     table = f.timetable
     now, i = f.clock[0] * f.timestep + SOON, table.following[0]
     while i < table.start.shape[0] and table.start[i] <= now:
-        for a in range(3):
+        for a in range(f.command.shape[0]):
             f.command[a] = table.commands[i, a]
         i += 1
     table.following[0] = i

@@ -54,6 +54,7 @@ TIMES = 8  # step times that are weighed against the planned one
 LEAST_TIME = 0.06  # [s] for which the CoP on one foot is planned at least
 LOADED, UNLOADED = 1.5, 1.15  # rates at which the load may go to a foot, and must leave one [1/T_d]
 LEAST_LOAD = 0.03  # [m g] that a foot may bear until it leaves
+STEP_TIME, WIDTH = 3, 4  # entries of a command
 ROOM = 0.01  # [m] between the soles of a step to the side, besides the least width
 
 
@@ -71,6 +72,12 @@ def go_on_from(contacts: ContactTick, torques: np.ndarray) -> None:
     copy_into(torques, contacts.applied)
     copy_into(torques, contacts.memory.torques)
     contacts.follows[0] = 1
+
+
+@compiled
+def step_time(g: Gait) -> float:
+    """T [s]: as commanded, or the gait's own."""
+    return g.command[STEP_TIME] if g.command[STEP_TIME] > 0.0 else g.step_time
 
 
 @compiled
@@ -114,8 +121,9 @@ def follow_command(t: WalkTick) -> None:
 def step_width(t: WalkTick) -> float:
     """W [m]: wider where steps to the side need it, so that the feet do not meet."""
     g = t.gait
-    way = abs(g.velocity[1]) * (g.step_time + g.transfer_time)
-    return max(g.width, t.walk.search.width_min + way + ROOM)
+    way = abs(g.velocity[1]) * (step_time(g) + g.transfer_time)
+    wanted = g.command[WIDTH] if g.command[WIDTH] > 0.0 else g.width
+    return max(wanted, t.walk.search.width_min + way + ROOM)
 
 
 @compiled
@@ -124,7 +132,7 @@ def offset_from(t: WalkTick, swinging: int) -> tuple[float, float]:
     c, g, level = t.walk, t.gait, t.walk.memory.level_frame
     outward = t.walk.search.foot_sign[swinging] * step_width(t)
     x, y = gait_offset(
-        c.state.omega[0], g.step_time, g.transfer_time, g.planned[0], g.planned[1], outward
+        c.state.omega[0], step_time(g), g.transfer_time, g.planned[0], g.planned[1], outward
     )
     return turned(level[0, 0], level[1, 0], x + c.offsets[COM_X], y + c.offsets[COM_Y])
 
@@ -165,7 +173,7 @@ def shift_cop(t: WalkTick, p: np.ndarray) -> bool:
     put_middle(t, new, t.stance)
     level = c.memory.level_frame
     outward = t.walk.search.foot_sign[1 - new] * step_width(t)
-    x, y = gait_offset(c.state.omega[0], g.step_time, g.transfer_time, 0.0, 0.0, outward)
+    x, y = gait_offset(c.state.omega[0], step_time(g), g.transfer_time, 0.0, 0.0, outward)
     x, y = turned(level[0, 0], level[1, 0], x, y)
     x, y = xi[0] - t.stance[0] - x, xi[1] - t.stance[1] - y
     p[0], p[1] = xi[0] + c.gains.gain * x, xi[1] + c.gains.gain * y
@@ -230,7 +238,7 @@ def lift_off(t: WalkTick) -> None:
     m.foot[0], m.swinging[0], m.load_fraction[0], m.corners[0] = foot, 1, 0.0, 0
     t.gait.starting[0] = 0
     point = c.state.sole_point
-    start_swing(c.swing, point[foot], point[1 - foot, 2], t.gait.step_time)
+    start_swing(c.swing, point[foot], point[1 - foot, 2], step_time(t.gait))
 
 
 @compiled
@@ -255,12 +263,12 @@ def plan_cop(t: WalkTick) -> None:
     c, g, omega = t.walk, t.gait, t.walk.state.omega[0]
     foot, level, xi = c.memory.foot[0], c.memory.level_frame, c.state.capture_point
     stance = c.state.sole_point[1 - foot]
-    n = single_support_region(t.walk.search.region, 1 - foot, stance, level[0, 0], level[1, 0], c.corners)
-    put_middle(t, 1 - foot, t.stance)
-    period, outward = g.step_time + g.transfer_time, t.walk.search.foot_sign[foot] * step_width(t)
-    step = turned(
-        level[0, 0], level[1, 0], period * g.planned[0], outward + period * g.planned[1]
+    n = single_support_region(
+        t.walk.search.region, 1 - foot, stance, level[0, 0], level[1, 0], c.corners
     )
+    put_middle(t, 1 - foot, t.stance)
+    period, outward = step_time(g) + g.transfer_time, t.walk.search.foot_sign[foot] * step_width(t)
+    step = turned(level[0, 0], level[1, 0], period * g.planned[0], outward + period * g.planned[1])
     offset = offset_from(t, 1 - foot)
     factor = transfer_factor(omega, g.transfer_time)
     left = max(time_left(c.swing), LEAST_TIME)
@@ -310,7 +318,7 @@ def plan_foothold(t: WalkTick) -> None:
     best, best_x, best_y, best_time = np.inf, 0.0, 0.0, planned
     for k in range(TIMES + 1):
         time = planned if k == 0 else low + (high - low) * (k - 1) / (TIMES - 1)
-        regular = g.step_time + c.offsets[TIME]
+        regular = step_time(g) + c.offsets[TIME]
         cost = foothold_after(t, time) + g.time_price * abs(w.time[0] + time - regular)
         if cost < best:
             best, best_time = cost, time

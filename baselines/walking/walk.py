@@ -41,7 +41,7 @@ def allocate_gait(config: GaitConfig, units: Units) -> Gait:
         start_radius=c.start_radius * h,
         start_time=c.start_time / omega,
         speed_margin=c.speed_margin * h * omega,
-        command=guarded_zeros(3),
+        command=guarded_zeros(5),
         velocity=guarded_zeros(3),
         error=guarded_zeros(2),
         planned=guarded_zeros(2),
@@ -99,7 +99,8 @@ class Walk(CaptureStep):
     @property
     def command(self) -> GaitCommand:
         """The velocity and turn that are asked for; may be set at any time."""
-        return GaitCommand(*self.gait.command.tolist())
+        ahead, left, turn, step_time, width = self.gait.command.tolist()
+        return GaitCommand(ahead, left, turn, step_time=step_time or None, width=width or None)
 
     @command.setter
     def command(self, command: GaitCommand) -> None:

@@ -13,6 +13,8 @@ def walk(
     speed: float = 0.5,
     left: float = 0.0,
     turn: float = 0.0,
+    step_time: float | None = None,
+    width: float | None = None,
     duration: float = 20.0,
     push: str | None = None,
     push_at: float = 6.0,
@@ -28,6 +30,8 @@ def walk(
         speed: ahead [m/s]; below 0 it walks backward.
         left: sideways [m/s].
         turn: to the left [deg/s].
+        step_time: from lift-off to touchdown [s]; by default the controller's own.
+        width: between the soles [m]; by default the controller's own.
         duration: of the walk [s].
         push: an impulse [N·s] and a direction [deg, 0 ahead, 90 left] such as 20@90, for 0.1 s.
         push_at: when it is pushed [s].
@@ -44,9 +48,9 @@ def walk(
         choose_gl_backend()
     from poise.training.sessions.walk import walk
 
-    walk(speed, left=left, turn=math.radians(turn), duration=duration, controller=controller,
-         robot=robot, push=push, push_at=push_at, seed=seed, video=video, say=_say,
-         allow=allow)  # fmt: skip
+    walk(speed, left=left, turn=math.radians(turn), step_time=step_time, width=width,
+         duration=duration, controller=controller, robot=robot, push=push, push_at=push_at,
+         seed=seed, video=video, say=_say, allow=allow)  # fmt: skip
 
 
 def _say(line: str) -> None:

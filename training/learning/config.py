@@ -136,9 +136,7 @@ class TrainConfig:
         kinds: dict[str, tuple[type[ResidualBalanceEnv], dict[str, Any]]] = {
             "residual": (ResidualBalanceEnv, {"residual": self.residual}),
             "step": (ResidualStepEnv, {"residual": self.step_residual}),
-            "walk": (
-                ResidualWalkEnv, {"residual": self.step_residual, "command": self.command}
-            ),
+            "walk": (ResidualWalkEnv, {"residual": self.step_residual, "command": self.command}),
             "whole": (ResidualWholeEnv, {"servos": self.servos, "hand_over": self.hand_over}),
         }
         kind, own = kinds[self.action]

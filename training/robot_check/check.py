@@ -10,11 +10,11 @@ import numpy as np
 
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.running.files import plain
+from poise.training.trials.legs import Leg, find_legs
 from poise.training.trials.push_limits import PushLimits
 
 from .faults import Fault, find_faults
 from .holding import Holding, holding
-from poise.training.trials.legs import Leg, find_legs
 from .one_leg import one_leg_qpos
 from .posture import PostureFigures, posture_figures
 from .stability import DirectionFigures, by_direction

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from .holding import Holding
 from poise.training.trials.legs import Leg
+
+from .holding import Holding
 from .stability import DirectionFigures
 from .touching import SelfContact
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.standing import described_qpos
-
 from poise.training.trials.legs import standing_data
 
 ZERO = "zero posture"  # of the model

@@ -8,9 +8,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from poise.training.trials.legs import Leg
+
 from .check import RobotCheck
 from .holding import Holding
-from poise.training.trials.legs import Leg
 from .posture import Difference
 
 EVERY = 2  # of the directions, in the table

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import mujoco
 
 from poise.envs.robots.robot import Robot
-
 from poise.training.trials.legs import standing_data
 
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)

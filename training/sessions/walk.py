@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from poise.baselines.allowance import allows
+from poise.baselines.walking.command import GaitCommand
 from poise.baselines.walking.schedule import parse_commands
 from poise.configs.errors import ConfigError, shown
 from poise.envs.balance.base import BalanceEnv
@@ -34,6 +35,8 @@ def walk(
     *,
     left: float = 0.0,
     turn: float = 0.0,
+    step_time: float | None = None,
+    width: float | None = None,
     duration: float = 20.0,
     controller: str = "walk",
     robot: str = "humanoid",
@@ -49,6 +52,7 @@ def walk(
     Args:
         speed, left: of the command [m/s].
         turn: of the command [rad/s].
+        step_time, width: of the command, see `GaitCommand`.
         duration: of the walk [s].
         controller: one that walks, as `load_agent` takes it.
         robot: a packaged robot or a path to its description.
@@ -68,7 +72,8 @@ def walk(
     if seed < 0:
         raise ConfigError(f"must be at least 0, not {seed}", field="seed")
     loaded = load_robot(robot)
-    commands = parse_commands({"ahead": speed, "left": left, "turn": turn}, "command")
+    asked = GaitCommand(speed, left, turn, step_time=step_time, width=width)
+    commands = parse_commands(asked, "command")
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
     agent = load_agent(controller, loaded, duration=duration, pushes=None)
     check_walks(controller, agent, "walk")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -106,9 +107,7 @@ class Walk:
         """The turn that is commanded from one time to another [rad]."""
         changes = [each.start for each in self.commands if first < each.start < last]
         times = [first, *changes, last]
-        return sum(
-            (b - a) * self.command_at(a).turn for a, b in zip(times[:-1], times[1:], strict=True)
-        )
+        return sum((b - a) * self.command_at(a).turn for a, b in pairwise(times))
 
     def as_commanded(self, pushed: float | None = None) -> bool:
         """Whether the last two strides follow the command: within 0.05 m/s and 5°.
@@ -203,7 +202,10 @@ class Walk:
 
     def _circle_error(self) -> float | None:
         """Largest distance of the settled walk, averaged over strides, from the circle that is
-        commanded, wherever that fits best [m]; None unless one command is a circle."""
+        commanded, around the middle that it goes round [m]; None unless one command is a circle.
+
+        The middle c solves |p|² = 2 p · c + k for the walk's points p by least squares.
+        """
         turning = [each for each in self.commands if each.turn and np.hypot(each.ahead, each.left)]
         rows, ends = self.landed.row, np.flatnonzero(self.settled) + 2
         if len(self.commands) != 1 or not turning or len(ends) < 3:
@@ -211,12 +213,9 @@ class Walk:
         command = turning[0]
         radius = np.hypot(command.ahead, command.left) / abs(command.turn)
         points = np.array([self.record.com[rows[k - 2] : rows[k]].mean(axis=0) for k in ends])
-        centre = points.mean(axis=0)
-        for _ in range(200):
-            away = points - centre
-            away /= np.linalg.norm(away, axis=1, keepdims=True)
-            centre = np.mean(points - radius * away, axis=0)
-        return float(np.max(np.abs(np.linalg.norm(points - centre, axis=1) - radius)))
+        sides = np.column_stack([2.0 * points, np.ones(len(points))])
+        middle = np.linalg.lstsq(sides, np.sum(points**2, axis=1), rcond=None)[0][:2]
+        return float(np.max(np.abs(np.linalg.norm(points - middle, axis=1) - radius)))
 
     def phase_at(self, time: float, left: int) -> float | None:
         """The phase of the stride at a time [s]: 0 where the `left` foot lands, ½ the other one.

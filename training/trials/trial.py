@@ -115,7 +115,8 @@ class Outcome:
             work Σ max(τ q̇, 0) alone.
         knee_mean, knee_peak: |τ|/m of the stance leg's knee on one foot [N·m/kg], at the ends of
             policy steps.
-        circle_error: of one command that is a circle, largest distance of the walk from it.
+        circle_error: of one command that is a circle, largest distance of the walk from it, around
+            the middle that the walk goes round.
         foot_slide: largest way of a sole that bears the robot alone.
         push_phase: phase of the stride at the start of the first push or kick: 0 where the left
             foot lands, 0.5 where the right one does.

@@ -18,7 +18,9 @@ OMEGA = 3.5
 
 def moved(xi, cop, duration):
     """ξ after `duration` of ξ̇ = ω (ξ − p(t)), integrated numerically."""
-    end = solve_ivp(lambda t, x: OMEGA * (x - cop(t)), (0.0, duration), [xi], rtol=1e-11, atol=1e-13)
+    end = solve_ivp(
+        lambda t, x: OMEGA * (x - cop(t)), (0.0, duration), [xi], rtol=1e-11, atol=1e-13
+    )
     return float(end.y[0, -1])
 
 

@@ -13,10 +13,10 @@ PERIOD = 0.02
 STILL = GaitCommand()
 
 
-def walk(*commands, push=(), seed=0, controller="walk"):
+def walk(*commands, push=(), seed=0, noise=1.0, controller="walk"):
     """Play (seconds, command) after each other; heading (n, 2), CoM (n, 3), and the environment."""
     env = ResidualStepEnv(controller=controller, duration=60.0)
-    env.reset(seed=seed, options={"push": list(push)})
+    env.reset(seed=seed, options={"push": list(push), "noise": noise})
     action, heading, com = np.zeros(len(env.action_names)), [], []
     for seconds, command in commands:
         if controller == "walk":
@@ -70,7 +70,7 @@ def test_it_stops_and_stands():
 
 
 def test_a_command_that_is_taken_back_before_the_first_step_is_no_step():
-    _, com, env = walk((0.06, GaitCommand(0.5)), (1.0, STILL))
+    _, _, env = walk((PERIOD, GaitCommand(0.5)), (1.0, STILL), noise=0.0)
     assert env.controller.steps == 0 and not env.controller.walking
 
 
@@ -113,3 +113,26 @@ def test_the_gait_has_the_units_of_the_robot():
     for name, power in (("width", 1.0), ("step_time", 0.5), ("time_price", 0.5)):
         ratio = (units[1].height / units[0].height) ** power
         assert getattr(gaits[1], name) / getattr(gaits[0], name) == pytest.approx(ratio)
+
+
+def test_step_time_and_width_are_commanded():
+    """They hold as soon as they are asked for, and the gait's own come back."""
+    still = {"ahead": 0.2}
+    _, _, env = walk(
+        (2.0, GaitCommand(**still)), (4.0, GaitCommand(**still, step_time=0.45, width=0.28))
+    )
+    gait, state = env.controller.gait, env.simulation.state
+    assert not env.fallen and env.controller._swing.duration == pytest.approx(0.45, abs=0.05)
+    across = np.array([-state.heading[1], state.heading[0]])
+    feet = state.sole_points[:, :2]
+    assert abs((feet[0] - feet[1]) @ across) == pytest.approx(0.28, abs=0.04)
+    assert env.controller.command == GaitCommand(0.2, step_time=0.45, width=0.28)
+    env.controller.command = GaitCommand(0.2)
+    for _ in range(150):
+        env.step(np.zeros(len(env.action_names)))
+    assert env.controller._swing.duration == pytest.approx(gait.step_time, abs=0.05)
+
+
+def test_a_step_time_of_a_command_is_above_zero():
+    with pytest.raises(ConfigError, match=r"command\.step_time.*above 0"):
+        GaitCommand(0.1, step_time=0.0)

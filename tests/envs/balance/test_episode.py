@@ -25,7 +25,8 @@ def new_episode(actions, nc=2):
     return allocate_episode(actions, 1, len(REWARD_TERMS), nc)
 
 
-def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, actions=3, e=None):
+def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, actions=3, e=None,
+         velocity_error=(0.0, 0.0, 0.0)):  # fmt: skip
     """One judged step; returns reward and episode."""
     r = simulation.robot
     if e is None:
@@ -44,6 +45,7 @@ def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, 
         views=simulation.views,
         action=e.action,
         last_action=e.last_action,
+        velocity_error=np.array(velocity_error),
     )
     judge_step(
         Judge(
@@ -130,6 +132,17 @@ def test_terms_of_the_velocity_tasks():
     s.J_v[:2] = 2.0 * unit  # counts as 1
     _, e = play(simulation, weights=RewardWeights(slip=5.0))
     assert e.reward_terms[REWARD_TERMS.index("slip")] == pytest.approx(-2.5)
+
+
+def test_tracking_a_command():
+    """exp(−(|Δv| / 0.02 ω h)² − (Δψ̇ / 0.05 ω)²), if it has a weight."""
+    simulation, r = generic_state(), robot()
+    omega = np.sqrt(9.81 / r.height_com)
+    way = 0.02 * omega * r.height_com
+    error = (0.3 * way, -0.4 * way, 0.6 * 0.05 * omega)
+    _, e = play(simulation, weights=RewardWeights(tracking=2.0), velocity_error=error)
+    expected = 2.0 * np.exp(-0.25 - 0.36)
+    assert e.reward_terms[REWARD_TERMS.index("tracking")] == pytest.approx(expected)
 
 
 def test_a_fall_costs_its_weight_and_earns_nothing():
@@ -292,8 +305,9 @@ def test_ticks_account_for_power_and_saturation():
     tau = 0.5 * r.torque_limit
     tau[:3] = -r.torque_limit[:3]
     record_tick(simulation.arrays, simulation.state_arrays.qvel, tau, 0.004, e)
-    power = np.abs(tau * simulation.state.qvel[r.motor_dofs]).sum()
-    assert e.metrics[episode.ENERGY] == pytest.approx(0.004 * power)
+    power = tau * simulation.state.qvel[r.motor_dofs]
+    assert e.metrics[episode.ENERGY] == pytest.approx(0.004 * np.abs(power).sum())
+    assert e.metrics[episode.POSITIVE_WORK] == pytest.approx(0.004 * power[power > 0.0].sum())
     assert e.metrics[episode.SATURATED] == pytest.approx(3 / r.model.nu)
     assert e.metrics[episode.PEAK_TORQUE] == pytest.approx(1.0)
     assert e.metrics[episode.TICKS] == 1.0

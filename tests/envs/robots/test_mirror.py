@@ -83,7 +83,9 @@ def test_a_mirrored_trial(kind, even):
 
 def test_a_mirrored_walk(even):
     """Told to go to the other side, with the actions mirrored, it starts with the other foot."""
-    env = ResidualWalkEnv(even, duration=3.0, pushes=None, residual=StepScales(trigger=0.03, **BODY))
+    env = ResidualWalkEnv(
+        even, duration=3.0, pushes=None, residual=StepScales(trigger=0.03, **BODY)
+    )
     seen, done = env.mirrors()
     rng = np.random.default_rng(3)
     actions = np.repeat(rng.uniform(-0.1, 0.1, (10, *env.action_space.shape)), 10, axis=0)

@@ -46,7 +46,7 @@ def test_help_is_light() -> None:
     assert done.returncode == 0, done.stderr
     names = (
         *("train", "evaluate", "benchmark", "compare", "leaderboard", "replay", "demo", "tune"),
-        *("qp-set", "report", "robot", "list", "export", "view"),
+        *("qp-set", "report", "robot", "list", "export", "view", "walk"),
     )
     for name in names:
         assert name in done.stdout
@@ -135,6 +135,19 @@ def test_a_broken_pipe_of_another_kind_is_raised(
         (["train", "--out", "run", "--config", "bad.yaml"], "bad.yaml: random: unknown field"),
         (["tune", "--out", "run", "--controller", "pid"], "controllers: no such name: 'pid'"),
         (["robot", "robby"], "robots: no such name: 'robby'"),
+        (["walk", "--speed", "nan"], "command: ahead: must be a finite number, not nan"),
+        (["walk", "--duration", "0"], "duration: must be above 0 and finite, not 0"),
+        (["walk", "--controller", "zero"], "walk: controller: the controller 'zero' does not walk"),
+        (["walk", "--push", "20"], "push: must be an impulse and a direction such as 20@90, not"),
+        (["walk", "--push", "a@b"], "push: must be an impulse and a direction such as 20@90, not"),
+        (["walk", "--push", "9@999"], "push: direction: must be at most 360.0, not 999.0"),
+        (["walk", "--push", "9@9", "--push-at", "30"], "push_at: must be within the 20 s of the w"),
+        (["walk", "--video", "a.gif"], "a.gif: the name of a video must end in .mp4 or .webp"),
+        (["walk", "--seed", "-1"], "seed: must be at least 0, not -1"),
+        (
+            ["evaluate", "zero", "--suite", "walk"],
+            "suite walk: controller: the controller 'zero' do",
+        ),
         (["robot", "robot.yaml", "--out", "run/a.json"], "robot.yaml: feet: a biped has two feet"),
     ],
 )

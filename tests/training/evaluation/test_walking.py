@@ -76,7 +76,9 @@ def test_who_only_stands_is_told_so_before_anything_is_played(
     tmp_path: Path, in_process: type[InProcess]
 ) -> None:
     """One line with the controllers that walk; no folder is left."""
-    with pytest.raises(ConfigError, match=r"the controller 'momentum-qp' does not walk \(choices: w"):
+    with pytest.raises(
+        ConfigError, match=r"the controller 'momentum-qp' does not walk \(choices: w"
+    ):
         evaluate(["walk", "momentum-qp"], "walk", out=tmp_path / "out")
     assert in_process.played == 0 and not (tmp_path / "out").exists()
 

@@ -10,8 +10,8 @@ import pytest
 
 from poise.baselines.stepping.config import SwingTask
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.trials.legs import find_legs
 from poise.training.robot_check.one_leg import one_leg_qpos
+from poise.training.trials.legs import find_legs
 from tests.support.small_biped import JOINTS, LEG, write_biped
 from tests.support.small_urdf import write_urdf
 

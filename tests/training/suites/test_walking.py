@@ -89,7 +89,10 @@ def test_repeated_pushes_wait_for_the_walk(limits: PushLimits) -> None:
     ("fields", "said"),
     [
         ({"walk": {"commands": []}}, "walk: commands: must not be empty"),
-        ({"walk": {"commands": [{"speed": 1}]}}, r"commands\[0\].speed: unknown field \(choices: a"),
+        (
+            {"walk": {"commands": [{"speed": 1}]}},
+            r"commands\[0\].speed: unknown field \(choices: a",
+        ),
         ({"velocity": {"courses": {"a": []}}}, "velocity: courses: needs one command or more"),
         ({"velocity": {"courses": {"a": [{}, {}]}}}, "courses.a: start: must increase"),
         ({"walk_kick": {"speeds": []}}, "walk_kick: speeds: must not be empty"),

@@ -32,7 +32,7 @@ def recorded(
     for i, t in enumerate(time):
         step, phase = divmod(t + 1e-9, STEP)
         swinging = int(step) % 2  # the right one first
-        down[i, swinging] = phase < DOWN or step == 0 and t < DOWN
+        down[i, swinging] = phase < DOWN or (step == 0 and t < DOWN)
         for foot, side in ((0, -1.0), (1, 1.0)):
             landings = [k for k in range(int(step) + 1) if k % 2 != foot or k == 0]
             row = round(landings[-1] * STEP / PERIOD)

@@ -1,0 +1,37 @@
+"""`poise walk`: training/sessions/walk.py and training/cli/walk.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from poise.training.cli.entry import main
+from poise.training.sessions.walk import walk
+
+
+def test_a_walk_is_told_in_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    """What was asked for, how far it is every 5 s, how it ended, its figures, its push."""
+    args = "walk --speed 0.4 --turn 5 --duration 8 --push 2@90 --push-at 5.5".split()
+    assert main(args) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[0] == "walk, humanoid: 0.4 m/s ahead, 0 left, 5 °/s for 8 s"
+    assert told[1].startswith("   5.0 s  0.") and told[1].endswith(" m/s")
+    starts = ["upright after 8 s", "the last two strides are as commanded", "speed: 0.", "steps: "]
+    starts += [
+        "cost of transport: ",
+        "knee of the stance leg: ",
+        "push: 2 N·s towards 90° at 5.5 s",
+    ]
+    for line, start in zip(told[2:], starts, strict=True):
+        assert line.startswith(start)
+    assert " of the stride" in told[-1]
+
+
+def test_a_fall_is_told(tmp_path: Path) -> None:
+    """A push that nothing holds: when it fell; a video of it is written."""
+    told: list[str] = []
+    path = tmp_path / "walk.webp"
+    outcome = walk(0.3, duration=4.0, push="90@90", push_at=0.5, video=path, say=told.append)
+    assert outcome.fallen and f"fell after {outcome.fall_time:.1f} s" in told
+    assert path.stat().st_size > 1000 and told[-1] == str(path)
