@@ -4,7 +4,8 @@
 # make docs    the site of docs/ and the docstrings, in build/site
 # make build   the wheel, tried alone       make bench   time the parts of a control tick
 # make clean   remove what was built (not .venv)
-# make release   the wheel and the sdist, checked, and tried alone on each of PYTHONS; notes
+# make release   the wheel and the sdist, checked, and tried alone on each of PYTHONS; notes, and
+#                the leaderboard's data for an archive such as Zenodo (.zenodo.json)
 # make weekly  the examples that need TorchRL, RLlib, RL Zoo or MoviePy, each in a fresh environment
 # make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
@@ -124,6 +125,7 @@ release: build build/twine
 	done
 	$(PYTHON) -c "import re, pathlib; print(re.split(r'(?m)^## ', pathlib.Path('CHANGELOG.md').read_text())[1])" \
 		> dist/notes.md
+	$(PYTHON) -m zipfile -c dist/poise-leaderboard.zip docs/results docs/leaderboard.md CITATION.cff LICENSE
 	@ls dist
 
 bench: setup
