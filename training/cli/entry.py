@@ -23,6 +23,7 @@ from poise.training.running.stopping import (
 
 from .commands import COMMANDS
 
+SHELLS = ("bash", "zsh", "fish", "tcsh")  # for which tyro writes completions
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
 
@@ -96,12 +97,19 @@ def _unknown(name: str) -> ConfigError:
     return ConfigError(f"no such command: {shown(name)}{hint}", choices=COMMANDS)
 
 
+def _shell(given: list[str]) -> str:
+    """The shell that a completion is asked for; raises ConfigError for any other."""
+    if len(given) != 1 or given[0] not in SHELLS:
+        raise ConfigError("needs a shell", field="print-completion", choices=SHELLS)
+    return given[0]
+
+
 def _run(args: list[str]) -> int:
     if args == ["--version"]:
         print(f"poise {poise.__version__}")
         return 0
-    if args[:1] == ["--print-completion"]:  # tyro's own flag has a longer name
-        args = ["--tyro-print-completion", *args[1:]]
+    if args[:1] == ["--print-completion"]:
+        args = ["--tyro-print-completion", _shell(args[1:])]
     if args and not args[0].startswith("-") and args[0] not in COMMANDS:
         raise _unknown(args[0])
     if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass

@@ -17,7 +17,7 @@ def export(
     """Write a policy for other programs: ONNX, safetensors, Stable-Baselines3, a model card.
 
     The ONNX file is compared with the policy on 10,000 random observations first. The folder is
-    one that Hugging Face takes as it is. Needs pip install 'poise[export]'.
+    one that Hugging Face takes as it is. Needs pip install -e '.[export]' in a checkout.
 
     Args:
         policy: a packaged policy (see poise list) or a folder written by poise train.

@@ -45,7 +45,7 @@ def view(
 
     Up to three controllers stand side by side and meet the same pushes: of a button, or of the
     mouse, which drags a body. With --trial it is a trial of the result in DIR, with a timeline.
-    Needs pip install 'poise[view]', but for --native.
+    Needs pip install -e '.[view]' in a checkout, but for --native.
 
     Args:
         shown: controllers, feedback-step if not given; with --trial, a folder written by poise

@@ -6,6 +6,7 @@ import importlib
 from typing import Any
 
 from poise.configs.errors import ConfigError
+from poise.configs.extras import how_to_install
 
 NAMES = ("onnx", "onnxruntime", "safetensors")
 
@@ -23,5 +24,5 @@ def library(name: str) -> Any:
     except ImportError:
         package = name.split(".")[0]
         raise ConfigError(
-            f"needs the package {package}: pip install 'poise[export]'", source="export"
+            f"needs the package {package}: {how_to_install('export')}", source="export"
         ) from None

@@ -13,6 +13,7 @@ from typing import Literal, TypeVar
 
 from poise.baselines.allowance import carried
 from poise.configs.errors import ConfigError, PoiseError, shown
+from poise.configs.extras import how_to_install
 
 from .processes import ADVICE, THREADS, WorkerPool, single_threaded, tell
 from .provenance import usable_cores
@@ -35,7 +36,7 @@ def check_backend(backend: str) -> None:
             import ray  # noqa: F401
         except ImportError:
             raise ConfigError(
-                "needs the optional library ray: pip install 'poise[ray]'", field="backend"
+                f"needs the optional library ray: {how_to_install('ray')}", field="backend"
             ) from None
 
 

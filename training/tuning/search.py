@@ -1,7 +1,7 @@
 """Tuning a controller's gains by CMA-ES on seeded pushes [Hansen16].
 
 Candidates of one generation meet the same pushes; every generation draws new ones, so that
-gains are not fitted to a few trials. Needs the `cma` package (`pip install poise[dev]`).
+gains are not fitted to a few trials. Needs the `cma` package (`pip install -e '.[dev]'`).
 """
 
 import json
@@ -15,6 +15,7 @@ from rich.console import Console
 
 from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError
+from poise.configs.extras import how_to_install
 from poise.configs.files import resolve, write_atomic
 from poise.configs.reading import is_file, parse_json, read_lines
 from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
@@ -164,7 +165,7 @@ class _Search:
         try:
             import cma
         except ImportError:
-            raise ConfigError("needs the library cma: pip install 'poise[dev]'") from None
+            raise ConfigError(f"needs the library cma: {how_to_install('dev')}") from None
 
         self.config, self.gains, self.robot = config, gains, load_robot(config.robot)
         rng = np.random.default_rng(config.seed)

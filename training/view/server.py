@@ -10,11 +10,13 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.extras import how_to_install
+
+from .origins import LOOPBACK, own_pages_only
 
 if TYPE_CHECKING:
     import viser
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 STOPPING = 0.3  # [s] that a server is given to end; then the end of the process ends it
 
 
@@ -25,8 +27,8 @@ def check_installed() -> None:
         import viser  # noqa: F401
     except ImportError as error:
         raise PoiseError(
-            f"poise view needs the packages viser and mjviser ({error}): pip install "
-            "'poise[view]', in a checkout pip install -e '.[view]'; or --native, MuJoCo's window"
+            f"poise view needs the packages viser and mjviser ({error}): {how_to_install('view')}; "
+            "or --native, MuJoCo's window"
         ) from None
 
 
@@ -52,7 +54,7 @@ def serving(host: str, port: int) -> Iterator[viser.ViserServer]:
     check_port(host, port)
     import viser
 
-    with _silent():
+    with _silent(), own_pages_only(host in LOOPBACK):
         server = viser.ViserServer(host, port, label="Poise", verbose=False)
     # A page could ask for a tunnel to the outside; nobody but the user decides who may look on.
     server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]

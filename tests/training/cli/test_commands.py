@@ -57,6 +57,27 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"poise {poise.__version__}\n"
 
 
+def test_bash_completes_commands_and_flags(capsys: pytest.CaptureFixture[str]) -> None:
+    """The script that is printed, tried in a shell."""
+    with pytest.raises(SystemExit) as end:
+        main(["--print-completion", "bash"])
+    assert not end.value.code
+    script = capsys.readouterr().out
+    complete = "COMP_WORDS=({}); COMP_CWORD={}; _tyro_poise; echo ${{COMPREPLY[@]}}; "
+    asked = complete.format("poise eva", 1) + complete.format("poise evaluate --sui", 2)
+    done = subprocess.run(["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True)
+    assert "evaluate" in done.stdout.splitlines()[0] and "--suite" in done.stdout.splitlines()[1]
+
+
+@pytest.mark.parametrize("given", [[], ["cmd"], ["bash", "zsh"]])
+def test_a_shell_without_completion_is_one_line(
+    given: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--print-completion", *given]) == 2
+    err = capsys.readouterr().err
+    assert err == "poise: print-completion: needs a shell (choices: bash, zsh, fish, tcsh)\n"
+
+
 @pytest.mark.parametrize(("name", "hint"), [("evalute", ", did you mean evaluate?"), ("xyz", "")])
 def test_an_unknown_command_is_one_line(
     capsys: pytest.CaptureFixture[str], name: str, hint: str

@@ -283,6 +283,38 @@ def test_only_this_machine_sees_it(server: viser.ViserServer) -> None:
 
 
 @pytest.mark.parametrize(
+    ("origin", "host", "code"),
+    [
+        ("http://127.0.0.1:{port}", "127.0.0.1:{port}", 101),
+        ("http://localhost:9000", "localhost:9000", 101),  # forwarded by ssh from another port
+        (None, "127.0.0.1:{port}", 101),  # no browser
+        ("http://elsewhere.example", "127.0.0.1:{port}", 403),
+        ("http://127.0.0.1:1", "127.0.0.1:{port}", 403),
+        ("http://elsewhere.example", "elsewhere.example", 403),  # a name that was led here
+    ],
+)
+def test_pages_of_others_are_refused(
+    server: viser.ViserServer, origin: str | None, host: str, code: int
+) -> None:
+    """Any page that is open in a browser here could ask; only that of the server is answered."""
+    port = server.get_port()
+    lines = [
+        "GET / HTTP/1.1",
+        f"Host: {host.format(port=port)}",
+        "Upgrade: websocket",
+        "Connection: Upgrade",
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
+        "Sec-WebSocket-Version: 13",
+        f"Sec-WebSocket-Protocol: viser-v{viser.__version__}",
+    ]
+    if origin is not None:
+        lines.append(f"Origin: {origin.format(port=port)}")
+    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as asked:
+        asked.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+        assert asked.recv(64).startswith(f"HTTP/1.1 {code} ".encode())
+
+
+@pytest.mark.parametrize(
     ("count", "aspect", "phone"),
     [(1, 0.9, False), (3, 2.0, False), (3, 0.47, True), (1, 0.47, True)],
 )
