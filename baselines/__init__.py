@@ -41,7 +41,8 @@ if TYPE_CHECKING:
     from poise.baselines.environments.scales import ResidualScales, StepScales, WholeScales
     from poise.baselines.environments.stepping import ResidualStepEnv
     from poise.baselines.environments.whole import ResidualWholeEnv
-    from poise.baselines.motions.motion import ReferenceMotion, load_motion
+    from poise.baselines.motions.motion import load_motion
+    from poise.baselines.motions.reference_motion import ReferenceMotion
     from poise.baselines.registry import load_controller
     from poise.baselines.stepping.capture_step import CaptureStep
     from poise.baselines.stepping.config import CaptureStepConfig
@@ -62,7 +63,8 @@ else:
             "environments.scales": ("ResidualScales", "StepScales", "WholeScales"),
             "environments.stepping": ("ResidualStepEnv",),
             "environments.whole": ("ResidualWholeEnv",),
-            "motions.motion": ("ReferenceMotion", "load_motion"),
+            "motions.motion": ("load_motion",),
+            "motions.reference_motion": ("ReferenceMotion",),
             "registry": ("load_controller",),
             "stepping.capture_step": ("CaptureStep",),
             "stepping.config": ("CaptureStepConfig",),

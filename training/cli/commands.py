@@ -275,8 +275,14 @@ def robot(
         print(picture)
 
 
+def motion() -> None:
+    """Motion capture on a robot: info, convert, import, follow; `poise motion --help`."""
+    raise AssertionError("main() answers this sub-command")
+
+
 def list_names() -> None:
     """List what can be named: robots, environments, controllers, policies, suites and the like."""
+    from poise.baselines.clips.library import packaged_clips
     from poise.configs.files import packaged
 
     kinds = (
@@ -293,6 +299,7 @@ def list_names() -> None:
     )
     for kind in kinds:
         print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
+    print(f"clips: {', '.join(packaged_clips())}")
     print("also as controllers: policies, zero, a folder written by poise train, module:Class")
 
 
@@ -310,5 +317,6 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "qp-set": qp_set,
     "export": export,
     "robot": robot,
+    "motion": motion,
     "list": list_names,
 }
