@@ -46,7 +46,8 @@ if TYPE_CHECKING:
     from poise.baselines.environments.stepping import ResidualStepEnv
     from poise.baselines.environments.walking import ResidualWalkEnv
     from poise.baselines.environments.whole import ResidualWholeEnv
-    from poise.baselines.motions.motion import ReferenceMotion, load_motion
+    from poise.baselines.motions.motion import load_motion
+    from poise.baselines.motions.reference_motion import ReferenceMotion
     from poise.baselines.registry import load_controller
     from poise.baselines.stepping.capture_step import CaptureStep
     from poise.baselines.stepping.config import CaptureStepConfig
@@ -71,7 +72,8 @@ else:
             "environments.stepping": ("ResidualStepEnv",),
             "environments.walking": ("ResidualWalkEnv",),
             "environments.whole": ("ResidualWholeEnv",),
-            "motions.motion": ("ReferenceMotion", "load_motion"),
+            "motions.motion": ("load_motion",),
+            "motions.reference_motion": ("ReferenceMotion",),
             "registry": ("load_controller",),
             "stepping.capture_step": ("CaptureStep",),
             "stepping.config": ("CaptureStepConfig",),

@@ -10,7 +10,8 @@ import numpy as np
 
 from poise.baselines.allowance import allowing, named
 from poise.baselines.controller import CompiledController, Controller, Targets, as_base_controller
-from poise.baselines.motions.motion import ReferenceMotion, load_motion
+from poise.baselines.motions.motion import load_motion
+from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.motions.targets import motion_arrays
 from poise.baselines.registry import ControllerConfig, load_controller, walking_controllers
 from poise.baselines.walking.command import GaitCommand
@@ -88,9 +89,9 @@ class ResidualBalanceEnv(BalanceEnv):
 
     Arguments: `robot` (a name, a .yaml file or a `Robot`), `config` (an `EnvConfig`, a .yaml file
     or a mapping), `controller` (a name, a .yaml file, a mapping or a `Controller`),
-    `motion` (a name, a .yaml file or a `ReferenceMotion`), `residual` (what an action of 1 adds, a
-    `ResidualScales`), `smoothing` (time constant of the action [s]), `gate` (distance from rest at
-    which the residual opens [m]), <arguments>
+    `motion` (a name, a .yaml file, a .npz file or a `ReferenceMotion`), `residual` (what an action
+    of 1 adds, a `ResidualScales`), `smoothing` (time constant of the action [s]), `gate` (distance
+    from rest at which the residual opens [m]), <arguments>
 
     Version history: v0, first release.
     """

@@ -1,4 +1,4 @@
-"""Reference motions in time: joints, centre of mass and root, from keyframes by role.
+"""Reference motions by name or file; from keyframes by role.
 
 A motion names no joint of any robot. Its keyframes move *roles* such as `knees`, which each
 robot's description maps to its own joints (`roles:` in configs/robots/*.yaml).
@@ -7,19 +7,20 @@ robot's description maps to its own joints (`roles:` in configs/robots/*.yaml).
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
-from poise.envs.compiled.copies import Copyable
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 
 from .postures import LevelKinematics
-from .splines import evaluate, piecewise, rest_spline
+from .reference_motion import ReferenceMotion
+from .robot_clip import read_robot_clip, reference_from
+from .splines import piecewise, rest_spline
 
 SAMPLING = 0.02  # [s] between the postures whose height and root orientation are computed
 BALANCE_TOLERANCE = 1e-6  # [m]
@@ -67,62 +68,19 @@ class MotionDescription:
             raise ValueError("keyframes: the last of a loop must be equal to the first")
 
 
-class MotionSample(NamedTuple):
-    """A reference motion at one time; nj = nv − 6 joints in dof order.
-
-    The CoM is relative to the mean of the sole points, in the heading frame, so com_offset[2]
-    is its height. root is the rotation vector φ from the standing root orientation, in the
-    heading frame: R = R_heading exp(φ) R_standing.
-    """
-
-    q_ref: np.ndarray  # (nj,) [rad]
-    v_ref: np.ndarray
-    a_ref: np.ndarray
-    com_offset: np.ndarray  # (3,) [m]
-    com_vel: np.ndarray
-    com_acc: np.ndarray
-    root: np.ndarray  # (3,) [rad]
-    root_vel: np.ndarray
-    root_acc: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class ReferenceMotion(Copyable):
-    """A motion of one robot, C² in time, as a table of cubic polynomials.
-
-    Columns of `coeffs` (k, 4, nj+6): joint positions, CoM offset (3), root rotation φ (3); see
-    `splines.piecewise` for the layout and `splines.evaluate` for the compiled evaluation.
-    """
-
-    name: str
-    knots: np.ndarray  # (k+1,) [s]
-    coeffs: np.ndarray  # (k, 4, nj+6)
-    loop: bool
-
-    @property
-    def duration(self) -> float:
-        """Time of the last keyframe [s]."""
-        return float(self.knots[-1])
-
-    def sample(self, t: float) -> MotionSample:
-        """The reference at time t [s]."""
-        out = np.zeros((3, self.coeffs.shape[2]))
-        evaluate(self.knots, self.coeffs, self.loop, t, out[0], out[1], out[2])
-        joints, com, root = out[:, :-6], out[:, -6:-3], out[:, -3:]
-        return MotionSample(*joints, *com, *root)
-
-
 def load_motion(motion: str | Path | ReferenceMotion, robot: Robot) -> ReferenceMotion:
-    """A packaged motion (`squat`), that of a path to a .yaml file, or `motion` itself.
+    """A packaged motion (`squat`), that of a .yaml file or of a robot's .npz file, or `motion`.
 
     Raises ConfigError naming file and field: no such motion, a role that the robot lacks, a
     posture out of a joint's range, a CoM outside the soles, a balance that cannot be found; or a
-    motion of a robot with other joints.
+    motion of a robot with other joints. A .npz file is one of `poise motion import`.
     """
     if isinstance(motion, ReferenceMotion):
         if motion.coeffs.shape[2] != len(robot.joint_names) + 6:
             raise ConfigError(f"{motion.name!r} is not a motion of {robot.name!r}", field="motion")
         return motion
+    if isinstance(motion, (str, Path)) and Path(motion).suffix == ".npz":
+        return reference_from(read_robot_clip(motion), robot, str(motion))
     path = resolve("motions", motion)
     description = build(MotionDescription, read_yaml(path), str(path))
     return make_motion(description, robot, path.stem, str(path))

@@ -12,7 +12,6 @@ from poise.envs.maths.vectors import copy_into, rotated
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 
-from .motion import ReferenceMotion
 from .offsets import (
     COM_X,
     COM_Y,
@@ -24,6 +23,7 @@ from .offsets import (
     MOMENTUM_X,
     MOMENTUM_Y,
 )
+from .reference_motion import ReferenceMotion
 from .splines import evaluate
 
 

@@ -23,21 +23,22 @@ MOST = 14  # files in a room
 FLOORS = """
  1 configs, training/statistics
  2 envs/compiled, baselines/allowance
- 3 envs/maths, baselines/solvers, baselines/warmup, training/running
+ 3 envs/maths, baselines/clips, baselines/solvers, baselines/warmup, training/running
  4 envs/robots
  5 envs/pushes
  6 envs/physics
  7 envs/sensors, envs/viewing, baselines/controller
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
- 9 envs/vector, baselines/in_place, baselines/policy_files, baselines/stepping
+ 9 envs/vector, baselines/in_place, baselines/policy_files, baselines/retargeting
+ 9 baselines/stepping
 10 baselines/walking
 11 baselines/registry
 12 baselines/environments
 13 training/learning
 14 training/trials
 15 training/figures, training/standalone, training/suites, training/tuning
-16 training/evaluation, training/qp_set, training/robot_check
+16 training/evaluation, training/following, training/qp_set, training/robot_check
 17 training/results
 18 training/export, training/report, training/sessions
 19 training/view
@@ -55,6 +56,8 @@ ALONE = {
     "llvmlite": "envs/compiled",
     "numba.core": "envs/compiled",
     "numba.extending": "envs/compiled",
+    "pybvh": "baselines/clips",
+    "mink": "baselines/retargeting",
     "torch": "training/learning",
     "stable_baselines3": "training/learning",
 }

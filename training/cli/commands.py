@@ -276,8 +276,14 @@ def robot(
         print(picture)
 
 
+def motion() -> None:
+    """Motion capture on a robot: info, convert, import, follow; `poise motion --help`."""
+    raise AssertionError("main() answers this sub-command")
+
+
 def list_names() -> None:
     """List what can be named: robots, environments, controllers, policies, suites and the like."""
+    from poise.baselines.clips.library import packaged_clips
     from poise.configs.files import packaged
 
     kinds = (
@@ -294,6 +300,7 @@ def list_names() -> None:
     )
     for kind in kinds:
         print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
+    print(f"clips: {', '.join(packaged_clips())}")
     print("also as controllers: policies, zero, a folder written by poise train, module:Class")
 
 
@@ -312,5 +319,6 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "qp-set": qp_set,
     "export": export,
     "robot": robot,
+    "motion": motion,
     "list": list_names,
 }

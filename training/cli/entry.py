@@ -117,6 +117,11 @@ def _run(args: list[str]) -> int:
 
         run(args[1:])
         return 0
+    if args[:1] == ["motion"]:  # it has sub-commands
+        from .motion import run as run_motion
+
+        run_motion(args[1:])
+        return 0
     code = tyro.extras.subcommand_cli_from_dict(
         COMMANDS,
         prog="poise",

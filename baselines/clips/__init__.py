@@ -1,0 +1,1 @@
+"""Motion clips of any skeleton: files of motion capture, what is done with them, planted feet."""

@@ -1,0 +1,153 @@
+"""A skeleton: a tree of joints with constant offsets, and its forward kinematics."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from poise.configs.errors import ConfigError
+
+from .rotations import multiply, rotate
+
+SIDES = ("left", "right")
+#: role of a joint on either side → names that files have for it, the most certain one first
+SIDED = {
+    "hip": ("upleg", "upperleg", "upperleg01", "thigh", "femur", "hip"),
+    "knee": ("leg", "lowerleg", "lowerleg01", "loleg", "shin", "calf", "tibia", "knee"),
+    "ankle": ("foot", "ankle"),
+    "toe": ("toebase", "toes", "toe", "toe11", "ball"),
+    "shoulder": ("arm", "upperarm", "upperarm01", "uparm", "humerus", "shoulder"),
+    "elbow": ("forearm", "lowerarm", "lowerarm01", "lowarm", "loarm", "radius", "elbow"),
+    "wrist": ("wrist", "hand"),
+}
+MIDDLE = {"head": ("head",), "neck": ("neck", "neck01", "lowerneck")}
+ROLES = (*(f"{role}_{side}" for role in SIDED for side in SIDES), *MIDDLE)
+_BEFORE = re.compile(r"^(left|right|l|r)[_.\- ]?(.+)$")
+_AFTER = re.compile(r"^(.+?)[_.\- ](left|right|l|r)$")
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Joints in an order in which parents come first; the first is the root.
+
+    In the rest pose every rotation is the identity; z is up and the skeleton faces x.
+
+    Attributes:
+        names: of the joints, all different.
+        parents: (J,) index of the parent; −1 of the root.
+        offsets: (J, 3) place in the parent's axes [m]; that of the root counts nothing.
+        end_parents: (E,) joints on which an end site hangs.
+        end_offsets: (E, 3) place of the end sites in the axes of these joints [m].
+        orders: of the three rotations that a file gives for each joint, such as ``ZYX``.
+    """
+
+    names: tuple[str, ...]
+    parents: np.ndarray
+    offsets: np.ndarray
+    end_parents: np.ndarray
+    end_offsets: np.ndarray
+    orders: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for array in (self.parents, self.offsets, self.end_parents, self.end_offsets):
+            array.setflags(write=False)
+
+    def global_pose(self, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places (F, J, 3) [m] and orientations (F, J, 4) of the joints in the world.
+
+        Q_i = Q_p q_i and p_i = p_p + Q_p l_i, with p the parent, from the root's places `root`
+        (F, 3) and the rotations `local` (F, J, 4) relative to the parents.
+        """
+        places, turns = np.empty((*local.shape[:2], 3)), np.empty(local.shape)
+        places[:, 0], turns[:, 0] = root, local[:, 0]
+        for i, parent in enumerate(self.parents[1:], start=1):
+            turns[:, i] = multiply(turns[:, parent], local[:, i])
+            places[:, i] = places[:, parent] + rotate(turns[:, parent], self.offsets[i])
+        return places, turns
+
+    def ends(self, places: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """Places (F, E, 3) [m] of the end sites, from those of `global_pose`."""
+        joints = self.end_parents
+        return places[:, joints] + rotate(turns[:, joints], self.end_offsets)
+
+    @cached_property
+    def rest(self) -> np.ndarray:
+        """(J, 3) places of the joints in the rest pose, the root at the origin [m]."""
+        identity = np.zeros((1, len(self.names), 4))
+        identity[..., 0] = 1.0
+        return self.global_pose(np.zeros((1, 3)), identity)[0][0]
+
+    @cached_property
+    def roles(self) -> dict[str, int]:
+        """Role, such as ``knee_left``, → joint, as far as the names tell them."""
+        return find_roles(self.names)
+
+    def joint(self, role: str, source: str | None = None) -> int:
+        """The joint of a role; raises ConfigError if no joint has a name that says it."""
+        if role not in self.roles:
+            raise ConfigError(
+                f"no joint is called as a {role} is", source=source, field="joints",
+                choices=self.names,
+            )  # fmt: skip
+        return self.roles[role]
+
+    @cached_property
+    def partners(self) -> np.ndarray:
+        """(J,) the joint of the same name on the other side; the joint itself in the middle."""
+        sided = {_sided(name): i for i, name in enumerate(self.names)}
+        other = {"left": "right", "right": "left", "": ""}
+        found = [sided.get((base, other[side]), i) for i, (base, side) in enumerate(
+            _sided(name) for name in self.names)]  # fmt: skip
+        return np.array(found)
+
+    @cached_property
+    def leg_length(self) -> float:
+        """Length of thigh and shank, mean of both legs [m]."""
+        return leg_length(self.offsets, self.parents, self.roles)
+
+
+def leg_length(offsets: np.ndarray, parents: np.ndarray, roles: dict[str, int]) -> float:
+    """Length of the way from ankle to hip along the joints between, mean of both sides."""
+    total = 0.0
+    for side in SIDES:
+        if f"ankle_{side}" not in roles or f"hip_{side}" not in roles:
+            raise ConfigError("no legs are found by name: a hip, knee and ankle on each side",
+                              field="joints", choices=ROLES)  # fmt: skip
+        joint = roles[f"ankle_{side}"]
+        while joint not in (roles[f"hip_{side}"], -1):
+            total += float(np.linalg.norm(offsets[joint]))
+            joint = int(parents[joint])
+    return total / len(SIDES)
+
+
+def find_roles(names: tuple[str, ...]) -> dict[str, int]:
+    """Role → index among `names`; of several names for a role the most certain one wins."""
+    sided = {_sided(name): i for i, name in reversed(list(enumerate(names)))}
+    found = {}
+    for role, words in SIDED.items():
+        for side in SIDES:
+            hits = [sided[word, side] for word in words if (word, side) in sided]
+            if hits:
+                found[f"{role}_{side}"] = hits[0]
+    for role, words in MIDDLE.items():
+        hits = [sided[word, ""] for word in words if (word, "") in sided]
+        if hits:
+            found[role] = hits[0]
+    return found
+
+
+def _sided(name: str) -> tuple[str, str]:
+    """(base, side) of a joint's name: ``mixamorig:LeftArm`` is (arm, left), ``Neck`` (neck, "")."""
+    plain = name.rpartition(":")[2].lower()
+    if match := _AFTER.match(plain):
+        base, side = match.groups()
+    elif match := _BEFORE.match(plain):
+        side, base = match.groups()
+    else:
+        return plain, ""
+    if side in ("l", "r") and base in ("owerback", "owerneck", "oot", "ib", "owerspine"):
+        return plain, ""  # lowerback, lowerneck, root, rib
+    return base, "left" if side.startswith("l") else "right"

@@ -1,0 +1,156 @@
+"""A robot's postures as frames: a file of them, and the reference motion that they make."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from poise.configs.archives import read_archive, read_arrays
+from poise.configs.errors import ConfigError
+from poise.configs.files import write_atomic
+from poise.configs.reading import parse_json, parsing
+from poise.configs.schema import build
+from poise.envs.robots.robot import Robot
+
+from .postures import LevelKinematics
+from .reference_motion import ReferenceMotion
+from .splines import piecewise, rest_spline
+
+FEWEST = 4  # frames that a spline at rest at both ends takes
+MOST = 20_000
+LEVEL = 0.02  # [m] by which a sole may leave the plane of both
+ABOUT = "about.json"
+
+
+@dataclass(frozen=True)
+class About:
+    """What a file of a robot's postures says of itself."""
+
+    robot: str
+    fingerprint: str
+    name: str
+    source: str = ""
+    licence: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotClip:
+    """Postures of one robot at one rate, both soles on the ground.
+
+    Attributes:
+        about: which robot's, and where they come from.
+        dt: time between frames [s].
+        qpos: (F, nq) as MuJoCo has them.
+    """
+
+    about: About
+    dt: float
+    qpos: np.ndarray
+
+    @property
+    def duration(self) -> float:
+        """Time of the last frame [s]."""
+        return (len(self.qpos) - 1) * self.dt
+
+
+def write_robot_clip(clip: RobotClip, path: str | Path) -> None:
+    """Write a ``.npz`` file; the same clip gives the same bytes.
+
+    Raises:
+        ConfigError: the name does not end in ``.npz``.
+        PoiseError: the file cannot be written.
+    """
+    if Path(path).suffix != ".npz":
+        raise ConfigError("must be the name of a .npz file", source=path, choices=("*.npz",))
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in (("qpos", clip.qpos), ("dt", np.array([clip.dt]))):
+            member = io.BytesIO()
+            np.lib.format.write_array(member, np.ascontiguousarray(array), version=(1, 0))
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), member.getvalue())
+        about = json.dumps(asdict(clip.about), ensure_ascii=False, indent=1)
+        archive.writestr(zipfile.ZipInfo(ABOUT), about)
+    write_atomic(path, content.getvalue())
+
+
+def read_robot_clip(path: str | Path) -> RobotClip:
+    """The postures in a file of `write_robot_clip`.
+
+    Raises:
+        ConfigError: no such file, or one that does not hold such postures.
+    """
+    arrays = read_arrays(path, ("qpos", "dt"))
+    archive = read_archive(path)
+    with parsing(path):
+        about = parse_json(archive.read(ABOUT))
+    if not isinstance(about, dict):
+        raise ConfigError("must be a mapping", source=path, field=ABOUT)
+    clip = RobotClip(build(About, about, f"{path}: {ABOUT}"), float(arrays["dt"].sum()),
+                     arrays["qpos"])  # fmt: skip
+    if clip.qpos.ndim != 2 or not FEWEST <= len(clip.qpos) <= MOST or clip.qpos.shape[1] < 8:
+        raise ConfigError(f"must be {FEWEST} to {MOST} postures, not {clip.qpos.shape}",
+                          source=path, field="qpos")  # fmt: skip
+    if arrays["dt"].shape != (1,) or not 1e-3 <= clip.dt <= 1.0:
+        raise ConfigError("must be one time from 0.001 to 1 s", source=path, field="dt")
+    if not np.isfinite(clip.qpos).all():
+        raise ConfigError("must be finite", source=path, field="qpos")
+    return clip
+
+
+def reference_from(clip: RobotClip, robot: Robot, source: str) -> ReferenceMotion:
+    """The reference motion of the postures: C², and at rest at both ends.
+
+    Joints, CoM and root are cubic splines through the frames. The places of the soles are where
+    they are: CoM and root are taken over the plane and the middle of both, see `LevelKinematics`.
+
+    Raises:
+        ConfigError: postures of another robot, a joint out of its range, or soles that leave
+            their plane by 2 cm: a foot that is lifted cannot be followed yet.
+    """
+    if clip.about.fingerprint != robot.fingerprint:
+        raise ConfigError(
+            f"is a motion of the robot {clip.about.robot!r}, not of {robot.name!r} as it is here",
+            source=source, field="motion",
+        )  # fmt: skip
+    kinematics, times = LevelKinematics(robot), np.arange(len(clip.qpos)) * clip.dt
+    joints = clip.qpos[:, 7:]
+    _check_range(joints, robot, source)
+    com, root = np.empty((len(times), 3)), np.empty((len(times), 3))
+    for i, q in enumerate(joints):
+        posture = kinematics.posture(q)
+        _check_level(kinematics, times[i], source)
+        com[i], root[i] = posture.com, kinematics.root_rotation(posture)
+    splines = [rest_spline(times, values) for values in (joints, com, root)]
+    knots, coeffs = piecewise(splines)
+    return ReferenceMotion(clip.about.name, knots, coeffs, loop=False)
+
+
+def _check_range(joints: np.ndarray, robot: Robot, source: str) -> None:
+    outside = np.maximum(robot.joint_range[:, 0] - joints, joints - robot.joint_range[:, 1])
+    frame, joint = np.unravel_index(np.argmax(outside), outside.shape)
+    if outside[frame, joint] > 1e-6:
+        raise ConfigError(
+            f"joint {robot.joint_names[joint]!r} is {outside[frame, joint]:.3g} beyond its range "
+            f"in frame {frame}", source=source, field="qpos",
+        )  # fmt: skip
+
+
+def _check_level(kinematics: LevelKinematics, time: float, source: str) -> None:
+    """Raise ConfigError if the soles of the last posture are not level with each other."""
+    robot, data = kinematics.robot, kinematics.data
+    first, second = (
+        (data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position,
+         data.xmat[s.body_id].reshape(3, 3) @ s.rotation[:, 2])
+        for s in robot.soles
+    )  # fmt: skip
+    gap = abs(float((second[0] - first[0]) @ (first[1] + second[1]) / 2.0))
+    if gap > LEVEL:
+        raise ConfigError(
+            f"at {time:.2f} s one sole is {100 * gap:.1f} cm above the other: both must stay on "
+            "the ground", source=source, field="qpos",
+        )  # fmt: skip

@@ -1,0 +1,155 @@
+"""Postures of a robot that meet targets frame by frame, by mink, with planted soles."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+import mink
+import mujoco
+import numpy as np
+import qpsolvers
+
+from poise.configs.errors import PoiseError
+from poise.envs.robots.robot import Robot
+
+from .limbs import Limbs
+from .targets import BodyTargets, low_pass
+from .tasks import HeightTask, SegmentTask, SolesTask
+
+COM, HEIGHT, POSTURE = 10.0, 10.0, 0.1  # costs beside those of the segments: 1/m, 1/m, 1/rad
+PLANTING = 3  # iterations from near postures to planted soles
+MARGIN = 0.005  # [rad] kept from the joint limits, for splines between the frames
+MOST, STEP = 10, 1e-3  # iterations, and the largest move [rad, m] that ends them
+LEAST_DAMPING, MOST_DAMPING = 1e-4, 10.0
+SOLES = 100.0  # weight of their errors [m, rad] where steps are compared
+
+
+class Solved(NamedTuple):
+    """Postures of all frames, and what they miss.
+
+    Attributes:
+        qpos: (F, nq).
+        sole_error: largest distance of a sole's corner from where it is planted [m].
+        direction_error: segment → root mean square of the angle to its target [rad].
+        time_per_frame: of the processor, median [s].
+    """
+
+    qpos: np.ndarray
+    sole_error: float
+    direction_error: dict[str, float]
+    time_per_frame: float
+
+
+def solve_frames(robot: Robot, limbs: Limbs, targets: BodyTargets, smooth: float) -> Solved:
+    """One QP after the other per frame, each begun where the last frame ended.
+
+    min Σ‖W (J Δq + e)‖² over the segments, the height of the hips, the horizontal place of the CoM,
+    and the standing posture, s.t. J_soles Δq = −e_soles and the joint limits: where a limit is met
+    the other joints make up for it, nothing is cut. A step that makes things worse is taken back
+    and tried again with more damping (Levenberg and Marquardt). The joints are then low-passed at
+    `smooth` [Hz], and the nearest postures with planted soles are what remains.
+
+    Raises PoiseError if a QP has no solution.
+    """
+    ik = _FrameIk(robot, limbs, list(targets.directions))
+    qpos, times = np.empty((len(targets), robot.model.nq)), np.zeros(len(targets))
+    for frame in range(len(targets)):
+        begin = time.thread_time()
+        qpos[frame] = ik.solve(targets, frame)
+        times[frame] += time.thread_time() - begin
+    wanted = low_pass(qpos[:, 7:], smooth)
+    angles, sole_error = np.empty((len(targets), len(targets.directions))), 0.0
+    for frame in range(len(targets)):
+        begin = time.thread_time()
+        qpos[frame] = ik.planted_near(qpos[frame], wanted[frame])
+        times[frame] += time.thread_time() - begin
+        ik.segments.aim(targets.directions, frame)
+        angles[frame] = ik.angles()
+        sole_error = max(sole_error, ik.sole_error())
+    rms = np.sqrt((angles**2).mean(axis=0))
+    errors = dict(zip(targets.directions, rms.tolist(), strict=True))
+    return Solved(qpos, sole_error, errors, float(np.median(times)))
+
+
+class _FrameIk:
+    """The tasks of one robot, from frame to frame."""
+
+    def __init__(self, robot: Robot, limbs: Limbs, names: list[str]):
+        self.robot, self.model = robot, robot.model
+        self.configuration = mink.Configuration(self.model, q=robot.standing_qpos)
+        self.planted = [_corners(robot, self.configuration.data, i) for i in range(2)]
+        self.segments, self.height = SegmentTask(limbs, names), HeightTask(limbs, HEIGHT)
+        data = self.configuration.data
+        self.standing = float((self.height.pelvis.place(data) - self.height.feet.place(data))[2])
+        com = mink.ComTask(np.array([COM, COM, 0.0]))
+        com.set_target_from_configuration(self.configuration)
+        posture = mink.PostureTask(self.model, POSTURE)
+        posture.set_target_from_configuration(self.configuration)
+        self.near = mink.PostureTask(self.model, 1.0)
+        self.tasks = [self.segments, self.height, com, posture]
+        self.soles = SolesTask([sole.body for sole in robot.soles], self.configuration)
+        self.damping = LEAST_DAMPING
+        self.limits = [mink.ConfigurationLimit(self.model, 1.0, MARGIN)]
+
+    def solve(self, targets: BodyTargets, frame: int) -> np.ndarray:
+        """(nq,) the posture of a frame."""
+        self.segments.aim(targets.directions, frame)
+        self.height.height = self.standing * float(targets.height[frame])
+        damping, merit = self.damping, self._merit()
+        for _ in range(MOST):
+            before, step = self.configuration.q.copy(), self._step(self.tasks, damping)
+            self.configuration.integrate_inplace(step, 1.0)
+            after = self._merit()
+            if after <= merit * (1.0 + 1e-9) + 1e-12:
+                merit, damping = after, max(0.2 * damping, LEAST_DAMPING)
+            else:
+                self.configuration.update(before)
+                damping = min(10.0 * damping, MOST_DAMPING)
+            if np.abs(step).max() < STEP:
+                break
+        self.damping = damping
+        return self.configuration.q.copy()
+
+    def planted_near(self, qpos: np.ndarray, joints: np.ndarray) -> np.ndarray:
+        """(nq,) the posture nearest to `joints` (nj,) with planted soles; begun at `qpos`."""
+        self.configuration.update(np.concatenate([qpos[:7], joints]))
+        self.near.set_target(self.configuration.q)
+        for _ in range(PLANTING):
+            step = self._step([self.near], LEAST_DAMPING)
+            self.configuration.integrate_inplace(step, 1.0)
+        return self.configuration.q.copy()
+
+    def _step(self, tasks: list[mink.Task], damping: float) -> np.ndarray:
+        """(nv,) the displacement of one QP."""
+        problem = mink.build_ik(self.configuration, tasks, 1.0, damping,
+                                limits=self.limits, constraints=[self.soles])  # fmt: skip
+        step = qpsolvers.solve_problem(problem, solver="daqp").x
+        if step is None:
+            raise PoiseError(f"no posture of {self.robot.name!r} near this one keeps its soles "
+                             "where they stand within the joint limits")  # fmt: skip
+        return step
+
+    def _merit(self) -> float:
+        """Σ‖W e‖² of the tasks and, heavily, of the soles: what a step must make smaller."""
+        errors = [task.cost * task.compute_error(self.configuration) for task in self.tasks]
+        errors.append(SOLES * self.soles.whole_error(self.configuration))
+        return float(sum(error @ error for error in errors))
+
+    def angles(self) -> np.ndarray:
+        """(S,) angles [rad] of the segments to their targets: ‖e‖ is a chord."""
+        chords = self.segments.compute_error(self.configuration).reshape(-1, 3)
+        return 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(chords, axis=1), 0.0, 1.0))
+
+    def sole_error(self) -> float:
+        """Largest distance of a corner of a sole from where it is planted [m]."""
+        data = self.configuration.data
+        gaps = [_corners(self.robot, data, i) - self.planted[i] for i in range(2)]
+        return float(max(np.linalg.norm(gap, axis=1).max() for gap in gaps))
+
+
+def _corners(robot: Robot, data: mujoco.MjData, foot: int) -> np.ndarray:
+    """(k, 3) corners of a sole in the world [m]."""
+    sole = robot.soles[foot]
+    corners = np.pad(sole.polygon, ((0, 0), (0, 1))) @ sole.rotation.T + sole.position
+    return data.xpos[sole.body_id] + corners @ data.xmat[sole.body_id].reshape(3, 3).T

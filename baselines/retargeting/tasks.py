@@ -1,0 +1,131 @@
+"""Tasks of mink that hold for any body: directions of segments, and a height.
+
+mink is imported here and in `solve.py` only, and these only when something is retargeted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mink
+import numpy as np
+
+from .limbs import Limbs, Point
+from .targets import LINES
+
+RANK = 1e-6  # of the largest singular value: smaller ones are rounding
+SINGULAR = 0.02  # [m, rad per rad] a motion of the legs that moves the feet less is damped
+
+
+class SegmentTask(mink.Task):
+    """Segments of the body point where they are to point.
+
+    e = d − d*, with the unit vector d = (b − a)/L from a point a to a point b at distance L:
+    J = (I − d dᵀ)(J_b − J_a)/L, three rows a segment. `directions` are set before a solve.
+    """
+
+    def __init__(self, limbs: Limbs, names: list[str]):
+        weights = np.repeat([LINES[name][2] for name in names], 3)
+        super().__init__(cost=weights, gain=1.0, lm_damping=0.0)
+        self.names = names
+        self.parts, self.differences = _differences(limbs, names)
+        self.directions = np.zeros((len(names), 3))
+
+    def aim(self, directions: Mapping[str, np.ndarray], frame: int) -> None:
+        """Take the directions of a frame as targets."""
+        self.directions = np.array([directions[name][frame] for name in self.names])
+
+    def compute_error(self, configuration: mink.Configuration) -> np.ndarray:
+        """(3 S,) differences of the unit vectors."""
+        vectors = self._vectors(configuration)
+        return (vectors / _norms(vectors) - self.directions).ravel()
+
+    def compute_jacobian(self, configuration: mink.Configuration) -> np.ndarray:
+        """(3 S, nv) derivative of the error by the displacement."""
+        model, data = configuration.model, configuration.data
+        vectors = self._vectors(configuration)
+        lengths = _norms(vectors)
+        d = vectors / lengths
+        of_parts = np.array([part.jacobian(model, data) for part in self.parts])
+        moved = np.tensordot(self.differences, of_parts, 1) / lengths[..., None]  # (S, 3, nv)
+        moved -= d[:, :, None] * np.einsum("si,sij->sj", d, moved)[:, None, :]
+        return moved.reshape(-1, model.nv)
+
+    def _vectors(self, configuration: mink.Configuration) -> np.ndarray:
+        """(S, 3) from the first to the second point of every segment [m]."""
+        places = np.array([part.place(configuration.data) for part in self.parts])
+        return self.differences @ places
+
+
+class HeightTask(mink.Task):
+    """The middle of the hips is `height` [m] above that of the ankles."""
+
+    def __init__(self, limbs: Limbs, cost: float):
+        super().__init__(cost=np.array([cost]), gain=1.0, lm_damping=0.0)
+        self.pelvis, self.feet = limbs.points["pelvis"], limbs.points["feet"]
+        self.height = 0.0
+
+    def compute_error(self, configuration: mink.Configuration) -> np.ndarray:
+        """(1,) [m]."""
+        data = configuration.data
+        return np.array([self.pelvis.place(data)[2] - self.feet.place(data)[2] - self.height])
+
+    def compute_jacobian(self, configuration: mink.Configuration) -> np.ndarray:
+        """(1, nv)."""
+        model, data = configuration.model, configuration.data
+        both = self.pelvis.jacobian(model, data) - self.feet.jacobian(model, data)
+        return both[2:3]
+
+
+class SolesTask(mink.Task):
+    """Feet that stay where they are in `configuration`, as equalities that never contradict.
+
+    The rows of both feet are A = U S Vᵀ. Where the legs' joints can hardly move a foot in some way
+    (ankles of one axis) Sᵢ is small, and an error eᵢ = (Uᵀe)ᵢ would ask for a large one. So the
+    rows are Vᵢᵀ Δq = −eᵢ Sᵢ/(Sᵢ² + λ²), λ = 0.02: no motion is larger than eᵢ/(2λ).
+    """
+
+    def __init__(self, bodies: list[str], configuration: mink.Configuration):
+        super().__init__(cost=np.ones(6 * len(bodies)), gain=1.0, lm_damping=0.0)
+        self.feet = [mink.FrameTask(body, "body", 1.0, 1.0) for body in bodies]
+        for foot in self.feet:
+            foot.set_target_from_configuration(configuration)
+
+    def whole_error(self, configuration: mink.Configuration) -> np.ndarray:
+        """(12,) errors of both feet [m, rad]."""
+        return np.concatenate([foot.compute_error(configuration) for foot in self.feet])
+
+    def compute_error(self, configuration: mink.Configuration) -> np.ndarray:
+        """(r,) motions along V that undo the errors, damped where they would be large."""
+        left, values, _ = self._ranks(configuration)
+        return values / (values**2 + SINGULAR**2) * (left.T @ self.whole_error(configuration))
+
+    def compute_jacobian(self, configuration: mink.Configuration) -> np.ndarray:
+        """(r, nv)."""
+        return self._ranks(configuration)[2]
+
+    def _ranks(self, configuration: mink.Configuration) -> tuple[np.ndarray, ...]:
+        rows = np.concatenate([foot.compute_jacobian(configuration) for foot in self.feet])
+        left, values, right = np.linalg.svd(rows, full_matrices=False)
+        kept = values > RANK * values[0]
+        return left[:, kept], values[kept], right[kept]
+
+
+def _norms(vectors: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def _differences(limbs: Limbs, names: list[str]) -> tuple[list[Point], np.ndarray]:
+    """Points of one body each (K), and the weights (S, K) by which segments are made of them."""
+    parts: dict[tuple[int, bytes], Point] = {}
+    rows = []
+    for name in names:
+        row: dict[tuple[int, bytes], float] = {}
+        for role, sign in ((LINES[name][0], -1.0), (LINES[name][1], 1.0)):
+            point = limbs.points[role]
+            for body, place in point.parts:
+                key = (body, place.tobytes())
+                parts.setdefault(key, Point(((body, place),)))
+                row[key] = row.get(key, 0.0) + sign / len(point.parts)
+        rows.append(row)
+    return list(parts.values()), np.array([[row.get(k, 0.0) for k in parts] for row in rows])

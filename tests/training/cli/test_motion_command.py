@@ -1,0 +1,56 @@
+"""`poise motion`: files in and out, and errors as one line with exit code 2."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from poise.baselines.clips.bvh import read_bvh
+from poise.baselines.motions.robot_clip import read_robot_clip
+from poise.training.cli.entry import main
+from tests.support.motion_files import small_bvh
+
+
+def test_info_convert_and_import(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["motion", "info", "cmu02_squat"]) == 0
+    assert "31, 16 of them with a role" in capsys.readouterr().out
+    part, squat, back = (tmp_path / name for name in ("part.bvh", "squat.npz", "robot.bvh"))
+    cut = ["--cut", "1.0", "2.0", "--mirror", "--speed", "2"]
+    assert main(["motion", "convert", "cmu02_squat", str(part), *cut]) == 0
+    assert read_bvh(part).clip.duration == pytest.approx(0.5, abs=0.04)
+    assert main(["motion", "import", str(part), "--out", str(squat), "--robot", "compact"]) == 0
+    assert "over joint limits" in capsys.readouterr().out
+    assert main(["motion", "convert", str(squat), str(back), "--robot", "compact"]) == 0
+    robot_clip = read_robot_clip(squat)
+    robot = read_bvh(back, "m", "y", "z").clip
+    assert np.abs(robot.root - robot_clip.qpos[:, :3]).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["jump"], "no such command: motion jump (choices: info, convert, import, follow)"),
+        (["info", "nothing"], "clip: no such name: 'nothing'; give a path to a .bvh file or a"),
+        (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),
+        (["import", "cmu02_walk", "--out", "x.npz"], "feet: its feet move by"),
+        (["convert", "cmu02_stand", "x.txt"], "x.txt: must be the name of a .bvh file"),
+        (["follow", "nothing.npz"], "nothing.npz: cannot be read (No such file or directory)"),
+    ],
+)
+def test_errors_are_one_line_and_exit_code_2(
+    arguments: list[str], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert main(["motion", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert text in error and error.count("\n") == 1
+
+
+def test_a_wrong_line_of_a_file_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "wrong.bvh"
+    path.write_text(small_bvh().replace("Frames: 12", "Frames: 11"))
+    assert main(["motion", "info", str(path)]) == 2
+    assert "line 59: the file ends after 12 rows, 'Frames:' says 11" in capsys.readouterr().err

@@ -1,0 +1,217 @@
+"""`poise motion …`: files of motion capture, on a robot, and performed."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from poise.baselines.allowance import named
+from poise.baselines.clips.bvh import read_bvh, write_bvh
+from poise.baselines.clips.clip import Clip
+from poise.baselines.clips.library import find_bvh
+from poise.configs.errors import ConfigError
+from poise.configs.files import write_atomic
+from poise.envs.robots.robot import load_robot
+from poise.training.running.terminal import terminal
+
+from .arguments import Allow, Switch
+
+File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+
+
+def info(file: File, /, *, unit: str = "auto", up: str = "auto", forward: str = "auto") -> None:
+    """What a BVH file holds: joints, unit, axes, rate, planted feet, skating.
+
+    Args:
+        file: a .bvh file, or the name of a packaged clip.
+        unit: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
+        up: the file's axis that is up, such as y or -z, or auto.
+        forward: the axis along which the rest pose faces, or auto.
+    """
+    from poise.training.following.tables import print_clip
+
+    clip, axes = read_bvh(find_bvh(file), unit, up, forward)
+    print_clip(clip, axes, terminal())
+
+
+def convert(
+    file: File,
+    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")],
+    /,
+    *,
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    cut: tuple[float, float] | None = None,
+    speed: float = 1.0,
+    mirror: Switch = False,
+    reverse: Switch = False,
+    turn: float = 0.0,
+    close: float = 0.0,
+    loop: int = 1,
+    rate: float | None = None,
+    robot: str = "humanoid",
+) -> None:
+    """Change a BVH file, in this order: cut, speed, mirror, reverse, close, loop, turn, rate.
+
+    What is written has y up, z forward, and metres. A .npz of poise motion import becomes a BVH
+    file of the robot.
+
+    Args:
+        file: a .bvh file, the name of a packaged clip, or a robot's .npz.
+        out: the .bvh file to write.
+        unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
+        up: the file's axis that is up, such as y or -z, or auto.
+        forward: the axis along which the rest pose faces, or auto.
+        cut: two times [s]; what lies between is kept.
+        speed: how many times as fast.
+        mirror: exchange left and right.
+        reverse: play it backwards.
+        turn: about the vertical axis [degrees].
+        close: seconds over which the end is led to the first frame.
+        loop: how many times, one after the other.
+        rate: frames a second.
+        robot: whose .npz it is.
+    """
+    clip = _clip(file, unit, up, forward, robot)
+    if cut is not None:
+        clip = clip.cut(*cut)
+    clip = clip.at_speed(speed) if speed != 1.0 else clip
+    clip = clip.mirrored() if mirror else clip
+    clip = clip.reversed() if reverse else clip
+    clip = clip.closed(close) if close else clip
+    clip = clip.repeated(loop)
+    clip = clip.turned(turn * 3.141592653589793 / 180.0) if turn else clip
+    if rate is not None:
+        if not 1.0 <= rate <= 1000.0:
+            raise ConfigError(f"must be from 1 to 1000, not {rate:g}", field="rate")
+        clip = clip.resampled(1.0 / rate)
+    write_bvh(clip, out)
+    print(out)
+
+
+def bring(
+    file: File,
+    /,
+    *,
+    out: Path,
+    robot: str = "humanoid",
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    cut: tuple[float, float] | None = None,
+    speed: float = 1.0,
+    mirror: Switch = False,
+    smooth: float = 3.0,
+    lead: float = 1.0,
+    planted: Switch = False,
+) -> None:
+    """Retarget a BVH file to a robot whose soles stay where it stands; see docs/motions.md.
+
+    The .npz file is taken wherever a motion is named. Needs pip install 'poise[motion]'.
+
+    Args:
+        file: a .bvh file, or the name of a packaged clip.
+        out: the .npz file to write.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
+        up: the file's axis that is up, such as y or -z, or auto.
+        forward: the axis along which the rest pose faces, or auto.
+        cut: two times [s]; what lies between is kept.
+        speed: how many times as fast.
+        mirror: exchange left and right.
+        smooth: low-pass on what is asked of the robot [Hz].
+        lead: from standing into the clip, and back [s].
+        planted: take the feet as planted though they move in the clip.
+    """
+    from poise.baselines.motions.robot_clip import reference_from, write_robot_clip
+    from poise.baselines.retargeting.retarget import retarget
+    from poise.training.following.tables import print_retargeted
+
+    clip = read_bvh(find_bvh(file), unit, up, forward).clip
+    clip = clip.cut(*cut) if cut is not None else clip
+    clip = clip.at_speed(speed) if speed != 1.0 else clip
+    clip = clip.mirrored() if mirror else clip
+    body = load_robot(robot)
+    made = retarget(clip, body, smooth=smooth, lead=lead, planted=planted)
+    reference_from(made.clip, body, str(file))  # nothing is written that cannot be followed
+    write_robot_clip(made.clip, out)
+    print_retargeted(made, terminal())
+    print(out)
+
+
+def follow(
+    motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")],
+    /,
+    *,
+    controller: str = "momentum-qp",
+    robot: str = "humanoid",
+    starts: int = 20,
+    push: float = 0.0,
+    directions: int = 8,
+    seed: int = 0,
+    out: Path | None = None,
+    allow: Allow = (),
+) -> None:
+    """Perform a motion, pushed or not, and say how near the robot stayed to it.
+
+    Args:
+        motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
+        controller: as in poise evaluate.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        starts: number of trials, each from a start that is disturbed in another way.
+        push: impulse of a push at a random time of the motion [N s]; 0 for none.
+        directions: of the pushes, spread evenly, one after the other.
+        seed: of starts and pushes.
+        out: a JSON file to write the trials to.
+    """
+    from poise.baselines.allowance import allowing
+    from poise.training.following.follow import follow
+    from poise.training.following.tables import print_followed
+
+    with allowing([*named(controller), *allow]):
+        trials = follow(motion, controller, robot=robot, starts=starts, impulse=push,
+                        directions=directions, seed=seed)  # fmt: skip
+    pushed = f"pushed by {push:g} N s" if push else "not pushed"
+    print_followed(trials, f"{Path(motion).stem} by {controller} on {robot}, {pushed}", terminal())
+    if out is not None:
+        rows = [asdict(trial) for trial in trials]
+        write_atomic(out, json.dumps(rows, indent=1) + "\n")
+        print(out)
+
+
+MOTION: dict[str, Callable[..., object]] = {
+    "info": info,
+    "convert": convert,
+    "import": bring,
+    "follow": follow,
+}
+
+
+def run(args: Sequence[str]) -> None:
+    """Run a sub-command of `poise motion`."""
+    if args and not args[0].startswith("-") and args[0] not in MOTION:
+        raise ConfigError(f"no such command: motion {args[0]}", choices=MOTION)
+    tyro.extras.subcommand_cli_from_dict(
+        MOTION,
+        prog="poise motion",
+        description="Motion capture: what files hold, a robot's motion of them, and performing it.",
+        args=list(args),
+    )
+
+
+def _clip(file: Path, unit: str, up: str, forward: str, robot: str) -> Clip:
+    """The clip of a BVH file, or of a robot's .npz."""
+    if file.suffix != ".npz":
+        return read_bvh(find_bvh(file), unit, up, forward).clip
+    from poise.baselines.motions.robot_clip import read_robot_clip
+    from poise.baselines.retargeting.robot_bvh import clip_of_robot
+
+    stored, body = read_robot_clip(file), load_robot(robot)
+    if stored.about.fingerprint != body.fingerprint:
+        raise ConfigError(f"is a motion of the robot {stored.about.robot!r}, not of {body.name!r}",
+                          source=file, field="robot")  # fmt: skip
+    return clip_of_robot(body, stored.qpos, stored.dt, file.stem)

@@ -1,0 +1,1 @@
+"""Motions performed: how near a controller keeps a robot to its reference, pushed or not."""

@@ -1,0 +1,34 @@
+"""Where the bodies of a robot are while it follows a motion exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from poise.baselines.motions.postures import LevelKinematics
+from poise.baselines.motions.reference_motion import ReferenceMotion
+from poise.envs.robots.robot import Robot
+
+
+class ReferenceBodies:
+    """Joints and bodies of a motion at a time; the soles stand as at the start, facing x.
+
+    Attributes:
+        bodies: (n,) bodies that are compared: the robot's own, which move.
+    """
+
+    def __init__(self, motion: ReferenceMotion, robot: Robot):
+        self.motion, self.robot = motion, robot
+        self._kinematics = LevelKinematics(robot)
+        model = robot.model
+        moving = model.body_weldid == np.arange(model.nbody)
+        moving[0] = False
+        self.bodies = np.flatnonzero(moving)
+
+    def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Joints (nj,) [rad] and places of the bodies (n, 3) [m] at a time [s]."""
+        sample, data = self.motion.sample(time), self._kinematics.data
+        axes = self._kinematics.posture(sample.q_ref).root_axes
+        to_heading = axes @ data.xmat[self.robot.root_body_id].reshape(3, 3).T
+        com = data.subtree_com[self.robot.root_body_id]
+        places = (data.xpos[self.bodies] - com) @ to_heading.T + sample.com_offset
+        return sample.q_ref, places

@@ -1,0 +1,84 @@
+"""What a person reads of followed motions and of retargeting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from poise.baselines.clips.axes import FileAxes
+from poise.baselines.clips.clip import Clip
+from poise.baselines.clips.contacts import measure_contacts
+from poise.baselines.retargeting.retarget import Retargeted
+
+from .follow import Followed
+
+
+def print_followed(trials: Sequence[Followed], title: str, console: Console) -> None:
+    """Falls, and errors over the trials that did not fall."""
+    table = _table(title)
+    falls = sum(trial.fallen for trial in trials)
+    table.add_row("trials, falls", f"{len(trials)}, {falls}")
+    table.add_row("solver failures", str(sum(trial.solver_failures for trial in trials)))
+    stood = [trial for trial in trials if not trial.fallen]
+    for name, field, factor, unit in (
+        ("joints, RMS", "joint_rms", np.degrees(1.0), "°"),
+        ("bodies, mean distance", "body_error", 1e3, "mm"),
+        ("the same, from the root", "body_error_root", 1e3, "mm"),
+        ("bodies in the last 0.5 s", "body_error_last", 1e3, "mm"),
+    ):
+        values = [factor * getattr(trial, field) for trial in stood]
+        text = f"{np.mean(values):.1f} {unit}, largest {max(values):.1f}" if values else "-"
+        table.add_row(name, text)
+    console.print(table)
+
+
+def print_clip(clip: Clip, axes: FileAxes, console: Console) -> None:
+    """What a file of motion capture holds, and how it was understood."""
+    contacts = measure_contacts(clip)
+    up, forward = axes.names
+    table = _table(clip.name)
+    for name, value in (
+        ("joints", f"{len(clip.skeleton.names)}, {len(clip.skeleton.roles)} of them with a role"),
+        ("frames", f"{len(clip)} at {1 / clip.dt:.4g} Hz, {clip.duration:.2f} s"),
+        ("unit, up, forward", f"{axes.unit:.4g} m, {up}, {forward}"),
+        ("legs", f"{clip.skeleton.leg_length:.3f} m"),
+        ("planted, left and right", "{:.0%}, {:.0%}".format(*contacts.planted.mean(axis=0))),
+        ("feet stay in place", f"{'yes' if contacts.in_place else 'no'}, they move by "
+         f"{100 * contacts.wander.max():.1f} cm"),
+        ("skating, mean and largest", f"{100 * contacts.skating:.1f}, "
+         f"{100 * contacts.skating_largest:.1f} cm/s"),
+        ("below the floor", f"{1000 * contacts.penetration:.1f} mm"),
+    ):  # fmt: skip
+        table.add_row(name, value)
+    console.print(table)
+
+
+def print_retargeted(made: Retargeted, console: Console) -> None:
+    """What the robot's postures miss."""
+    table = _table(f"{made.clip.about.name} on {made.clip.about.robot}")
+    worst = sorted(made.direction_error.items(), key=lambda item: -item[1])
+    directions = ", ".join(f"{name} {np.degrees(error):.1f}°" for name, error in worst)
+    for name, value in (
+        (
+            "frames",
+            f"{len(made.clip.qpos)} at {1 / made.clip.dt:.3g} Hz, {made.clip.duration:.2f} s",
+        ),
+        ("legs over the clip's", f"{made.scale:.3f}"),
+        ("soles off their places", f"{1000 * made.sole_error:.2g} mm at most"),
+        ("over joint limits", f"{np.degrees(made.limit_excess):.2g}°"),
+        ("directions, RMS", directions),
+        ("time a frame", f"{1000 * made.time_per_frame:.1f} ms of the processor"),
+    ):
+        table.add_row(name, value)
+    console.print(table)
+
+
+def _table(title: str) -> Table:
+    table = Table(title=escape(title), title_justify="left", show_header=False)
+    table.add_column("of the motion", no_wrap=True)
+    table.add_column("value", overflow="fold")
+    return table
