@@ -1,6 +1,6 @@
 """`poise/ResidualBalance-v0`: the action moves the targets of a momentum QP."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,30 +13,24 @@ from poise.baselines.controller import CompiledController, Controller, Targets, 
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.motions.targets import motion_arrays
-from poise.baselines.registry import ControllerConfig, load_controller, walking_controllers
-from poise.baselines.walking.command import GaitCommand
-from poise.baselines.walking.controller import WalkingController
+from poise.baselines.registry import ControllerConfig, load_controller
 from poise.baselines.walking.schedule import (
-    Follower,
-    TimedCommand,
-    empty_timetable,
     follow_timetable,
-    parse_commands,
 )
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_steps
 from poise.configs.schema import build, to_dict
-from poise.envs.balance.base import BalanceEnv, EnvConfig
+from poise.envs.balance.base import EnvConfig
 from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, StepEnd, judge_step
 from poise.envs.balance.observation import Term, mirror_terms
-from poise.envs.balance.start import RESET_OPTIONS
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Erased, Kernel, Program, address_of
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
+from .commanded import CommandedEnv
 from .policy_step import (
     PolicyStep,
     TargetInputs,
@@ -51,7 +45,7 @@ from .policy_step import (
 from .scales import Lag, ResidualScales, action_term, make_residual
 
 
-class ResidualBalanceEnv(BalanceEnv):
+class ResidualBalanceEnv(CommandedEnv):
     """Keep a pushed robot on its feet by moving the targets of the momentum QP.
 
     Action: Box(−1, 1, (4,)), in the heading frame (origin at the middle of the soles, x forward, y
@@ -69,11 +63,11 @@ class ResidualBalanceEnv(BalanceEnv):
     height) and `lean_x`, `lean_y` (a rotation of the root's target about the axes x and y); one for
     `residual.momentum` [m h² ω] appends `momentum_x` and `momentum_y`, angular momentum that the
     posture is to carry. One for `residual.torque` [the motor's limit] appends an entry for each
-    motor, whose torque is added to the controller's, within the limit. With `smoothing` τ > 0 [s] the targets follow the action as a first-order
-    lag, a ← a + (1 − e^(−T/τ)) (action − a) per policy step T; a then is what the observation and
-    the rewards call the action. With `gate` d₀ > 0 [m] the residual is scaled by
-    1 − exp(−(d/d₀)²), d the distance of the capture point from the reference's: at rest the
-    controller is alone.
+    motor, whose torque is added to the controller's, within the limit. With `smoothing` τ > 0 [s]
+    the targets follow the action as a first-order lag, a ← a + (1 − e^(−T/τ)) (action − a) per
+    policy step T; a then is what the observation and the rewards call the action. With `gate`
+    d₀ > 0 [m] the residual is scaled by 1 − exp(−(d/d₀)²), d the distance of the capture point from
+    the reference's: at rest the controller is alone.
 
     Observation: <observation>
 
@@ -98,7 +92,6 @@ class ResidualBalanceEnv(BalanceEnv):
 
     scales_class: type[ResidualScales] = ResidualScales  #: whose fields `residual` has
     only_targets = True  #: the action moves targets and nothing else
-    option_names = (*RESET_OPTIONS, "command")  #: of `reset`
 
     def __init__(
         self,
@@ -154,9 +147,7 @@ class ResidualBalanceEnv(BalanceEnv):
         self.control_substeps = whole_steps(period, step, "controller period", source)
         self.ticks = whole_steps(self.config.policy_period, period, "policy_period", source)
         self._controller, self._base = controller, base
-        decides = base.unwrapped
-        self._walker = decides if isinstance(decides, WalkingController) else None
-        self._timetable = empty_timetable()
+        self._take_walker(base)
         # all others are called from Python, tick by tick
         self._compiled = isinstance(controller, CompiledController) and controller.compiled
         self._com_offset = float(base.com_offset)
@@ -194,49 +185,6 @@ class ResidualBalanceEnv(BalanceEnv):
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref
-
-    @property
-    def command(self) -> GaitCommand | None:
-        """What a controller that walks is told to do now; None for one that does not walk.
-
-        Setting it ends the commands of the reset. Raises ConfigError for a controller that does not
-        walk.
-        """
-        return None if self._walker is None else self._walker.command
-
-    @command.setter
-    def command(self, command: GaitCommand | Mapping[str, float]) -> None:
-        if not isinstance(command, GaitCommand):
-            command = build(GaitCommand, to_dict(command), "command")
-        walker = self._expect_walker("environment")
-        self._timetable.clear()
-        walker.command = command
-
-    def _expect_walker(self, source: str) -> WalkingController:
-        """The controller; raises ConfigError for one that does not walk."""
-        if self._walker is None:
-            kind = type(self._base.unwrapped).__name__
-            raise ConfigError(f"the controller {kind} does not walk; give one that does",
-                              source=source, field="command",
-                              choices=walking_controllers())  # fmt: skip
-        return self._walker
-
-    def _commands(self, options: Mapping[str, Any]) -> Sequence[TimedCommand]:
-        """The commands of an episode that begins with these options."""
-        return parse_commands(options["command"]) if "command" in options else ()
-
-    def _begin_walk(self, options: Mapping[str, Any]) -> None:
-        commands = self._commands(options)
-        if "command" in options:
-            self._expect_walker("reset")
-        self._timetable.fill(commands)
-        if self._walker is not None:
-            follow_timetable(self._follower(self._walker))
-
-    def _follower(self, walker: WalkingController) -> Follower:
-        """The block by which the controller is told its commands."""
-        clock = self.simulation.clock
-        return Follower(self._timetable, clock, self.arrays.timestep, walker.gait.command)
 
     def _begin(self, options: Mapping[str, Any]) -> None:
         self.controller.reset(self.state_source.state)

@@ -59,7 +59,7 @@ def find_limbs(robot: Robot) -> Limbs:
     feet = sorted(robot.soles, key=lambda sole: -data.xpos[sole.body_id][1])
     chains = [_joints(model, sole.body_id) for sole in feet]
     points: dict[str, Point] = {}
-    for side, own, other in (("left", *chains), ("right", *chains[::-1])):
+    for side, own, other in zip(("left", "right"), chains, chains[::-1], strict=True):
         hip, knee, ankle = _three(data, [j for j in own if j not in other])
         points |= {f"{role}_{side}": _anchor(model, joint)
                    for role, joint in (("hip", hip), ("knee", knee), ("ankle", ankle))}  # fmt: skip

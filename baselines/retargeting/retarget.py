@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -88,7 +88,7 @@ def _check_feet(clip: Clip) -> None:
         )  # fmt: skip
 
 
-def _solver():  # type: ignore[no-untyped-def]  # the function `solve_frames`
+def _solver() -> Any:  # the function `solve_frames`
     try:
         from .solve import solve_frames
     except ImportError as error:

@@ -17,6 +17,7 @@ from poise.baselines.whole_body.momentum_qp import (
 from poise.baselines.whole_body.parameters import QPParameters
 from poise.baselines.whole_body.tick import contact_tick
 from poise.configs.errors import ConfigError
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import NO_KERNEL, Kernel, address_of
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
@@ -280,9 +281,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             contact_kernel=NO_KERNEL,
         )
 
-    def compiled_tick(
-        self, state: RobotState, targets: Targets
-    ) -> tuple[Kernel[CaptureTick], CaptureTick]:
+    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
         """Return the kernel that compiled code calls instead of `torques`, and its block."""
         tick = self.tick(state, targets)
         return address_of(capture_tick, tick), tick

@@ -11,6 +11,7 @@ from poise.baselines.stepping.config import StepLimits
 from poise.baselines.stepping.swing import swing_gains, swing_task
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
+from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Kernel, address_of
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.pendulum import Units
@@ -162,9 +163,7 @@ class Walk(CaptureStep):
             on_first=on_first, on_second=on_second, on_both=on_both,
         )  # fmt: skip
 
-    def compiled_tick(
-        self, state: RobotState, targets: Targets
-    ) -> tuple[Kernel[WalkTick], WalkTick]:
+    def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
         """Return the kernel that compiled code calls instead of `torques`, and its block."""
         tick = self.walk_tick(state, targets)
         return address_of(walk_tick, tick), tick

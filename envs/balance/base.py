@@ -246,8 +246,11 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         Raises ConfigError as `check_action` does.
         """
         vector, e = real_array(action), self.episode
-        fits = vector is not None and vector.shape == e.action.shape
-        if not (fits and take_action(vector.astype(float), e.last_action, e.action)):
+        if (
+            vector is None
+            or vector.shape != e.action.shape
+            or not take_action(vector.astype(float), e.last_action, e.action)
+        ):
             self.check_action(action)  # raises, and names what is wrong
 
     def check_action(self, action: np.ndarray) -> np.ndarray:

@@ -198,8 +198,8 @@ def fingerprint(model: mujoco.MjModel, standing_qpos: np.ndarray) -> str:
     for array in [*(getattr(model, name) for name in names), standing_qpos]:
         rounded = np.round(np.asarray(array, dtype=float), 6) + 0.0  # + 0.0: no negative zeros
         digest.update(repr(rounded.tolist()).encode())
-    names = ("timestep", "integrator", "solver", "cone", "gravity", "disableflags")
-    for name in names if model.opt.impratio == 1.0 else (*names, "impratio"):
+    options = ("timestep", "integrator", "solver", "cone", "gravity", "disableflags")
+    for name in options if model.opt.impratio == 1.0 else (*options, "impratio"):
         digest.update(repr(np.asarray(getattr(model.opt, name), dtype=float).tolist()).encode())
     return digest.hexdigest()
 

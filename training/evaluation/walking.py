@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -24,10 +25,11 @@ def walk_levels(played: Played, duration: float) -> list[WalkLevel]:
     cells: dict[tuple[str, str], list[Outcome]] = {}
     for trial, outcome in part(played, *WALKING):
         cells.setdefault((trial.part, str(trial.level)), []).append(outcome)
-    return [
+    levels = [
         {"part": name, "level": level, **_level(outcomes, duration)}
         for (name, level), outcomes in cells.items()
-    ]  # type: ignore[typeddict-item]
+    ]
+    return cast(list[WalkLevel], levels)
 
 
 def _level(outcomes: Sequence[Outcome], duration: float) -> dict[str, object]:

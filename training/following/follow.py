@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import whole_number
+from poise.envs.balance.episode import FAILURES
 from poise.envs.balance.termination import FallLimits
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.trials.agents import Agent, load_agent
@@ -111,9 +111,10 @@ def play(
     return Followed(
         bool(env.fallen),
         float(np.sqrt(table[:, 0].mean())),
-        *(float(mean) for mean in table[:, 1:].mean(axis=0)),
+        float(table[:, 1].mean()),
+        float(table[:, 2].mean()),
         float(last[:, 1].mean()),
-        int(env.controller.failures) if isinstance(env, ResidualBalanceEnv) else 0,
+        int(env.episode.metrics[FAILURES]),
         push,
     )
 

@@ -29,7 +29,8 @@ def readable(colour: RGB, ground: RGB, least: float = CONTRAST) -> RGB:
     """
     end = 0.0 if luminance(ground) > 0.18 else 1.0
     for percent in range(101):
-        mixed = tuple(part + 0.01 * percent * (end - part) for part in colour)
+        red, green, blue = (part + 0.01 * percent * (end - part) for part in colour)
+        mixed = red, green, blue
         if contrast(mixed, ground) >= least:
             break
     return mixed

@@ -1,0 +1,78 @@
+"""Environments whose controller may walk: it follows commands, one after the other."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from poise.baselines.controller import BaseController
+from poise.baselines.registry import walking_controllers
+from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.controller import WalkingController
+from poise.baselines.walking.schedule import (
+    Follower,
+    TimedCommand,
+    empty_timetable,
+    follow_timetable,
+    parse_commands,
+)
+from poise.configs.errors import ConfigError
+from poise.configs.schema import build, to_dict
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.start import RESET_OPTIONS
+
+
+class CommandedEnv(BalanceEnv):
+    """Base of environments around a controller, which may be one that walks."""
+
+    option_names = (*RESET_OPTIONS, "command")  #: of `reset`
+
+    def _take_walker(self, controller: BaseController) -> None:
+        """Take the controller that is told what to do, if it walks."""
+        decides = controller.unwrapped
+        self._walker = decides if isinstance(decides, WalkingController) else None
+        self._decides = type(decides).__name__
+        self._timetable = empty_timetable()
+
+    @property
+    def command(self) -> GaitCommand | None:
+        """What a controller that walks is told to do now; None for one that does not walk.
+
+        Setting it ends the commands of the reset. Raises ConfigError for a controller that does not
+        walk.
+        """
+        return None if self._walker is None else self._walker.command
+
+    @command.setter
+    def command(self, command: GaitCommand | Mapping[str, float]) -> None:
+        if not isinstance(command, GaitCommand):
+            command = build(GaitCommand, to_dict(command), "command")
+        walker = self._expect_walker("environment")
+        self._timetable.clear()
+        walker.command = command
+
+    def _expect_walker(self, source: str) -> WalkingController:
+        """The controller; raises ConfigError for one that does not walk."""
+        if self._walker is None:
+            raise ConfigError(
+                f"the controller {self._decides} does not walk; give one that does",
+                source=source,
+                field="command",
+                choices=walking_controllers(),
+            )
+        return self._walker
+
+    def _commands(self, options: Mapping[str, Any]) -> Sequence[TimedCommand]:
+        """The commands of an episode that begins with these options."""
+        return parse_commands(options["command"]) if "command" in options else ()
+
+    def _begin_walk(self, options: Mapping[str, Any]) -> None:
+        commands = self._commands(options)
+        if "command" in options:
+            self._expect_walker("reset")
+        self._timetable.fill(commands)
+        if self._walker is not None:
+            follow_timetable(self._follower(self._walker))
+
+    def _follower(self, walker: WalkingController) -> Follower:
+        """The block by which the controller is told its commands."""
+        clock = self.simulation.clock
+        return Follower(self._timetable, clock, self.arrays.timestep, walker.gait.command)
