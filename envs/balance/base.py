@@ -238,9 +238,10 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         Raises ConfigError as `check_action` does.
         """
         vector, e = real_array(action), self.episode
-        fits = vector is not None and vector.shape == e.action.shape
-        if not (fits and take_action(vector.astype(float), e.last_action, e.action)):
-            self.check_action(action)  # raises, and names what is wrong
+        if vector is not None and vector.shape == e.action.shape:
+            if take_action(vector.astype(float), e.last_action, e.action):
+                return
+        self.check_action(action)  # raises, and names what is wrong
 
     def check_action(self, action: np.ndarray) -> np.ndarray:
         """Return `action` as numbers, see `checked_action`."""
