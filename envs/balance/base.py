@@ -246,12 +246,10 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         Raises ConfigError as `check_action` does.
         """
         vector, e = real_array(action), self.episode
-        if (
-            vector is None
-            or vector.shape != e.action.shape
-            or not take_action(vector.astype(float), e.last_action, e.action)
-        ):
-            self.check_action(action)  # raises, and names what is wrong
+        if vector is not None and vector.shape == e.action.shape:
+            if take_action(vector.astype(float), e.last_action, e.action):
+                return
+        self.check_action(action)  # raises, and names what is wrong
 
     def check_action(self, action: np.ndarray) -> np.ndarray:
         """Return `action` as numbers, see `checked_action`."""

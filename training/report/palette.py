@@ -29,11 +29,10 @@ def readable(colour: RGB, ground: RGB, least: float = CONTRAST) -> RGB:
     """
     end = 0.0 if luminance(ground) > 0.18 else 1.0
     for percent in range(101):
-        red, green, blue = (part + 0.01 * percent * (end - part) for part in colour)
-        mixed = red, green, blue
-        if contrast(mixed, ground) >= least:
+        r, g, b = (part + 0.01 * percent * (end - part) for part in colour)
+        if contrast((r, g, b), ground) >= least:
             break
-    return mixed
+    return r, g, b
 
 
 def contrast(first: RGB, second: RGB) -> float:
