@@ -86,7 +86,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         self._strides = no_strides()
         super().__init__(robot, config, controller=controller, **arguments)
 
-    @ResidualStepEnv.controller.setter  # type: ignore[attr-defined]
+    @ResidualStepEnv.controller.setter
     def controller(self, controller: Controller) -> None:
         """The controller whose targets and steps the action moves.
 
@@ -95,7 +95,7 @@ class ResidualWalkEnv(ResidualStepEnv):
         walker = as_base_controller(controller, self.robot).unwrapped
         if not isinstance(walker, WalkingController):
             raise ConfigError("does not walk", field="controller", choices=walking_controllers())
-        ResidualStepEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
+        ResidualStepEnv.controller.fset(self, controller)
         self.walker = walker  #: the controller that walks, of which `controller` may be a wrapper
 
     def arguments(self) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -76,7 +77,9 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     (`Walk.as_commanded`); there is no time of recovery then, and no drift.
     """
     walk = Walk(record.arrays(), trial.commands, outcome.fall_time)
-    figures = {name: _finite_or_none(value) for name, value in walk.figures().items()}
+    figures: dict[str, Any] = {
+        name: _finite_or_none(value) for name, value in walk.figures().items()
+    }
     weight = env.robot.mass * float(np.linalg.norm(env.model.opt.gravity))
     for name, per_metre in (
         ("cost_of_transport", "energy_per_metre"),
@@ -84,7 +87,7 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     ):
         cost = figures.pop(per_metre)
         figures[name] = None if cost is None else cost / weight
-    starts = [push.start for push in (*trial.pushes, *trial.kicks)]
+    starts = [*(push.start for push in trial.pushes), *(kick.start for kick in trial.kicks)]
     first = min(starts, default=None)
     left = int(np.argmax(foot_signs(env.robot)))
     phase = None if first is None else walk.phase_at(first, left)

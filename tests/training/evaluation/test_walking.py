@@ -89,7 +89,7 @@ def test_levels_count_falls_by_the_minute() -> None:
     def played(level: str, **fields: float | None) -> tuple[Trial, Outcome]:
         fell = fields.get("fall_time") is not None
         trial = Trial(0, 0, part="walk", level=level, commands=(TimedCommand(0.5),))
-        return trial, Outcome(recovered=not fell, fallen=fell, **fields)  # type: ignore[arg-type]
+        return trial, Outcome(recovered=not fell, fallen=fell, **fields)
 
     trials = [
         played("a", speed_ahead=0.4), played("a", speed_ahead=0.6),
