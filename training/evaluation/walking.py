@@ -25,20 +25,19 @@ def walk_levels(played: Played, duration: float) -> list[WalkLevel]:
     cells: dict[tuple[str, str], list[Outcome]] = {}
     for trial, outcome in part(played, *WALKING):
         cells.setdefault((trial.part, str(trial.level)), []).append(outcome)
-    levels = [
-        {"part": name, "level": level, **_level(outcomes, duration)}
-        for (name, level), outcomes in cells.items()
-    ]
-    return cast(list[WalkLevel], levels)
+    return [_level(*key, outcomes, duration) for key, outcomes in cells.items()]
 
 
-def _level(outcomes: Sequence[Outcome], duration: float) -> dict[str, object]:
+def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -> WalkLevel:
     fallen = sum(outcome.fallen for outcome in outcomes)
     stood = sum(not outcome.fallen and outcome.error is None for outcome in outcomes)
     times = [duration if each.fall_time is None else each.fall_time for each in outcomes]
     minutes = sum(times) / 60.0
     low, high = poisson_interval(fallen)
+    means = {key: _mean(outcomes, key) for key in MEANS}
     return {
+        "part": name,
+        "level": text,
         **rate([outcome.recovered for outcome in outcomes]),
         "fallen": fallen,
         "never_fell_rate": stood / len(outcomes),
@@ -46,7 +45,7 @@ def _level(outcomes: Sequence[Outcome], duration: float) -> dict[str, object]:
         "minutes": minutes,
         "falls_per_minute": fallen / minutes,
         "falls_per_minute_ci95": (low / minutes, high / minutes),
-        **{name: _mean(outcomes, name) for name in MEANS},
+        **cast(WalkMeans, means),
     }
 
 

@@ -87,7 +87,7 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     ):
         cost = figures.pop(per_metre)
         figures[name] = None if cost is None else cost / weight
-    starts = [push.start for push in trial.pushes] + [kick.start for kick in trial.kicks]
+    starts = [*(push.start for push in trial.pushes), *(kick.start for kick in trial.kicks)]
     first = min(starts, default=None)
     left = int(np.argmax(foot_signs(env.robot)))
     phase = None if first is None else walk.phase_at(first, left)

@@ -78,7 +78,7 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
     try:
         later = parse_json(line["later"]) if line["later"] else []
         pushes = [_read_push(line)] if line["body"] else []
-        many: dict[str, Any] = {
+        many: dict[str, tuple[Any, ...]] = {
             name: tuple(build(kind, item, str(path)) for item in parse_json(line[name] or "[]"))
             for name, kind in MANY.items()
         }
