@@ -27,8 +27,8 @@ class ReferenceBodies:
     def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Joints (nj,) [rad] and places of the bodies (n, 3) [m] at a time [s]."""
         sample, data = self.motion.sample(time), self._kinematics.data
-        axes = self._kinematics.posture(sample.q_ref).root_axes
-        to_heading = axes @ data.xmat[self.robot.root_body_id].reshape(3, 3).T
+        posture = self._kinematics.posture(sample.q_ref)
+        to_heading = posture.root_axes @ data.xmat[self.robot.root_body_id].reshape(3, 3).T
         com = data.subtree_com[self.robot.root_body_id]
-        places = (data.xpos[self.bodies] - com) @ to_heading.T + sample.com_offset
+        places = (data.xpos[self.bodies] - com) @ to_heading.T + posture.com
         return sample.q_ref, places
