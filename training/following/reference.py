@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from poise.baselines.motions.postures import LevelKinematics
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.envs.robots.robot import Robot
+
+
+class Stance(NamedTuple):
+    """Where the soles stood at the start: their middle (3,) [m], their heading (cos, sin)."""
+
+    origin: np.ndarray
+    heading: np.ndarray
+
+    def placed(self, places: np.ndarray) -> np.ndarray:
+        """Places (n, 3) about soles at the origin that face x, about these."""
+        cos, sin = self.heading
+        return places @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) + self.origin
 
 
 class ReferenceBodies:
