@@ -65,9 +65,9 @@ def follow(
     """Let a controller perform a motion from `starts` disturbed starts.
 
     A fall is what environments call so, but for a motion that itself goes low or bends over: then
-    it is a CoM below 0.8 of the motion's lowest, a tilt 30° beyond its largest. With an `impulse` [N·s] trial k is pushed once at the robot's
-    first push body, in direction 360° k / `directions`, at a random time within the motion; the
-    same for every controller.
+    it is a CoM below 0.8 of the motion's lowest, a tilt 30° beyond its largest. With an `impulse`
+    [N·s] trial k is pushed once at the robot's first push body, in direction 360° k /
+    `directions`, at a random time within the motion; the same for every controller.
 
     Raises:
         ConfigError: no such motion, controller or robot, one that does not play motions, counts
