@@ -124,7 +124,8 @@ def reference_from(clip: RobotClip, robot: Robot, source: str) -> ReferenceMotio
     for i, q in enumerate(joints):
         posture = kinematics.posture(q)
         _check_level(kinematics, times[i], source)
-        com[i], root[i] = posture.com, kinematics.root_rotation(posture)
+        com[i] = posture.com - kinematics.standing.com * [1.0, 1.0, 0.0]  # controllers add that
+        root[i] = kinematics.root_rotation(posture)
     splines = [rest_spline(times, values) for values in (joints, com, root)]
     knots, coeffs = piecewise(splines)
     return ReferenceMotion(clip.about.name, knots, coeffs, loop=False)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
@@ -17,12 +18,13 @@ from poise.envs.balance.termination import FallLimits
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.trials.agents import Agent, load_agent
 
-from .reference import ReferenceBodies
+from .reference import ReferenceBodies, Stance
 
 LAST = 0.5  # [s] of a trial whose error is told apart
 AFTER = 0.5  # [s] that a trial goes on after the motion's end
 PUSH_TIME = 0.1  # [s]
 LONGEST = 600.0  # [s]
+LEAN = 30.0  # [deg] beyond the motion's own largest tilt
 FALLEN = 0.8  # of the motion's lowest CoM: lower is a fall where the motion itself goes low
 
 
@@ -62,10 +64,10 @@ def follow(
 ) -> list[Followed]:
     """Let a controller perform a motion from `starts` disturbed starts.
 
-    A fall is what environments call so, but for a motion that itself goes low: then it is a CoM
-    below 0.8 of the motion's lowest. With an `impulse` [N·s] trial k is pushed once at the robot's
-    first push body, in direction 360° k / `directions`, at a random time within the motion; the
-    same for every controller.
+    A fall is what environments call so, but for a motion that itself goes low or bends over: then
+    it is a CoM below 0.8 of the motion's lowest, a tilt 30° beyond its largest. With an `impulse`
+    [N·s] trial k is pushed once at the robot's first push body, in direction 360° k /
+    `directions`, at a random time within the motion; the same for every controller.
 
     Raises:
         ConfigError: no such motion, controller or robot, one that does not play motions, counts
@@ -97,13 +99,15 @@ def play(
     observation, _ = env.reset(seed=seed, options={"push": [] if push is None else [push]})
     if agent.begin is not None:
         agent.begin()
+    state = env.simulation.state
+    stance = Stance(state.origin.copy(), state.heading.copy())
     errors: list[tuple[float, float, float]] = []
     done = False
     while not done:
         _, terminated, truncated = env.step_without_info(agent.act(observation))
         observation, done = env.episode.observation.astype(np.float32), terminated or truncated
         if not env.fallen:
-            errors.append(_errors(env, reference))
+            errors.append(_errors(env, reference, stance))
     table = np.array(errors).reshape(-1, 3)
     last = table[-round(LAST / env.config.policy_period) :]
     if not len(table):
@@ -119,9 +123,10 @@ def play(
     )
 
 
-def _errors(env: Any, reference: ReferenceBodies) -> tuple[float, float, float]:
+def _errors(env: Any, reference: ReferenceBodies, stance: Stance) -> tuple[float, float, float]:
     """Mean square of the joints, mean distance of the bodies, the same relative to the root."""
     joints, places = reference.at(env.simulation.time)
+    places = stance.placed(places)
     now = env.simulation.data.xpos[reference.bodies]
     root = int(np.searchsorted(reference.bodies, reference.robot.root_body_id))
     gap = now - places
@@ -135,7 +140,9 @@ def _errors(env: Any, reference: ReferenceBodies) -> tuple[float, float, float]:
 def _agent(controller: str, robot: Robot, motion: ReferenceMotion) -> Agent:
     period = 0.02
     duration = period * round((min(motion.duration, LONGEST) + AFTER) / period)
-    fall = {"height": min(FallLimits().height, FALLEN * _lowest(motion) / robot.height_com)}
+    low, tilt = _extremes(motion)
+    fall = {"height": min(FallLimits().height, FALLEN * low / robot.height_com),
+            "tilt": min(max(FallLimits().tilt, tilt + LEAN), 180.0)}  # fmt: skip
     given = {"motion": motion, "pushes": None, "duration": duration, "fall": fall}
     try:
         return load_agent(controller, robot, **given)
@@ -146,10 +153,12 @@ def _agent(controller: str, robot: Robot, motion: ReferenceMotion) -> Agent:
         ) from None  # fmt: skip
 
 
-def _lowest(motion: ReferenceMotion) -> float:
-    """Least height of the motion's CoM above the soles [m]."""
-    times = np.arange(0.0, motion.duration, 0.05)
-    return min(float(motion.sample(time).com_offset[2]) for time in times)
+def _extremes(motion: ReferenceMotion) -> tuple[float, float]:
+    """Least height of the motion's CoM above the soles [m], largest tilt of its root [deg]."""
+    samples = [motion.sample(time) for time in np.arange(0.0, motion.duration, 0.05)]
+    turned = [Rotation.from_rotvec(sample.root).as_matrix()[2, 2] for sample in samples]
+    low = min(float(sample.com_offset[2]) for sample in samples)
+    return low, float(np.degrees(np.arccos(np.clip(min(turned), -1.0, 1.0))))
 
 
 def _pushed(robot: Robot) -> str:

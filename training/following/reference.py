@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from poise.baselines.motions.postures import LevelKinematics
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.envs.robots.robot import Robot
+
+
+class Stance(NamedTuple):
+    """Where the soles stood at the start: their middle (3,) [m], their heading (cos, sin)."""
+
+    origin: np.ndarray
+    heading: np.ndarray
+
+    def placed(self, places: np.ndarray) -> np.ndarray:
+        """Places (n, 3) about soles at the origin that face x, about these."""
+        cos, sin = self.heading
+        return places @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) + self.origin
 
 
 class ReferenceBodies:
@@ -27,8 +41,8 @@ class ReferenceBodies:
     def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Joints (nj,) [rad] and places of the bodies (n, 3) [m] at a time [s]."""
         sample, data = self.motion.sample(time), self._kinematics.data
-        axes = self._kinematics.posture(sample.q_ref).root_axes
-        to_heading = axes @ data.xmat[self.robot.root_body_id].reshape(3, 3).T
+        posture = self._kinematics.posture(sample.q_ref)
+        to_heading = posture.root_axes @ data.xmat[self.robot.root_body_id].reshape(3, 3).T
         com = data.subtree_com[self.robot.root_body_id]
-        places = (data.xpos[self.bodies] - com) @ to_heading.T + sample.com_offset
+        places = (data.xpos[self.bodies] - com) @ to_heading.T + posture.com
         return sample.q_ref, places
