@@ -79,6 +79,7 @@ def steps() -> None:
     """Physics, state and episode, and the policy step from which everything is called."""
     env = ResidualBalanceEnv(duration=0.1)
     env.reset(seed=0, options={"push": {"impulse": 1.0, "start": 0.0}})
+    env.set_action(np.zeros(len(env.action_names)))
     env.simulation.step(np.zeros(env.robot.model.nu))
     env.simulation.state.support_distance(np.zeros(2))
     tick = _tick(env)

@@ -181,7 +181,9 @@ class ResidualBalanceEnv(CommandedEnv):
     def _mirror_actions(self, parts: dict[str, Mirror]) -> Mirror:
         names, targets = self.action_names, len(self._moved)
         terms = [action_term(name) for name in names[:targets]]
-        return mirror_terms([*terms, Term("motors", names[targets:], "1", "", "motors")], parts)
+        if self.residual.torque > 0.0:
+            terms.append(Term("motors", names[targets:], "1", "", "motors"))
+        return mirror_terms(terms, parts)
 
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref

@@ -156,7 +156,11 @@ def test_torchrl_collects(name):
 @EACH
 def test_observations_change(name):
     """No entry is constant over a few random episodes, but for feet that stay on the ground."""
-    env = gymnasium.make(name, **{**SMALL, "pushes": {**PUSHES, "magnitude": [0.5, 1.0]}})
+    varied = {**SMALL, "pushes": {**PUSHES, "magnitude": [0.5, 1.0]}}
+    if name == "poise/ResidualWalk-v0":
+        ranges = {"ahead": [0.2, 0.6], "left": [-0.1, 0.1], "turn": [-0.2, 0.2]}
+        varied |= {"command": ranges, "duration": 1.2}
+    env = gymnasium.make(name, **varied)
     seen = []
     for seed in range(6):
         seen.append(env.reset(seed=seed)[0])

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import pytest
 
-from poise.training.cli import entry, train
+from poise.training.cli import entry, motion, train
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -94,6 +94,8 @@ def parsed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     recorders = {name: recorder(name, function) for name, function in entry.COMMANDS.items()}
     monkeypatch.setattr(entry, "COMMANDS", recorders)
+    clips = {name: recorder("motion", function) for name, function in motion.MOTION.items()}
+    monkeypatch.setattr(motion, "MOTION", clips)
     monkeypatch.setattr(train, "run", lambda args: (train.parse(args), called.append("train")))
     return called
 
@@ -140,8 +142,8 @@ def test_commands_of_sentences_parse(page: str, command: str, parsed: list[str])
     """Placeholders get a value; of `a|b|c` the first is taken; `--out` may be left out."""
     words = [PLACES.get(word, word) for word in re.sub(r"(\\\|\w+)+", "", command).split()[1:]]
     words = [word for word in words if word]
-    if len(words) == 1 or words[1] == "--help":
-        assert words[0] in {*entry.COMMANDS, "COMMAND"}, page
+    if len(words) == 1 or words[1] == "--help" or words[0] == "--print-completion":
+        assert words[0] in {*entry.COMMANDS, "COMMAND", "--print-completion"}, page
         return
     if words[0] in NEEDED and "--out" not in words:
         words += ["--out", "out"]

@@ -19,7 +19,9 @@ from poise.training.trials.push_limits import PushLimits, load_limits, write_lim
 from .run import Run
 
 REFERENCE = "momentum-qp"
-RESTLESS = ("simbicon",)  # always marks time, and so never counts as recovered
+# `simbicon` always marks time, and so never counts as recovered; `walk` is feedback-step where
+# nothing is commanded
+RESTLESS = ("simbicon", "walk")
 
 
 @allows("controllers")

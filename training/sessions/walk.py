@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from poise.baselines.allowance import allows
-from poise.baselines.walking.command import GaitCommand
 from poise.baselines.walking.schedule import parse_commands
 from poise.configs.errors import ConfigError, shown
 from poise.envs.balance.base import BalanceEnv
@@ -72,7 +71,7 @@ def walk(
     if seed < 0:
         raise ConfigError(f"must be at least 0, not {seed}", field="seed")
     loaded = load_robot(robot)
-    asked = GaitCommand(speed, left, turn, step_time=step_time, width=width)
+    asked = {"ahead": speed, "left": left, "turn": turn, "step_time": step_time, "width": width}
     commands = parse_commands(asked, "command")
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
     agent = load_agent(controller, loaded, duration=duration, pushes=None)

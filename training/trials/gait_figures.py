@@ -74,7 +74,7 @@ class Walk:
         rows = self.landed.row
         spans = list(zip(rows[:-2], rows[2:], strict=True))
         self.velocity = np.array([self.mean_velocity(*span) for span in spans]).reshape(-1, 3)
-        wanted = [self.command_at(record.time[row]).array() for row in rows[2:]]
+        wanted = [self.command_at(record.time[row]).array()[:3] for row in rows[2:]]
         self.wanted = np.array(wanted).reshape(-1, 3)
         begun = [self._changed(record.time[row]) for row in rows[2:]]
         self.settled = record.time[rows[:-2]] >= np.array(begun) + SETTLING

@@ -14,7 +14,7 @@ from poise.baselines.clips.rotations import angle_between
 from poise.configs.errors import ConfigError, PoiseError
 from tests.support.motion_files import FRAMES, mutated, small_bvh
 
-MUTATIONS = 150  # python -m tests.performance.motions: 2,000
+MUTATIONS = 150
 
 
 @pytest.fixture
