@@ -220,6 +220,8 @@ def transfer_tick(t: WalkTick) -> bool:
     c.on_both.limited[0] = 0
     ready = shift_cop(t, c.vector) if g.starting[0] else transfer_cop(t, c.vector)
     g.clock[0] += c.gains.period
+    if not g.starting[0]:
+        m.clock[0] = g.clock[0]
     if ready:
         return True
     find_nearest(m.region[: m.corners[0]], c.vector, p)

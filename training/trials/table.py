@@ -57,7 +57,8 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
 
 
 def _many(items: Sequence[Any]) -> str | None:
-    return json.dumps([asdict(item) for item in items]) if items else None
+    told = [{k: v for k, v in asdict(item).items() if v is not None} for item in items]
+    return json.dumps(told) if told else None
 
 
 def outcome_cells(outcome: Outcome) -> dict[str, Cell]:
