@@ -90,8 +90,9 @@ def test_a_packaged_policy_is_known_by_its_folder(
     assert agent.fingerprint != load_agent("residual", robot).fingerprint
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
     names = ["ppo-torque", "residual", "residual-lqr-lip", "residual-pd", "residual-step"]
+    names += ["residual-torque"]
     assert packaged("policies") == [*names, "residual-whole-g1"]
-    assert default_controllers()[-5:] == tuple(names)
+    assert default_controllers()[-6:] == tuple(names)
     assert default_controllers("unitree_g1")[-1] == "residual-whole-g1"
     with pytest.raises(ConfigError, match=", ".join([*names, "residual-whole-g1", "zero"])):
         load_agent("residual-abe07", robot)
