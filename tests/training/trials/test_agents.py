@@ -60,7 +60,7 @@ def test_a_controllers_file_is_played_and_told_apart(robot: Robot, tmp_path: Pat
 def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: str) -> None:
     """The text names what was asked for and what there is."""
     with pytest.raises(
-        ConfigError, match="momentum-qp, .*residual-lqr-lip, residual-step, residual-whole-g1, zero"
+        ConfigError, match="momentum-qp, .*residual-lqr-lip, residual-step, residual-torque, residual-whole-g1, zero"
     ) as error:
         load_agent(name, robot)
     assert name in str(error.value)
