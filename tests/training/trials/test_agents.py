@@ -60,7 +60,8 @@ def test_a_controllers_file_is_played_and_told_apart(robot: Robot, tmp_path: Pat
 def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: str) -> None:
     """The text names what was asked for and what there is."""
     with pytest.raises(
-        ConfigError, match="momentum-qp, .*residual-lqr-lip, residual-step, residual-torque, residual-whole-g1, zero"
+        ConfigError,
+        match="momentum-qp, .*residual-lqr-lip, residual-step, residual-torque, residual-whole-g1, zero",
     ) as error:
         load_agent(name, robot)
     assert name in str(error.value)
@@ -123,7 +124,8 @@ def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
     """residual on the baseline, residual-CONTROLLER on another; no larger than need be."""
     found = load_policy(name).config
     if found.action != "residual":
-        others = {"torque": "ppo-torque", "step": "residual-step", "whole": "residual-whole-g1"}
+        steps = "residual-torque" if found.step_residual.torque > 0.0 else "residual-step"
+        others = {"torque": "ppo-torque", "step": steps, "whole": "residual-whole-g1"}
         assert name == others[found.action]
     else:
         on_baseline = found.controller == "momentum-qp"
