@@ -61,7 +61,7 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     """The text names what was asked for and what there is."""
     with pytest.raises(
         ConfigError,
-        match="momentum-qp, .*residual-lqr-lip, residual-step, residual-torque, residual-whole-g1, zero",
+        match="momentum-qp, .*residual-step, residual-torque, residual-whole-g1, zero",
     ) as error:
         load_agent(name, robot)
     assert name in str(error.value)
