@@ -31,7 +31,13 @@ def test_a_hard_push_is_a_fall_and_standing_is_none() -> None:
     (fallen,) = follow("standing", robot=robot, starts=1, impulse=200.0)
     assert fallen.fallen and fallen.push is not None and fallen.push["impulse"] == 200.0
     (still,) = follow("standing", robot=robot, starts=1)
-    assert not still.fallen and still.body_error_last < 0.02  # as a clip's
+    assert not still.fallen
+
+
+@pytest.mark.xfail(strict=True, reason="it stands 14 mm off the reference, and why is not known")
+def test_standing_still_is_an_error_of_zero() -> None:
+    (still,) = follow("standing", robot=robot_named("humanoid"), starts=1)
+    assert still.body_error_last < 3e-3
 
 
 def test_the_reference_s_bodies_are_those_of_standing() -> None:
