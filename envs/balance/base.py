@@ -87,9 +87,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         self.action_names = self._action_names()
         self.terms = self._observation_terms()  #: of which the observation is made
         size = sum(term.size for term in self.terms)
-        self.episode = allocate_episode(
-            len(self.action_names), size, len(REWARD_TERMS), len(self.robot.soles)
-        )
+        sizes = len(REWARD_TERMS), len(self.robot.soles), self.robot.model.nu
+        self.episode = allocate_episode(len(self.action_names), size, *sizes)
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.action_names),), np.float32)
         self._described: tuple[object, list[PushInfo]] = None, []  # pushes, their infos

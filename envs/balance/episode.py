@@ -32,8 +32,10 @@ from .termination import Limits, has_diverged, has_fallen, uprightness
     LAST_MOVING,  # time of the last policy step that was not quiet [s]
     FAILURES,  # control ticks at which the controller's solver failed
     POSITIVE_WORK,  # ∫ Σ max(τ q̇, 0) dt [J]
-) = range(15)
-METRICS = 15
+    TORQUE_VARIATION,  # sum over ticks of the mean over motors of |Δτ|/τ_max
+    TORQUE_TIME,  # of the ticks that were accounted for [s]
+) = range(17)
+METRICS = 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +48,7 @@ class EpisodeArrays(Block):
     reward: np.ndarray  # (1,) of the last policy step
     reward_terms: np.ndarray  # (terms,) weighted; their sum is the reward
     metrics: np.ndarray  # (METRICS,)
+    last_torque: np.ndarray  # (nu,) of the last control tick [N·m]
     root_wrench: np.ndarray  # (6,) of a soft root in the last tick [N, N·m]
     sole_start: np.ndarray  # (nc, 2)
     sole_rest: np.ndarray  # (nc, 2) where the soles were when the running quiet time began
@@ -54,8 +57,10 @@ class EpisodeArrays(Block):
     ticks: np.ndarray  # (1,) int: control ticks of the running policy step
 
 
-def allocate_episode(actions: int, observations: int, terms: int, nc: int) -> EpisodeArrays:
-    """Zeroed storage: as many entries of each as named, and `nc` soles."""
+def allocate_episode(
+    actions: int, observations: int, terms: int, nc: int, nu: int
+) -> EpisodeArrays:
+    """Zeroed storage: as many entries of each as named, `nc` soles and `nu` motors."""
     return EpisodeArrays(
         action=guarded_zeros(actions),
         last_action=guarded_zeros(actions),
@@ -63,6 +68,7 @@ def allocate_episode(actions: int, observations: int, terms: int, nc: int) -> Ep
         reward=guarded_zeros(1),
         reward_terms=guarded_zeros(terms),
         metrics=guarded_zeros(METRICS),
+        last_torque=guarded_zeros(nu),
         root_wrench=guarded_zeros(6),
         sole_start=guarded_zeros((nc, 2)),
         sole_rest=guarded_zeros((nc, 2)),
@@ -94,7 +100,7 @@ def record_tick(
 ):
     """Account for one control tick with motor torques `tau` (nu,) at speeds `qvel` (nv,)."""
     m = e.metrics
-    power, positive, saturated = 0.0, 0.0, 0.0
+    power, positive, saturated, change = 0.0, 0.0, 0.0, 0.0
     for i in range(tau.shape[0]):
         work = tau[i] * qvel[robot.motor_dofs[i]]
         power += abs(work)
@@ -102,9 +108,13 @@ def record_tick(
         load = abs(tau[i]) / robot.torque_limit[i]
         m[PEAK_TORQUE] = max(m[PEAK_TORQUE], load)
         saturated += 1.0 if load > 0.999 else 0.0
+        change += abs(tau[i] - e.last_torque[i]) / robot.torque_limit[i]
+        e.last_torque[i] = tau[i]
     m[ENERGY] += power * period
     m[POSITIVE_WORK] += positive * period
     m[SATURATED] += saturated / tau.shape[0]
+    m[TORQUE_VARIATION] += change / tau.shape[0] if m[TICKS] > 0.0 else 0.0
+    m[TORQUE_TIME] += period
     m[TICKS] += 1.0
 
 

@@ -94,6 +94,8 @@ def counts(outcomes: Sequence[Outcome]) -> Counts:
         "min_cop_margin_median": over("min_cop_margin", np.median, standing),
         "max_slide": over("max_slide", np.max, standing),
         "energy_median": over("energy", np.median, standing),
+        "mean_power_median": over("mean_power", np.median, standing),
+        "torque_variation_median": over("torque_variation", np.median, standing),
         "peak_torque_median": over("peak_torque", np.median),
         "mean_abs_action": over("mean_abs_action", np.mean),
         "mean_abs_action_max": over("mean_abs_action", np.max),

@@ -46,6 +46,8 @@ class Counts(Rate, total=False):
     min_cop_margin_median: Number
     max_slide: Number
     energy_median: Number
+    mean_power_median: Number
+    torque_variation_median: Number
     peak_torque_median: Number
     mean_abs_action: Number
     mean_abs_action_max: Number

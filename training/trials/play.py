@@ -19,6 +19,7 @@ from .signals import Sway
 from .trial import Outcome, Trial
 
 FOOT_DISPLACED = 0.05  # [m]
+TINY = 1e-9  # [s]
 SETTLED = 1.0  # [s] after which actions and drift count
 Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
 
@@ -117,6 +118,8 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
         energy=_finite(m[episode.ENERGY]),
         peak_torque=_finite(m[episode.PEAK_TORQUE]),
         saturation=float(m[episode.SATURATED] / max(m[episode.TICKS], 1.0)),
+        mean_power=_finite(m[episode.ENERGY] / max(m[episode.TORQUE_TIME], TINY)),
+        torque_variation=_finite(m[episode.TORQUE_VARIATION] / max(m[episode.TORQUE_TIME], TINY)),
         solver_failures=int(m[episode.FAILURES]),
         mean_abs_action=settled.actions / settled.steps if settled.steps else None,
         com_drift=_finite(settled.drift) if settled.steps and not trial.pushes else None,

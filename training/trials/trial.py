@@ -93,6 +93,10 @@ class Outcome:
         energy: ∫ Σ |τ q̇| dt [J].
         peak_torque: largest |τ| over its limit.
         saturation: fraction of motors and ticks at the limit.
+        mean_power: ∫ Σ |τ q̇| dt over the time that was played [W].
+        torque_variation: Σ |τ_k − τ_k−1| / τ_max over the control ticks k, mean over the motors,
+            over the time that was played [1/s]. A torque that goes from one limit to the other and
+            back once a second has 4; one that hums has more.
         solver_failures: ticks at which the QP was not solved.
         mean_abs_action: mean |action| after the first second.
         com_drift: without a push, largest horizontal distance of the CoM from where it was after
@@ -136,6 +140,8 @@ class Outcome:
     energy: float | None = None
     peak_torque: float | None = None
     saturation: float = 0.0
+    mean_power: float | None = None
+    torque_variation: float | None = None
     solver_failures: int = 0
     mean_abs_action: float | None = None
     com_drift: float | None = None

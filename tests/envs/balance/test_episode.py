@@ -22,7 +22,7 @@ from tests.support.shared import generic_state, robot
 
 def new_episode(actions, nc=2):
     """An empty record."""
-    return allocate_episode(actions, 1, len(REWARD_TERMS), nc)
+    return allocate_episode(actions, 1, len(REWARD_TERMS), nc, robot().model.nu)
 
 
 def play(simulation, limits=None, weights=None, tau=None, q_ref=None, time=0.5, actions=3, e=None,
@@ -311,6 +311,24 @@ def test_ticks_account_for_power_and_saturation():
     assert e.metrics[episode.SATURATED] == pytest.approx(3 / r.model.nu)
     assert e.metrics[episode.PEAK_TORQUE] == pytest.approx(1.0)
     assert e.metrics[episode.TICKS] == 1.0
+    assert e.metrics[episode.TORQUE_VARIATION] == 0.0  # there was no torque before it
+
+
+def test_torque_variation_is_the_way_that_torques_go_over_their_limits():
+    """Whatever the number of ticks in which they go it; one that hums goes a longer one."""
+    simulation, r = generic_state(), robot()
+
+    def variation(fractions):
+        e = new_episode(1)
+        for fraction in fractions:
+            tau = fraction * r.torque_limit
+            record_tick(simulation.arrays, simulation.state_arrays.qvel, tau, 0.004, e)
+        assert e.metrics[episode.TORQUE_TIME] == pytest.approx(0.004 * len(fractions))
+        return e.metrics[episode.TORQUE_VARIATION]
+
+    assert variation([-0.5, 0.5]) == pytest.approx(1.0)
+    assert variation(np.linspace(-0.5, 0.5, 9)) == pytest.approx(1.0)
+    assert variation([-0.5, 0.6, 0.4, 0.5]) == pytest.approx(1.1 + 0.2 + 0.1)
 
 
 def test_a_new_episode_forgets_the_last():
