@@ -129,6 +129,8 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         ("CoM drift [mm]", figure(lambda e: _number(e["com_drift_max"], ".1f", 1000.0))),
         ("feet drift [mm]", figure(lambda e: _number(e["foot_drift_max"], ".1f", 1000.0))),
         ("lean at the end [°]", figure(lambda e: _number(e["unpushed_lean_max"], ".2f"))),
+        ("power [W]", figure(lambda e: _number(e["mean_power_median"], ".0f"))),
+        ("chatter [1/s]", figure(lambda e: _number(e["torque_variation_median"], ".2f"))),
         ("steps, mean", figure(lambda e: _number(e["steps_mean"] or None, ".1f"))),
         ("of one-step limit", figure(lambda e: f"{e['step_share_1_mean']:.2f}")),
         ("solver failures", figure(lambda e: f"{e['solver_failures'] or NONE}")),
