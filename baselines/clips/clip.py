@@ -14,6 +14,7 @@ from .skeleton import SIDES, Skeleton
 MIRROR = np.array([1.0, -1.0, 1.0])  # of places, in the plane of x and z
 MIRROR_TURN = np.array([1.0, -1.0, 1.0, -1.0])  # of quaternions
 SHORTEST = 2  # frames
+MOST_FRAMES = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +70,12 @@ class Clip:
         return root, slerp(self.rotations[before], self.rotations[after], u[:, None])
 
     def resampled(self, dt: float) -> Clip:
-        """The clip with another time between frames [s], its end cut by less than one."""
-        times = np.arange(int(self.duration / dt + 1e-9) + 1) * dt
+        """The clip with another time between frames [s], its end cut by less than one.
+
+        Raises ConfigError where that is fewer than two frames, or more than a million.
+        """
+        count = self.duration / dt + 1e-9 + 1.0
+        times = np.arange(_frames(count, self.name, "rate")) * dt
         root, rotations = self.sample(times)
         return replace(self, dt=dt, root=root, rotations=rotations)
 
@@ -80,7 +85,8 @@ class Clip:
         Raises:
             ConfigError: the times do not lie in the clip, or hold fewer than two frames.
         """
-        first, last = round(start / self.dt), round(end / self.dt)
+        within = -self.dt < start < end < self.duration + self.dt  # so they are finite
+        first, last = (round(start / self.dt), round(end / self.dt)) if within else (0, 0)
         if not 0 <= first or not last < len(self) or last - first + 1 < SHORTEST:
             raise ConfigError(
                 f"must be two times within 0 and {self.duration:.3f} s, in order, not "
@@ -90,9 +96,13 @@ class Clip:
         return replace(self, root=self.root[chosen], rotations=self.rotations[chosen])
 
     def at_speed(self, factor: float) -> Clip:
-        """The clip `factor` > 0 times as fast, at the same rate of frames."""
-        faster = replace(self, dt=self.dt / _positive(factor, self.name, "speed"))
-        return faster.resampled(self.dt)
+        """The clip `factor` > 0 times as fast, at the same rate of frames.
+
+        Raises ConfigError where that is fewer than two frames, or more than a million.
+        """
+        _frames(self.duration / _positive(factor, self.name, "speed") / self.dt + 1.0, self.name,
+                "speed")  # fmt: skip
+        return replace(self, dt=self.dt / factor).resampled(self.dt)
 
     def reversed(self) -> Clip:
         """The frames in the opposite order."""
@@ -166,6 +176,7 @@ class Clip:
         """
         if count < 1:
             raise ConfigError(f"must be at least 1, not {count}", source=self.name, field="loop")
+        _frames(count * (len(self) - 1.0) + 1.0, self.name, "loop")
         parts, turned = [self], self.facing() if count > 1 else np.zeros(1)
         for _ in range(count - 1):
             following = self.turned(float(turned[-1] - turned[0]) * len(parts))
@@ -175,6 +186,14 @@ class Clip:
         root = np.concatenate([pieces[0][0], *(r[1:] for r, _ in pieces[1:])])
         rotations = np.concatenate([pieces[0][1], *(r[1:] for _, r in pieces[1:])])
         return replace(self, root=root, rotations=rotations)
+
+
+def _frames(count: float, source: str, field: str) -> int:
+    """The number of whole frames; raises ConfigError for too few, or more than can be kept."""
+    if not SHORTEST <= count < MOST_FRAMES + 1:
+        raise ConfigError(f"leaves {count:.0f} frames: at least {SHORTEST} and at most "
+                          f"{MOST_FRAMES} can be kept", source=source, field=field)  # fmt: skip
+    return int(count)
 
 
 def _positive(value: float, source: str, field: str) -> float:

@@ -69,5 +69,5 @@ def measure_contacts(clip: Clip) -> Contacts:
 
 
 def _toe(clip: Clip, side: str) -> int:
-    roles = clip.skeleton.roles
-    return roles.get(f"toe_{side}", clip.skeleton.joint(f"ankle_{side}", clip.name))
+    toe = f"toe_{side}"
+    return clip.skeleton.joint(toe if toe in clip.skeleton.roles else f"ankle_{side}", clip.name)

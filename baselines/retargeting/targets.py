@@ -55,10 +55,10 @@ def clip_targets(clip: Clip, arms: bool, smooth: float) -> BodyTargets:
     Raises:
         ConfigError: joints that are not known by name; fewer than 8 frames.
     """
-    clip = clip.resampled(RATE)
-    if len(clip) < FEW:
-        raise ConfigError(f"lasts {clip.duration:.2f} s, at least {FEW * RATE:.2f} s are needed",
+    if clip.duration < (least := (FEW - 1) * RATE) - 1e-9:
+        raise ConfigError(f"lasts {clip.duration:.2f} s, at least {least:.2f} s are needed",
                           source=clip.name)  # fmt: skip
+    clip = clip.resampled(RATE)
     points = _points(clip, clip.turned(-_feet_heading(clip)).places())
     height = (points["pelvis"] - points["feet"])[:, 2]
     upright = max(float(height.max()), UPRIGHT * clip.skeleton.leg_length)
@@ -135,10 +135,12 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 def _circle(a: np.ndarray, b: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Unit vectors (n, 3) from `a` towards `b` (3,) at fractions `u` (n,) of the angle.
 
-    Between opposite ones, as of an arm that is raised over the head, the way leads through x.
+    Between opposite ones, as of an arm that is raised over the head, the way leads through x, and
+    between those along x through z.
     """
     across = b - (a @ b) * a
     if np.linalg.norm(across) < 1e-3:
-        across = np.array([1.0, 0.0, 0.0]) - a[0] * a
+        through = np.eye(3)[0 if abs(a[0]) < 0.9 else 2]
+        across = through - (a @ through) * a
     angle = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b) * u[:, None]
     return np.cos(angle) * a + np.sin(angle) * _unit(across)

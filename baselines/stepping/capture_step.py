@@ -128,9 +128,10 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         super().__init__(robot, self.config.qp)
         self.sets = ContactSets(robot, self.config.step_qp, self.config.torque_rate_limit)
         self.region = CopRegion(robot, self.config.region_fraction)
-        limits = possible_limits(robot, self.config)
+        c = self.config
+        limits = possible_limits(robot, c.limits, c.swing, c.step_qp.torque.share)
         self.steps_possible = limits is not None
-        self.planner = self._planner(self.region, limits or self.config.limits)
+        self.planner = self._planner(self.region, limits or c.limits)
         self.offsets = self.planner.offsets  #: what a policy adds
         self._swing = Swing(np.zeros(3), 0.0, self.config.swing, robot.units)
         self.recentring = recentring_arrays(robot, self.config.recentring)

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
 from poise.envs.compiled.calls import NO_KERNEL, address_of
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.maths.pendulum import Units
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
@@ -29,6 +30,34 @@ class StepPlan(NamedTuple):
     time: float  #: from now to touchdown [s]
     cost: float  #: [m]
     time_offset: float = 0.0  #: part of the time that feedback and a policy added [s]
+
+
+class SearchLimits(TypedDict):
+    """`StepLimits` in SI units, as a `Search` has them [m, m/s, s]."""
+
+    ahead: float
+    behind: float
+    width_min: float
+    width_max: float
+    speed: float
+    side_speed: float
+    time_min: float
+    time_max: float
+
+
+def search_limits(limits: StepLimits, units: Units) -> SearchLimits:
+    """The limits of steps of a robot with these units."""
+    h, omega = units.height, units.omega
+    return {
+        "ahead": limits.ahead * h,
+        "behind": limits.behind * h,
+        "width_min": limits.width_min * h,
+        "width_max": limits.width_max * h,
+        "speed": limits.speed * h * omega,
+        "side_speed": limits.side_speed * h * omega,
+        "time_min": limits.time_min / omega,
+        "time_max": limits.time_max / omega,
+    }
 
 
 class StepPlanner(Copyable):
@@ -70,7 +99,7 @@ class StepPlanner(Copyable):
         return self._search
 
     def _allocate(self, state: RobotState) -> Search:
-        limits, choice, region = self.limits, self.choice, self.region.arrays
+        choice, region = self.choice, self.region.arrays
         h, omega = self.units.height, self.units.omega
         return Search(
             state=state.arrays,
@@ -80,14 +109,7 @@ class StepPlanner(Copyable):
             heading=guarded_zeros(2),
             foot_sign=self.foot_sign,
             height=h,
-            ahead=limits.ahead * h,
-            behind=limits.behind * h,
-            width_min=limits.width_min * h,
-            width_max=limits.width_max * h,
-            speed=limits.speed * h * omega,
-            side_speed=limits.side_speed * h * omega,
-            time_min=limits.time_min / omega,
-            time_max=limits.time_max / omega,
+            **search_limits(self.limits, self.units),
             sagittal_offset=choice.sagittal_offset * h,
             lateral_offset=choice.lateral_offset * h,
             margin=choice.margin * h,

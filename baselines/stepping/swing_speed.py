@@ -20,7 +20,7 @@ from scipy.optimize import linprog
 from poise.envs.physics.arrays import dof_chain
 from poise.envs.robots.robot import Robot
 
-from .config import CaptureStepConfig, StepLimits
+from .config import StepLimits, SwingTask
 
 PEAK = 15.0 / 8.0  # of a speed over its mean, from rest to rest
 ROUNDS, STEP, CLOSE = 60, 0.05, 1e-6  # of the lift; most that a round turns a joint [rad]; [m]
@@ -49,25 +49,28 @@ def swing_speed(robot: Robot, clearance: float, torque_share: float = 1.0) -> Sw
     return SwingSpeed(*np.min(feet, axis=0).tolist())
 
 
-def possible_limits(robot: Robot, config: CaptureStepConfig) -> StepLimits | None:
-    """The limits of steps of `config` within what the legs can do; None: they can do no step.
+def possible_limits(
+    robot: Robot, limits: StepLimits, swing: SwingTask, torque_share: float = 1.0
+) -> StepLimits | None:
+    """The `limits` of steps within what the legs can do; None: they can do no step.
 
     The foot rises in `swing.lift` of the time and comes down in the rest. Where that takes longer
     than `time_max` it would not land in time. Limits that do not bind are those given, to the bit.
+    `torque_share` is that of `swing_speed`.
     """
-    c, h, omega = config, robot.height_com, robot.omega
-    speed = swing_speed(robot, c.swing.clearance * h, c.step_qp.torque.share)
+    h, omega = robot.height_com, robot.omega
+    speed = swing_speed(robot, swing.clearance * h, torque_share)
     if min(speed) <= STILL:
         return None
-    shorter = min(c.swing.lift, 1.0 - c.swing.lift)
-    time = c.swing.clearance * h * omega / (shorter * speed.lift)
-    if time > c.limits.time_max:
+    shorter = min(swing.lift, 1.0 - swing.lift)
+    time = swing.clearance * h * omega / (shorter * speed.lift)
+    if time > limits.time_max:
         return None
     return replace(
-        c.limits,
-        speed=min(c.limits.speed, speed.ahead / (h * omega)),
-        side_speed=min(c.limits.side_speed, speed.sideways / (h * omega)),
-        time_min=max(c.limits.time_min, time),
+        limits,
+        speed=min(limits.speed, speed.ahead / (h * omega)),
+        side_speed=min(limits.side_speed, speed.sideways / (h * omega)),
+        time_min=max(limits.time_min, time),
     )
 
 

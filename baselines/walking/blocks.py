@@ -25,6 +25,7 @@ class Gait(Block):
     start_radius: float  # [m]
     start_time: float  # [s]
     speed_margin: float  # [m/s]
+    time_min: float  # of a step, whatever the command says [s]
     command: np.ndarray  # (5,) see `GaitCommand.array`
     velocity: np.ndarray  # (3,) ahead, left, turn, which follow the command
     error: np.ndarray  # (2,) what the sum of the velocity's errors adds to it [m/s]

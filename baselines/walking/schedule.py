@@ -68,7 +68,8 @@ def command_sampler(value: object) -> CommandSampler:
     if isinstance(value, CommandSampler):
         return value
     if isinstance(value, GaitCommand):
-        value = {name: getattr(value, name) for name in ("ahead", "left", "turn")}
+        entries = ("ahead", "left", "turn", "step_time", "width")  # the last two are not drawn
+        value = {name: x for name in entries if (x := getattr(value, name)) is not None}
     if not isinstance(value, Mapping):
         raise ConfigError(
             f"must be a command or ranges of commands, not {shown(value)}",

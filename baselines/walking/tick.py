@@ -76,8 +76,9 @@ def go_on_from(contacts: ContactTick, torques: np.ndarray) -> None:
 
 @compiled
 def step_time(g: Gait) -> float:
-    """T [s]: as commanded, or the gait's own."""
-    return g.command[STEP_TIME] if g.command[STEP_TIME] > 0.0 else g.step_time
+    """T [s]: as commanded, or the gait's own; no shorter than the legs can."""
+    wanted = g.command[STEP_TIME] if g.command[STEP_TIME] > 0.0 else g.step_time
+    return max(wanted, g.time_min)
 
 
 @compiled

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from poise.baselines.controller import Targets
-from poise.baselines.stepping.blocks import CaptureTick, Search
+from poise.baselines.stepping.blocks import CaptureTick
 from poise.baselines.stepping.capture_step import CaptureStep, check_qps
 from poise.baselines.stepping.config import StepLimits
+from poise.baselines.stepping.planner import search_limits
 from poise.baselines.stepping.swing import swing_gains, swing_task
+from poise.baselines.stepping.swing_speed import possible_limits
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.envs.compiled.block import Block
@@ -24,8 +26,11 @@ from .config import GaitConfig, WalkConfig
 from .tick import walk_tick
 
 
-def allocate_gait(config: GaitConfig, units: Units) -> Gait:
-    """The gait of `config` for a robot with these units, at rest."""
+def allocate_gait(config: GaitConfig, units: Units, limits: StepLimits | None) -> Gait:
+    """The gait of `config` for a robot with these units, at rest.
+
+    `limits` are what its legs can do of those of `config`; None: no step, no command is one then.
+    """
     c, h, omega = config, units.height, units.omega
     whole = np.int64
     return Gait(
@@ -41,7 +46,8 @@ def allocate_gait(config: GaitConfig, units: Units) -> Gait:
         transfer_gain=float(c.transfer_gain),
         start_radius=c.start_radius * h,
         start_time=c.start_time / omega,
-        speed_margin=c.speed_margin * h * omega,
+        speed_margin=c.speed_margin * h * omega if limits else np.inf,
+        time_min=(limits or c.limits).time_min / omega,
         command=guarded_zeros(5),
         velocity=guarded_zeros(3),
         error=guarded_zeros(2),
@@ -56,30 +62,15 @@ def allocate_gait(config: GaitConfig, units: Units) -> Gait:
     )
 
 
-def limited(search: Search, limits: StepLimits, units: Units) -> Search:
-    """The same search within other limits."""
-    h, omega = units.height, units.omega
-    return replace(
-        search,
-        ahead=limits.ahead * h,
-        behind=limits.behind * h,
-        width_min=limits.width_min * h,
-        width_max=limits.width_max * h,
-        speed=limits.speed * h * omega,
-        side_speed=limits.side_speed * h * omega,
-        time_min=limits.time_min / omega,
-        time_max=limits.time_max / omega,
-    )
-
-
 class Walk(CaptureStep):
     """Walks at a commanded velocity by footholds that lead the capture point [Englsberger11].
 
     Without a command it is `capture-step` with the same gains, bit for bit. With one it shifts its
     weight and walks: each foothold puts the capture point where the gait has it at lift-off
     (`dcm.py`), so that a push moves the foothold and the walk goes on. When the command is zero
-    again it walks until both soles hold the capture point, and stands. Raises ConfigError as
-    `CaptureStep` does.
+    again it walks until both soles hold the capture point, and stands. Steps stay within what the
+    legs' motors can do; a robot whose feet could not be down again in time stands, whatever it is
+    told. Raises ConfigError as `CaptureStep` does.
     """
 
     def __init__(self, robot: Robot, config: WalkConfig | None = None):
@@ -87,7 +78,9 @@ class Walk(CaptureStep):
         prepare("contacts", "planner", "walking")
         gait = self._gait_config = config.gait
         check_qps(config, gait__qp=gait.qp)
-        self.gait = allocate_gait(gait, robot.units)
+        limits = possible_limits(robot, gait.limits, gait.swing, gait.qp.torque.share)
+        self.gait_limits = limits or gait.limits  #: of the steps of a walk
+        self.gait = allocate_gait(gait, robot.units, limits)
         self.gait_sets = ContactSets(robot, gait.qp, gait.torque_rate_limit)
         self._walk_tick: WalkTick | None = None
         super().__init__(robot, config)
@@ -159,7 +152,8 @@ class Walk(CaptureStep):
             landing_speed=gait.swing.landing_speed * h * omega,
         )
         return replace(
-            capture, gains=gains, swing=swing, search=limited(capture.search, gait.limits, units),
+            capture, gains=gains, swing=swing,
+            search=replace(capture.search, **search_limits(self.gait_limits, units)),
             on_first=on_first, on_second=on_second, on_both=on_both,
         )  # fmt: skip
 

@@ -40,7 +40,7 @@ def walk(
         controller: one that walks: a name, a .yaml file, or a folder written by poise train.
         video: an MP4 or WebP file to write.
     """
-    if not all(math.isfinite(value) for value in (duration, push_at)) or duration <= 0.0:
+    if not 0.0 < duration < math.inf:
         raise ConfigError(f"must be above 0 and finite, not {duration:g}", field="duration")
     from poise.envs.viewing.gl import choose_gl_backend
 

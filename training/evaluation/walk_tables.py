@@ -48,6 +48,8 @@ def _figure(key: str, form: str) -> Callable[[WalkLevel], str]:
 
 
 def _falls(level: WalkLevel) -> str:
+    if level["falls_per_minute_ci95"] is None:  # the controller raised in every trial
+        return NONE
     low, high = level["falls_per_minute_ci95"]
     return f"{level['falls_per_minute']:.2f} [{low:.2f}, {high:.2f}]"
 

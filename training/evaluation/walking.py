@@ -31,7 +31,8 @@ def walk_levels(played: Played, duration: float) -> list[WalkLevel]:
 def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -> WalkLevel:
     fallen = sum(outcome.fallen for outcome in outcomes)
     stood = sum(not outcome.fallen and outcome.error is None for outcome in outcomes)
-    times = [duration if each.fall_time is None else each.fall_time for each in outcomes]
+    played = [each for each in outcomes if each.error is None]
+    times = [duration if each.fall_time is None else each.fall_time for each in played]
     minutes = sum(times) / 60.0
     low, high = poisson_interval(fallen)
     means = {key: _mean(outcomes, key) for key in MEANS}
@@ -43,8 +44,8 @@ def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -
         "never_fell_rate": stood / len(outcomes),
         "never_fell_ci95": wilson_interval(stood, len(outcomes)),
         "minutes": minutes,
-        "falls_per_minute": fallen / minutes,
-        "falls_per_minute_ci95": (low / minutes, high / minutes),
+        "falls_per_minute": fallen / minutes if minutes else None,
+        "falls_per_minute_ci95": (low / minutes, high / minutes) if minutes else None,
         **cast(WalkMeans, means),
     }
 

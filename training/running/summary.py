@@ -193,8 +193,8 @@ class WalkLevel(Rate, WalkMeans, total=False):
     never_fell_rate: float
     never_fell_ci95: Interval
     minutes: float
-    falls_per_minute: float
-    falls_per_minute_ci95: Interval
+    falls_per_minute: Number
+    falls_per_minute_ci95: Interval | None
 
 
 class PhaseJ50(TypedDict):

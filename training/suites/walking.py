@@ -8,7 +8,7 @@ whatever their size and direction.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import ClassVar
 
 import numpy as np
@@ -28,12 +28,12 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 def from_start(command: GaitCommand) -> TimedCommand:
     """The command from the reset on."""
-    return TimedCommand(command.ahead, command.left, command.turn, 0.0)
+    return TimedCommand(**{**asdict(command), "start": 0.0})
 
 
 def command_text(command: GaitCommand) -> str:
     """The command in words, such as `ahead 0.5, turn 0.25`."""
-    names = ("ahead", "left", "turn")
+    names = [each.name for each in fields(GaitCommand)]
     said = [f"{name} {getattr(command, name):g}" for name in names if getattr(command, name)]
     return ", ".join(said) or "stand"
 

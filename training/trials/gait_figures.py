@@ -79,6 +79,9 @@ class Walk:
         begun = [self._changed(record.time[row]) for row in rows[2:]]
         self.settled = record.time[rows[:-2]] >= np.array(begun) + SETTLING
         self.settled &= record.time[rows[2:]] <= until
+        self._known = np.zeros(len(record.time), dtype=bool)  # rows of settled strides
+        for first, last in np.array(spans, dtype=int).reshape(-1, 2)[self.settled]:
+            self._known[first:last] = True
 
     def mean_velocity(self, first: int, last: int) -> np.ndarray:
         """(3,) ahead, left [m/s] and turn [rad/s] from row to row."""
@@ -179,9 +182,8 @@ class Walk:
 
     def _knees(self) -> dict[str, float | None]:
         """Mean and largest |τ|/m [N·m/kg] of the stance leg's knee on one foot."""
-        r, ends = self.record, self.landed.row[2:][self.settled]
-        single = r.down.sum(axis=1) == 1
-        single[: ends[0] if len(ends) else None] = False
+        r = self.record
+        single = self._known & (r.down.sum(axis=1) == 1)
         load = r.knees[single, np.argmax(r.down[single], axis=1)]
         known = load[np.isfinite(load)]
         return {
@@ -193,12 +195,12 @@ class Walk:
         """Largest way of a sole on the ground while the other one is in the air [m]."""
         r, worst = self.record, 0.0
         for foot in range(r.down.shape[1]):
-            alone = r.down[:, foot] & (r.down.sum(axis=1) == 1)
+            alone = self._known & r.down[:, foot] & (r.down.sum(axis=1) == 1)
             edges = np.flatnonzero(np.diff(np.concatenate([[0], alone, [0]]).astype(int)))
             for first, last in edges.reshape(-1, 2):
                 ways = r.feet[first:last, foot] - r.feet[first, foot]
                 worst = max(worst, float(np.linalg.norm(ways, axis=1).max()))
-        return worst if len(self.landed.row) else None
+        return worst if self._known.any() else None
 
     def _circle_error(self) -> float | None:
         """Largest distance of the settled walk, averaged over strides, from the circle that is
@@ -220,13 +222,16 @@ class Walk:
     def phase_at(self, time: float, left: int) -> float | None:
         """The phase of the stride at a time [s]: 0 where the `left` foot lands, ½ the other one.
 
-        Between touchdowns it goes on at the pace of the step before. None before the third one.
+        Between touchdowns it goes on at the pace of the step before. None before the third one, and
+        where both feet land at once.
         """
         rows, feet, times = self.landed.row, self.landed.foot, self.record.time
         past = int(np.sum(times[rows] <= time))
         if past < 3:
             return None
         last, step = times[rows[past - 1]], times[rows[past - 1]] - times[rows[past - 2]]
+        if step == 0.0:
+            return None
         part = min((time - last) / step, 1.0 - 1e-9)
         return float(0.5 * part + (0.0 if feet[past - 1] == left else 0.5))
 

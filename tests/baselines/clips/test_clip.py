@@ -42,8 +42,23 @@ def test_cut_speed_and_reverse(walk: Clip) -> None:
     assert np.all(walk.reversed().places() == walk.places()[::-1])
     with pytest.raises(ConfigError, match="cut: must be two times within 0 and 2.83"):
         walk.cut(1.0, 5.0)
+    with pytest.raises(ConfigError, match="cut: must be two times within 0 and 2.83"):
+        walk.cut(np.nan, np.inf)
     with pytest.raises(ConfigError, match="speed: must be above 0"):
         walk.at_speed(0.0)
+
+
+def test_a_clip_has_two_frames_and_no_more_than_a_million(walk: Clip) -> None:
+    """Whatever is asked for: one frame could not be read again, and memory has an end."""
+    for made, field in (
+        (lambda: walk.at_speed(1e3), "speed: leaves 1 frames: at least 2"),
+        (lambda: walk.at_speed(1e-9), "speed: leaves .* at most 1000000"),
+        (lambda: walk.resampled(10.0), "rate: leaves 1 frames: at least 2"),
+        (lambda: walk.resampled(1e-9), "rate: leaves .* at most 1000000"),
+        (lambda: walk.repeated(10**9), "loop: leaves .* at most 1000000"),
+    ):
+        with pytest.raises(ConfigError, match=field):
+            made()
 
 
 def test_sampling_is_the_frames_and_slerp_between(walk: Clip) -> None:

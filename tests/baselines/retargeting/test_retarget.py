@@ -131,5 +131,5 @@ def test_what_cannot_be_followed_is_said(squat: Clip) -> None:
         retarget(walk, robot)
     with pytest.raises(ConfigError, match="smooth: must be above 0"):
         retarget(squat, robot, smooth=0.0)
-    with pytest.raises(ConfigError, match="at least 0.27 s are needed"):
+    with pytest.raises(ConfigError, match="at least 0.23 s are needed"):
         retarget(squat.cut(0.0, 0.1), robot)

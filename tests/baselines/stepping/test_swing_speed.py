@@ -11,7 +11,7 @@ import pytest
 from poise.baselines.controller import Targets
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.stepping.capture_step import CaptureStep
-from poise.baselines.stepping.config import CaptureStepConfig
+from poise.baselines.stepping.config import CaptureStepConfig, StepLimits
 from poise.baselines.stepping.swing_speed import possible_limits, swing_speed
 from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.envs.physics.arrays import dof_chain
@@ -33,6 +33,10 @@ def config(name: str = "capture-step") -> CaptureStepConfig:
     found = controller_config(name)
     assert isinstance(found, CaptureStepConfig)
     return found
+
+
+def possible(body: Robot, c: CaptureStepConfig) -> StepLimits | None:
+    return possible_limits(body, c.limits, c.swing, c.step_qp.torque.share)
 
 
 def test_speeds_go_with_the_damping() -> None:
@@ -62,12 +66,12 @@ def test_no_joint_moves_faster_than_its_motor_can_drive_it() -> None:
 @pytest.mark.parametrize("body", ["humanoid", "toddler"])
 def test_limits_that_do_not_bind_are_those_of_the_file(name: str, body: str) -> None:
     """To the bit: nothing changes for robots that are fast enough."""
-    assert possible_limits(robot(body), config(name)) == config(name).limits
+    assert possible(robot(body), config(name)) == config(name).limits
 
 
 def test_slow_legs_step_less_far_and_take_longer() -> None:
     """The limits of speed fall with the damping, and the least time of a step rises."""
-    limits, given = possible_limits(damped(8.0), config()), config().limits
+    limits, given = possible(damped(8.0), config()), config().limits
     assert limits is not None
     assert limits.speed < given.speed and limits.side_speed < given.side_speed
     assert given.time_min < limits.time_min <= limits.time_max == given.time_max
@@ -77,7 +81,7 @@ def test_slow_legs_step_less_far_and_take_longer() -> None:
 def test_legs_that_would_land_too_late_never_step() -> None:
     """A fall then has the torques of feet in place, bit for bit."""
     slow = damped(30.0)
-    assert possible_limits(slow, config()) is None
+    assert possible(slow, config()) is None
     stepping, in_place = CaptureStep(slow, config()), MomentumQP(slow, config().qp)
     assert stepping.step_limits is None
     simulation, falling = Simulation(slow), np.zeros(slow.model.nv)

@@ -56,6 +56,8 @@ def test_numbers_and_ranges_make_a_sampler():
         command_sampler({"ahead": [0.5, 0.2]})
     with pytest.raises(ConfigError, match=r"must be a command or ranges of commands, not 0.5"):
         command_sampler(0.5)
+    with pytest.raises(ConfigError, match="command: step_time: unknown field"):
+        command_sampler(GaitCommand(0.1, step_time=0.4))  # which a sampler does not draw
     with pytest.raises(ConfigError, match="command: interval: must be a list, not 3"):
         command_sampler({"interval": 3})
 

@@ -1,12 +1,16 @@
 """Walking at a commanded velocity, from standing and back."""
 
+import copy
+
 import numpy as np
 import pytest
 
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.registry import load_controller
+from poise.baselines.stepping.swing_speed import possible_limits
 from poise.baselines.walking.command import GaitCommand
 from poise.configs.errors import ConfigError
+from poise.envs.robots.robot import Robot
 from tests.support.shared import robot
 
 PERIOD = 0.02
@@ -136,3 +140,54 @@ def test_step_time_and_width_are_commanded():
 def test_a_step_time_of_a_command_is_above_zero():
     with pytest.raises(ConfigError, match=r"command\.step_time.*above 0"):
         GaitCommand(0.1, step_time=0.0)
+
+
+@pytest.mark.parametrize("step_time", [5.1, np.inf, np.nan])
+def test_a_step_time_of_a_command_is_one_that_a_pendulum_stands(step_time):
+    """Longer ones would have e^(ωT) overflow, and the torques not be numbers."""
+    with pytest.raises(ConfigError, match=r"command\.step_time.*at most 5"):
+        GaitCommand(0.1, step_time=step_time)
+
+
+def damped(factor: float) -> Robot:
+    """The toddler with so many times the damping in its joints."""
+    changed = copy.deepcopy(robot("toddler"))
+    changed.model.dof_damping[6:] *= factor
+    return changed
+
+
+def test_slow_legs_walk_with_steps_that_they_can_do():
+    """Mean speed and least time of a step are those of `possible_limits`, in SI units."""
+    slow = damped(5.0)
+    env = ResidualStepEnv(slow, controller="walk")
+    env.reset(seed=0)
+    controller = env.controller
+    config, units = controller.config.gait, slow.units
+    limits = possible_limits(slow, config.limits, config.swing, config.qp.torque.share)
+    tick = controller.walk_tick(env.simulation.state, env.targets)
+    pace = units.height * units.omega
+    assert limits.speed < config.limits.speed
+    assert tick.walk.search.speed == pytest.approx(limits.speed * pace)
+    assert tick.walk.search.side_speed == pytest.approx(limits.side_speed * pace)
+    assert tick.walk.search.time_min == pytest.approx(limits.time_min / units.omega)
+    assert tick.walk.search.time_min > config.limits.time_min / units.omega
+    assert tick.capture.search.time_max == pytest.approx(
+        controller.config.limits.time_max / units.omega
+    )
+
+
+def test_a_step_is_not_commanded_to_be_quicker_than_the_legs():
+    _, _, env = walk((2.0, GaitCommand(0.2, step_time=0.05)))
+    gait = env.controller.gait
+    assert not env.fallen
+    assert env.controller._swing.duration >= gait.time_min - 1e-9
+
+
+def test_legs_that_would_land_too_late_do_not_walk():
+    """Nothing that is asked for makes them step."""
+    env = ResidualStepEnv(damped(30.0), controller="walk", duration=1.0)
+    env.reset(seed=0, options={"push": [], "command": {"ahead": 0.2, "turn": 0.1}})
+    for _ in range(40):
+        env.step(np.zeros(len(env.action_names)))
+    assert env.controller.steps == 0 and not env.controller.walking
+    assert not env.fallen

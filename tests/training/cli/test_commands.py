@@ -158,6 +158,11 @@ def test_a_broken_pipe_of_another_kind_is_raised(
         (["robot", "robby"], "robots: no such name: 'robby'"),
         (["walk", "--speed", "nan"], "command: ahead: must be a finite number, not nan"),
         (["walk", "--duration", "0"], "duration: must be above 0 and finite, not 0"),
+        (
+            ["walk", "--push", "9@9", "--push-at", "nan"],
+            "push_at: must be within the 20 s of the w",
+        ),
+        (["walk", "--step-time", "9"], "step_time: must be at most 5.0, not 9.0"),
         (["walk", "--controller", "zero"], "walk: controller: the controller 'zero' does not walk"),
         (["walk", "--push", "20"], "push: must be an impulse and a direction such as 20@90, not"),
         (["walk", "--push", "a@b"], "push: must be an impulse and a direction such as 20@90, not"),

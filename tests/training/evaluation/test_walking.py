@@ -16,11 +16,12 @@ from poise.configs.errors import ConfigError
 from poise.envs.pushes.push import Kick, Push
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate
+from poise.training.evaluation.walk_tables import walk_tables
 from poise.training.evaluation.walking import phase_figures, walk_levels
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.running.summary import EnvelopeFigures
-from poise.training.trials.trial import Outcome, Trial
+from poise.training.trials.trial import Outcome, Trial, failed
 from tests.support.evaluations import InProcess, write_suite
 
 SMALL = {
@@ -98,12 +99,28 @@ def test_levels_count_falls_by_the_minute() -> None:
     one, two = walk_levels(trials, 60.0)
     assert one["level"] == "a" and one["trials"] == 3 and one["fallen"] == 1
     assert one["minutes"] == 2.5 and one["falls_per_minute"] == pytest.approx(0.4)
+    assert one["falls_per_minute_ci95"] is not None
     low, high = one["falls_per_minute_ci95"]
     assert low == pytest.approx(0.02532 / 2.5, rel=1e-3)
     assert high == pytest.approx(5.5716 / 2.5, rel=1e-3)
     assert one["speed_ahead"] == pytest.approx(0.5) and one["recovered"] == 2
     assert two["fallen"] == 0 and two["falls_per_minute_ci95"][0] == 0.0
     assert walk_levels([(Trial(0, 0, part="quiet"), Outcome(True, False))], 60.0) == []
+
+
+def test_who_raises_has_not_walked_for_a_minute() -> None:
+    """Trials in which the controller raised add no time; without any time there is no rate."""
+    trial = Trial(0, 0, part="walk", level="a", commands=(TimedCommand(0.5),))
+    broken = (trial, failed(ValueError("no")))
+    (level,) = walk_levels([(trial, Outcome(True, False)), broken], 60.0)
+    assert level["minutes"] == 1.0 and level["trials"] == 2 and level["falls_per_minute"] == 0.0
+    (level,) = walk_levels([broken], 60.0)
+    assert level["minutes"] == 0.0
+    assert level["falls_per_minute"] is None and level["falls_per_minute_ci95"] is None
+    table = walk_tables({"ranking": ["x"], "controllers": {"x": {"walks": [level]}}})  # type: ignore[typeddict-item]
+    text = io.StringIO()
+    Console(file=text, width=120).print(*table)
+    assert "0 of 1" in text.getvalue()
 
 
 def test_j50_by_phase() -> None:

@@ -38,6 +38,17 @@ def test_a_walk_has_every_command(limits: PushLimits) -> None:
     assert not any(trial.pushes or trial.kicks for trial in found)
 
 
+def test_a_walk_has_all_of_its_command(limits: PushLimits) -> None:
+    """Its step time and width too, in the trials and in the name of the level."""
+    command = {"ahead": 0.4, "step_time": 0.35, "width": 0.2}
+    for part in ("walk", "walk_push", "walk_kick", "walk_repeated"):
+        field = {"commands": [command]} if part == "walk" else {"command": command}
+        plan = Plan(build(Suite, {part: field}, "suite"), limits, 7, ["walk"])
+        assert {trial.command for trial in plan.first} == {TimedCommand(**command)}
+        levels = {trial.level for trial in plan.first if part != "walk_kick"}
+        assert levels <= {"ahead 0.4, step_time 0.35, width 0.2"}
+
+
 def test_pushes_come_at_all_phases(limits: PushLimits) -> None:
     """Of any period, in every direction, and among the small pushes as among the large ones."""
     found = trials("walk-push", limits)

@@ -106,13 +106,29 @@ def test_lengths_times_and_costs() -> None:
 
 
 def test_a_sole_that_slides_on_one_foot() -> None:
-    """The largest way while the other foot is in the air."""
+    """The largest way while the other foot is in the air, in the strides that are settled."""
     record = recorded()
     feet = record.feet.copy()
     alone = np.flatnonzero(record.down[:, 1] & ~record.down[:, 0])
-    feet[alone[3:], 1, 0] += 0.02
+    feet[alone[3:], 1, 0] += 0.05  # at 0.2 s, when it begins to walk
+    feet[alone[record.time[alone] > 8.22], 1, 0] += 0.02
     slid = Walk(replace(record, feet=feet), (TimedCommand(0.5),)).figures()["foot_slide"]
     assert slid == pytest.approx(0.02)
+
+
+def test_a_fall_is_no_part_of_a_walk() -> None:
+    """Nor is what comes before the first settled stride, and after the last one."""
+    record = recorded()
+    around = (record.time < 4.0) | (record.time >= 14.4)
+    knees, feet = record.knees.copy(), record.feet.copy()
+    knees[around] += 50.0
+    feet[around, 1, 0] += np.linspace(0.0, 3.0, np.count_nonzero(around))
+    fell = Walk(replace(record, knees=knees, feet=feet), (TimedCommand(0.5),), fall_time=15.4)
+    figures = fell.figures()
+    assert figures["knee_peak"] == 1.0 and figures["knee_mean"] == pytest.approx(0.75, abs=0.01)
+    assert figures["foot_slide"] == 0.0
+    none = Walk(record, (TimedCommand(0.5),), fall_time=4.0).figures()
+    assert none["knee_peak"] is None and none["foot_slide"] is None
 
 
 def test_only_settled_strides_count() -> None:
@@ -185,3 +201,12 @@ def test_the_phase_of_a_push() -> None:
     assert told.phase_at(4.1, left=0) == pytest.approx(0.625)
     assert told.phase_at(4.39, left=1) == pytest.approx(0.4875)
     assert told.phase_at(1.0, left=1) is None
+
+
+def test_who_lands_on_both_feet_at_once_has_no_phase() -> None:
+    """Not one that is no number: steps of no time have no pace."""
+    record = recorded()
+    hops = np.repeat(record.down[:, :1], 2, axis=1)
+    told = Walk(replace(record, down=hops), (TimedCommand(0.5),))
+    assert len(told.landed.row) > 10
+    assert told.phase_at(record.time[told.landed.row[-1]], left=1) is None
