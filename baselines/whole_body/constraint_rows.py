@@ -14,6 +14,7 @@ from poise.envs.physics.state import RobotState
 from .contacts.contact import ContactRows
 from .limits.limit import Bounds
 from .parameters import QPParameters
+from .tasks.task import Rows
 
 
 def contact_jacobian(state: RobotState, points: Sequence[ContactRows] = ()) -> np.ndarray:
@@ -39,6 +40,35 @@ def point_motion_bounds(points: Sequence[ContactRows]) -> Bounds:
     """J v̇ + J̇ v = what each point in contact is to have."""
     accel = np.concatenate([point.accel for point in points])
     return Bounds(np.vstack([point.J for point in points]), accel, accel)
+
+
+def contact_motion(
+    state: RobotState, p: QPParameters, points: Sequence[ContactRows] = ()
+) -> tuple[Bounds, Rows]:
+    """What the contacts are to do: equalities, and the rows that are a task instead.
+
+    These are none, or the weakest row of J on legs of fewer than six joints (`null_space.py`).
+    """
+    parts = [sole_motion(state, p), *([point_motion_bounds(points)] if points else [])]
+    J, accel = np.vstack([part.C for part in parts]), np.concatenate([part.l for part in parts])
+    weak = np.zeros(len(J), dtype=bool)
+    if len(state.J) > 6 and p.weakest_weight.any():
+        weak[weakest_row(J)] = True
+    turns = (np.arange(len(J)) % 6 >= 3) & (np.arange(len(J)) < len(state.J))
+    weights = np.where(turns, p.weakest_weight[1], p.weakest_weight[0])
+    return Bounds(J[~weak], accel[~weak], accel[~weak]), Rows(J[weak], accel[weak], weights[weak])
+
+
+def weakest_row(J: np.ndarray) -> int:
+    """The row that is left once all others have been taken, each the longest of those that remain
+    at right angles to those taken before; of equal ones the first."""
+    left, rest = list(range(len(J))), J.copy()
+    while len(left) > 1:
+        length2 = np.sum(rest[left] ** 2, axis=1)
+        taken = left.pop(int(np.argmax(length2 > length2.max() * (1.0 - 1e-9))))
+        along = rest[taken] / np.linalg.norm(rest[taken])
+        rest -= np.outer(rest @ along, along)
+    return left[0]
 
 
 def point_cones(state: RobotState, points: Sequence[ContactRows]) -> Bounds:

@@ -26,12 +26,11 @@ from poise.envs.physics.state import RobotState
 
 from .constraint_rows import (
     contact_jacobian,
+    contact_motion,
     joint_limits,
     point_cones,
-    point_motion_bounds,
     root_dynamics,
     sole_cones,
-    sole_motion,
     torque_limits,
     torque_matrix,
 )
@@ -92,6 +91,7 @@ def build(
     """
     p = parameters
     cop_vel = np.zeros(2) if cop_vel is None else cop_vel
+    motion, weakest = contact_motion(state, p, points)
     terms = [
         posture_rows(state, targets, p),
         linear_momentum_rows(state, targets, p),
@@ -99,11 +99,12 @@ def build(
         wrench_rows(state, p, points),
         torque_rows(state, p, points),
         accel_rows(state, p),
+        weakest,
         *tasks,
     ]
     bounds = [
         root_dynamics(state, p, points),
-        sole_motion(state, p),
+        motion,
         sole_cones(state, p),
         torque_limits(state, p, points),
         *([joint_limits(state, p)] if p.brakes else []),
@@ -111,12 +112,11 @@ def build(
         *constraints,
     ]
     if points:
-        bounds += [point_motion_bounds(points), point_cones(state, points)]
+        bounds.append(point_cones(state, points))
     if p.soft_root:
         terms.append(root_rows(state, p, points))
     # Zero wherever the soles do not move, so it changes no solution; but H becomes positive
     # definite even if no task weighs the root's linear acceleration.
-    motion = sole_motion(state, p)
     terms.append(Rows(motion.C, motion.l, np.full(len(motion.l), p.accel_weight.max())))
     k = len(state.J) + 3 * len(points)
     return assemble(terms, bounds, len(state.qvel) + k + (6 if p.soft_root else 0))

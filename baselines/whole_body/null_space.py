@@ -3,6 +3,11 @@
 Only the joints between the root and a contact (the *held* ones) have columns in J. So the null
 space is one orthonormal vector for each other joint, its own acceleration, and an orthonormal basis
 of the held part, from Householder's QR of Jᵀ with column pivoting.
+
+Two legs of fewer than six joints are a closed chain near a dead centre: soles that are turned by
+1° hold a pelvis at full strength that is free where they are parallel. What a soft contact gives
+way by is enough to move it. So there the row of J that the pivoting takes last, the weakest, is
+left to a task of the objective, and the null space is that of the others.
 """
 
 from collections.abc import Sequence
@@ -15,6 +20,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 
+WHOLE_LEG = 6  # joints that place a foot anywhere
 DEPENDENT = 1e-6  # pivot, relative to the first, below which a row of J follows from the others
 
 
@@ -30,6 +36,8 @@ class NullSpace(Block):
     beta: np.ndarray  # (min(k, nh),)
     pivot: np.ndarray  # (min(k, nh),) int: the row of J that each reflector eliminates
     open: np.ndarray  # (k,) bool: rows of J still to be eliminated
+    spare: int  # 1 where the weakest row, the last of `pivot`, is no equality; else 0
+    weakest: np.ndarray  # (2,) R, r: that row of J v̇ = b is R x_0 = r, x_0 the first of x
     basis: np.ndarray  # (nh, 8 or more) null vectors, then v̇₀, as columns
 
 
@@ -39,8 +47,8 @@ def allocate_null_space(robot: RobotArrays, points: Sequence[np.ndarray] = ()) -
     k = 6 * len(robot.sole_body) + 3 * len(points)
     chains = [chain[:n] for chain, n in zip(robot.chain, robot.chain_length, strict=True)]
     held = np.unique(np.concatenate([*chains, *points]))
-    nh, steps = len(held), min(k, len(held))
-    width, basis_width = (-(-columns // 8) * 8 for columns in (k, nh - steps + 1))
+    nh, steps, spare = len(held), min(k, len(held)), int(short_legs(robot))
+    width, basis_width = (-(-columns // 8) * 8 for columns in (k, nh - steps + spare + 1))
     zeros = guarded_zeros
     return NullSpace(
         held=held,
@@ -51,8 +59,18 @@ def allocate_null_space(robot: RobotArrays, points: Sequence[np.ndarray] = ()) -
         beta=zeros(steps),
         pivot=zeros(steps, dtype=np.int64),
         open=zeros(k, dtype=np.bool_),
+        spare=spare,
+        weakest=zeros(2),
         basis=zeros((nh, basis_width)),
     )
+
+
+def short_legs(robot: RobotArrays) -> bool:
+    """Whether there are several legs, and one has fewer than six joints of its own."""
+    chains = [set(chain[:n]) for chain, n in zip(robot.chain, robot.chain_length, strict=True)]
+    others = [set().union(*chains[:i], *chains[i + 1 :]) for i in range(len(chains))]
+    own = [len(chain - other) for chain, other in zip(chains, others, strict=True)]
+    return len(own) > 1 and min(own) < WHOLE_LEG
 
 
 @compiled
@@ -64,10 +82,12 @@ def solve_resting(
     In: J (k, nv), rhs (k,). Out: vdot0 (nv,), and in the first columns of V (nv, n) an orthonormal
     basis of the null space: the held joints' part, then one column for each other joint; the rest
     is zero. Rows of J that depend on others (a straight leg) are dropped: their part of v̇₀ is 0.
+    With a `spare` row the first column moves that one alone, and v̇₀ solves the others.
     """
     held, free, basis = space.held, space.free, space.basis
     steps, nh = space.reflectors.shape
-    nullity = nh - steps
+    equalities = steps - space.spare
+    nullity = nh - equalities
     _reduce(J, space)
     basis[:, :] = 0.0
     smallest = DEPENDENT * abs(space.rows[0, space.pivot[0]])
@@ -77,9 +97,12 @@ def solve_resting(
         for i in range(r):
             total -= space.rows[i, column] * basis[i, nullity]
         pivot = space.rows[r, column]
+        if r == equalities:
+            space.weakest[0], space.weakest[1] = pivot, total
+            break
         basis[r, nullity] = total / pivot if abs(pivot) > smallest else 0.0
     for i in range(nullity):
-        basis[steps + i, i] = 1.0
+        basis[equalities + i, i] = 1.0
     for r in range(steps - 1, -1, -1):
         _reflect(space.reflectors[r], space.beta[r], r, basis, space.product)
     V[:, :] = 0.0

@@ -84,7 +84,7 @@ def carry_momentum(p: QPParameters, t: TargetArrays, ws: Workspace):
     for a in range(6):
         for b in range(6):
             total = 0.0
-            for i in range(nz):
+            for i in range(ws.space.spare, nz):
                 total += ws.B[a, i] * ws.B[b, i]
             G[a, b] = total
         trace += G[a, a]
@@ -101,7 +101,7 @@ def carry_momentum(p: QPParameters, t: TargetArrays, ws: Workspace):
         for b in range(a + 1, 6):
             y[a] -= G[a, b] * y[b]
         y[a] /= G[a, a]
-    for i in range(nz):
+    for i in range(ws.space.spare, nz):
         z = 0.0
         for a in range(6):
             z += ws.B[a, i] * y[a]
@@ -116,6 +116,18 @@ def posture_fraction(p: QPParameters, com: np.ndarray, com_ref: np.ndarray) -> f
     x, y = com[0] - com_ref[0], com[1] - com_ref[1]
     away = (x * x + y * y) / (p.far_distance * p.far_distance)
     return p.far_share + (1.0 - p.far_share) * np.exp(-away)
+
+
+@compiled
+def weigh_weakest_row(s: StateArrays, p: QPParameters, ws: Workspace):
+    """Add ½ weight (J v̇ − b)² of the row of J that is no equality, where there is one."""
+    if ws.space.spare == 0:
+        return
+    row, pivot, rest = ws.space.pivot[-1], ws.space.weakest[0], ws.space.weakest[1]
+    turns = row < s.J.shape[0] and row % 6 >= 3
+    weight = p.weakest_weight[1 if turns else 0]
+    ws.H[0, 0] += weight * pivot * pivot
+    ws.g[0] -= weight * pivot * rest
 
 
 @compiled
@@ -147,6 +159,7 @@ def build_objective(
             ws.weighted[r, j] = weights[r] * ws.rows[r, j]
             ws.g[j] += residual * ws.rows[r, j]
     np.dot(ws.rows.T, ws.weighted, ws.H)
+    weigh_weakest_row(s, p, ws)
     if p.soft_root:
         for i in range(6):
             ws.H[ws.first_root + i, ws.first_root + i] += p.root_weight[i]

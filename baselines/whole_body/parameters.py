@@ -11,9 +11,13 @@ from poise.envs.robots.robot import Robot
 
 from .contacts.wrench_cone import robot_cones
 from .gains import JointLimit
+from .null_space import short_legs
 
 if TYPE_CHECKING:
     from .momentum_qp import MomentumQPConfig
+
+# A pelvis held by soles that are turned by 0.02 rad is as good as free; by 0.2 rad it is held.
+WEAKEST_WEIGHT = 3000.0  # per (acceleration / g)² or (angular acceleration / ω²)²
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +40,7 @@ class QPParameters(Block):
     force_weight: float  # per N²
     moment_weight: float  # per (N·m)²
     torque_weight: np.ndarray  # (nv−6,) per (N·m)²
+    weakest_weight: np.ndarray  # (2,) of J's weakest row: per (m/s²)² and per (rad/s²)²; or 0
     accel_floor: float  # per (unit of z)²
     sole_damping: float  # k_v [1/s]
     cone: np.ndarray  # (nc, rows, 6) cone · w_sole ≤ 0
@@ -78,6 +83,7 @@ def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig")
     torque_limit = np.zeros(nj)  # a joint without a motor has none
     torque_limit[arrays.motor_dofs - 6] = config.torque.share * arrays.torque_limit
     joint = config.joint or JointLimit()
+    weakest = WEAKEST_WEIGHT if short_legs(arrays) else 0.0
     com_stiffness = np.array([com.stiffness, com.stiffness, com.height_stiffness])
     return QPParameters(
         accel_weight=accel_weight / omega**4,
@@ -96,6 +102,7 @@ def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig")
         force_weight=config.contact.force_weight / force**2,
         moment_weight=config.contact.moment_weight / moment**2,
         torque_weight=np.full(nj, config.torque.weight / moment**2),
+        weakest_weight=weakest / np.array([arrays.gravity**2, omega**4]),
         accel_floor=1e-8 / omega**4,
         sole_damping=config.contact.damping * omega,
         cone=robot_cones(robot, config.contact.friction_share, config.contact.polygon_share),

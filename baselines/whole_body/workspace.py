@@ -59,7 +59,7 @@ def lay_out(
     """
     nj, nc = len(robot.q_standing), len(robot.sole_body)
     nv, k = nj + 6, 6 * nc + 3 * points
-    first_internal = nv - len(space.beta)
+    first_internal = nv - len(space.beta) + space.spare
     first_force = first_internal + 6 * (nc - 1)
     first_root = first_force + 3 * points
     first_point = nc * cone_rows
@@ -135,9 +135,9 @@ class Workspace(Block):
 
     @property
     def N(self) -> np.ndarray:
-        """(nz, nv) rows span the null space of J: the first columns of V."""
-        held, steps = self.space.held, len(self.space.beta)
-        return self.V[:, : len(held) - steps + len(self.space.free)].T
+        """(nz, nv) rows span the null space of J, or of all its rows but the weakest: the first
+        columns of V."""
+        return self.V[:, : self.first_internal].T
 
 
 def allocate_workspace(

@@ -42,7 +42,8 @@ def motors(state, torques):
 
 
 @pytest.mark.parametrize(
-    ("name", "root"), [("humanoid", "hard"), ("humanoid", "soft"), ("tall", "hard")]
+    ("name", "root"),
+    [("humanoid", "hard"), ("humanoid", "soft"), ("tall", "hard"), ("toddler", "hard")],
 )
 def test_the_compiled_problem_has_the_same_solution(name, root):
     """Torques, accelerations, wrenches and u_root agree along push recoveries: 1e-9 relative."""

@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from poise.baselines.whole_body.null_space import allocate_null_space, solve_resting
+from poise.baselines.whole_body.null_space import allocate_null_space, short_legs, solve_resting
 from poise.envs.physics.arrays import robot_arrays
 from tests.support.physics import robot_named
 
@@ -14,7 +15,7 @@ def solved(J, rhs, space):
     nv = J.shape[1]
     vdot0, V = np.full(nv, np.nan), np.full((nv, nv), np.nan)
     solve_resting(J, rhs, space, vdot0, V)
-    nz = nv - len(space.beta)
+    nz = nv - len(space.beta) + space.spare
     assert not V[:, nz:].any()
     return vdot0, V[:, :nz]
 
@@ -77,3 +78,31 @@ def test_a_robot_of_one_sole_has_more_null_vectors_than_rows():
     assert len(space.product) >= space.basis.shape[1]
     np.testing.assert_allclose(J @ vdot0, rhs, atol=1e-10)
     np.testing.assert_allclose(J @ V, 0.0, atol=1e-12)
+
+
+def test_on_short_legs_the_weakest_row_is_left_out():
+    """Five joints a leg: v̇₀ and V keep all rows but one, which the first column alone moves; with
+    that of `weakest` it is met too, and the solution is the whole one."""
+    space = allocate_null_space(robot_arrays(robot_named("toddler")))
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        J, rhs = random_jacobian(rng, space), rng.normal(size=12)
+        vdot0, V = solved(J, rhs, space)
+        others, weak = space.pivot[:-1], space.pivot[-1]
+        np.testing.assert_allclose(J[others] @ vdot0, rhs[others], atol=1e-10)
+        np.testing.assert_allclose(J[others] @ V, 0.0, atol=1e-12)
+        np.testing.assert_allclose(J[weak] @ V[:, 1:], 0.0, atol=1e-12)
+        np.testing.assert_allclose(V.T @ V, np.eye(V.shape[1]), atol=1e-12)
+        pivot, rest = space.weakest
+        np.testing.assert_allclose(J @ (vdot0 + V[:, 0] * rest / pivot), rhs, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "short"), [("humanoid", False), ("tall", False), ("compact", False), ("toddler", True)]
+)
+def test_short_legs(name, short):
+    """Only the toddler's ankles have one axis; one leg alone is no closed chain."""
+    arrays = robot_arrays(robot_named(name))
+    assert short_legs(arrays) == short
+    alone = replace(arrays, chain=arrays.chain[:1], chain_length=arrays.chain_length[:1])
+    assert not short_legs(alone)
