@@ -26,10 +26,13 @@ __all__ = [
     "ServoConfig",
     "Simulation",
     "StateSource",
+    "Terrain",
     "TorqueBalanceEnv",
     "choose_gl_backend",
     "load_robot",
+    "make_terrain",
     "observation_table",
+    "on_terrain",
     "parse_pushes",
     "replicate",
 ]
@@ -48,9 +51,10 @@ if TYPE_CHECKING:
     from poise.envs.pushes.options import parse_pushes
     from poise.envs.pushes.push import Kick, Push
     from poise.envs.pushes.sampler import PushSampler
-    from poise.envs.robots.robot import Robot, load_robot
+    from poise.envs.robots.robot import Robot, load_robot, on_terrain
     from poise.envs.sensors.delayed import DelayedState
     from poise.envs.sensors.source import StateSource
+    from poise.envs.terrain.terrain import Terrain, make_terrain
     from poise.envs.vector.batch import EnvBatch, replicate
     from poise.envs.vector.vector_env import BalanceVectorEnv
     from poise.envs.viewing.camera import Camera
@@ -73,9 +77,10 @@ else:
             "pushes.options": ("parse_pushes",),
             "pushes.push": ("Kick", "Push"),
             "pushes.sampler": ("PushSampler",),
-            "robots.robot": ("Robot", "load_robot"),
+            "robots.robot": ("Robot", "load_robot", "on_terrain"),
             "sensors.delayed": ("DelayedState",),
             "sensors.source": ("StateSource",),
+            "terrain.terrain": ("Terrain", "make_terrain"),
             "vector.batch": ("EnvBatch", "replicate"),
             "vector.vector_env": ("BalanceVectorEnv",),
             "viewing.camera": ("Camera",),

@@ -16,7 +16,7 @@ from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.simulation import Simulation, World
 from poise.envs.pushes.push import PushInfo, push_info
 from poise.envs.robots.mirror import Mirror, mirror_robot
-from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.robots.robot import Robot, load_robot, on_terrain
 from poise.envs.sensors.sensed import SensedRobot
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.rendered import RenderedEnv
@@ -66,8 +66,9 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         camera: Camera | Mapping[str, object] | str | int | None = None,
         **overrides: object,
     ):
-        self.robot = robot if isinstance(robot, Robot) else load_robot(robot)
         self.config = env_config(config, **overrides)
+        known = robot if isinstance(robot, Robot) else load_robot(robot)
+        self.robot = on_terrain(known, self.config.terrain)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.policy_period)}
         self._set_up_rendering(self.robot.model, render_mode, width, height, camera)
         self.sensor_delay = self.config.sensors.delay

@@ -8,6 +8,8 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml, to_dict
 from poise.envs.pushes.sampler import PushSampler
+from poise.envs.terrain.flat import Flat
+from poise.envs.terrain.terrain import Terrain
 
 from .reward import RewardWeights
 from .start import StartNoise as StartNoise
@@ -56,10 +58,13 @@ class EnvConfig:
         default_factory=ObservationConfig, metadata={"omit": "default"}
     )
     sensors: SensorConfig = field(default_factory=SensorConfig, metadata={"omit": "default"})
+    terrain: Terrain = field(default_factory=Flat, metadata={"omit": "default"})
 
 
 def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: object) -> EnvConfig:
     """An EnvConfig from a .yaml file, a mapping or an object; `overrides` win.
+
+    `terrain` may be the name of a kind alone.
 
     Raises ConfigError naming the file, the field and the choices, UnknownArgument for an override
     that is no field.
@@ -84,4 +89,7 @@ def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: obj
             choices=EnvConfig.__dataclass_fields__,
         )
     overrides = {name: to_dict(value) for name, value in overrides.items()}
-    return build(EnvConfig, {**fields, **overrides}, source)
+    merged = {**fields, **overrides}
+    if isinstance(merged.get("terrain"), str):
+        merged["terrain"] = {"kind": merged["terrain"]}
+    return build(EnvConfig, merged, source)

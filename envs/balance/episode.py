@@ -34,8 +34,9 @@ from .termination import Limits, has_diverged, has_fallen, uprightness
     POSITIVE_WORK,  # ∫ Σ max(τ q̇, 0) dt [J]
     TORQUE_VARIATION,  # sum over ticks of the mean over motors of |Δτ|/τ_max
     TORQUE_TIME,  # of the ticks that were accounted for [s]
-) = range(17)
-METRICS = 17
+    EDGE_CONTACTS,  # times that a foot came to touch an edge of the terrain
+) = range(18)
+METRICS = 18
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,7 @@ class EpisodeArrays(Block):
     root_wrench: np.ndarray  # (6,) of a soft root in the last tick [N, N·m]
     sole_start: np.ndarray  # (nc, 2)
     sole_rest: np.ndarray  # (nc, 2) where the soles were when the running quiet time began
+    edges: np.ndarray  # (nc,) 1 where a foot touched an edge in the last policy step
     steps: np.ndarray  # (1,) int: policy steps since the reset
     running: np.ndarray  # (1,) int: whether there may be another one
     ticks: np.ndarray  # (1,) int: control ticks of the running policy step
@@ -72,6 +74,7 @@ def allocate_episode(
         root_wrench=guarded_zeros(6),
         sole_start=guarded_zeros((nc, 2)),
         sole_rest=guarded_zeros((nc, 2)),
+        edges=guarded_zeros(nc),
         steps=guarded_zeros(1, dtype=np.int64),
         running=guarded_zeros(1, dtype=np.int64),
         ticks=guarded_zeros(1, dtype=np.int64),
@@ -87,6 +90,7 @@ def begin_episode(s: StateArrays, e: EpisodeArrays):
     e.reward_terms[:] = 0.0
     e.metrics[:] = 0.0
     e.root_wrench[:] = 0.0
+    e.edges[:] = 0.0
     e.metrics[MIN_COP_MARGIN] = np.inf
     e.steps[0], e.running[0], e.ticks[0] = 0, 1, 0
     for i in range(s.sole_point.shape[0]):
@@ -179,6 +183,7 @@ def judge_step(j: Judge):
     m[FALLEN] = 1.0 if fallen else 0.0
     record_quiet(j, fallen)
     record_excursions(s, e)
+    record_edges(s, e)
     e.reward[0] = sum_rewards(j.rewards, fallen, diverged, e.reward_terms)
     e.steps[0] += 1
     e.running[0] = not fallen and e.steps[0] < j.limits.max_steps
@@ -231,6 +236,15 @@ def record_excursions(s: StateArrays, e: EpisodeArrays):
     m[MAX_CAPTURE] = max(m[MAX_CAPTURE], np.sqrt(xi_x * xi_x + xi_y * xi_y))
     m[MIN_COP_MARGIN] = min(m[MIN_COP_MARGIN], support_distance(s, s.cop[0], s.cop[1]))
     m[MAX_SLIDE] = max(m[MAX_SLIDE], sole_distance(s, e.sole_start))
+
+
+@compiled
+def record_edges(s: StateArrays, e: EpisodeArrays):
+    """Count the feet that have come to touch an edge."""
+    for i in range(s.edges.shape[0]):
+        if s.edges[i] > 0.5 and e.edges[i] < 0.5:
+            e.metrics[EDGE_CONTACTS] += 1.0
+        e.edges[i], s.edges[i] = s.edges[i], 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from poise.envs.compiled.copies import portable
 from poise.envs.maths.pendulum import Units
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import MAX_VERTICES
+from poise.envs.terrain.arrays import surface_arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,9 @@ class RobotArrays(Block):
     M_colind: np.ndarray
     ground_sensor: int  #: address in `sensordata`: contacts of anything with the ground
     sole_sensor: np.ndarray  #: (nc,) addresses: contacts of that foot with the ground
+    surfaces: np.ndarray  #: (n, 6) of the terrain, see `Surface`; none on level ground
+    floor: float  #: height of the ground where there is no surface [m]
+    edge_sensor: np.ndarray  #: (nc,) addresses: directions of that foot's contacts, on a terrain
 
     @property
     def units(self) -> Units:
@@ -123,6 +127,9 @@ def robot_arrays(robot: Robot) -> RobotArrays:
         M_colind=model.M_colind.astype(np.int64),
         ground_sensor=int(robot.sensor_adr["ground"]),
         sole_sensor=np.array([robot.sensor_adr[sole.name] for sole in soles], dtype=np.int64),
+        surfaces=surface_arrays(robot.terrain.surfaces()),
+        floor=0.0 if robot.terrain.flat else robot.terrain.floor(),
+        edge_sensor=np.array([robot.edge_adr.get(sole.name, 0) for sole in soles], dtype=np.int64),
     )
 
 

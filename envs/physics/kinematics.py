@@ -17,9 +17,14 @@ from poise.envs.maths.pendulum import compiled_rate
 from poise.envs.maths.polygons import convex_hull
 from poise.envs.maths.vectors import copy_into
 from poise.envs.robots.soles import MAX_VERTICES
+from poise.envs.terrain.arrays import ground_height, surface_below, surface_height
+from poise.envs.terrain.building import SLOTS
 
 from .arrays import RobotArrays, SimViews
 from .jacobian import point_jacobian
+
+STEEP = 0.7  # of the vertical part of a contact's direction, below which it is that of a wall
+EDGE = 0.005  # [m] between surfaces from which their border is an edge
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +61,8 @@ class StateArrays(Block):
     dof_axes: np.ndarray  # (nv, 6)
     dof_axes_dot: np.ndarray  # (nv, 6)
     tree_com: np.ndarray  # (3,)
+    ground: np.ndarray  # (nc,)
+    edges: np.ndarray  # (nc,)
 
 
 def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
@@ -92,6 +99,8 @@ def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
         dof_axes=zeros((nv, 6)),
         dof_axes_dot=zeros((nv, 6)),
         tree_com=zeros(3),
+        ground=zeros(nc),
+        edges=zeros(nc),
     )
 
 
@@ -102,6 +111,8 @@ def update_state(robot: RobotArrays, views: SimViews, s: StateArrays):
     _momentum(robot, views, s)
     _soles(robot, views, s)
     _contact(robot, views, s)
+    if robot.surfaces.shape[0] > 0:
+        stand_on_terrain(robot, views, s)
     _bodies(robot, views, s)
 
 
@@ -250,6 +261,54 @@ def _bodies(robot: RobotArrays, views: SimViews, s: StateArrays):
             s.dof_axes[d, a] = views.cdof[d, a]
             s.dof_axes_dot[d, a] = views.cdof_dot[d, a]
     copy_into(views.subtree_com[robot.tree_body], s.tree_com)
+
+
+@compiled
+def stand_on_terrain(robot: RobotArrays, views: SimViews, s: StateArrays):
+    """What is relative to the ground where that is not z = 0, and which feet touch edges.
+
+    The origin is as high as the soles that touch the ground are in the mean, without one as the
+    lowest sole. The CoP lies in the plane through it, and ω is that of the CoM's height above it.
+    """
+    touching, height, lowest = 0, 0.0, np.inf
+    for i in range(s.sole_point.shape[0]):
+        x, y, z = s.sole_point[i, 0], s.sole_point[i, 1], s.sole_point[i, 2]
+        s.ground[i] = ground_height(robot.surfaces, robot.floor, x, y)
+        lowest = min(lowest, z)
+        if s.contacts[i] > 0.5:
+            touching, height = touching + 1, height + z
+            if touches_edge(robot, views, s, i):
+                s.edges[i] = 1.0
+    s.origin[2] = height / touching if touching > 0 else lowest
+    fz = s.contact_wrench[2]
+    if fz > 1e-3 * robot.mass * robot.gravity:
+        for a in range(2):
+            s.cop[a] += s.origin[2] * s.contact_wrench[a] / fz
+    above = max(s.com[2] - s.origin[2], 0.2 * robot.height_com)
+    s.omega[0] = compiled_rate(robot.gravity, above)
+    for a in range(2):
+        s.capture_point[a] = s.com[a] + s.com_vel[a] / s.omega[0]
+
+
+@compiled
+def touches_edge(robot: RobotArrays, views: SimViews, s: StateArrays, i: int) -> bool:
+    """Return whether a foot on the ground presses against a step, or reaches over the edge of the
+    surface that it stands on."""
+    first = robot.edge_sensor[i]
+    for slot in range(SLOTS):
+        found = views.sensordata[first + 4 * slot] > 0.0
+        if found and abs(views.sensordata[first + 4 * slot + 3]) < STEEP:
+            return True
+    axes, surfaces = s.sole_axes[i], robot.surfaces
+    own = surface_below(surfaces, s.sole_point[i, 0], s.sole_point[i, 1])
+    for k in range(robot.sole_vertices[i]):
+        u, v = robot.sole_polygon[i, k, 0], robot.sole_polygon[i, k, 1]
+        x = s.sole_point[i, 0] + axes[0, 0] * u + axes[0, 1] * v
+        y = s.sole_point[i, 1] + axes[1, 0] * u + axes[1, 1] * v
+        below = ground_height(surfaces, robot.floor, x, y)
+        if abs(below - surface_height(surfaces, own, robot.floor, x)) > EDGE:
+            return True
+    return False
 
 
 AIRBORNE = 0.02  # [h]: a sole without contact that is this far above the lowest one is in the air

@@ -69,7 +69,7 @@ def advance_world(world: World):
 
 
 class Simulation(Copyable):
-    """A robot on flat ground. `state` is current after `reset` and after every `step`."""
+    """A robot on its terrain. `state` is current after `reset` and after every `step`."""
 
     def __init__(self, robot: Robot):
         self.robot = robot
@@ -137,6 +137,7 @@ class Simulation(Copyable):
         mujoco.mj_normalizeQuat(self.model, self.data.qpos)
         mujoco.mj_forward(self.model, self.data)
         self.clock[0] = 0
+        self.state_arrays.edges[:] = 0.0
         update_state(self.arrays, self.views, self.state_arrays)
         self.start_yaw = self.state.heading_yaw
         self.set_pushes(pushes)

@@ -123,7 +123,10 @@ class RobotState(Copyable):
 
     @property
     def origin(self) -> np.ndarray:
-        """(3,) origin of the heading frame: mean of the sole reference points [m]."""
+        """(3,) origin of the heading frame: mean of the sole reference points [m].
+
+        On a terrain it is as high as the soles that touch the ground are in the mean.
+        """
         return _frozen(self.arrays.origin)
 
     @property
@@ -142,8 +145,18 @@ class RobotState(Copyable):
         return _frozen(self.arrays.contact_wrench)
 
     @property
+    def ground(self) -> np.ndarray:
+        """(nc,) height of the ground below each sole's reference point [m]."""
+        return _frozen(self.arrays.ground)
+
+    @property
+    def support_height(self) -> float:
+        """Height of the plane in which the CoP lies [m]: 0, on a terrain that of `origin`."""
+        return float(self.arrays.origin[2]) if len(self.robot.surfaces) else 0.0
+
+    @property
     def cop(self) -> np.ndarray:
-        """(2,) p, centre of pressure on the ground [m]."""
+        """(2,) p, centre of pressure on the ground [m]; on a terrain at the height of `origin`."""
         return _frozen(self.arrays.cop)
 
     @property

@@ -62,11 +62,11 @@ def install_ground(spec: mujoco.MjSpec, name: str | None, source: str) -> str:
     return ground.name
 
 
-def check_ground(model: mujoco.MjModel, ground: int, source: str) -> None:
-    """Raise ConfigError unless the ground is the plane z = 0."""
+def check_ground(model: mujoco.MjModel, ground: int, floor: float, source: str) -> None:
+    """Raise ConfigError unless the ground was the plane z = 0, now lowered to the `floor` [m]."""
     normal = np.zeros(3)
     mujoco.mju_rotVecQuat(normal, np.array([0.0, 0.0, 1.0]), model.geom_quat[ground])
-    if model.geom_pos[ground, 2] != 0 or normal[2] < 1.0 - 1e-9:
+    if model.geom_pos[ground, 2] != floor or normal[2] < 1.0 - 1e-9:
         raise ConfigError(
             f"the plane {model.geom(ground).name!r} must be z = 0", source=source, field="ground"
         )

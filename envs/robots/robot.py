@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -14,6 +14,9 @@ from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
 from poise.envs.compiled.copies import Copyable
 from poise.envs.maths.pendulum import Units
+from poise.envs.terrain.building import EDGE_SENSOR, add_terrain_sensors, build_terrain
+from poise.envs.terrain.flat import Flat
+from poise.envs.terrain.terrain import Terrain
 
 from .actuators import install_motors
 from .description import RobotDescription
@@ -63,7 +66,7 @@ class Robot(Copyable):
         height_com: height of the centre of mass above the ground in the standing posture [m].
         com_ahead: how far the centre of mass then is ahead of the middle of the soles [m].
         root_body_id: the floating body.
-        ground_geom_id: the ground plane, z = 0.
+        ground_geom_id: the ground plane, z = 0, or the floor below a terrain.
         soles: one per foot, in the description's order.
         standing_qpos: (nq,) standing posture: soles flat on the ground, the mean of their
             reference points at (0, 0), facing +x.
@@ -74,8 +77,11 @@ class Robot(Copyable):
         sensor_adr: address in ``data.sensordata`` of the number of contacts with the ground, by
             foot name; ``"ground"`` counts all contacts with it. What the feet leave of it is
             contact of other bodies.
-        fingerprint: hash of all that the dynamics depend on.
+        fingerprint: hash of all that the dynamics depend on, but for the terrain.
         keyframes: name → (nq,) qpos of the keyframes that the model came with.
+        source: the file of the description.
+        terrain: what it stands on.
+        edge_adr: address of the directions of contacts, by foot name; on level ground none.
     """
 
     name: str
@@ -95,6 +101,9 @@ class Robot(Copyable):
     sensor_adr: dict[str, int]
     fingerprint: str
     keyframes: dict[str, np.ndarray]
+    source: str
+    terrain: Terrain
+    edge_adr: dict[str, int]
 
     @property
     def motor_names(self) -> tuple[str, ...]:
@@ -119,11 +128,40 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
         ConfigError: no such robot; the description or its MJCF is not valid, or does not fit the
             other. The text names the file, the field and the valid choices.
     """
-    path = resolve("robots", name_or_path)
+    return _load(resolve("robots", name_or_path), Flat())
+
+
+def on_terrain(robot: Robot, terrain: Terrain) -> Robot:
+    """The same robot on another terrain; itself, where it is on that one.
+
+    Masses, friction and time step that differ from the described ones stay.
+
+    Raises ConfigError as `load_robot` does: the robot's file is read again.
+    """
+    if terrain == robot.terrain or (terrain.flat and robot.terrain.flat):
+        return robot
+    moved = _load(Path(robot.source), terrain)
+    _keep_variation(robot.model, moved.model)
+    kept = ("name", "mass", "fingerprint")
+    return replace(moved, **{name: getattr(robot, name) for name in kept})
+
+
+def _keep_variation(old: mujoco.MjModel, new: mujoco.MjModel) -> None:
+    """Let a model be like another one of the same bodies in what variants change."""
+    new.opt.timestep = old.opt.timestep
+    first, of_old = new.body_geomnum[0], old.body_geomnum[0]
+    new.geom_friction[first:] = old.geom_friction[of_old:]
+    new.geom_friction[:first] = old.geom_friction[0]
+    if not np.array_equal(new.body_mass, old.body_mass):
+        new.body_mass[:], new.body_inertia[:] = old.body_mass, old.body_inertia
+        mujoco.mj_setConst(new, mujoco.MjData(new))
+
+
+def _load(path: Path, terrain: Terrain) -> Robot:
     source = str(path)
     description = build(RobotDescription, read_yaml(path), source)
     file = model_file(description.source, path)
-    spec, keyframes, ground_name = _prepare(description, path, file)
+    spec, keyframes, ground_name = _prepare(description, path, file, terrain)
     model = _compile(spec, source)
     data = mujoco.MjData(model)
     root = model.body(description.root).id
@@ -133,7 +171,7 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
         data.qpos[:] = described_qpos(model, description, keyframes, source)
     mujoco.mj_kinematics(model, data)
     ground = model.geom(ground_name).id
-    check_ground(model, ground, source)
+    check_ground(model, ground, 0.0 if terrain.flat else terrain.floor(), source)
     geoms, planes = [], []
     for i, foot in enumerate(description.feet):
         with pointing_to_scenes(file, "pair"):
@@ -176,6 +214,13 @@ def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
         },
         fingerprint=fingerprint(model, standing_qpos),
         keyframes=keyframes,
+        source=source,
+        terrain=terrain,
+        edge_adr={
+            foot.name: int(model.sensor(EDGE_SENSOR + foot.name).adr[0])
+            for foot in description.feet
+            if not terrain.flat
+        },
     )
     for array in (
         *keyframes.values(),
@@ -205,7 +250,7 @@ def fingerprint(model: mujoco.MjModel, standing_qpos: np.ndarray) -> str:
 
 
 def _prepare(
-    description: RobotDescription, path: Path, file: Path | None
+    description: RobotDescription, path: Path, file: Path | None, terrain: Terrain
 ) -> tuple[mujoco.MjSpec, dict[str, np.ndarray], str]:
     """The model with motors, ground, sensors and options; its keyframes; the ground's name."""
     source = str(path)
@@ -220,7 +265,12 @@ def _prepare(
     for element in [*spec.keys, *spec.sensors]:  # they need not fit the new actuators
         spec.delete(element)
     install_motors(spec, model, description.torque_limits, source)
-    add_contact_sensors(spec, description, ground)
+    if terrain.flat:
+        add_contact_sensors(spec, description, ground)
+    else:
+        build_terrain(spec, terrain, ground)
+        feet = [(foot.name, foot.body) for foot in description.feet]
+        add_terrain_sensors(spec, CONTACT_SENSOR, feet)
     set_options(spec, description.options)
     return spec, keyframes, ground
 

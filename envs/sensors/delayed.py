@@ -16,7 +16,7 @@ from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, update_state
 from poise.envs.physics.simulation import Simulation
-from poise.envs.robots.robot import Robot
+from poise.envs.robots.robot import Robot, on_terrain
 
 from .source import StateSource
 
@@ -110,7 +110,7 @@ class DelayedState(StateSource):
         super().__init__(simulation)
         late = whole_steps(delay, simulation.model.opt.timestep, "sensors.delay", least=0)
         self.delay = delay
-        self.known = Simulation(robot)
+        self.known = Simulation(on_terrain(robot, simulation.robot.terrain))
         self.arrays, self.state_arrays = self.known.arrays, self.known.state_arrays
         self._delay = allocate_delay(simulation, self.known, late + 1)
         self.sense = Program.of([(measure, self._delay)])

@@ -28,18 +28,18 @@ class ContactForces:
     def find(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         """Body id → force (3,) [N] on it, world axes, and the point (3,) [m] where it acts."""
         model, data = self.simulation.model, self._data
-        ground = self.simulation.robot.ground_geom_id
+        fixed = model.geom_bodyid[:] == 0  # the ground, and what is built on it
         self._take_state()
         sums: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         wrench = np.zeros(6)
         for i, contact in enumerate(data.contact):
             pair = contact.geom
-            if ground not in pair or contact.efc_address < 0:
+            if not fixed[pair].any() or contact.efc_address < 0:
                 continue
             mujoco.mj_contactForce(model, data, i, wrench)
-            sign = 1.0 if pair[0] == ground else -1.0  # it is that of the first on the second
+            sign = 1.0 if fixed[pair[0]] else -1.0  # it is that of the first on the second
             force = sign * contact.frame.reshape(3, 3).T @ wrench[:3]
-            body = int(model.geom_bodyid[pair[1] if pair[0] == ground else pair[0]])
+            body = int(model.geom_bodyid[pair[1] if fixed[pair[0]] else pair[0]])
             total, weighted = sums.get(body, (np.zeros(3), np.zeros(3)))
             sums[body] = total + force, weighted + wrench[0] * contact.pos
         return {

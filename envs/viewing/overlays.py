@@ -51,13 +51,16 @@ def marks(simulation: Simulation) -> list[Mark]:
     """All marks for the simulation's current state, which is only read."""
     state = simulation.state.copy()  # the support polygon is computed into the state's own arrays
     size = simulation.robot.height_com
-    ground = [*state.com[:2], 0.0]
-    found, blue = _polygon(state.support_polygon, 0.013 * size), CAPTURE_POINT.colour
-    found.append(_disc("capture point", state.capture_point, 0.065 * size, 0.004 * size, blue))
+    level = state.support_height
+    found, blue = _polygon(state.support_polygon, level, 0.013 * size), CAPTURE_POINT.colour
+    point = np.append(state.capture_point, level)
+    found.append(_disc("capture point", point, 0.065 * size, 0.004 * size, blue))
     if state.contact_wrench[2] > 1e-3 * state.mass * simulation.arrays.gravity:
-        found.append(_disc("cop", state.cop, 0.046 * size, 0.007 * size, COP.colour))
+        point = np.append(state.cop, level)
+        found.append(_disc("cop", point, 0.046 * size, 0.007 * size, COP.colour))
     black = COM.colour
-    found.append(_disc("com on ground", np.array(ground), 0.026 * size, 0.010 * size, black))
+    point = np.append(state.com[:2], level)
+    found.append(_disc("com on ground", point, 0.026 * size, 0.010 * size, black))
     found.append(Mark("com", SPHERE, state.com, state.com, 0.04 * size, black))
     return found + push_arrows(simulation)
 
@@ -111,13 +114,13 @@ def draw(scene: mujoco.MjvScene, found: list[Mark]) -> None:
 
 
 def _disc(name: str, point: np.ndarray, radius: float, height: float, colour: RGB) -> Mark:
-    """A disc on the ground at `point` (2,) or (3,), which sticks out of it by `height`."""
-    start = np.array([point[0], point[1], 0.0])
+    """A disc at `point` (3,), or (2,) at z = 0, which sticks out of the ground by `height`."""
+    start = np.append(point, 0.0)[:3]
     return Mark(name, DISC, start, start + [0.0, 0.0, height], radius, colour)
 
 
-def _polygon(vertices: np.ndarray, radius: float) -> list[Mark]:
-    corners = np.column_stack([vertices, np.zeros(len(vertices))])
+def _polygon(vertices: np.ndarray, level: float, radius: float) -> list[Mark]:
+    corners = np.column_stack([vertices, np.full(len(vertices), level)])
     ends = np.roll(corners, -1, axis=0)
     return [
         Mark("support", BAR, start, end, radius, SUPPORT.colour)

@@ -23,7 +23,8 @@ MOST = 14  # files in a room
 FLOORS = """
  1 configs, training/statistics
  2 envs/compiled, baselines/allowance
- 3 envs/maths, baselines/clips, baselines/solvers, baselines/warmup, training/running
+ 3 envs/maths, envs/terrain, baselines/clips, baselines/solvers, baselines/warmup
+ 3 training/running
  4 envs/robots
  5 envs/pushes
  6 envs/physics

@@ -47,18 +47,19 @@ def contact_forces(
     simulation: Simulation, body: int | None = None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """(point, force on the robot) of every contact with the ground, or of one body's; world."""
-    model, data, ground = simulation.model, simulation.data, simulation.robot.ground_geom_id
+    model, data = simulation.model, simulation.data
+    fixed = model.geom_bodyid == 0
     out = []
     for i, contact in enumerate(data.contact):
-        if ground not in contact.geom:
+        if not fixed[contact.geom].any():
             continue
-        other = contact.geom2 if contact.geom1 == ground else contact.geom1
+        other = contact.geom2 if fixed[contact.geom1] else contact.geom1
         if body is not None and model.geom_bodyid[other] != body:
             continue
         wrench = np.zeros(6)
         mujoco.mj_contactForce(model, data, i, wrench)
         assert not wrench[3:].any()  # contact dimension 3
-        sign = 1.0 if contact.geom1 == ground else -1.0  # the force is on geom2
+        sign = 1.0 if fixed[contact.geom1] else -1.0  # the force is on geom2
         out.append((contact.pos.copy(), sign * contact.frame.reshape(3, 3).T @ wrench[:3]))
     return out
 

@@ -1,0 +1,81 @@
+"""Terrain in MuJoCo: a box under every surface, and the sensors that see all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+
+from .terrain import Surface, Terrain
+
+THICKNESS = 0.05  # [m] of a box below the floor; half of that of a slanting one
+SHADES = ((0.80, 0.82, 0.84, 1.0), (0.70, 0.72, 0.75, 1.0))
+EDGE_SENSOR = "edges_"  # prefix of the sensors of contacts' directions
+SLOTS = 16  # contacts of a foot that such a sensor shows
+FOUND, NORMAL = 1, 32  # bits of what a contact sensor gives
+ALIKE = (  # what a box has of the plane beneath it
+    *("contype", "conaffinity", "condim", "priority", "margin", "gap", "solmix"),
+    *("friction", "solref", "solimp"),
+)
+
+
+def build_terrain(spec: mujoco.MjSpec, terrain: Terrain, ground: str) -> None:
+    """Add the surfaces to a model whose plane is called `ground`, which becomes the floor."""
+    plane = next(geom for geom in spec.worldbody.geoms if geom.name == ground)
+    floor = terrain.floor()
+    plane.pos[2] += floor
+    pairs = [pair for pair in spec.pairs if ground in (pair.geomname1, pair.geomname2)]
+    for i, surface in enumerate(terrain.surfaces()):
+        if surface.gradient == 0.0 and surface.height == floor:
+            continue  # it is the plane's
+        name = f"terrain_{i}"
+        box = spec.worldbody.add_geom(name=name, **_box(surface, floor))
+        box.rgba = SHADES[i % len(SHADES)]
+        for attribute in ALIKE:
+            setattr(box, attribute, getattr(plane, attribute))
+        for pair in pairs:
+            _copy_pair(spec, pair, ground, name)
+
+
+def _box(surface: Surface, floor: float) -> dict[str, object]:
+    """A box whose upper side is the surface, and which reaches down to the floor."""
+    angle = np.arctan(surface.gradient)
+    slant = 0.5 * (surface.x_max - surface.x_min) / np.cos(angle)
+    depth = 2.0 * THICKNESS if surface.gradient else surface.height - floor + THICKNESS
+    half = np.array([slant, 0.5 * (surface.y_max - surface.y_min), 0.5 * depth])
+    normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
+    return {
+        "type": mujoco.mjtGeom.mjGEOM_BOX,
+        "size": half,
+        "pos": surface.middle - half[2] * normal,
+        "quat": [np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0],
+    }
+
+
+def _copy_pair(spec: mujoco.MjSpec, pair: mujoco.MjsPair, ground: str, name: str) -> None:
+    """The contact pair of the plane for a box, too."""
+    other = pair.geomname2 if pair.geomname1 == ground else pair.geomname1
+    spec.add_pair(
+        geomname1=name, geomname2=other, condim=pair.condim, friction=pair.friction,
+        margin=pair.margin, gap=pair.gap, solref=pair.solref, solreffriction=pair.solreffriction,
+        solimp=pair.solimp,
+    )  # fmt: skip
+
+
+def add_terrain_sensors(spec: mujoco.MjSpec, prefix: str, feet: Iterable[tuple[str, str]]) -> None:
+    """Sensors of contacts with all that does not move, as `add_contact_sensors` has of a plane.
+
+    Args:
+        prefix: of the names of the sensors that count.
+        feet: name and body of each.
+    """
+    world = {"objtype": mujoco.mjtObj.mjOBJ_BODY, "objname": "world"}
+    contact = mujoco.mjtSensor.mjSENS_CONTACT
+    spec.add_sensor(name=f"{prefix}ground", type=contact, intprm=[FOUND, 0, 1], **world)
+    for name, body in feet:
+        between = {"objtype": mujoco.mjtObj.mjOBJ_XBODY, "objname": body,
+                   "reftype": mujoco.mjtObj.mjOBJ_BODY, "refname": "world"}  # fmt: skip
+        spec.add_sensor(name=prefix + name, type=contact, intprm=[FOUND, 0, 1], **between)
+        shown = [FOUND | NORMAL, 0, SLOTS]
+        spec.add_sensor(name=EDGE_SENSOR + name, type=contact, intprm=shown, **between)

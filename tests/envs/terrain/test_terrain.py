@@ -1,0 +1,86 @@
+"""Terrain: where its surfaces are, as configuration says, as Python and as compiled code find."""
+
+import numpy as np
+import pytest
+
+from poise.configs.errors import ConfigError
+from poise.configs.schema import to_dict
+from poise.envs.balance.config import EnvConfig, env_config
+from poise.envs.terrain.arrays import ground_height, surface_arrays
+from poise.envs.terrain.flat import Flat
+from poise.envs.terrain.slope import Slope
+from poise.envs.terrain.stairs import Stairs
+from poise.envs.terrain.stones import Stones
+from poise.envs.terrain.terrain import make_terrain, seeded
+
+
+def test_stairs_rise_by_one_step_at_every_edge():
+    stairs = Stairs(count=3, rise=0.1, tread=0.3, start=0.5)
+    for x, height in ((0.49, 0.0), (0.51, 0.1), (0.79, 0.1), (0.81, 0.2), (1.11, 0.3), (3.0, 0.3)):
+        assert stairs.height(x, 0.0) == pytest.approx(height)
+    assert stairs.floor() == 0.0
+
+
+def test_stairs_down_lead_to_a_floor_below_the_start():
+    stairs = Stairs(count=3, rise=0.1, tread=0.3, down=True)
+    assert stairs.height(0.0, 0.0) == 0.0
+    assert stairs.floor() == stairs.height(2.0, 0.0) == pytest.approx(-0.3)
+    assert stairs.height(0.6, 5.0) == stairs.floor()  # beside them
+
+
+def test_a_slope_rises_by_the_tangent_of_its_angle():
+    slope = Slope(angle=-8.0, length=2.0, start=0.5)
+    drop = np.tan(np.radians(8.0))
+    assert slope.height(0.4, 0.0) == 0.0
+    assert slope.height(1.5, 0.0) == pytest.approx(-drop)
+    assert slope.height(3.0, 0.0) == slope.floor() == pytest.approx(-2.0 * drop)
+
+
+def test_between_stones_is_the_floor():
+    stones = Stones(count=4, length=0.3, gap=0.1, depth=0.2, start=0.5)
+    assert stones.height(0.55, 0.0) == stones.floor() == pytest.approx(-0.2)
+    assert stones.height(0.75, 0.0) == 0.0
+    assert stones.height(0.95, 0.0) == stones.floor()
+
+
+def test_errors_are_bounded_known_to_nobody_and_drawn_by_the_seed():
+    stairs = Stairs(error=0.02, seed=5)
+    true, known = stairs.surfaces(), stairs.believed()
+    errors = np.array([a.height - b.height for a, b in zip(true, known, strict=True)])
+    assert known == Stairs().surfaces()
+    assert errors[0] == 0.0 and 0.01 < np.abs(errors).max() <= 0.02
+    assert stairs.surfaces() == true != seeded(stairs, 6).surfaces()
+    assert Slope(unseen=True).believed() == [] != Slope().believed()
+
+
+@pytest.mark.parametrize(
+    "terrain", [Stairs(down=True), Slope(), Stones(gap=0.05, spread=0.05), Flat()], ids=str
+)
+def test_compiled_code_finds_the_same_heights(terrain):
+    rows, floor = surface_arrays(terrain.surfaces()), terrain.floor()
+    for x, y in np.random.default_rng(0).uniform([-3, -2], [8, 2], (200, 2)):
+        assert ground_height(rows, floor, x, y) == pytest.approx(terrain.height(x, y), abs=1e-12)
+
+
+def test_the_configuration_of_an_environment_takes_a_kind_or_a_mapping():
+    assert env_config(None).terrain == Flat()
+    assert env_config(None, terrain="stairs").terrain == Stairs()
+    config = env_config({"terrain": {"kind": "slope", "angle": 5}})
+    assert config.terrain == Slope(angle=5.0) == make_terrain({"kind": "slope", "angle": 5})
+    assert "terrain" not in to_dict(EnvConfig())  # or fingerprints of policies would change
+    assert env_config(to_dict(config)) == config
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [
+        ("hills", r"terrain.kind: no such kind: 'hills' \(choices: .*stairs"),
+        ({"kind": "stairs", "rise": -0.1}, r"terrain.rise: must be above 0"),
+        ({"kind": "stairs", "height": 0.1}, r"terrain.height: unknown field \(choices: .*rise"),
+        (3, r"terrain: must be"),
+    ],
+)
+def test_what_is_no_terrain_is_told_in_a_line(value, says):
+    for take in (make_terrain, lambda terrain: env_config(None, terrain=terrain)):
+        with pytest.raises(ConfigError, match=says):
+            take(value)
