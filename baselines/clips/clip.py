@@ -128,7 +128,9 @@ class Clip:
         return replace(self, skeleton=skeleton, root=self.root * MIRROR, rotations=rotations)
 
     def turned(self, angle: float) -> Clip:
-        """The clip turned about the world's z axis by `angle` [rad]."""
+        """The clip turned about the world's z axis by a finite `angle` [rad], else ConfigError."""
+        if not np.isfinite(angle):
+            raise ConfigError(f"must be finite, not {angle:g}", source=self.name, field="turn")
         turn, rotations = about_z(angle), self.rotations.copy()
         rotations[:, 0] = multiply(turn, rotations[:, 0])
         return replace(self, root=rotate(turn, self.root), rotations=rotations)
@@ -191,8 +193,8 @@ class Clip:
 def _frames(count: float, source: str, field: str) -> int:
     """The number of whole frames; raises ConfigError for too few, or more than can be kept."""
     if not SHORTEST <= count < MOST_FRAMES + 1:
-        raise ConfigError(f"leaves {count:.0f} frames: at least {SHORTEST} and at most "
-                          f"{MOST_FRAMES} can be kept", source=source, field=field)  # fmt: skip
+        raise ConfigError(f"must give {SHORTEST} to {MOST_FRAMES} frames, not {count:.0f}",
+                          source=source, field=field)  # fmt: skip
     return int(count)
 
 

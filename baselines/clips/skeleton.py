@@ -17,7 +17,7 @@ SIDES = ("left", "right")
 SIDED = {
     "hip": ("upleg", "upperleg", "upperleg01", "thigh", "femur", "hip"),
     "knee": ("leg", "lowerleg", "lowerleg01", "loleg", "shin", "calf", "tibia", "knee"),
-    "ankle": ("foot", "ankle"),
+    "ankle": ("ankle", "foot"),  # where a file has both, its foot is the ball
     "toe": ("toebase", "toes", "toe", "toe11", "ball"),
     "shoulder": ("arm", "upperarm", "upperarm01", "uparm", "humerus", "shoulder"),
     "elbow": ("forearm", "lowerarm", "lowerarm01", "lowarm", "loarm", "radius", "elbow"),
@@ -125,7 +125,10 @@ def leg_length(offsets: np.ndarray, parents: np.ndarray, roles: dict[str, int]) 
 
 def find_roles(names: tuple[str, ...]) -> dict[str, int]:
     """Role → index among `names`; of several names for a role the most certain one wins."""
-    sided = {_sided(name): i for i, name in reversed(list(enumerate(names)))}
+    sided = {}
+    for i, name in reversed(list(enumerate(names))):
+        base, side = _sided(name)
+        sided[base.replace("_", ""), side] = i
     found = {}
     for role, words in SIDED.items():
         for side in SIDES:

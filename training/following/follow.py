@@ -71,10 +71,11 @@ def follow(
 
     Raises:
         ConfigError: no such motion, controller or robot, one that does not play motions, counts
-            below 1, an impulse below 0.
+            below 1, an impulse or a seed below 0.
     """
     for name, count in (("starts", starts), ("directions", directions)):
         whole_number(count, 1, name)
+    whole_number(seed, 0, "seed")
     if not 0.0 <= impulse < np.inf:
         raise ConfigError(f"must be at least 0, not {impulse:g}", field="impulse")
     body = robot if isinstance(robot, Robot) else load_robot(robot)

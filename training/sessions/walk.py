@@ -135,7 +135,7 @@ def lines(outcome: Outcome, trial: Trial, agent: Agent) -> Iterator[str]:
     o, end = outcome, agent.env.simulation.time
     yield f"fell after {o.fall_time:.1f} s" if o.fallen else f"upright after {end:.0f} s"
     if not o.fallen:
-        yield "the last two strides are " + ("as commanded" if o.recovered else "not as commanded")
+        yield said_of_end(o, trial)
     if o.speed_ahead is not None and o.speed_left is not None and o.turn_rate is not None:
         yield (f"speed: {o.speed_ahead:.3f} m/s ahead, {o.speed_left:.3f} left, "
                f"{np.degrees(o.turn_rate):.1f} °/s; error {o.speed_error:.3f}, "
@@ -151,6 +151,14 @@ def lines(outcome: Outcome, trial: Trial, agent: Agent) -> Iterator[str]:
     for push in trial.pushes:
         at = "" if o.push_phase is None else f", at {o.push_phase:.2f} of the stride"
         yield f"push: {push.impulse:g} N·s towards {push.direction:g}° at {push.start:g} s{at}"
+
+
+def said_of_end(outcome: Outcome, trial: Trial) -> str:
+    """Whether a robot that has not fallen does in the end as it is told."""
+    held = "" if outcome.recovered else "not "
+    if trial.command is None or not trial.command.array()[:3].any():
+        return f"it is {held}at rest"
+    return f"the last two strides are {held}as commanded"
 
 
 def _film(agent: Agent, trial: Trial, path: str | Path) -> None:

@@ -31,6 +31,8 @@ def test_turned_and_moved_as_a_whole(walk: Clip) -> None:
     assert abs(faced.facing()[0]) < 1e-12
     assert faced.root[0, :2] == pytest.approx([0, 0], abs=1e-12)
     assert faced.root[-1, 0] > 2.0  # who walks, walks ahead
+    with pytest.raises(ConfigError, match="turn: must be finite, not nan"):
+        walk.turned(np.nan)
 
 
 def test_cut_speed_and_reverse(walk: Clip) -> None:
@@ -51,11 +53,11 @@ def test_cut_speed_and_reverse(walk: Clip) -> None:
 def test_a_clip_has_two_frames_and_no_more_than_a_million(walk: Clip) -> None:
     """Whatever is asked for: one frame could not be read again, and memory has an end."""
     for made, field in (
-        (lambda: walk.at_speed(1e3), "speed: leaves 1 frames: at least 2"),
-        (lambda: walk.at_speed(1e-9), "speed: leaves .* at most 1000000"),
-        (lambda: walk.resampled(10.0), "rate: leaves 1 frames: at least 2"),
-        (lambda: walk.resampled(1e-9), "rate: leaves .* at most 1000000"),
-        (lambda: walk.repeated(10**9), "loop: leaves .* at most 1000000"),
+        (lambda: walk.at_speed(1e3), "speed: must give 2 to 1000000 frames, not 1"),
+        (lambda: walk.at_speed(1e-9), "speed: must give 2 to 1000000 frames, not"),
+        (lambda: walk.resampled(10.0), "rate: must give 2 to 1000000 frames, not 1"),
+        (lambda: walk.resampled(1e-9), "rate: must give 2 to 1000000 frames, not"),
+        (lambda: walk.repeated(10**9), "loop: must give 2 to 1000000 frames, not"),
     ):
         with pytest.raises(ConfigError, match=field):
             made()

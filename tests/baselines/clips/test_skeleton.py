@@ -12,6 +12,7 @@ from poise.configs.errors import ConfigError
 FAMILIES = {
     "mixamo": ("mixamorig:{}UpLeg", "mixamorig:{}Leg", "mixamorig:{}Foot", "mixamorig:{}Arm"),
     "plain": ("{}Hip", "{}Knee", "{}Ankle", "{}Shoulder"),
+    "smpl": ("{}_Hip", "{}_Knee", "{}_Ankle", "{}_Shoulder"),
     "blender": ("thigh.{}", "shin.{}", "foot.{}", "upper_arm.{}"),
 }
 
@@ -31,9 +32,14 @@ def test_all_roles_of_the_packaged_skeletons_are_found(skeleton: Skeleton) -> No
         assert sign * rest[skeleton.roles[f"elbow_{side}"], 1] > 0.15
 
 
-@pytest.mark.parametrize("family", ["mixamo", "plain"])
-def test_families_of_names(family: str) -> None:
-    names = tuple(name.format(side) for side in ("Left", "Right") for name in FAMILIES[family])
+@pytest.mark.parametrize("sides", [("Left", "Right"), ("L", "R")])
+@pytest.mark.parametrize("family", FAMILIES)
+def test_families_of_names(family: str, sides: tuple[str, str]) -> None:
+    """Whatever else there is: a collar bone that is called a shoulder, a ball called a foot."""
+    further = {"blender": "shoulder.{}", "smpl": "{}_Foot"}
+    names = tuple(name.format(side) for side in sides for name in FAMILIES[family])
+    if family in further:
+        names += tuple(further[family].format(side) for side in sides)
     roles = find_roles(names)
     wanted = [f"{role}_{side}" for side in ("left", "right")
               for role in ("hip", "knee", "ankle", "shoulder")]  # fmt: skip

@@ -15,6 +15,7 @@ from poise.baselines.motions.robot_clip import reference_from
 from poise.baselines.retargeting.limbs import find_limbs
 from poise.baselines.retargeting.retarget import Retargeted, retarget
 from poise.baselines.retargeting.targets import (
+    BodyTargets,
     between_standing,
     clip_targets,
     standing_targets,
@@ -105,6 +106,17 @@ def test_ways_begin_at_standing_and_meet_the_clip(squat: Clip) -> None:
         turns = np.arccos(np.clip((values[1:] * values[:-1]).sum(axis=1), -1, 1))
         assert turns.max() < np.radians(20.0)  # a frame: no jump
     assert whole.height[0] == 1.0 == whole.height[-1]
+
+
+@pytest.mark.parametrize("rest", [[1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [-1.0, 0.0, 0.0]])
+def test_the_way_between_opposite_directions_is_a_half_circle(rest: list[float]) -> None:
+    """Of unit vectors, each as far from the next one as eased; through x, or z if it is along x."""
+    standing = BodyTargets({"forearm": np.array([rest])}, np.ones(1))
+    clip = BodyTargets({"forearm": -np.array([rest, rest])}, np.ones(2))
+    way = between_standing(clip, standing, 1.0).directions["forearm"]
+    assert np.linalg.norm(way, axis=1) == pytest.approx(1.0)
+    turns = np.arccos(np.clip((way[1:31] * way[:30]).sum(axis=1), -1, 1))
+    assert turns.sum() == pytest.approx(np.pi) and turns.max() < np.radians(12.0)
 
 
 @pytest.mark.parametrize("kind", ["segments", "height"])

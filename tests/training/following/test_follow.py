@@ -56,3 +56,5 @@ def test_what_follows_no_motion_is_said() -> None:
         follow("standing", "zero", robot=robot_named("humanoid"), starts=1)
     with pytest.raises(ConfigError, match="starts: must be at least 1"):
         follow("standing", starts=0)
+    with pytest.raises(ConfigError, match="seed: must be at least 0"):
+        follow("standing", seed=-1)

@@ -28,6 +28,14 @@ def test_a_walk_is_told_in_lines(capsys: pytest.CaptureFixture[str]) -> None:
     assert " of the stride" in told[-1]
 
 
+def test_to_stand_is_a_command(capsys: pytest.CaptureFixture[str]) -> None:
+    """It has no strides of which anything could be said."""
+    assert main("walk --speed 0 --duration 3".split()) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told == ["walk, humanoid: 0 m/s ahead, 0 left, 0 °/s for 3 s", "upright after 3 s",
+                    "it is at rest"]  # fmt: skip
+
+
 def test_a_fall_is_told(tmp_path: Path) -> None:
     """A push that nothing holds: when it fell; a video of it is written."""
     told: list[str] = []
