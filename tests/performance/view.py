@@ -28,7 +28,7 @@ def measure(names: tuple[str, ...], seconds: float) -> tuple[float, list[float]]
     live = Live(load_session(names, load_robot("humanoid")))
     delays: list[float] = []
     with serving("127.0.0.1", 0) as server:
-        view = BrowserView(server, live, lambda robot, names: live)
+        view = BrowserView(server, live, lambda spec: live)
         show = view.stage.show
 
         def shown(frames) -> None:

@@ -99,11 +99,12 @@ class Browser:
         self.call("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button=button,
                   clickCount=1, **held)  # fmt: skip
 
-    def click(self, text: str) -> None:
-        """Click on the button that has this text, once there is one."""
+    def click(self, text: str, among: str = "button") -> None:
+        """Click on the button, or what else a CSS selector finds, that has this text, once it is
+        there: the innermost and last one."""
         button = (
-            "[...document.querySelectorAll('button')]"
-            f".find(b => b.innerText.trim() == {json.dumps(text)})"
+            f"[...document.querySelectorAll({json.dumps(among)})]"
+            f".findLast(b => (b.innerText ?? '').trim() == {json.dumps(text)})"
         )
         self.wait(f"!!{button}")
         place = self.run(
@@ -112,6 +113,19 @@ class Browser:
         )
         self.mouse("Pressed", *place)
         self.mouse("Released", *place)
+
+    def save_to(self, folder: Path) -> None:
+        """Let the page save files into a folder, and read and write the clipboard."""
+        self._browser("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+        self._browser("Browser.grantPermissions", permissions=["clipboardReadWrite"])
+
+    def _browser(self, method: str, **params: Any) -> dict[str, Any]:
+        """A command to the browser, not to its page."""
+        session, self._session = self._session, None
+        try:
+            return self.call(method, **params)
+        finally:
+            self._session = session
 
     def run(self, script: str) -> Any:
         """The value of a JavaScript expression, awaited."""

@@ -24,16 +24,28 @@ Pushes = Annotated[
     ),
 ]
 
+Commands = Annotated[
+    tuple[str, ...],
+    tyro.conf.UseAppendAction,
+    tyro.conf.arg(
+        metavar="COMMAND",
+        help="What a controller that walks is told, such as '{ahead: 0.6, left: 0, turn: 0.2, "
+        "start: 1}' in m/s, rad/s and s; repeatable.",
+    ),
+]
+
 
 def view(
     shown: Shown = (),
     /,
     *,
     robot: str = "humanoid",
+    motion: str = "standing",
     host: str = "127.0.0.1",
     port: int = 8080,
     seed: int = 0,
     push: Pushes = (),
+    command: Commands = (),
     trial: int | None = None,
     controllers: tuple[str, ...] = (),
     native: Switch = False,
@@ -51,6 +63,7 @@ def view(
         shown: controllers, feedback-step if not given; with --trial, a folder written by poise
             evaluate or poise benchmark.
         robot: a packaged robot (see poise list) or a .yaml description.
+        motion: that is performed: a name, a .yaml, or a .npz of poise motion import.
         host: address to serve at; the default can be reached from this machine alone.
         port: of the page; 0 is any that is free.
         seed: of the start, which is a little disturbed.
@@ -70,8 +83,8 @@ def view(
             raise ConfigError("goes with --trial; without it, controllers stand before the flags",
                               field="controllers")  # fmt: skip
         view(
-            shown, robot=robot, host=host, port=port, seed=seed, pushes=push, native=native,
-            seconds=seconds, dark=dark, allow=allow,
+            shown, robot=robot, motion=motion, host=host, port=port, seed=seed, pushes=push,
+            commands=command, native=native, seconds=seconds, dark=dark, allow=allow,
         )  # fmt: skip
         return
     if len(shown) != 1:

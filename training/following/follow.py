@@ -80,7 +80,9 @@ def follow(
         raise ConfigError(f"must be at least 0, not {impulse:g}", field="impulse")
     body = robot if isinstance(robot, Robot) else load_robot(robot)
     reference = load_motion(motion, body)
-    agent = _agent(controller, body, reference)
+    period = 0.02
+    duration = period * round((min(reference.duration, LONGEST) + AFTER) / period)
+    agent = performer(controller, body, reference, duration)
     bodies = ReferenceBodies(reference, body)
     rng = np.random.default_rng(seed)
     trials = []
@@ -138,9 +140,12 @@ def _errors(env: Any, reference: ReferenceBodies, stance: Stance) -> tuple[float
     )
 
 
-def _agent(controller: str, robot: Robot, motion: ReferenceMotion) -> Agent:
-    period = 0.02
-    duration = period * round((min(motion.duration, LONGEST) + AFTER) / period)
+def performer(controller: str, robot: Robot, motion: ReferenceMotion, duration: float) -> Agent:
+    """An agent that performs a motion for `duration` [s]; a fall is what `follow` calls so.
+
+    Raises:
+        ConfigError: no such controller, or one that plays no motions.
+    """
     low, tilt = _extremes(motion)
     fall = {"height": min(FallLimits().height, FALLEN * low / robot.height_com),
             "tilt": min(max(FallLimits().tilt, tilt + LEAN), 180.0)}  # fmt: skip

@@ -14,6 +14,8 @@ from poise.envs.pushes.push import Push
 from poise.envs.viewing.contact_forces import ContactForces
 from poise.envs.viewing.overlays import Mark, foothold_mark, marks
 
+from .ghost import Ghost, Poses, ghost_of
+
 #: value of a frame → title of its plot
 VALUES = {
     "speed": "speed of the centre of mass [m/s]",
@@ -33,6 +35,8 @@ class Frame(NamedTuple):
         marks: of the quantities of `envs/viewing/quantities.py`.
         values: of `VALUES`.
         fall_time: when it fell [s]; None: it has not.
+        ghost: where the bodies are if the reference motion is followed exactly; None: it has none
+            that moves.
     """
 
     time: float
@@ -42,15 +46,25 @@ class Frame(NamedTuple):
     marks: tuple[Mark, ...]
     values: dict[str, float]
     fall_time: float | None
+    ghost: Poses | None = None
 
 
 def between(first: Frame, second: Frame, fraction: float) -> Frame:
     """Bodies between two frames, for slow motion; everything else is that of the second one."""
+    ghost = second.ghost
+    if first.ghost is not None and ghost is not None:
+        ghost = _between(first.ghost, ghost, fraction)
+    both = Poses(first.positions, first.quaternions), Poses(second.positions, second.quaternions)
+    return second._replace(**_between(*both, fraction)._asdict(), ghost=ghost)
+
+
+def _between(first: Poses, second: Poses, fraction: float) -> Poses:
+    """Of each body the fraction of the way, and of the turn the shorter way around."""
     signs = np.where(np.sum(first.quaternions * second.quaternions, axis=1) < 0.0, -1.0, 1.0)
     turned = (1.0 - fraction) * signs[:, None] * first.quaternions + fraction * second.quaternions
-    return second._replace(
-        positions=(1.0 - fraction) * first.positions + fraction * second.positions,
-        quaternions=turned / np.linalg.norm(turned, axis=1, keepdims=True),
+    return Poses(
+        (1.0 - fraction) * first.positions + fraction * second.positions,
+        turned / np.linalg.norm(turned, axis=1, keepdims=True),
     )
 
 
@@ -60,6 +74,7 @@ class Observer:
     def __init__(self, env: BalanceEnv):
         self._env = env
         self._forces = ContactForces(env.simulation)
+        self._ghost: Ghost | None = None
 
     def __call__(self, fall_time: float | None = None) -> Frame:
         """The frame of this moment, of a robot that fell at `fall_time` [s]."""
@@ -75,7 +90,14 @@ class Observer:
             marks=(*marks(simulation), *self._forces.marks(), *_footholds(env)),
             values=_values(simulation),
             fall_time=fall_time,
+            ghost=self._reference(simulation.time),
         )
+
+    def _reference(self, time: float) -> Poses | None:
+        """The ghost's bodies at a time [s]; it stands anew where the robot has been reset."""
+        if time == 0.0:
+            self._ghost = ghost_of(self._env)
+        return None if self._ghost is None else self._ghost(time)
 
 
 def _values(simulation: Simulation) -> dict[str, float]:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Protocol
 
+from poise.baselines.motions.reference_motion import ReferenceMotion
+from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.schedule import TimedCommand
 from poise.configs.errors import PoiseError
 from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import Robot
-from poise.training.trials.agents import load_agent
 
 from .frames import Frame, Observer
-from .session import Session
+from .session import Session, load_player
+from .spec import SessionSpec, Spec, TrialSpec
 
 KEPT = 30.0  # [s] of a session that can be scrubbed through
 LONGEST_FILM = 60.0  # [s]
@@ -37,8 +41,12 @@ class Play(Protocol):
         """Of the heading at the reset, which directions are relative to [rad]."""
 
     @property
-    def command(self) -> str:
-        """The command that shows the same again."""
+    def spec(self) -> Spec:
+        """What shows the same again."""
+
+    @property
+    def gait(self) -> GaitCommand | None:
+        """What those that walk are told now; None where nothing walks."""
 
     @property
     def ended(self) -> bool:
@@ -59,22 +67,45 @@ class Play(Protocol):
     def push(self, **fields: object) -> Push:
         """Push every robot now; raises ConfigError or PoiseError where that cannot be."""
 
+    def walk(self, **fields: object) -> TimedCommand:
+        """Tell those that walk a command; raises ConfigError or PoiseError where that cannot be."""
+
 
 class Live:
-    """A session and the frames of its last seconds."""
+    """A session and the frames of its last seconds.
+
+    Args:
+        session: that goes on.
+        spec: what it was loaded from.
+        motion: that is performed; None: they stand.
+    """
 
     live, ended = True, False
 
-    def __init__(self, session: Session, command: str = ""):
-        self.session, self._command = session, command
+    def __init__(
+        self,
+        session: Session,
+        spec: SessionSpec | None = None,
+        motion: ReferenceMotion | None = None,
+    ):
+        names = tuple(session.names)
+        self._spec = SessionSpec(names, session.robot.name) if spec is None else spec
+        self.session, self._motion = session, motion
         self.names, self.robot, self.period = session.names, session.robot, session.period
         self._observers = [Observer(side.env) for side in session.sides]
         self._begin()
 
     @property
-    def command(self) -> str:
-        """The command that plays the same again: the same start and the same pushes."""
-        return self._command + "".join(f" --push '{_written(p)}'" for p in self.session.pushes)
+    def spec(self) -> SessionSpec:
+        """What plays the same again: the same start, pushes and commands."""
+        pushes = tuple(_push_text(push) for push in self.session.pushes)
+        commands = tuple(_command_text(command) for command in self.session.commands)
+        return replace(self._spec, pushes=pushes, commands=commands)
+
+    @property
+    def gait(self) -> GaitCommand | None:
+        """What those that walk are told now."""
+        return self.session.command if self.session.walks else None
 
     @property
     def yaw(self) -> float:
@@ -95,16 +126,21 @@ class Live:
         """Push every robot; see `Session.push`."""
         return self.session.push(**fields)
 
+    def walk(self, **fields: object) -> TimedCommand:
+        """Tell those that walk a command; see `Session.walk`."""
+        return self.session.walk(**fields)
+
     def film(self, name: str, path: Path) -> None:
         """Play the same again by another agent, and write an MP4 of it."""
         from poise.training.figures.video import record
 
-        time, trial = self.session.time, self.session.trial
+        time = self.session.time
         if time == 0.0:
             raise PoiseError("nothing has been played that a video could show")
         if time > LONGEST_FILM:
             raise PoiseError(f"a video is of at most {LONGEST_FILM:g} s, begin anew by Reset")
-        agent = load_agent(name, self.robot, duration=time, pushes=None)
+        agent = load_player(name, self.robot, self._motion, time)
+        trial = self.session.sides[self.names.index(name)].own(self.session.trial)
         if agent.begin is not None:
             agent.begin()
         record(agent.env, agent.act, path, {"seed": trial.seed, "options": trial.options})
@@ -123,13 +159,14 @@ class Live:
 class Recorded:
     """Frames that were recorded before; see `recorded_trial`."""
 
-    live, yaw = False, 0.0
+    live, yaw, gait = False, 0.0, None
 
     def __init__(
-        self, names: list[str], robot: Robot, history: Sequence[Frames], period: float,
-        command: str, film: Callable[[str, Path], object],
+        self, spec: TrialSpec, robot: Robot, history: Sequence[Frames], period: float,
+        film: Callable[[str, Path], object],
     ):  # fmt: skip
-        self.names, self.robot, self.period, self.command = names, robot, period, command
+        self.spec, self.names = spec, list(spec.controllers)
+        self.robot, self.period = robot, period
         self.history, self.at, self._film = history, 0, film
 
     @property
@@ -153,18 +190,32 @@ class Recorded:
         """Raises PoiseError: what is over cannot be pushed."""
         raise PoiseError("a recorded trial cannot be pushed, what poise view CONTROLLER plays can")
 
+    def walk(self, **fields: object) -> TimedCommand:
+        """Raises PoiseError: what is over takes no command."""
+        raise PoiseError("a recorded trial takes no command, what poise view CONTROLLER plays does")
 
-def _written(push: Push) -> str:
+
+def _push_text(push: Push) -> str:
     """A push as `--push` takes it, without what has its default."""
     x, y, z = push.point
-    optional = {
-        "elevation": push.elevation or None,
-        "point": f"[{x}, {y}, {z}]" if any(push.point) else None,
-        "profile": None if push.profile == "square" else push.profile,
-    }
-    fields = {
-        "impulse": push.impulse, "direction": push.direction, "duration": push.duration,
-        "body": push.body, "start": push.start,
-        **{name: value for name, value in optional.items() if value is not None},
-    }  # fmt: skip
-    return "{" + ", ".join(f"{name}: {value}" for name, value in fields.items()) + "}"
+    return _mapping(
+        impulse=push.impulse,
+        direction=push.direction,
+        duration=push.duration,
+        body=push.body,
+        start=push.start,
+        elevation=push.elevation or None,
+        point=f"[{x}, {y}, {z}]" if any(push.point) else None,
+        profile=None if push.profile == "square" else push.profile,
+    )
+
+
+def _command_text(command: TimedCommand) -> str:
+    """A command as `--command` takes it, without what has its default."""
+    return _mapping(**{name: value or None for name, value in asdict(command).items()})
+
+
+def _mapping(**fields: object) -> str:
+    """A YAML mapping on one line, of what is not None."""
+    given = {name: value for name, value in fields.items() if value is not None}
+    return "{" + ", ".join(f"{name}: {value}" for name, value in given.items()) + "}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from poise.training.trials.trial import Outcome
 
 from .frames import Frame, Observer
 from .live import Frames, Recorded
-from .session import MOST
+from .spec import MOST, TrialSpec
 
 
 class Recorder:
@@ -65,16 +64,13 @@ def recorded_trial(
         lines.append(f"trial {trial}, {name}: {_end(done.outcome)}, {differs}")
     envs = [recorder.env for recorder in recorders if recorder.env is not None]
     period = min(env.config.policy_period for env in envs)
-    command = f"poise view {shlex.quote(str(folder))} --trial {trial} --controllers "
 
     def film(name: str, path: Path) -> None:
         replay(results, trial, name, video=path, allow=allow)
 
     history = _side_by_side([recorder.frames for recorder in recorders], period)
-    return Recorded(
-        names, envs[0].robot, history, period,
-        command + " ".join(map(shlex.quote, names)), film,
-    ), lines  # fmt: skip
+    spec = TrialSpec(str(folder), trial, tuple(names))
+    return Recorded(spec, envs[0].robot, history, period, film), lines
 
 
 def _end(outcome: Outcome) -> str:

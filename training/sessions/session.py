@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from poise.baselines.environments.commanded import CommandedEnv
+from poise.baselines.motions.reference_motion import ReferenceMotion
+from poise.baselines.registry import walking_controllers
+from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.schedule import MOST_COMMANDS, TimedCommand, parse_commands
+from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import Robot
+from poise.training.following.follow import performer
 from poise.training.trials.agents import Agent, load_agent
 from poise.training.trials.play import SteppedTrial
 from poise.training.trials.trial import Trial
 
 LONGEST = 1e5  # [s] after which a session would end by itself: a day
-MOST = 3  # controllers side by side
+SOON = 1e-9  # [s] by which times may round
 
 
 class Side:
@@ -22,12 +30,19 @@ class Side:
 
     def __init__(self, agent: Agent, trial: Trial):
         self.agent, self.env = agent, agent.env
+        self.walker: CommandedEnv | None = None  #: takes commands
+        if isinstance(agent.env, CommandedEnv) and agent.env.command is not None:
+            self.walker = agent.env
         self.begin(trial)
 
     def begin(self, trial: Trial) -> None:
         """Start the trial anew."""
         self.fall_time: float | None = None  #: [s] after the reset
-        self._stepped = SteppedTrial(self.agent, trial)
+        self._stepped = SteppedTrial(self.agent, self.own(trial))
+
+    def own(self, trial: Trial) -> Trial:
+        """What of a trial is for this controller: one that only stands is told no velocity."""
+        return trial if self.walker is not None else replace(trial, commands=())
 
     @property
     def time(self) -> float:
@@ -48,26 +63,38 @@ class Side:
 class Session:
     """A trial that several controllers play at once, each with a robot of its own.
 
-    Every push, of the schedule or from outside, meets all of them alike. `trial` has all that came,
-    so that `run_trial` gives the same states again, bit for bit.
+    Every push, of the schedule or from outside, meets all of them alike, and so does every command
+    those that walk. `trial` has all that came, so that `run_trial` gives the same states again, bit
+    for bit.
 
     Args:
         agents: who plays; their environments are for one robot.
         seed: of the disturbed start.
-        pushes: that are known before it begins.
+        pushes, commands: that are known before it begins.
+
+    Raises:
+        ConfigError: a command, and none of them walks.
     """
 
-    def __init__(self, agents: Sequence[Agent], seed: int = 0, pushes: Sequence[Push] = ()):
-        self.seed, self._known = seed, tuple(pushes)
-        self.pushes = self._known
+    def __init__(
+        self,
+        agents: Sequence[Agent],
+        seed: int = 0,
+        pushes: Sequence[Push] = (),
+        commands: Sequence[TimedCommand] = (),
+    ):
+        self.seed, self._known = seed, (tuple(pushes), tuple(commands))
+        self.pushes, self.commands = self._known
         self.sides = [Side(agent, self.trial) for agent in agents]
         self.robot: Robot = agents[0].env.robot
         self.period = agents[0].env.config.policy_period  #: of a step [s]
+        if commands:
+            self._expect_walkers()
 
     @property
     def trial(self) -> Trial:
-        """The trial so far: its start and all its pushes."""
-        return Trial(0, self.seed, self.pushes)
+        """The trial so far: its start, all its pushes and all its commands."""
+        return Trial(0, self.seed, self.pushes, commands=self.commands)
 
     @property
     def names(self) -> list[str]:
@@ -80,8 +107,8 @@ class Session:
         return self.sides[0].time
 
     def reset(self) -> None:
-        """Begin anew, without the pushes that came while it ran."""
-        self.pushes = self._known
+        """Begin anew, without the pushes and commands that came while it ran."""
+        self.pushes, self.commands = self._known
         for side in self.sides:
             side.begin(self.trial)
 
@@ -103,13 +130,69 @@ class Session:
             side.env.simulation.set_pushes(self.pushes)
         return push
 
+    @property
+    def walks(self) -> bool:
+        """Whether any of the controllers takes commands."""
+        return any(side.walker is not None for side in self.sides)
+
+    @property
+    def command(self) -> GaitCommand:
+        """The command that holds now."""
+        so_far = [each for each in self.commands if each.start <= self.time + SOON]
+        return so_far[-1] if so_far else GaitCommand()
+
+    def walk(self, **fields: object) -> TimedCommand:
+        """Tell every controller that walks a command, which holds from now on until the next.
+
+        `fields` are those of `GaitCommand`. Commands that were known for later do not come.
+
+        Raises:
+            ConfigError: a field that is not valid; no controller walks.
+            PoiseError: there have been as many commands as an episode may have.
+        """
+        (command,) = parse_commands({**fields, "start": self.time}, "command")
+        walkers = self._expect_walkers()
+        before = tuple(each for each in self.commands if each.start < self.time - SOON)
+        if len(before) == MOST_COMMANDS:
+            raise PoiseError(f"at most {MOST_COMMANDS} commands: begin anew by Reset")
+        self.commands = (*before, command)
+        for walker in walkers:
+            walker.command = GaitCommand(
+                command.ahead, command.left, command.turn,
+                step_time=command.step_time, width=command.width,
+            )  # fmt: skip
+        return command
+
+    def _expect_walkers(self) -> list[CommandedEnv]:
+        walkers = [side.walker for side in self.sides if side.walker is not None]
+        if not walkers:
+            raise ConfigError("none of these controllers walks", field="command",
+                              choices=walking_controllers())  # fmt: skip
+        return walkers
+
 
 def load_session(
-    names: Sequence[str], robot: Robot, seed: int = 0, pushes: Sequence[Push] = ()
+    names: Sequence[str],
+    robot: Robot,
+    seed: int = 0,
+    pushes: Sequence[Push] = (),
+    *,
+    commands: Sequence[TimedCommand] = (),
+    motion: ReferenceMotion | None = None,
 ) -> Session:
     """A session of these controllers in the standard conditions of an evaluation.
 
-    Raises ConfigError for a controller that is not valid, or is for another robot.
+    With a motion all perform it, and a fall is what `follow` calls so.
+
+    Raises ConfigError for a controller that is not valid, is for another robot, or plays no
+    motions; for commands where none of them walks.
     """
-    agents = [load_agent(name, robot, duration=LONGEST, pushes=None) for name in names]
-    return Session(agents, seed, pushes)
+    agents = [load_player(name, robot, motion, LONGEST) for name in names]
+    return Session(agents, seed, pushes, commands)
+
+
+def load_player(name: str, robot: Robot, motion: ReferenceMotion | None, duration: float) -> Agent:
+    """A controller of a session that lasts `duration` [s]; errors as of `load_session`."""
+    if motion is None:
+        return load_agent(name, robot, duration=duration, pushes=None)
+    return performer(name, robot, motion, duration)

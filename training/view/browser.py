@@ -5,26 +5,30 @@ from __future__ import annotations
 import queue
 import time
 from collections.abc import Callable
-from typing import Literal
+from dataclasses import replace
 
-import numpy as np
 import viser
 
 from poise.configs.errors import PoiseError
 from poise.envs.viewing.quantities import Quantity
+from poise.training.sessions.choices import choices
 from poise.training.sessions.frames import between
 from poise.training.sessions.live import Frames, Play
 from poise.training.sessions.mouse import Pull
 from poise.training.sessions.pace import Pace
+from poise.training.sessions.spec import SessionSpec, Spec, TrialSpec, read_link
 
-from .panel import OPACITY, Panel, Wishes
+from .pages import Pages
+from .panel import OPACITY, Panel, Wishes, status
 from .plots import Plots
 from .saving import send_films, send_picture
-from .stage import BACKGROUND, PHONE, Stage, set_look
+from .stage import BACKGROUND, Stage, set_look
+from .walking import Throttle
 
 FRAME = 1.0 / 30.0  # [s] between two pictures
 TELL = 0.25  # [s] between two looks at status and plots
-Load = Callable[[str, list[str]], Play]  # robot, controllers → what is played then
+COMMAND = 0.2  # [s] between two commands: a slider that is dragged asks for many
+Load = Callable[[Spec], Play]
 Job = Callable[[], None]
 
 
@@ -37,7 +41,7 @@ class BrowserView:
     Args:
         server: of the page.
         play: a session or a recorded trial.
-        load: makes another session.
+        load: makes what another spec asks for.
         dark: whether the page is dark to begin with.
     """
 
@@ -45,34 +49,34 @@ class BrowserView:
         self._server, self._load, self._jobs = server, load, queue.SimpleQueue[Job]()
         self.pace, self.paused = Pace(), False
         self._opacity, self._hidden, self._following = OPACITY, set[Quantity](), True
-        self._phones: dict[int, bool] = {}  # page → whether its controls are below
+        self._sliders = Throttle(COMMAND)  # what they ask for
         self._drawn = self._told = -1e9  # when the last picture and status were shown [s]
         self._set_dark(dark)
         wishes = Wishes(
             pause=self.toggle, step=self.step, reset=self.reset, speed=self.set_speed,
-            seek=self.seek, push=self.push, load=self.load, show=self.show, follow=self._follow,
-            opacity=self._set_opacity, dark=self._set_dark,
-            picture=self._picture, film=self._film,
+            seek=self.seek, push=self.push, walk=self.walk, load=self.load,
+            open_trial=self.open_trial, show=self.show, follow=self._follow,
+            opacity=self._set_opacity, dark=self._set_dark, picture=self._picture, film=self._film,
         )  # fmt: skip
-        self.panel = Panel(server.gui, self.ask, wishes, play.live, dark)
+        self.choices = choices(play.spec)
+        self.panel = Panel(server.gui, self.ask, wishes, self.choices, play.live, dark)
         beside = server.gui.add_panel()
         self._tab = beside.add_tab("Over time", viser.Icon.CHART_LINE)
         beside.dock_left()
         beside.set_width(300)
         server.gui.main_panel.dock_right()
+        self._pages = Pages(server, lambda: self.stage)
         self._set_play(play)
-        server.on_client_connect(self._connected)
 
     def _set_play(self, play: Play) -> None:
         """Show this."""
         self.play = play
         self.stage = Stage(self._server, play.robot, play.names, self._grabbed, self._opacity)
-        for page, client in self._server.get_clients().items():
-            self.stage.point_camera(client, self._phones.get(page, False))
+        self._pages.point_cameras()
         self.stage.marks.hidden, self.stage.following = self._hidden, self._following
         with self._tab:
             self.plots = Plots(self._server.gui, play.names)
-        self.panel.set_up(play.robot, play.names, play.live)
+        self.panel.set_up(play)
         self._changed()
 
     def ask(self, do: Callable[..., None], *arguments: object) -> None:
@@ -99,11 +103,13 @@ class BrowserView:
     def step(self) -> None:
         """Pause, and play one step."""
         self.paused = True
+        self._give_command()
         self.play.step()
         self._changed()
 
     def reset(self) -> None:
         """Begin anew."""
+        self._sliders.waiting = None
         self.play.reset()
         self._changed()
 
@@ -124,14 +130,37 @@ class BrowserView:
         self.play.push(**fields)
         self.paused = False
 
-    def load(self, robot: str, names: list[str]) -> None:
-        """Play other controllers, or another robot."""
-        self._say(f"loading {', '.join(names)} …")
-        play = self._load(robot, names)
+    def walk(self, fields: dict[str, float]) -> None:
+        """Tell those that walk a command, soon."""
+        self._sliders.waiting = fields
+
+    def load(self, robot: str, names: list[str], motion: str) -> None:
+        """Play other controllers, another robot or another motion."""
+        seed = self.play.spec.seed if isinstance(self.play.spec, SessionSpec) else 0
+        self.open(SessionSpec(tuple(names), robot, motion, seed))
+
+    def open_trial(self, trial: int) -> None:
+        """Show another trial of the same result, by the same controllers."""
+        if isinstance(self.play.spec, TrialSpec):
+            self.open(replace(self.play.spec, trial=trial))
+
+    def visited(self, query: str) -> None:
+        """A page is opened whose address may be a link; called in the server's thread.
+
+        Raises ConfigError for a link that is not valid.
+        """
+        spec = read_link(query, self.play.spec, self.choices.all)
+        if spec is not None and spec != self.play.spec:
+            self.ask(self.open, spec)
+
+    def open(self, spec: Spec) -> None:
+        """Play something else."""
+        self._pages.say(f"loading {', '.join(spec.controllers)} …")
+        play = self._load(spec)
         self.stage.remove()
         self.plots.remove()
         self._set_play(play)
-        self.paused = False
+        self.paused, self._sliders.waiting = False, None
         self.pace.rest()
 
     def _advance(self) -> None:
@@ -144,18 +173,25 @@ class BrowserView:
             self.paused = True
 
     def _play_due(self) -> None:
+        self._give_command()
         for _ in range(self.pace.due(self.play.period)):
             self.play.step()
+
+    def _give_command(self) -> None:
+        """Have those that walk told what the sliders ask for, if the last command is old enough."""
+        fields = self._sliders.take(self.play.history[-1][0].time)
+        if fields is not None:
+            self.play.walk(**fields)
 
     def _attempt(self, job: Job) -> None:
         """Do something; what it raises is told, and no end of the page."""
         try:
             job()
         except PoiseError as error:
-            self._say(str(error), "red")
+            self._pages.say(str(error), "red")
         except Exception as error:  # a controller from outside, or a page that is not ours
             self.paused = True
-            self._say(f"{type(error).__name__}: {error}", "red")
+            self._pages.say(f"{type(error).__name__}: {error}", "red")
 
     def _draw(self, now: float) -> None:
         self._drawn = now
@@ -164,8 +200,9 @@ class BrowserView:
             self._told = now
             history = self.play.history
             at, first, last = (history[k][0].time for k in (self.play.at, 0, -1))
-            self.panel.tell(self._status(), self.paused, at, first, last)
-            self.panel.command.content = f"`{self.play.command}`"
+            self.panel.tell(status(self.play, self.paused, self.pace), self.paused, at, first, last)
+            waits = self._sliders.waiting is not None
+            self.panel.tell_how(self.play.spec, None if waits else self.play.gait)
             self.plots.show(history, self.play.at, self.play.period)
 
     def _frames(self) -> Frames:
@@ -180,17 +217,6 @@ class BrowserView:
         """Have the next picture show everything anew."""
         self._drawn = self._told = -1e9
 
-    def _status(self) -> str:
-        frames = self.play.history[self.play.at]
-        factor = "paused" if self.paused else f"**{self.pace.factor:.2f} × real time**"
-        if self.pace.speed != 1.0:
-            factor += f" at {self.pace.speed:g} ×"
-        lines = [f"{frames[0].time:.2f} s, {factor}"]
-        for name, frame in zip(self.play.names, frames, strict=True):
-            fell = None if frame.fall_time is None else f"fell at {frame.fall_time:.2f} s"
-            lines.append(f"`{name}`: {fell or 'on its feet'}")
-        return "  \n".join(lines)
-
     def _wait(self, end: float) -> None:
         """Do what is asked; or wait for it until the next step or picture is due."""
         due = FRAME if self.paused else self.pace.until_due(self.play.period)
@@ -203,23 +229,6 @@ class BrowserView:
         self._attempt(job)
         if self.paused:
             self.pace.rest()
-
-    def _say(self, text: str, colour: Literal["red"] | None = None) -> None:
-        for client in self._server.get_clients().values():
-            client.add_notification("Poise", text, auto_close_seconds=6.0, color=colour)
-
-    def _connected(self, client: viser.ClientHandle) -> None:
-        """Show a new page all robots; again when its form changes, as panels are docked late, until
-        the user has moved the camera."""
-        self._phones[client.client_id] = phone = client.camera.image_width < PHONE
-        form, eye = client.camera.aspect, self.stage.point_camera(client, phone)
-
-        @client.camera.on_update
-        def _(camera: viser.CameraHandle) -> None:
-            nonlocal form, eye
-            changed = abs(camera.aspect - form) > 1e-3
-            if changed and np.allclose(camera.position, eye, atol=1e-2):
-                form, eye = camera.aspect, self.stage.point_camera(client, phone)
 
     def _grabbed(self, phase: str, pulled: Pull) -> None:
         """In the server's thread, while a body is dragged."""
@@ -248,9 +257,13 @@ class BrowserView:
         set_look(self._server, dark)
 
     def _picture(self, client: int) -> None:
-        send_picture(self._server, client, BACKGROUND[self._dark])
+        """In a thread of the server: it waits for the browser."""
+        try:
+            send_picture(self._server, client, BACKGROUND[self._dark])
+        except (RuntimeError, TimeoutError) as error:  # viser's, of a page that draws nothing
+            self._pages.say(f"no picture came: {error}", "red")
 
     def _film(self, client: int) -> None:
-        self._say("writing the video; the simulation waits …")
+        self._pages.say("writing the video; the simulation waits …")
         send_films(self._server, client, self.play)
         self.pace.rest()

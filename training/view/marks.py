@@ -17,6 +17,7 @@ from poise.envs.viewing.quantities import (
     COP,
     FOOTHOLD,
     PUSH,
+    REFERENCE,
     SUPPORT,
     Quantity,
 )
@@ -30,6 +31,7 @@ SHOWN: dict[Quantity, tuple[str, ...]] = {
     SUPPORT: ("support",),
     CONTACT_FORCE: ("contact force",),
     FOOTHOLD: ("foothold",),
+    REFERENCE: (),  # a robot, not a mark
 }
 ROOM = {"spheres": 2, "cylinders": 32, "heads": 10}  # mesh → instances for each robot
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0], np.float32)

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import html
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import viser
 
+from poise.baselines.walking.command import GaitCommand
 from poise.envs.pushes.options import body_names
-from poise.envs.robots.robot import Robot
 from poise.envs.viewing.quantities import Quantity
+from poise.training.sessions.choices import NOBODY, Choices
+from poise.training.sessions.live import Play
 from poise.training.sessions.mouse import DURATION, WEIGHT
-from poise.training.sessions.session import MOST
+from poise.training.sessions.pace import Pace
+from poise.training.sessions.spec import MOST, Spec, TrialSpec
 
-from .choices import NOBODY, controllers, robots
 from .marks import SHOWN
+from .walking import WalkSliders
 
 SPEEDS = {"1×": 1.0, "1/2×": 0.5, "1/4×": 0.25, "1/10×": 0.1}  # label → simulated over real time
 OPACITY = 0.75  # of the robot, with which marks inside are seen
+#: where a page may not write to the clipboard, by another address than this machine's, the link
+#: itself can be copied
+LINK = """<div style="font-size: 0.85em; padding: 0 0.75em"><a href="{link}">Link to this</a>
+<button style="margin-left: 0.5em; cursor: pointer" onclick="const b = this;
+navigator.clipboard.writeText(b.previousElementSibling.href).then(() => b.innerText = 'Copied')"
+>Copy</button></div>"""
 Ask = Callable[..., None]  # has a function called with arguments, by the loop that plays
 
 
@@ -33,7 +43,9 @@ class Wishes:
     speed: Callable[[float], None]
     seek: Callable[[float], None]
     push: Callable[[dict[str, object]], None]
-    load: Callable[[str, list[str]], None]
+    walk: Callable[[dict[str, float]], None]
+    load: Callable[[str, list[str], str], None]
+    open_trial: Callable[[int], None]
     show: Callable[[Quantity, bool], None]
     opacity: Callable[[float], None]
     follow: Callable[[bool], None]
@@ -49,14 +61,26 @@ class Panel:
         gui: of the server.
         ask: has a wish done by the loop; callbacks run in threads of the server.
         wishes: what there is to ask for.
+        choices: names of robots, controllers and motions.
         live: whether pushes and controllers can be chosen: not in a recorded trial.
         dark: whether the page is dark to begin with.
     """
 
-    def __init__(self, gui: viser.GuiApi, ask: Ask, wishes: Wishes, live: bool, dark: bool):
-        self._gui, self._ask, self.wishes = gui, ask, wishes
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        ask: Ask,
+        wishes: Wishes,
+        choices: Choices,
+        live: bool,
+        dark: bool,
+    ):
+        self._gui, self._ask, self.wishes, self.choices = gui, ask, wishes, choices
         self.status = gui.add_markdown("")
         self._playing()
+        with gui.add_folder("Trial of the result", visible=not live):
+            self._picking()
+        self.walk = WalkSliders(gui, wishes.walk)
         with gui.add_folder("Push", visible=live):
             self._pushing()
         with gui.add_folder("Robot and controllers", expand_by_default=False, visible=live):
@@ -66,17 +90,29 @@ class Panel:
         with gui.add_folder("Save", expand_by_default=False):
             self._saving()
 
-    def set_up(self, robot: Robot, names: Sequence[str], live: bool) -> None:
-        """Offer what this robot has, and what is played by these controllers."""
-        bodies = body_names(robot)
+    def set_up(self, play: Play) -> None:
+        """Offer what this robot has, and what is played."""
+        bodies, spec = body_names(play.robot), play.spec
         self.body.options = bodies
         self.body.value = "torso" if "torso" in bodies else bodies[0]
-        self.impulse.value = round(WEIGHT * robot.mass, 1)
-        if live and robot.name in self.robot.options:
-            self.robot.value = robot.name
+        self.impulse.value = round(WEIGHT * play.robot.mass, 1)
+        self.walk.set_visible(play.gait is not None)
+        if isinstance(spec, TrialSpec):
+            self.trial.value = spec.trial
+            return
+        for choice, name in ((self.robot, spec.robot), (self.motion, spec.motion)):
+            if name in choice.options:
+                choice.value = name
         for k, choice in enumerate(self.controllers):
-            name = names[k] if k < len(names) else NOBODY
+            name = spec.controllers[k] if k < len(spec.controllers) else NOBODY
             choice.value = name if name in choice.options else NOBODY
+
+    def tell_how(self, spec: Spec, gait: GaitCommand | None) -> None:
+        """Bring the command line, the link and, with a `gait`, its sliders up to date."""
+        self.command.content = f"`{spec.command}`"
+        self.link.content = LINK.format(link=html.escape(spec.link))
+        if gait is not None:
+            self.walk.tell(gait)
 
     def tell(self, text: str, paused: bool, at: float, first: float, last: float) -> None:
         """Bring the status, the button and the timeline [s] up to date."""
@@ -103,6 +139,11 @@ class Panel:
     def _seek(self, event: Any) -> None:
         self.wishes.seek(float(event.target.value))
 
+    def _picking(self) -> None:
+        self.trial: Any = self._gui.add_number("Trial", 0, min=0, step=1)
+        button = self._gui.add_button("Show this trial")
+        button.on_click(self._asked(lambda _: self.wishes.open_trial(int(self.trial.value))))
+
     def _pushing(self) -> None:
         gui = self._gui
         self.impulse: Any = gui.add_number("Impulse [N·s]", 20.0, min=0.0, max=1000.0, step=1.0)
@@ -125,21 +166,23 @@ class Panel:
 
     def _choosing(self) -> None:
         gui = self._gui
-        self.robot: Any = gui.add_dropdown("Robot", robots())
-        names = controllers()
+        self.robot: Any = gui.add_dropdown("Robot", self.choices.robots)
+        names = self.choices.controllers
         self.controllers: list[Any] = [
             gui.add_dropdown(f"Controller {k + 1}", names if k == 0 else (NOBODY, *names))
             for k in range(MOST)
         ]
+        self.motion: Any = gui.add_dropdown("Motion", self.choices.motions)
         gui.add_button("Load").on_click(self._asked(lambda _: self.load()))
 
     def load(self) -> None:
-        """Ask for the robot and the controllers that are chosen."""
-        # the server takes any value from a page: only packaged names are loaded
+        """Ask for what is chosen."""
+        # the server takes any value from a page: only names that are offered are loaded
         chosen = [choice.value for choice in self.controllers]
-        names = [name for name in chosen if name in controllers()]
-        if names and self.robot.value in robots():
-            self.wishes.load(self.robot.value, names)
+        names = [name for name in chosen if name in self.choices.controllers]
+        robot, motion = self.robot.value, self.motion.value
+        if names and robot in self.choices.robots and motion in self.choices.motions:
+            self.wishes.load(robot, names, motion)
 
     def _showing(self, dark: bool) -> None:
         gui, wishes = self._gui, self.wishes
@@ -162,6 +205,7 @@ class Panel:
         picture.on_click(self._draw)
         film = gui.add_button("Video (MP4)", icon=viser.Icon.MOVIE)
         film.on_click(self._asked(lambda e: wishes.film(e.client_id)))
+        self.link = gui.add_html("")
         self.command = gui.add_markdown("")
 
     def _draw(self, event: Any) -> None:
@@ -175,6 +219,19 @@ class Panel:
                 self._ask(do, event)
 
         return callback
+
+
+def status(play: Play, paused: bool, pace: Pace) -> str:
+    """What stands above the controls: time, how near to real time it is, who has fallen."""
+    frames = play.history[play.at]
+    factor = "paused" if paused else f"**{pace.factor:.2f} × real time**"
+    if pace.speed != 1.0:
+        factor += f" at {pace.speed:g} ×"
+    lines = [f"{frames[0].time:.2f} s, {factor}"]
+    for name, frame in zip(play.names, frames, strict=True):
+        fell = None if frame.fall_time is None else f"fell at {frame.fall_time:.2f} s"
+        lines.append(f"`{name}`: {fell or 'on its feet'}")
+    return "  \n".join(lines)
 
 
 def _of(event: Any, options: dict[str, float]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -13,13 +14,23 @@ from mjviser.conversions import get_geom_texture_id, merge_geoms
 
 from poise.envs.robots.robot import Robot
 from poise.envs.viewing.appearance import looks
-from poise.training.sessions.frames import Frame
+from poise.envs.viewing.quantities import RGB
 
 from .marks import linear
 
 AZIMUTH = 50.0  # of the lamp in the copy of the model, which viser does not use
 VISIBLE_GROUPS = 3  # of geoms, as in MuJoCo's own viewer
 Mesh = viser.BatchedMeshHandle | viser.BatchedGlbHandle
+
+
+class Posed(Protocol):
+    """Where the bodies of a robot are, world axes: (nbody, 3) [m]; (nbody, 4), w first."""
+
+    @property
+    def positions(self) -> np.ndarray: ...
+
+    @property
+    def quaternions(self) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)
@@ -39,12 +50,19 @@ class Robots:
         robot: their kind.
         count: of robots.
         opacity: with less than 1, marks inside of them are seen; textures are always opaque.
+        colour: of all of it, without textures; None: as described.
     """
 
     def __init__(
-        self, scene: viser.SceneApi, root: str, robot: Robot, count: int, opacity: float = 1.0
+        self,
+        scene: viser.SceneApi,
+        root: str,
+        robot: Robot,
+        count: int,
+        opacity: float = 1.0,
+        colour: RGB | None = None,
     ):
-        self._scene, self._opacity = scene, opacity
+        self._scene, self._opacity, self._colour = scene, opacity, colour
         self.model = looks(robot, 16, 16, AZIMUTH)
         self._still = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3))
         self.meshes = [
@@ -53,7 +71,7 @@ class Robots:
             for k, geoms in enumerate(_parts(self.model, body))
         ]
 
-    def show(self, frames: Sequence[Frame], offsets: np.ndarray) -> None:
+    def show(self, frames: Sequence[Posed], offsets: np.ndarray) -> None:
         """Put each robot where its frame says, moved by its offset (count, 3) [m]."""
         positions = np.stack([f.positions for f in frames], axis=1) + offsets  # (nbody, count, 3)
         quaternions = np.stack([f.quaternions for f in frames], axis=1)
@@ -67,6 +85,11 @@ class Robots:
             if isinstance(mesh.handle, viser.BatchedMeshHandle):
                 mesh.handle.opacity = _opacity(opacity)
 
+    def set_visible(self, visible: bool) -> None:
+        """Show the robots, or hide them."""
+        for mesh in self.meshes:
+            mesh.handle.visible = visible
+
     def remove(self) -> None:
         """Take the robots out of the scene."""
         for mesh in self.meshes:
@@ -75,13 +98,17 @@ class Robots:
     def _add(self, name: str, geoms: list[int]) -> Mesh:
         mesh = merge_geoms(self.model, geoms)
         wxyzs, positions = self._still
-        if get_geom_texture_id(self.model, geoms[0]) >= 0:
-            return self._scene.add_batched_meshes_trimesh(name, mesh, wxyzs, positions, lod="off")
-        assert isinstance(mesh.visual, trimesh.visual.ColorVisuals)
-        colour = linear(tuple(np.asarray(mesh.visual.vertex_colors)[0, :3] / 255.0))
+        colour = self._colour
+        if colour is None:
+            if get_geom_texture_id(self.model, geoms[0]) >= 0:
+                return self._scene.add_batched_meshes_trimesh(
+                    name, mesh, wxyzs, positions, lod="off"
+                )
+            assert isinstance(mesh.visual, trimesh.visual.ColorVisuals)
+            colour = tuple(np.asarray(mesh.visual.vertex_colors)[0, :3] / 255.0)
         return self._scene.add_batched_meshes_simple(
-            name, mesh.vertices, mesh.faces, wxyzs, positions, batched_colors=colour, lod="off",
-            opacity=_opacity(self._opacity),
+            name, mesh.vertices, mesh.faces, wxyzs, positions, batched_colors=linear(colour),
+            lod="off", opacity=_opacity(self._opacity),
         )  # fmt: skip
 
 

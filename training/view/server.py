@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.extras import how_to_install
 
-from .origins import LOOPBACK, own_pages_only
+from .origins import LOOPBACK, Visits, own_pages_only
 
 if TYPE_CHECKING:
     import viser
@@ -49,12 +49,15 @@ def check_port(host: str, port: int) -> None:
 
 
 @contextlib.contextmanager
-def serving(host: str, port: int) -> Iterator[viser.ViserServer]:
-    """A server that ends with the block; raises ConfigError as `check_port`."""
+def serving(host: str, port: int, visits: Visits | None = None) -> Iterator[viser.ViserServer]:
+    """A server that ends with the block; raises ConfigError as `check_port`.
+
+    `visits` is told of pages that are opened.
+    """
     check_port(host, port)
     import viser
 
-    with _silent(), own_pages_only(host in LOOPBACK):
+    with _silent(), own_pages_only(host in LOOPBACK, visits or Visits()):
         server = viser.ViserServer(host, port, label="Poise", verbose=False)
     # A page could ask for a tunnel to the outside; nobody but the user decides who may look on.
     server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
@@ -67,9 +70,12 @@ def serving(host: str, port: int) -> Iterator[viser.ViserServer]:
             ending.join(STOPPING)
 
 
-def greeting(host: str, port: int) -> list[str]:
-    """What is said at the start: the address, who can reach it, and how from elsewhere."""
-    url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
+def greeting(host: str, port: int, link: str = "") -> list[str]:
+    """What is said at the start: the address, who can reach it, and how from elsewhere.
+
+    `link` is what stands in the address behind the server.
+    """
+    url = f"http://{f'[{host}]' if ':' in host else host}:{port}{link}"
     if host not in LOOPBACK:
         return [url, f"reachable by everybody who can reach {host}: there is no password"]
     return [

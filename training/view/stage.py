@@ -11,6 +11,7 @@ import viser
 from poise.envs.robots.robot import Robot
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.overlays import Mark
+from poise.envs.viewing.quantities import REFERENCE
 from poise.training.sessions.frames import Frame
 from poise.training.sessions.mouse import Pull, pull
 
@@ -19,6 +20,7 @@ from .robots import Robots
 
 ROOT = "/world"  # of the scene, moved against the robot
 LANE = 1.7  # distance of robots side by side, over CoM height
+GHOST = 0.35  # opacity of a reference motion
 FOLLOW = 0.4  # [s] time constant with which the scene follows the robot
 CAMERA = Camera(azimuth=35.0, elevation=14.0)
 ALONE, TALL = 1.5, 2.4  # width and height that are seen of one robot, over CoM height
@@ -59,6 +61,7 @@ class Stage:
         scene = server.scene
         self._root = scene.add_frame(ROOT, show_axes=False)
         self.robots = Robots(scene, ROOT, robot, count, opacity)
+        self.ghosts: Robots | None = None  #: of the reference motion, where there is one
         self.marks = Marks(scene, ROOT, count)
         self._names = [
             scene.add_label(f"{ROOT}/names/{k}", name, anchor="bottom-center")
@@ -86,10 +89,24 @@ class Stage:
         with self._server.atomic():
             self._root.position = -self._middle
             self.robots.show(frames, self._offsets)
+            self._show_ghosts(frames)
             self.marks.show(found)
             for label, frame, offset in zip(self._names, frames, self._offsets, strict=True):
                 up = np.array([0.0, 0.0, NAME_AT * self.robot.height_com])
                 label.position = frame.com * [1.0, 1.0, 0.0] + up + offset
+
+    def _show_ghosts(self, frames: Sequence[Frame]) -> None:
+        """Show where the bodies are to be, in frames that say it."""
+        poses = [frame.ghost for frame in frames if frame.ghost is not None]
+        if len(poses) < len(frames):
+            return
+        if self.ghosts is None:
+            scene, count = self._server.scene, len(frames)
+            self.ghosts = Robots(
+                scene, f"{ROOT}/ghosts", self.robot, count, GHOST, REFERENCE.colour
+            )
+        self.ghosts.set_visible(REFERENCE not in self.marks.hidden)
+        self.ghosts.show(poses, self._offsets)
 
     def point_camera(self, client: viser.ClientHandle, phone: bool) -> np.ndarray:
         """Let a page see all robots, whatever its form; returns where its camera is (3,) [m]."""

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-import yaml
-
 from poise.baselines.allowance import allows
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
-from poise.configs.yaml_loader import Loader
-from poise.envs.pushes.options import parse_pushes
-from poise.envs.pushes.push import Push
-from poise.envs.robots.robot import Robot, load_robot
-from poise.training.sessions.live import Live, Play
+from poise.training.sessions.live import Play
+from poise.training.sessions.loading import load_live
 from poise.training.sessions.recorded import recorded_trial
-from poise.training.sessions.session import MOST, load_session
+from poise.training.sessions.spec import MOST, STANDING, SessionSpec, Spec, TrialSpec
 from poise.training.trials.agents import check_name
 
+from .origins import Visits
 from .server import check_installed, check_port, greeting, serving
 
 DEFAULT = "feedback-step"
@@ -32,10 +27,12 @@ def view(
     controllers: Sequence[str] = (),
     *,
     robot: str = "humanoid",
+    motion: str = STANDING,
     host: str = "127.0.0.1",
     port: int = 8080,
     seed: int = 0,
     pushes: Sequence[str] = (),
+    commands: Sequence[str] = (),
     native: bool = False,
     seconds: float | None = None,
     dark: bool = False,
@@ -47,9 +44,11 @@ def view(
     Args:
         controllers: up to three names as `load_agent` takes them; none: `DEFAULT`.
         robot: a packaged robot or a path to its description.
+        motion: that is performed: a packaged one, a .yaml, or a .npz of `poise motion import`.
         host, port: where the page is served; port 0 is any that is free.
         seed: of the start.
         pushes: scheduled ones, each a YAML mapping as `parse_pushes` takes it.
+        commands: of controllers that walk, each a YAML mapping as `parse_commands` takes it.
         native: MuJoCo's own window instead of a page, of one controller.
         seconds: of the wall clock after which it ends; None: when the process is stopped.
         dark: whether the page is dark.
@@ -60,29 +59,18 @@ def view(
         ConfigError: anything named does not exist or is not valid; nothing has been loaded then.
         PoiseError: viser is not installed, or there is no display.
     """
-    names = list(controllers) or [DEFAULT]
-    _check(names, robot, seconds, native)
+    spec = SessionSpec(tuple(controllers) or (DEFAULT,), robot, motion, seed, tuple(pushes),
+                       tuple(commands))  # fmt: skip
+    _check(spec, seconds, native)
     if not native:
         check_port(host, port)
         check_installed()
-    loaded = load_robot(robot)
-    planned = [push for text in pushes for push in _read_pushes(text, loaded)]
-
-    def load(robot: str | Robot, names: Sequence[str]) -> Live:
-        model = robot if isinstance(robot, Robot) else load_robot(robot)
-        known = planned if isinstance(robot, Robot) else []
-        session = load_session(names, model, seed, known)
-        where = model.name if isinstance(robot, str) else robot_name
-        return Live(session, f"poise view {shlex.join(names)} --robot {where} --seed {seed}")
-
-    robot_name = shlex.quote(robot)
-    say(f"loading {', '.join(names)}")
-    live = load(loaded, names)
+    live = load_live(spec, say)
     if native:
         from .native import run_native
 
         return run_native(live, seconds, say)
-    return _serve(live, load, host, port, seconds, dark, say)
+    return _serve(live, _load_session, host, port, seconds, dark, say)
 
 
 def view_trial(
@@ -111,20 +99,27 @@ def view_trial(
     _check_seconds(seconds)
     check_port(host, port)
     check_installed()
-    play, lines = recorded_trial(Path(folder), trial, controllers, allow)
-    for line in lines:
-        say(line)
-    return _serve(play, _not_here, host, port, seconds, dark, say)
+
+    def load(spec: Spec) -> Play:
+        assert isinstance(spec, TrialSpec)
+        play, lines = recorded_trial(Path(folder), spec.trial, spec.controllers, allow)
+        for line in lines:
+            say(line)
+        return play
+
+    play = load(TrialSpec(str(folder), trial, tuple(controllers)))
+    return _serve(play, load, host, port, seconds, dark, say)
 
 
-def _check(names: Sequence[str], robot: str, seconds: float | None, native: bool) -> None:
+def _check(spec: SessionSpec, seconds: float | None, native: bool) -> None:
     """Raises ConfigError for what is wrong with the names, before anything is compiled."""
-    if len(names) > (1 if native else MOST):
+    count = len(spec.controllers)
+    if count > (1 if native else MOST):
         most = "one controller is shown by --native" if native else f"at most {MOST} side by side"
-        raise ConfigError(f"{most}, not {len(names)}", field="controllers")
+        raise ConfigError(f"{most}, not {count}", field="controllers")
     _check_seconds(seconds)
-    resolve("robots", robot)
-    for name in names:
+    resolve("robots", spec.robot)
+    for name in spec.controllers:
         check_name(name)
 
 
@@ -133,32 +128,23 @@ def _check_seconds(seconds: float | None) -> None:
         raise ConfigError(f"must be above 0, not {seconds}", field="seconds")
 
 
-def _read_pushes(text: str, robot: Robot) -> list[Push]:
-    """The pushes of a flag `--push`."""
-    try:
-        fields = yaml.load(text, Loader=Loader)
-    except yaml.YAMLError:
-        raise ConfigError(f"is no YAML mapping: {shown(text)}", field="push") from None
-    parsed = parse_pushes(fields, robot)
-    pushes = [push for push in parsed if isinstance(push, Push)]
-    if len(pushes) != len(parsed):
-        raise ConfigError("a kick (delta_v) is no push of a trial; give an impulse", field="push")
-    return pushes
-
-
-def _not_here(robot: str, names: Sequence[str]) -> Play:
-    raise ConfigError("a recorded trial has its controllers")
+def _load_session(spec: Spec) -> Play:
+    assert isinstance(spec, SessionSpec)
+    return load_live(spec)
 
 
 def _serve(
-    play: Play, load: Callable[[str, list[str]], Play], host: str, port: int,
+    play: Play, load: Callable[[Spec], Play], host: str, port: int,
     seconds: float | None, dark: bool, say: Say,
 ) -> float:  # fmt: skip
     from .browser import BrowserView
 
-    with serving(host, port) as server:
+    visits = Visits()
+    with serving(host, port, visits) as server:
         browser = BrowserView(server, play, load, dark)
-        for line in greeting(host, server.get_port()):
+        visits.opened = browser.visited
+        link = play.spec.link if isinstance(play.spec, TrialSpec) else ""
+        for line in greeting(host, server.get_port(), link):
             say(line)
         with suppress(KeyboardInterrupt):
             if seconds is None:

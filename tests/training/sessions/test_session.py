@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from functools import partial
 
+import mujoco
 import numpy as np
 import pytest
 
+from poise.baselines.motions.motion import load_motion
+from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.pushes.push import Push
 from poise.training.sessions.frames import VALUES, Frame, between
 from poise.training.sessions.live import KEPT, Live
+from poise.training.sessions.loading import read_mapping
 from poise.training.sessions.session import Session, load_session
+from poise.training.sessions.spec import SessionSpec
 from poise.training.trials.agents import load_agent
 from poise.training.trials.play import run_trial
 from poise.training.trials.trial import Trial
@@ -205,11 +210,87 @@ def test_the_last_seconds_are_kept(session: Session, monkeypatch: pytest.MonkeyP
 
 def test_the_command_plays_the_same_again(session: Session) -> None:
     """Its flags have every digit of the pushes that came."""
-    live = Live(session, "poise view a --seed 3")
+    live = Live(session, SessionSpec(("a",), seed=3))
     live.reset()
     live.step()
     live.push(**SMALL, point=[0.1, 0.0, -0.25])
-    assert live.command == (
-        "poise view a --seed 3 --push '{impulse: 12.0, direction: 70.0, duration: 0.1, "
-        "body: torso, start: 0.02, point: [0.1, 0.0, -0.25]}'"
+    assert live.spec.command == (
+        "poise view a --robot humanoid --seed 3 --push '{impulse: 12.0, direction: 70.0, "
+        "duration: 0.1, body: torso, start: 0.02, point: [0.1, 0.0, -0.25]}'"
     )
+
+
+@pytest.fixture(scope="module")
+def walk() -> Session:
+    return load_session(["walk", "zero"], robot(), seed=5)
+
+
+def test_a_walk_is_its_trial_bit_for_bit(walk: Session) -> None:
+    """Commands that came while it ran are those of the trial, and so are the commands in text."""
+    walk.reset()
+    live, seen = Live(walk), [state(walk.sides[0].env)]
+    for step in range(150):
+        if step in (10, 60, 110):
+            live.walk(ahead=0.003 * step, left=0.1, turn=-0.0015 * step)
+        live.step()
+        seen.append(state(walk.sides[0].env))
+    assert walk.command.ahead == 0.33 and len(walk.trial.commands) == 3
+    again = played("walk", walk.trial, 3.0)
+    assert len(again) == 151 and all(map(partial(np.array_equal), seen, again))
+    texts = [read_mapping(text, "command") for text in live.spec.commands]
+    assert parse_commands(texts) == walk.trial.commands
+
+
+def test_a_command_takes_the_place_of_what_was_planned(walk: Session) -> None:
+    """One at the same moment takes the place of the other; a reset brings the plan back."""
+    planned = (TimedCommand(ahead=0.2), TimedCommand(ahead=0.4, start=1.0))
+    session = Session([walk.sides[0].agent], 5, (), planned)
+    assert session.command == planned[0]
+    session.step()
+    session.walk(ahead=0.5)
+    session.walk(ahead=0.6)
+    assert session.commands == (planned[0], TimedCommand(ahead=0.6, start=0.02))
+    assert session.sides[0].walker.command.ahead == 0.6
+    session.reset()
+    assert session.commands == planned and session.sides[0].walker.command.ahead == 0.2
+
+
+def test_what_does_not_walk_takes_no_command(session: Session, walk: Session) -> None:
+    """Beside one that walks it stands; alone it refuses, and names those that do."""
+    assert walk.walks and not session.walks
+    message = "command: none of these controllers walks.*walk"
+    with pytest.raises(ConfigError, match=message):
+        session.walk(ahead=0.5)
+    with pytest.raises(ConfigError, match=message):
+        Session([walk.sides[1].agent], commands=[TimedCommand(0.5)])
+    with pytest.raises(ConfigError, match="ahead"):
+        walk.walk(ahead=float("nan"))
+
+
+def test_the_ghost_is_the_reference() -> None:
+    """Its joints are the motion's, and its soles stand where the robot's stood at the reset."""
+    motion = load_motion("squat", robot())
+    session = load_session(["momentum-qp"], robot(), seed=1, motion=motion)
+    live, env = Live(session), session.sides[0].env
+    state = env.simulation.state
+    origin, heading = state.origin.copy(), state.heading.copy()
+    for _ in range(60):
+        live.step()
+    frame = live.history[-1][0]
+    assert frame.ghost is not None
+    data = mujoco.MjData(robot().model)
+    data.qpos[:3], data.qpos[3:7] = frame.ghost.positions[1], frame.ghost.quaternions[1]
+    data.qpos[7:] = motion.sample(frame.time).q_ref
+    mujoco.mj_kinematics(robot().model, data)
+    assert np.allclose(data.xpos[1:], frame.ghost.positions[1:], atol=1e-9)
+    assert np.allclose(np.abs(np.sum(data.xquat * frame.ghost.quaternions, axis=1))[1:], 1.0)
+    feet = [(data.xmat[s.body_id].reshape(3, 3), data.xpos[s.body_id], s) for s in robot().soles]
+    middle = np.mean([place + turn @ sole.position for turn, place, sole in feet], axis=0)
+    ahead = sum((turn @ sole.rotation)[:2, 0] for turn, _, sole in feet)
+    assert np.allclose(middle, origin, atol=1e-9)
+    assert np.allclose(ahead / np.linalg.norm(ahead), heading, atol=1e-9)
+    apart = np.linalg.norm(frame.positions - frame.ghost.positions, axis=1)[1:]
+    assert 1e-4 < apart.max() < 0.06  # it is followed, not copied
+    between_two = between(live.history[-2][0], frame, 0.5).ghost
+    before = live.history[-2][0].ghost
+    assert np.allclose(2.0 * between_two.positions, before.positions + frame.ghost.positions)

@@ -8,6 +8,8 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,11 +22,14 @@ pytest.importorskip("mjviser", reason="not installed: pip install 'poise[view]'"
 import viser
 
 from poise.configs.errors import ConfigError
-from poise.envs.viewing.quantities import COM
+from poise.envs.viewing.quantities import COM, REFERENCE
 from poise.training.sessions.live import Live, Play
+from poise.training.sessions.loading import load_live
 from poise.training.sessions.session import Session, load_session
+from poise.training.sessions.spec import SessionSpec, Spec
 from poise.training.view import browser
 from poise.training.view.browser import BrowserView
+from poise.training.view.origins import Visits
 from poise.training.view.server import check_port, greeting, serving
 from poise.training.view.stage import FIELD_OF_VIEW, LANE, first_view
 from tests.support.browser import CHROMIUM, Browser
@@ -40,12 +45,20 @@ HARMLESS = (
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[viser.ViserServer]:
-    with serving("127.0.0.1", 0) as found:
+    with serving("127.0.0.1", 0, visits) as found:
         yield found
 
 
-def load(name: str, names: list[str]) -> Play:
-    return Live(load_session(names, robot(name)), "poise view")
+visits = Visits()
+
+
+def load(spec: Spec) -> Play:
+    assert isinstance(spec, SessionSpec)
+    asked.append(spec)
+    return load_live(spec)
+
+
+asked: list[Spec] = []  # of `load`, by all tests
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +71,7 @@ def view(server: viser.ViserServer, session: Session) -> BrowserView:
     session.reset()
     server.scene.reset()
     server.gui.reset()
-    return BrowserView(server, Live(session, "poise view"), load)
+    return BrowserView(server, Live(session), load)
 
 
 def run_until(view: BrowserView, condition: Callable[[], bool], seconds: float = 30.0) -> None:
@@ -71,9 +84,13 @@ def run_until(view: BrowserView, condition: Callable[[], bool], seconds: float =
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
 def test_a_browser_shows_it_and_pushes_it(
-    view: BrowserView, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+    view: BrowserView,
+    server: viser.ViserServer,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
-    """The page loads, the robot moves in it, the button and the mouse push it; no error."""
+    """The page loads, the robot moves in it, the button and the mouse push it, it saves a picture
+    and copies a link; no error."""
     view.toggle()  # until the page is there
     view.panel.wishes.follow(False)  # or the ground would move too
     monkeypatch.setattr(browser, "FRAME", 0.2)  # what a processor can draw without a GPU
@@ -81,7 +98,7 @@ def test_a_browser_shows_it_and_pushes_it(
     server.scene.add_light_directional("/light/sun", intensity=2.0, position=(2.5, 1.0, 5.0))
     page: dict[str, Any] = {}
     url = f"http://127.0.0.1:{server.get_port()}"
-    thread = threading.Thread(target=use, args=(url, view, page), daemon=True)
+    thread = threading.Thread(target=use, args=(url, view, page, tmp_path), daemon=True)
     thread.start()
     run_until(view, lambda: not thread.is_alive(), 300.0)
     assert "failed" not in page, page["failed"]
@@ -94,9 +111,14 @@ def test_a_browser_shows_it_and_pushes_it(
     assert (button.body, button.direction, button.duration) == ("torso", 0.0, 0.1)
     assert button.impulse == pytest.approx(0.5 * robot().mass, abs=0.1)
     assert 3.0 < mouse.impulse < 30.0 and any(mouse.point)
+    saved = np.asarray(Image.open(tmp_path / "poise.png").convert("RGB"))
+    assert saved.shape[1] == after.shape[1]  # the scene, whole
+    assert 100 < len(np.unique(saved.reshape(-1, 3), axis=0))
+    assert tuple(saved[0, 0]) == (255, 255, 255)
+    assert page["link"] == url + view.play.spec.link
 
 
-def use(url: str, view: BrowserView, page: dict[str, Any]) -> None:
+def use(url: str, view: BrowserView, page: dict[str, Any], folder: Path) -> None:
     """What a user does, from a thread."""
     session = view.play.session
     try:
@@ -113,6 +135,15 @@ def use(url: str, view: BrowserView, page: dict[str, Any]) -> None:
             chromium.click("Pause")
             wait(lambda: view.paused)
             page["pictures"] = before, picture(chromium)
+            chromium.save_to(folder)
+            chromium.click("Save", "*")
+            chromium.click("Picture (PNG)")
+            wait((folder / "poise.png").is_file)
+            chromium.click("Copy")
+            chromium.wait(
+                "[...document.querySelectorAll('button')].some(b => b.innerText == 'Copied')"
+            )
+            page["link"] = chromium.run("navigator.clipboard.readText()")
     except BaseException as error:
         page["failed"] = repr(error)
         raise
@@ -185,7 +216,7 @@ def test_a_wrong_push_is_no_end(view: BrowserView) -> None:
 
 def test_other_controllers_are_loaded(view: BrowserView) -> None:
     """The scene and the plots have a robot and a line for each."""
-    view.ask(view.load, "humanoid", NAMES)
+    view.ask(view.load, "humanoid", NAMES, "standing")
     run_until(view, lambda: len(view.play.names) == 2)
     view.run(0.1)
     handles = [mesh.handle for mesh in view.stage.robots.meshes]
@@ -211,7 +242,9 @@ def test_only_packaged_names_are_loaded(view: BrowserView) -> None:
     assert asked == []
     view.panel.robot.value = "humanoid"
     view.panel.load()
-    assert asked == [("humanoid", ["capture-step"])]
+    view.panel.motion.value = "../squat.npz"
+    view.panel.load()
+    assert asked == [("humanoid", ["capture-step"], "standing")]
 
 
 def test_a_controller_that_raises_is_no_end(
@@ -234,7 +267,7 @@ def test_whatever_a_button_raises_is_no_end(
 ) -> None:
     """A controller that raises in a single step, a page that sends what no page of ours does."""
     told: list[str] = []
-    monkeypatch.setattr(view, "_say", lambda text, *_: told.append(text))
+    monkeypatch.setattr(view._pages, "say", lambda text, *_: told.append(text))
 
     def fail() -> None:
         raise ZeroDivisionError("of a controller")
@@ -258,6 +291,73 @@ def test_marks_can_be_hidden(view: BrowserView) -> None:
     view.show(COM, False)
     view.run(0.1)
     assert not spheres.handle.batched_scales.any()
+
+
+def test_a_motion_has_a_ghost(view: BrowserView) -> None:
+    """It is loaded, drawn where the reference is, and can be hidden."""
+    view.ask(view.load, "humanoid", NAMES[:1], "squat")
+    run_until(view, lambda: view.play.spec.motion == "squat" and view.play.at > 3)
+    ghosts = view.stage.ghosts
+    assert ghosts is not None and len(ghosts.meshes) == len(view.stage.robots.meshes)
+    poses = view.stage.frames[0].ghost
+    for mesh in ghosts.meshes:
+        assert np.allclose(mesh.handle.batched_positions[0], poses.positions[mesh.body], atol=1e-5)
+        assert np.allclose(mesh.handle.batched_wxyzs[0], poses.quaternions[mesh.body], atol=1e-5)
+        assert mesh.handle.visible
+    view.show(REFERENCE, False)
+    view.run(0.1)
+    assert not any(mesh.handle.visible for mesh in ghosts.meshes)
+    assert view.stage.robots.meshes[0].handle.visible
+
+
+def test_what_only_stands_has_no_ghost(view: BrowserView) -> None:
+    view.run(0.1)
+    assert view.stage.ghosts is None and view.stage.frames[0].ghost is None
+
+
+def test_sliders_command_a_walk(view: BrowserView) -> None:
+    """They are there where something walks, show what holds, and are heeded now and then."""
+    assert not view.panel.walk._folder.visible
+    view.open(SessionSpec(("walk",), commands=("{ahead: 0.5, turn: 0.1}",)))
+    sliders = view.panel.walk.sliders
+    run_until(view, lambda: view.play.at > 2)
+    assert view.panel.walk._folder.visible
+    assert [round(s.value, 3) for s in sliders.values()] == [0.5, 0.0, 6.0]  # 0.1 rad/s is 5.7°/s
+    sliders["ahead"].value, sliders["turn"].value = 0.3, -10.0
+    for _ in range(50):
+        view.panel.walk._updated(SimpleNamespace(client_id=1))  # as when a user drags
+        view.run(0.02)
+    commands = view.play.session.commands
+    assert 2 <= len(commands) < 10
+    assert (commands[-1].ahead, commands[-1].turn) == (0.3, -0.1745)
+    view.reset()
+    assert view.play.session.command.ahead == 0.5
+    run_until(view, lambda: sliders["ahead"].value == 0.5)
+
+
+def test_a_link_is_opened(server: viser.ViserServer, view: BrowserView) -> None:
+    """A page whose address names controllers loads them; one that names a file gets a line."""
+    visits.opened = view.visited
+    asked.clear()
+    link = SessionSpec(("zero",), seed=3, pushes=("{impulse: 2, body: torso, start: 1}",)).link
+    assert get(server, link).startswith("HTTP/1.1 200 ")
+    run_until(view, lambda: view.play.spec.controllers == ("zero",))
+    assert view.play.session.trial.pushes[0].impulse == 2.0 and view.play.spec.seed == 3
+    answer = get(server, "/?controller=os:system")
+    assert answer.startswith("HTTP/1.1 404 ") and "a link may name what is packaged" in answer
+    assert get(server, link, "Sec-Fetch-Dest: image").startswith("HTTP/1.1 200 ")
+    assert get(server, "/").startswith("HTTP/1.1 200 ")
+    view.run(0.1)
+    assert len(asked) == 1
+
+
+def get(server: viser.ViserServer, path: str, *headers: str) -> str:
+    """The answer to a browser that opens an address."""
+    port = server.get_port()
+    lines = [f"GET {path} HTTP/1.1", f"Host: 127.0.0.1:{port}", "Connection: close", *headers]
+    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as asked:
+        asked.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+        return asked.makefile("rb").read(400).decode(errors="replace")
 
 
 def test_a_port_that_is_taken_is_told() -> None:

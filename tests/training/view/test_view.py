@@ -25,10 +25,11 @@ from poise.envs.viewing import window
 from poise.training.cli.entry import main
 from poise.training.results.replay import replay
 from poise.training.sessions import live as live_module
+from poise.training.sessions import loading
 from poise.training.sessions.live import Live
 from poise.training.sessions.recorded import _side_by_side, recorded_trial
 from poise.training.sessions.session import load_session
-from poise.training.view import native, view
+from poise.training.view import native
 from tests.endurance.processes import heed_interrupts
 from tests.support.report_folders import SOFT, finished
 from tests.support.shared import robot
@@ -48,6 +49,9 @@ PUSH = "{impulse: 20, direction: 90, body: torso, start: 0.1}"
         (["zero", "--push", "{impulse: 1, body: tail}"], "body: no body 'tail'"),
         (["zero", "--push", "["], "push: is no YAML mapping"),
         (["zero", "--push", "{delta_v: 1.0}"], "push: a kick"),
+        (["zero", "--motion", "dance"], "motions: no such name: 'dance'"),
+        (["walk", "--command", "["], "command: is no YAML mapping"),
+        (["walk", "--command", "{speed: 1}"], "command: speed: unknown field"),
         (["zero", "--controllers", "zero"], "controllers: goes with --trial"),
         (["nowhere", "--trial", "3"], "nowhere: no such folder"),
         (["--trial", "3"], "trial: goes with one folder"),
@@ -59,7 +63,7 @@ def test_what_cannot_be_shown_is_one_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     """With exit code 2, and before a controller is loaded, which would compile."""
-    monkeypatch.setattr(view, "load_session", lambda *_: pytest.fail("loaded"))
+    monkeypatch.setattr(loading, "load_session", lambda *_, **__: pytest.fail("loaded"))
     assert main(["view", *args]) == 2
     err = capsys.readouterr().err
     assert err.startswith("poise: ") and message in err and err.count("\n") == 1
@@ -133,7 +137,7 @@ def test_a_trial_of_a_result_is_shown_as_it_was() -> None:
         assert play.history[-1][side].fall_time == done.outcome.fall_time
         lengths.append(len(heights))
     assert play.history[-1][1].fall_time is not None and len(play.history) == max(lengths)
-    assert play.command.endswith(f"--trial 2 --controllers '{soft}' zero")
+    assert play.spec.command.endswith(f"--trial 2 --controllers '{soft}' zero")
 
 
 def keep_height(heights: list[float], env: BalanceEnv) -> None:

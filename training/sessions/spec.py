@@ -1,0 +1,126 @@
+"""What is to be shown, in text: the command and the link that show the same again."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from urllib.parse import parse_qs, urlencode
+
+from poise.configs.errors import ConfigError, shown
+
+STANDING = "standing"  # the motion of a session that names none
+MOST = 3  # controllers side by side
+
+
+@dataclass(frozen=True)
+class SessionSpec:
+    """A session: who plays what, from which start, with which pushes and commands.
+
+    Attributes:
+        controllers, robot, motion: names and paths, as a user writes them.
+        seed: of the disturbed start.
+        pushes, commands: YAML mappings, as `parse_pushes` and `parse_commands` take them.
+    """
+
+    controllers: tuple[str, ...]
+    robot: str = "humanoid"
+    motion: str = STANDING
+    seed: int = 0
+    pushes: tuple[str, ...] = ()
+    commands: tuple[str, ...] = ()
+
+    @property
+    def command(self) -> str:
+        """The command line that plays the same."""
+        words = ["poise", "view", *self.controllers, "--robot", self.robot]
+        if self.motion != STANDING:
+            words += ["--motion", self.motion]
+        words += ["--seed", str(self.seed)]
+        words += [word for text in self.pushes for word in ("--push", text)]
+        return shlex.join(words + [word for text in self.commands for word in ("--command", text)])
+
+    @property
+    def link(self) -> str:
+        """The address that plays the same, without the server's."""
+        fields = {"controller": self.controllers, "robot": self.robot, "motion": self.motion,
+                  "seed": self.seed, "push": self.pushes, "command": self.commands}  # fmt: skip
+        return "/?" + urlencode(fields, doseq=True)
+
+
+@dataclass(frozen=True)
+class TrialSpec:
+    """A trial of a result in a folder, by some of the controllers that took part."""
+
+    folder: str
+    trial: int
+    controllers: tuple[str, ...]
+
+    @property
+    def command(self) -> str:
+        """The command line that shows the same."""
+        words = ["poise", "view", self.folder, "--trial", str(self.trial)]
+        return shlex.join([*words, "--controllers", *self.controllers])
+
+    @property
+    def link(self) -> str:
+        """The address that shows the same where this folder is shown, without the server's."""
+        return "/?" + urlencode({"trial": self.trial, "controller": self.controllers}, doseq=True)
+
+
+Spec = SessionSpec | TrialSpec
+
+
+def read_link(query: str, now: Spec, names: Collection[str]) -> Spec | None:
+    """What a link asks for; None where it asks for nothing.
+
+    Args:
+        query: of the address, what stands behind its question mark.
+        now: what is shown; what the link leaves open stays as it is there, but for pushes and
+            commands.
+        names: of robots, controllers and motions that a link may name.
+
+    Raises:
+        ConfigError: a name that is not among them, more than three controllers, a number that is
+            none.
+    """
+    given = parse_qs(query)
+    _check_count(tuple(given.get("controller", ())))
+    if isinstance(now, TrialSpec):
+        return _trial(given, now)
+    known = ("controller", "robot", "motion", "seed", "push", "command")
+    if not any(name in given for name in known):
+        return None
+    spec = replace(
+        now,
+        controllers=tuple(given.get("controller", now.controllers)),
+        robot=given.get("robot", [now.robot])[-1],
+        motion=given.get("motion", [STANDING])[-1],
+        seed=_number(given.get("seed", ["0"])[-1], "seed"),
+        pushes=tuple(given.get("push", ())),
+        commands=tuple(given.get("command", ())),
+    )
+    for name in (*spec.controllers, spec.robot, spec.motion):
+        if name not in names:
+            raise ConfigError(f"a link may name what is packaged alone, not {shown(name)}")
+    return spec
+
+
+def _trial(given: dict[str, list[str]], now: TrialSpec) -> TrialSpec | None:
+    if "trial" not in given:
+        return None
+    controllers = tuple(given.get("controller", now.controllers))
+    return TrialSpec(now.folder, _number(given["trial"][-1], "trial"), controllers)
+
+
+def _check_count(controllers: tuple[str, ...]) -> None:
+    if len(controllers) > MOST:
+        raise ConfigError(f"at most {MOST} side by side, not {len(controllers)}",
+                          field="controller")  # fmt: skip
+
+
+def _number(text: str, field: str) -> int:
+    """A whole number of at most nine digits."""
+    if not (text.isascii() and text.isdigit() and len(text) < 10):
+        raise ConfigError(f"must be a whole number, not {shown(text)}", field=field)
+    return int(text)
