@@ -6,6 +6,9 @@ import numpy as np
 
 from poise.baselines.stepping.blocks import CaptureTick, StepMemory, SwingArrays
 from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program
+
+from .models.reference import Reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +49,9 @@ class WalkTick(Block):
     capture: CaptureTick  # while it stands, and catches falls from there
     walk: CaptureTick  # the same memory, with the QPs, the swing and the limits of the gait
     gait: Gait
+    reference: Reference  # what the model of the gait is told, and what it answers
+    model: Program  # its kernel
+    constant_height: int  # 1: the gait's own height holds, and no model is asked
     stance: np.ndarray  # (2,) scratch: the middle of what the stance sole reaches [m]
     swinging: np.ndarray  # (2,) scratch: the same of the other one
 

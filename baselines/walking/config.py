@@ -6,6 +6,9 @@ from typing import Literal
 from poise.baselines.stepping.config import CaptureStepConfig, StepLimits, SwingTask
 from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 
+from .models.lip import Lip
+from .models.reference import ReferenceModel
+
 POSITIVE, NOT_NEGATIVE = {"above": 0.0}, {"min": 0.0}
 
 
@@ -18,6 +21,8 @@ class GaitConfig:
     width: float = field(default=0.254, metadata=POSITIVE)  # between the soles
     height: float = field(default=0.966, metadata=POSITIVE)  # of the CoM, where legs reach
     leg_length: float = field(default=1.04, metadata=POSITIVE)  # that limits it in a long step
+    # what the height follows: `lip` keeps `height`, the others are in models/
+    model: ReferenceModel = field(default_factory=Lip, metadata={"omit": "default"})
     acceleration: float = field(default=0.041, metadata=POSITIVE)  # of the velocity [g]
     turn_acceleration: float = field(default=0.08, metadata=POSITIVE)  # of the turn [ω²]
     # what is planned is the velocity asked for, and so much of the sum of each step's error

@@ -36,6 +36,7 @@ from poise.baselines.stepping.tick import (
     solve_contacts,
 )
 from poise.baselines.whole_body.tick import ContactTick
+from poise.envs.compiled.calls import run
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.polygons import find_nearest
 from poise.envs.maths.vectors import along, copy_into, turned
@@ -49,6 +50,7 @@ from .dcm import (
     transfer_factor,
     transfer_point,
 )
+from .models.reference import share_load
 
 TIMES = 8  # step times that are weighed against the planned one
 LEAST_TIME = 0.06  # [s] for which the CoP on one foot is planned at least
@@ -98,6 +100,7 @@ def start_walking(t: WalkTick) -> None:
     for a in range(3):
         g.velocity[a] = 0.0
     g.error[0] = g.error[1] = 0.0
+    t.reference.begun[0] = 0
 
 
 @compiled
@@ -163,7 +166,31 @@ def ask_for(t: WalkTick, ground: float, stride_x: float, stride_y: float, p: np.
         own.com_acc[a] = rate * (s.com[a] - own.cop[a])
     own.com[2] = ground + height + offsets[COM_Z]
     own.com_vel[2] = own.com_acc[2] = 0.0
+    if not t.constant_height:
+        follow_model(t)
     limit_posture(c)
+
+
+@compiled
+def follow_model(t: WalkTick) -> None:
+    """Let the height be what the reference model answers."""
+    c, r, s, own, g = t.walk, t.reference, t.walk.state, t.walk.reference_out, t.gait
+    new, level = c.memory.foot[0], c.memory.level_frame
+    if c.memory.swinging[0]:
+        share_load(r, 1 - new, 1.0, np.inf)
+        r.time_left[0] = time_left(c.swing)
+        r.landing[0], r.landing[1] = c.swing.foothold[0], c.swing.foothold[1]
+    else:
+        duration = np.inf if g.starting[0] else g.transfer_time
+        share_load(r, new, 0.5 if g.starting[0] else g.clock[0] / duration, duration)
+        r.time_left[0] = max(g.transfer_time - g.clock[0], 0.0)
+    r.ahead[0], r.ahead[1] = level[0, 0], level[1, 0]
+    for a in range(2):
+        r.com_vel[a], r.com_acc[a], r.cop[a] = s.com_vel[a], own.com_acc[a], own.cop[a]
+    run(t.model)
+    r.begun[0] = 1
+    own.com[2] = s.com[2] + r.height[0] + c.offsets[COM_Z]
+    own.com_vel[2], own.com_acc[2] = r.height[1], r.height[2]
 
 
 @compiled

@@ -23,6 +23,9 @@ from poise.envs.robots.robot import Robot
 from .blocks import Gait, WalkTick
 from .command import GaitCommand
 from .config import GaitConfig, WalkConfig
+from .models.leg_rows import leg_task
+from .models.legs import leg_arrays, no_legs
+from .models.reference import allocate_reference
 from .tick import walk_tick
 
 
@@ -83,6 +86,8 @@ class Walk(CaptureStep):
         self.gait = allocate_gait(gait, robot.units, limits)
         self.gait_sets = ContactSets(robot, gait.qp, gait.torque_rate_limit)
         self._walk_tick: WalkTick | None = None
+        legs = no_legs() if gait.model.keeps_height else leg_arrays(robot)
+        self.reference = allocate_reference(robot, gait.qp.period, legs)
         super().__init__(robot, config)
 
     @property
@@ -122,7 +127,12 @@ class Walk(CaptureStep):
         known = self._walk_tick
         if known is None or known.capture is not capture:
             walk, pair = self._of_gait(capture), guarded_zeros(2)
-            known = WalkTick(capture, walk, self.gait, pair, guarded_zeros(2))
+            model = self._gait_config.model
+            known = WalkTick(
+                capture=capture, walk=walk, gait=self.gait, reference=self.reference,
+                model=model.bind(self.robot, capture.state, self.reference),
+                constant_height=int(model.keeps_height), stance=pair, swinging=guarded_zeros(2),
+            )  # fmt: skip
             self._walk_tick = known
         return known
 
@@ -134,7 +144,8 @@ class Walk(CaptureStep):
         on_first, on_second, on_both = (
             self.gait_sets.sets[soles].bind(
                 capture.state, asked, self.gait_sets,
-                [swing_task(foot, way, axes, task) for foot in swinging],
+                [swing_task(foot, way, axes, task) for foot in swinging]
+                + [leg_task(leg, self.reference) for leg in soles if gait.model.has_rows],
             )
             for soles, swinging in (((0,), (1,)), ((1,), (0,)), ((0, 1), ()))
         )  # fmt: skip

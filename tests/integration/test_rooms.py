@@ -32,7 +32,7 @@ FLOORS = """
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
  9 envs/vector, baselines/in_place, baselines/policy_files, baselines/retargeting
- 9 baselines/stepping
+ 9 baselines/stepping, baselines/walking/models
 10 baselines/walking
 11 baselines/registry
 12 baselines/environments

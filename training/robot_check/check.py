@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from poise.envs.physics.legs import Leg, find_legs
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.running.files import plain
-from poise.training.trials.legs import Leg, find_legs
 from poise.training.trials.push_limits import PushLimits
 
 from .faults import Fault, find_faults

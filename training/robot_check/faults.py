@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from poise.training.trials.legs import Leg
+from poise.envs.physics.legs import Leg
 
 from .holding import Holding
 from .stability import DirectionFigures

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from poise.envs.physics.legs import standing_data
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.standing import described_qpos
-from poise.training.trials.legs import standing_data
 
 ZERO = "zero posture"  # of the model
 

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from poise.training.trials.legs import Leg
+from poise.envs.physics.legs import Leg
 
 from .check import RobotCheck
 from .holding import Holding

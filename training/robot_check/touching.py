@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import mujoco
 
+from poise.envs.physics.legs import standing_data
 from poise.envs.robots.robot import Robot
-from poise.training.trials.legs import standing_data
 
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.episode import ENERGY, POSITIVE_WORK
-
-from .legs import find_legs
+from poise.envs.physics.legs import find_legs
 
 
 class Row(NamedTuple):

@@ -1,4 +1,4 @@
-"""training/trials/legs.py and training/robot_check/one_leg.py."""
+"""envs/physics/legs.py and training/robot_check/one_leg.py."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from poise.baselines.stepping.config import SwingTask
+from poise.envs.physics.legs import find_legs
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.robot_check.one_leg import one_leg_qpos
-from poise.training.trials.legs import find_legs
 from tests.support.small_biped import JOINTS, LEG, write_biped
 from tests.support.small_urdf import write_urdf
 

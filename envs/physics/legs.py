@@ -23,6 +23,7 @@ class Leg:
         knee: the joint between the last two of three or more that turn about the robot's left;
             None where there are fewer.
         knee_bend: angle between the lines from hip to knee and from knee to ankle [deg].
+        hip, ankle: the joints before and after the knee that turn about the robot's left, likewise.
         ankle_pitch, ankle_roll: whether a joint of the ankle turns about the robot's left, about
             its forward direction.
     """
@@ -31,6 +32,8 @@ class Leg:
     joints: tuple[str, ...]
     knee: str | None
     knee_bend: float | None
+    hip: str | None
+    ankle: str | None
     ankle_pitch: bool
     ankle_roll: bool
 
@@ -68,15 +71,18 @@ def _leg(model: mujoco.MjModel, data: mujoco.MjData, foot: str, joints: list[int
     names = [model.joint(i).name for i in joints]
     axes, anchors = np.abs(data.xaxis[joints]), data.xanchor[joints]
     pitch, low = axes[:, 1] > ALONG, anchors[:, 2] < ANKLE * anchors[0, 2]
-    knee, bend = None, None
+    hip, knee, ankle, bend = None, None, None, None
     if np.count_nonzero(pitch) >= 3:
-        hip, middle, ankle = np.flatnonzero(pitch)[-3:]
-        knee, bend = names[middle], _bend(*anchors[[hip, middle, ankle]][:, [0, 2]])
+        chain = np.flatnonzero(pitch)[-3:]
+        hip, knee, ankle = (names[i] for i in chain)
+        bend = _bend(*anchors[chain][:, [0, 2]])
     return Leg(
         foot=foot,
         joints=tuple(names),
         knee=knee,
         knee_bend=bend,
+        hip=hip,
+        ankle=ankle,
         ankle_pitch=bool(np.any(pitch & low)),
         ankle_roll=bool(np.any((axes[:, 0] > ALONG) & low)),
     )

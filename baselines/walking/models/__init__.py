@@ -1,0 +1,1 @@
+"""Reference models of the stance leg: what the height of a walk follows."""
