@@ -129,8 +129,8 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         ("CoM drift [mm]", figure(lambda e: _number(e["com_drift_max"], ".1f", 1000.0))),
         ("feet drift [mm]", figure(lambda e: _number(e["foot_drift_max"], ".1f", 1000.0))),
         ("lean at the end [°]", figure(lambda e: _number(e["unpushed_lean_max"], ".2f"))),
-        ("power [W]", figure(lambda e: _at_rest(e, "mean_power_median", ".0f"))),
-        ("chatter [1/s]", figure(lambda e: _at_rest(e, "torque_variation_median", ".2f"))),
+        ("power [W]", figure(lambda e: _at_rest(e, e["mean_power_median"], ".0f"))),
+        ("chatter [1/s]", figure(lambda e: _at_rest(e, e["torque_variation_median"], ".2f"))),
         ("steps, mean", figure(lambda e: _number(e["steps_mean"] or None, ".1f"))),
         ("of one-step limit", figure(lambda e: f"{e['step_share_1_mean']:.2f}")),
         ("solver failures", figure(lambda e: f"{e['solver_failures'] or NONE}")),
@@ -181,9 +181,9 @@ def _number(value: float | None, form: str, scale: float = 1.0) -> str:
     return NONE if value is None else format(scale * value, form)
 
 
-def _at_rest(entry: Entry, name: str, form: str) -> str:
+def _at_rest(entry: Entry, value: float | None, form: str) -> str:
     """A figure of robots that stand: of pushed ones it says more of the pushes."""
-    return _number(entry[name] if entry["com_drift_max"] is not None else None, form)
+    return _number(value if entry["com_drift_max"] is not None else None, form)
 
 
 def _room(names: Iterable[str], most: int) -> int:
