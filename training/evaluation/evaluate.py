@@ -8,9 +8,10 @@ from pathlib import Path
 from rich.console import Console
 
 from poise.baselines.allowance import allows
+from poise.baselines.registry import walking_controllers
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, packaged_folder
-from poise.configs.reading import read_json
+from poise.configs.reading import read_json, read_yaml
 from poise.envs.pushes.sampler import LimitTable
 from poise.envs.robots.robot import load_robot
 from poise.training.running.summary import Summary
@@ -19,9 +20,7 @@ from poise.training.trials.push_limits import PushLimits, load_limits, write_lim
 from .run import Run
 
 REFERENCE = "momentum-qp"
-# `simbicon` always marks time, and so never counts as recovered; `walk` is feedback-step where
-# nothing is commanded
-RESTLESS = ("simbicon", "walk")
+RESTLESS = ("simbicon",)  # always marks time, and so never counts as recovered
 
 
 @allows("controllers")
@@ -115,9 +114,15 @@ def benchmark(
 
 
 def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
-    """The reference, all other packaged controllers that can rest, and the robot's policies."""
-    others = (name for name in packaged("controllers") if name not in (REFERENCE, *RESTLESS))
-    return (REFERENCE, *others, *packaged_policies(robot))
+    """The reference, all other packaged controllers that can rest, and the robot's policies.
+
+    Controllers that walk, and policies on them, are left out: where nothing is commanded they are
+    `feedback-step`.
+    """
+    elsewhere = {REFERENCE, *RESTLESS, *walking_controllers()}
+    others = (name for name in packaged("controllers") if name not in elsewhere)
+    policies = (name for name in packaged_policies(robot) if not walks(name))
+    return (REFERENCE, *others, *policies)
 
 
 def packaged_policies(robot: str) -> list[str]:
@@ -125,6 +130,12 @@ def packaged_policies(robot: str) -> list[str]:
     folder = packaged_folder("policies")
     states = {name: read_json(folder / name / "state.json") for name in packaged("policies")}
     return [name for name, state in states.items() if state["robot"] == robot]
+
+
+def walks(policy: str) -> bool:
+    """Whether this packaged policy moves the steps of a walk."""
+    config = read_yaml(packaged_folder("policies") / policy / "config.yaml")
+    return bool(config.get("action") == "walk")
 
 
 def measured_limits(summary: Summary, path: Path, robot: str) -> None:

@@ -61,7 +61,7 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     """The text names what was asked for and what there is."""
     with pytest.raises(
         ConfigError,
-        match="momentum-qp, .*residual-step, residual-torque, residual-whole-g1, zero",
+        match="momentum-qp, .*residual-torque, residual-walk, residual-whole-g1, zero",
     ) as error:
         load_agent(name, robot)
     assert name in str(error.value)
@@ -92,10 +92,11 @@ def test_a_packaged_policy_is_known_by_its_folder(
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
     names = ["ppo-torque", "residual", "residual-lqr-lip", "residual-pd", "residual-step"]
     names += ["residual-torque"]
-    assert packaged("policies") == [*names, "residual-whole-g1"]
+    others = ["residual-walk", "residual-whole-g1"]
+    assert packaged("policies") == [*names, *others]
     assert default_controllers()[-6:] == tuple(names)
     assert default_controllers("unitree_g1")[-1] == "residual-whole-g1"
-    with pytest.raises(ConfigError, match=", ".join([*names, "residual-whole-g1", "zero"])):
+    with pytest.raises(ConfigError, match=", ".join([*names, *others, "zero"])):
         load_agent("residual-abe07", robot)
 
 
@@ -126,6 +127,7 @@ def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
     if found.action != "residual":
         steps = "residual-torque" if found.step_residual.torque > 0.0 else "residual-step"
         others = {"torque": "ppo-torque", "step": steps, "whole": "residual-whole-g1"}
+        others["walk"] = "residual-walk"
         assert name == others[found.action]
     else:
         on_baseline = found.controller == "momentum-qp"
