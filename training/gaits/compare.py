@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -234,10 +233,7 @@ def _with_j50(
 
     summary = evaluate(names, "walk-push", out=Path(out) / "walk-push", robot=robot, seed=seed,
                        workers=workers, console=terminal(), allow=allow)  # fmt: skip
-    found: dict[str, Any] = {
-        name: entry["envelope"]["j50_mean"] for name, entry in summary["controllers"].items()
-        if entry.get("envelope")
-    }  # fmt: skip
+    found = {name: entry.get("j50_mean") for name, entry in summary["controllers"].items()}
     return [replace(each, j50=found.get(each.controller)) for each in figures]
 
 

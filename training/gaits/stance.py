@@ -83,7 +83,7 @@ class StanceRecord:
 def _spans(down: np.ndarray, time: np.ndarray, since: float) -> list[tuple[int, int]]:
     """First row and row after the last one of whole stances of one foot."""
     edges = np.flatnonzero(np.diff(down.astype(int)))
-    landed = [row + 1 for row in edges if not down[row] and time[row + 1] >= since]
+    landed = [int(row) + 1 for row in edges if not down[row] and time[row + 1] >= since]
     lifted = np.array([row + 1 for row in edges if down[row]], dtype=int)
     spans = [(row, int(lifted[lifted > row][0])) for row in landed if np.any(lifted > row)]
     return [(a, b) for a, b in spans if time[b] - time[a] >= SHORTEST]

@@ -14,9 +14,9 @@ COLUMNS = (
     ("fell", lambda f: f"{f.falls} of {f.starts}"),
     ("speed [m/s]", lambda f: _text(f.speed_ahead, ".3f")),
     ("RMS error", lambda f: _text(f.speed_error_rms, ".3f")),
-    ("cost of transport", lambda f: _text(f.cost_of_transport, ".2f")),
-    ("positive", lambda f: _text(f.positive_cost_of_transport, ".2f")),
-    ("stance knee [N·m/kg]", lambda f: _text(f.knee_mean, ".2f")),
+    ("CoT", lambda f: _text(f.cost_of_transport, ".2f")),
+    ("of positive work", lambda f: _text(f.positive_cost_of_transport, ".2f")),
+    ("knee [N·m/kg]", lambda f: _text(f.knee_mean, ".2f")),
     ("peak", lambda f: _text(f.knee_peak, ".2f")),
     ("RMSE to humans", lambda f: _text(f.knee_rmse, ".2f")),
     ("force peak [m g]", lambda f: _text(f.force_peak, ".2f")),
@@ -30,7 +30,7 @@ def print_gaits(figures: Sequence[GaitFigures], console: Console) -> None:
     """A table for each speed."""
     for speed in dict.fromkeys(each.speed for each in figures):
         table = Table(title=f"{speed:g} m/s", title_justify="left")
-        table.add_column("controller", overflow="fold")
+        table.add_column("controller", overflow="fold", min_width=11)
         own = [each for each in figures if each.speed == speed]
         shown = [(head, form) for head, form in COLUMNS if {form(each) for each in own} != {"–"}]
         for head, _ in shown:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.training.gaits.stance import Row, StanceRecord
 from tests.support.shared import robot
 
@@ -42,13 +43,11 @@ def test_a_touch_is_no_stance():
 
 def test_standing_with_bent_knees_extends_them():
     """The sign: a knee that bears a robot with bent knees is extended by its torque."""
-    from poise.baselines.environments.residual import ResidualBalanceEnv
-
     env = ResidualBalanceEnv(controller="momentum-qp", pushes=None, duration=1.0)
     env.reset(seed=0)
     record = StanceRecord(env.robot)
     for _ in range(20):
         env.step(np.zeros(len(env.action_names)))
         record(env)
-    assert np.all(record._rows[-1].knees > 0.5)
+    assert np.all(record._rows[-1].knees > 0.3)
     assert record._rows[-1].force == pytest.approx(1.0, abs=0.1)
