@@ -40,7 +40,7 @@ FLOORS = """
 14 training/trials
 15 training/figures, training/standalone, training/suites, training/tuning
 16 training/evaluation, training/following, training/qp_set, training/robot_check
-17 training/results
+17 training/gaits, training/results
 18 training/export, training/report, training/sessions
 19 training/view
 20 training/cli

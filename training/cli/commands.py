@@ -10,6 +10,7 @@ from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Names, RobotName, Switch
 from .export import export
+from .gait import gait
 from .results import compare, leaderboard, replay, report
 from .view import view
 from .walk import walk
@@ -312,6 +313,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "compare": compare,
     "leaderboard": leaderboard,
     "walk": walk,
+    "gait": gait,
     "view": view,
     "replay": replay,
     "report": report,

@@ -46,7 +46,7 @@ def test_help_is_light() -> None:
     assert done.returncode == 0, done.stderr
     names = (
         *("train", "evaluate", "benchmark", "compare", "leaderboard", "replay", "demo", "tune"),
-        *("qp-set", "report", "robot", "list", "export", "view", "walk"),
+        *("qp-set", "report", "robot", "list", "export", "view", "walk", "gait"),
     )
     for name in names:
         assert name in done.stdout
@@ -170,6 +170,16 @@ def test_a_broken_pipe_of_another_kind_is_raised(
         (["walk", "--push", "9@9", "--push-at", "30"], "push_at: must be within the 20 s of the w"),
         (["walk", "--video", "a.gif"], "a.gif: the name of a video must end in .mp4 or .webp"),
         (["walk", "--seed", "-1"], "seed: must be at least 0, not -1"),
+        (["gait", "--compare", "zero", "--out", "g"], "gait: controller: the controller 'zero' do"),
+        (["gait", "--compare", "lip", "lip", "--out", "g"], "compare: needs names, all different"),
+        (["gait", "--compare", "lip", "--out", "g", "--speeds", "0"], "speeds: must be finite and"),
+        (
+            ["gait", "--compare", "lip", "--out", "g", "--duration", "3"],
+            "duration: must be at leas",
+        ),
+        (["gait", "--compare", "lip", "--out", "g", "--starts", "0"], "starts: must be at least 1"),
+        (["gait", "--compare", "lip", "--out", "g", "--human", "me"], "human: no such name: 'me'"),
+        (["gait", "--compare", "lop", "--out", "g"], "controller: no such controller: 'lop'"),
         (
             ["evaluate", "zero", "--suite", "walk"],
             "suite walk: controller: the controller 'zero' do",

@@ -1,0 +1,1 @@
+"""Reference models of walking beside each other, and beside human data."""
