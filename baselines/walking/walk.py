@@ -1,6 +1,7 @@
 """Walking at a commanded velocity, and standing as `capture-step` does where none is asked for."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -17,15 +18,18 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.pendulum import Units
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
+from poise.envs.terrain.flat import Flat
+from poise.envs.terrain.terrain import Surface, Terrain
 
 from .blocks import Gait, WalkTick
 from .command import GaitCommand
 from .config import GaitConfig, WalkConfig
+from .given import allocate_treads, given_footholds
 from .tick import walk_tick
 
 
-def allocate_gait(config: GaitConfig, units: Units) -> Gait:
-    """The gait of `config` for a robot with these units, at rest."""
+def allocate_gait(config: GaitConfig, units: Units, surfaces: Sequence[Surface] = ()) -> Gait:
+    """The gait of `config` for a robot with these units, at rest, on given `surfaces` or free."""
     c, h, omega = config, units.height, units.omega
     whole = np.int64
     return Gait(
@@ -53,6 +57,20 @@ def allocate_gait(config: GaitConfig, units: Units) -> Gait:
         cop=guarded_zeros(2),
         middle=guarded_zeros(2),
         step_clock=guarded_zeros(1),
+        treads=allocate_treads(config.treads, list(surfaces), h),
+    )
+
+
+def over_treads(config: GaitConfig) -> GaitConfig:
+    """The same gait with the times and the height of one on given footholds."""
+    treads = config.treads
+    return replace(
+        config,
+        step_time=treads.step_time,
+        transfer_time=treads.transfer_time,
+        time_price=treads.time_price,
+        height=treads.height,
+        limits=replace(config.limits, time_max=max(treads.time_max, config.limits.time_max)),
     )
 
 
@@ -78,16 +96,18 @@ class Walk(CaptureStep):
     Without a command it is `capture-step` with the same gains, bit for bit. With one it shifts its
     weight and walks: each foothold puts the capture point where the gait has it at lift-off
     (`dcm.py`), so that a push moves the foothold and the walk goes on. When the command is zero
-    again it walks until both soles hold the capture point, and stands. Raises ConfigError as
+    again it walks until both soles hold the capture point, and stands. On a `terrain` that gives
+    footholds, such as stairs, each is on its tread (`treads.py`). Raises ConfigError as
     `CaptureStep` does.
     """
 
     def __init__(self, robot: Robot, config: WalkConfig | None = None):
         config = config or WalkConfig()
         prepare("contacts", "planner", "walking")
-        gait = self._gait_config = config.gait
+        gait = self._gait_config = self._level_gait = config.gait
         check_qps(config, gait__qp=gait.qp)
         self.gait = allocate_gait(gait, robot.units)
+        self._terrain: Terrain = Flat()
         self.gait_sets = ContactSets(robot, gait.qp, gait.torque_rate_limit)
         self._walk_tick: WalkTick | None = None
         super().__init__(robot, config)
@@ -106,6 +126,24 @@ class Walk(CaptureStep):
     @command.setter
     def command(self, command: GaitCommand) -> None:
         self.gait.command[:] = command.array()
+
+    @property
+    def terrain(self) -> Terrain:
+        """What it believes to walk on; may be set between trials.
+
+        Setting it raises ConfigError with the limits of the robot for what it cannot step on.
+        """
+        return self._terrain
+
+    @terrain.setter
+    def terrain(self, terrain: Terrain) -> None:
+        level = self._level_gait
+        given = given_footholds(terrain, self.robot, level.treads)
+        self._gait_config = over_treads(level) if given else level
+        gait = allocate_gait(self._gait_config, self.robot.units, given)
+        kept = {f.name: getattr(self.gait, f.name) for f in fields(Gait)}
+        arrays = {name: each for name, each in kept.items() if isinstance(each, np.ndarray)}
+        self.gait, self._terrain, self._walk_tick = replace(gait, **arrays), terrain, None
 
     @property
     def failures(self) -> int:
