@@ -15,6 +15,7 @@ class Treads(Block):
     surfaces: np.ndarray  # (n, 6) see `Surface`; none: footholds are free
     margin: float  # [m]
     least_step: float  # [m]
+    approach: float  # [m]
     highest: float  # [m]
     clearance: float  # [m]
     hold: np.ndarray  # (2,) up, down [of the swing]
@@ -22,6 +23,7 @@ class Treads(Block):
     lower: np.ndarray  # (2,)
     arrive: float
     left: np.ndarray  # (3,) where the swinging foot lifted off [m]
+    aim: np.ndarray  # (1,) int: the surface that the step goes to
     target: np.ndarray  # (1,) height of the foothold that is being weighed [m]
     room: np.ndarray  # (2,) scratch: from a sole's point back to its heel, on to its toes [m]
 

@@ -11,7 +11,7 @@ from poise.envs.terrain.terrain import Surface, Terrain
 
 from .blocks import Treads
 from .config import TreadConfig
-from .treads import FREE
+from .treads import FREE, LEVEL
 
 STEEPEST = 10.0  # [°] of ground that is walked on as if it were level
 
@@ -28,7 +28,8 @@ def given_footholds(terrain: Terrain, robot: Robot, config: TreadConfig) -> list
         if abs(angle) > STEEPEST:
             raise _cannot(terrain, f"a slope of {angle:.3g}°", robot,
                           f"walks on up to {STEEPEST:.3g}°")  # fmt: skip
-    if all(_length(surface) > FREE for surface in surfaces):
+    long = all(_length(surface) > FREE for surface in surfaces)
+    if long and all(_meet(before, after) for before, after in pairwise(surfaces)):
         return []
     for before, after in pairwise(surfaces):
         _check_step(before, after, terrain, robot, config)
@@ -61,6 +62,15 @@ def _cannot(terrain: Terrain, what: str, robot: Robot, limit: str) -> ConfigErro
                        field="terrain")  # fmt: skip
 
 
+def _meet(before: Surface, after: Surface) -> bool:
+    """Whether one goes on where the other ends, without an edge between them."""
+    ends = [
+        surface.height + surface.gradient * (x - surface.middle[0])
+        for surface, x in ((before, before.x_max), (after, after.x_min))
+    ]
+    return bool(after.x_min == before.x_max and abs(ends[0] - ends[1]) < LEVEL)
+
+
 def _length(surface: Surface) -> float:
     return surface.x_max - surface.x_min
 
@@ -72,6 +82,7 @@ def allocate_treads(config: TreadConfig, surfaces: list[Surface], height: float)
         surfaces=surface_arrays(surfaces),
         margin=c.margin * height,
         least_step=c.least_step * height,
+        approach=c.approach * height,
         highest=c.highest * height,
         clearance=c.clearance * height,
         hold=np.array([c.hold_up, c.hold_down]),
@@ -79,6 +90,7 @@ def allocate_treads(config: TreadConfig, surfaces: list[Surface], height: float)
         lower=np.array([c.lower, c.lower_down]),
         arrive=float(c.arrive),
         left=np.zeros(3),
+        aim=np.zeros(1, dtype=np.int64),
         target=np.zeros(1),
         room=np.zeros(2),
     )

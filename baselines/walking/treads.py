@@ -19,6 +19,7 @@ SIDE_BY_SIDE = 0.08  # [m] between feet that are not one behind the other
 LEVEL = 0.02  # [m] between surfaces of one height
 MOST_STEPS = 4  # before the first tread, in which the steps become as long as meets it
 NOT_HELD = 1.0  # [m] cost of a foothold where no surface holds the sole
+OTHER = 0.12  # [m] cost of another surface than the one that a step aims at
 SLOW = 0.02  # [m/s]
 UP, DOWN = 0, 1
 
@@ -51,7 +52,7 @@ def is_free(r: Treads, i: int) -> bool:
 @compiled
 def settle_on_tread(t: WalkTick, foot: int) -> float:
     """Move the foothold that is weighed along x to the nearest surface that holds the sole; its
-    height into `target`; by how much it was moved [m]."""
+    height into `target`; by how much it was moved, and more if that is not the one aimed at [m]."""
     r, place = t.gait.treads, t.walk.search.foothold
     stance = t.walk.state.sole_point[1 - foot, 2]
     put_room(t, foot)
@@ -60,9 +61,10 @@ def settle_on_tread(t: WalkTick, foot: int) -> float:
         low, high = r.surfaces[i, X_MIN] + r.room[0], r.surfaces[i, X_MAX] - r.room[1]
         x = min(max(place[0], low), high)
         z = surface_height(r.surfaces, i, 0.0, x)
-        if high < low or abs(z - stance) > r.highest or abs(x - place[0]) >= nearest:
+        way = abs(x - place[0]) + (0.0 if i == r.aim[0] else OTHER)
+        if high < low or abs(z - stance) > r.highest or way >= nearest:
             continue
-        nearest, moved, found = abs(x - place[0]), x, True
+        nearest, moved, found = way, x, True
         r.target[0] = z
     if not found:
         r.target[0] = stance
@@ -81,18 +83,27 @@ def first_place(r: Treads, i: int) -> float:
 
 @compiled
 def meet_treads(t: WalkTick, period: float) -> None:
-    """Plan the velocity with which steps, one each `period` [s], meet the treads ahead."""
+    """Plan the velocity with which steps, one each `period` [s], meet the treads ahead.
+
+    On both feet it also decides which surface the next step is to go to.
+    """
     g, r, c = t.gait, t.gait.treads, t.walk
     foot, feet = c.memory.foot[0], c.state.sole_point
     stance = feet[1 - foot] if c.memory.swinging[0] else feet[foot]
     i = surface_below(r.surfaces, stance[0], stance[1])
     g.error[0], g.planned[0] = 0.0, g.velocity[0]
+    if not c.memory.swinging[0]:
+        r.aim[0] = i
     if g.velocity[0] <= SLOW or i < 0 or i + 1 >= r.surfaces.shape[0]:
         return
     put_room(t, foot)
     way, steps = first_place(r, i + 1) - stance[0], 1.0
     if is_free(r, i):
         steps = max(np.rint(way / max(g.velocity[0] * period, r.least_step)), 1.0)
+        steps = max(steps, np.ceil(way / r.approach))
+    if not c.memory.swinging[0]:
+        r.aim[0] = i + 1 if steps == 1.0 else i
+    steps = 1.0 if r.aim[0] > i else max(steps, 2.0)
     if steps <= MOST_STEPS:
         g.planned[0] = way / (steps * period)
 
@@ -150,11 +161,12 @@ def advance_over_edges(t: WalkTick) -> None:
     w, r, dt = t.walk.swing, t.gait.treads, t.walk.gains.period
     after, whole, rest = w.time[0] + dt, w.duration[0], time_left(w)
     start, end = r.left[2], w.ground[0]
+    between = t.walk.state.sole_point[1 - t.walk.memory.foot[0], 2]
     own = surface_below(r.surfaces, r.left[0], r.left[1])
     plain = own == surface_below(r.surfaces, w.foothold[0], w.foothold[1])
     way = DOWN if end < start - LEVEL else UP
     hold, arrive, rise = r.hold[way] * whole, r.arrive * whole, r.rise[way] * whole
-    lower, apex = r.lower[way] * whole, max(start, end) + r.clearance
+    lower, apex = r.lower[way] * whole, max(start, end, between) + r.clearance
     if plain:
         hold, arrive, rise, lower = 0.0, whole, w.lift * whole, w.lift * whole
         apex = end + w.apex

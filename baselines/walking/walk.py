@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -142,7 +143,9 @@ class Walk(CaptureStep):
         self._gait_config = over_treads(level) if given else level
         gait = allocate_gait(self._gait_config, self.robot.units, given)
         kept = {f.name: getattr(self.gait, f.name) for f in fields(Gait)}
-        arrays = {name: each for name, each in kept.items() if isinstance(each, np.ndarray)}
+        arrays: dict[str, Any] = {
+            n: each for n, each in kept.items() if isinstance(each, np.ndarray)
+        }
         self.gait, self._terrain, self._walk_tick = replace(gait, **arrays), terrain, None
 
     @property
