@@ -142,11 +142,12 @@ class Walk(CaptureStep):
         given = given_footholds(terrain, self.robot, level.treads)
         self._gait_config = over_treads(level) if given else level
         gait = allocate_gait(self._gait_config, self.robot.units, given)
-        kept = {f.name: getattr(self.gait, f.name) for f in fields(Gait)}
-        arrays: dict[str, Any] = {
-            n: each for n, each in kept.items() if isinstance(each, np.ndarray)
+        kept: dict[str, Any] = {
+            name: each
+            for name, each in ((f.name, getattr(self.gait, f.name)) for f in fields(Gait))
+            if isinstance(each, np.ndarray)
         }
-        self.gait, self._terrain, self._walk_tick = replace(gait, **arrays), terrain, None
+        self.gait, self._terrain, self._walk_tick = replace(gait, **kept), terrain, None
 
     @property
     def failures(self) -> int:
