@@ -6,7 +6,7 @@ from typing import Any
 from poise.baselines.controller import BaseController
 from poise.baselines.registry import walking_controllers
 from poise.baselines.walking.command import GaitCommand
-from poise.baselines.walking.controller import WalkingController
+from poise.baselines.walking.controller import TerrainWalker, WalkingController
 from poise.baselines.walking.schedule import (
     Follower,
     TimedCommand,
@@ -64,7 +64,15 @@ class CommandedEnv(BalanceEnv):
         """The commands of an episode that begins with these options."""
         return parse_commands(options["command"]) if "command" in options else ()
 
+    def _tell_terrain(self) -> None:
+        """Tell a controller that plans its steps what the simulation stands on."""
+        terrain, walker = self.simulation.robot.terrain, self._walker
+        if isinstance(walker, TerrainWalker) and walker.terrain != terrain:
+            walker.terrain = terrain
+            self._unbind()
+
     def _begin_walk(self, options: Mapping[str, Any]) -> None:
+        self._tell_terrain()
         commands = self._commands(options)
         if "command" in options:
             self._expect_walker("reset")

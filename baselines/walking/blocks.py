@@ -12,6 +12,26 @@ from .models.reference import Reference
 
 
 @dataclass(frozen=True, eq=False)
+class Treads(Block):
+    """The surfaces on which footholds are given, and how the foot swings between them."""
+
+    surfaces: np.ndarray  # (n, 6) see `Surface`; none: footholds are free
+    margin: float  # [m]
+    least_step: float  # [m]
+    approach: float  # [m]
+    highest: float  # [m]
+    clearance: float  # [m]
+    hold: np.ndarray  # (2,) up, down [of the swing]
+    rise: np.ndarray  # (2,)
+    lower: np.ndarray  # (2,)
+    arrive: float
+    left: np.ndarray  # (3,) where the swinging foot lifted off [m]
+    aim: np.ndarray  # (1,) int: the surface that the step goes to
+    target: np.ndarray  # (1,) height of the foothold that is being weighed [m]
+    room: np.ndarray  # (2,) scratch: from a sole's point back to its heel, on to its toes [m]
+
+
+@dataclass(frozen=True, eq=False)
 class Gait(Block):
     """A `GaitConfig` in SI units, the command, and how far the walk is."""
 
@@ -40,6 +60,7 @@ class Gait(Block):
     cop: np.ndarray  # (2,) that was asked for last on one foot [m]
     middle: np.ndarray  # (2,) between the soles at the last touchdown [m]
     step_clock: np.ndarray  # (1,) since then [s]; < 0: there was none
+    treads: Treads
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,33 @@ POSITIVE, NOT_NEGATIVE = {"above": 0.0}, {"min": 0.0}
 
 
 @dataclass(frozen=True)
+class TreadConfig:
+    """The gait over footholds that are given, such as the treads of stairs.
+
+    Fractions are of the time from lift-off to touchdown.
+    """
+
+    step_time: float = field(default=1.9, metadata=POSITIVE)
+    transfer_time: float = field(default=0.353, metadata=POSITIVE)
+    time_max: float = field(default=2.47, metadata=POSITIVE)  # by which a step may last
+    time_price: float = field(default=0.018, metadata=NOT_NEGATIVE)
+    height: float = field(default=0.95, metadata=POSITIVE)  # of the CoM above the line of the feet
+    clearance: float = field(default=0.038, metadata=POSITIVE)  # above the higher tread
+    margin: float = field(default=0.0127, metadata=NOT_NEGATIVE)  # from the sole to the edges
+    least_step: float = field(default=0.19, metadata=POSITIVE)  # towards the first tread, and
+    approach: float = field(default=0.46, metadata=POSITIVE)  # the longest of these
+    highest: float = field(default=0.25, metadata=POSITIVE)  # step up or down
+    longest: float = field(default=0.6, metadata=POSITIVE)  # step, from tread to tread
+    hold_up: float = field(default=0.25, metadata=NOT_NEGATIVE)  # before the foot goes forward
+    hold_down: float = field(default=0.1, metadata=NOT_NEGATIVE)
+    rise: float = field(default=0.48, metadata=POSITIVE)  # when it is as high as it gets, going up
+    rise_down: float = field(default=0.3, metadata=POSITIVE)  # the same, going down
+    lower: float = field(default=0.62, metadata=POSITIVE)  # when it begins to come down, going up
+    lower_down: float = field(default=0.7, metadata=POSITIVE)
+    arrive: float = field(default=0.98, metadata=POSITIVE)  # when it is above its foothold
+
+
+@dataclass(frozen=True)
 class GaitConfig:
     """The gait: its times, its width, how it follows a command, and the QP of its ticks."""
 
@@ -43,6 +70,7 @@ class GaitConfig:
             time_min=0.7, time_max=2.0,
         )
     )  # fmt: skip
+    treads: TreadConfig = field(default_factory=TreadConfig)
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
 

@@ -3,6 +3,7 @@
 from typing import Protocol, runtime_checkable
 
 from poise.baselines.stepping.blocks import StepMemory
+from poise.envs.terrain.terrain import Terrain
 
 from .blocks import Gait
 from .command import GaitCommand
@@ -23,3 +24,10 @@ class WalkingController(Protocol):
     @property
     def walking(self) -> bool:
         """True from the first shift of weight until the walk has stopped."""
+
+
+@runtime_checkable
+class TerrainWalker(Protocol):
+    """What a controller that plans its steps on a terrain has: environments set it at the reset."""
+
+    terrain: Terrain  #: that it believes to walk on

@@ -51,6 +51,14 @@ from .dcm import (
     transfer_point,
 )
 from .models.reference import share_load
+from .treads import (
+    advance_over_edges,
+    feet_are_level,
+    follow_line,
+    footholds_given,
+    meet_treads,
+    settle_on_tread,
+)
 
 TIMES = 8  # step times that are weighed against the planned one
 LEAST_TIME = 0.06  # [s] for which the CoP on one foot is planned at least
@@ -112,6 +120,8 @@ def follow_command(t: WalkTick) -> None:
         g.velocity[a] += min(max(g.command[a] - g.velocity[a], -most), most)
     for a in range(2):
         g.planned[a] = g.velocity[a] + g.error[a]
+    if footholds_given(t):
+        meet_treads(t, step_time(g) + g.transfer_time)
     g.yaw[0] += dt * g.velocity[2]
     cos, sin, level = np.cos(g.yaw[0]), np.sin(g.yaw[0]), t.walk.memory.level_frame
     set_level_frame(level, cos, sin)
@@ -166,7 +176,9 @@ def ask_for(t: WalkTick, ground: float, stride_x: float, stride_y: float, p: np.
         own.com_acc[a] = rate * (s.com[a] - own.cop[a])
     own.com[2] = ground + height + offsets[COM_Z]
     own.com_vel[2] = own.com_acc[2] = 0.0
-    if not t.constant_height:
+    if footholds_given(t):
+        follow_line(t, height + offsets[COM_Z])
+    elif not t.constant_height:
         follow_model(t)
     limit_posture(c)
 
@@ -269,6 +281,7 @@ def lift_off(t: WalkTick) -> None:
     t.gait.starting[0] = 0
     point = c.state.sole_point
     start_swing(c.swing, point[foot], point[1 - foot, 2], step_time(t.gait))
+    copy_into(point[foot], t.gait.treads.left)
 
 
 @compiled
@@ -346,14 +359,20 @@ def plan_foothold(t: WalkTick) -> None:
     low = max(q.time_min - w.time[0], FROZEN)
     high = max(q.time_max - w.time[0], low)
     best, best_x, best_y, best_time = np.inf, 0.0, 0.0, planned
+    ground = w.ground[0]
     for k in range(TIMES + 1):
         time = planned if k == 0 else low + (high - low) * (k - 1) / (TIMES - 1)
         regular = step_time(g) + c.offsets[TIME]
         cost = foothold_after(t, time) + g.time_price * abs(w.time[0] + time - regular)
+        if footholds_given(t):
+            cost += settle_on_tread(t, foot)
         if cost < best:
             best, best_time = cost, time
             best_x, best_y = q.foothold[0], q.foothold[1]
+            if footholds_given(t):
+                ground = g.treads.target[0]
     aim_swing(w, best_x, best_y, w.time[0] + best_time)
+    w.ground[0] = ground
 
 
 @compiled
@@ -366,7 +385,10 @@ def swing_tick(t: WalkTick) -> None:
         plan_foothold(t)
     stance = c.state.sole_point[1 - foot]
     ask_for(t, stance[2], w.foothold[0] - stance[0], w.foothold[1] - stance[1], g.cop)
-    advance_swing(w, c.gains.period)
+    if footholds_given(t):
+        advance_over_edges(t)
+    else:
+        advance_swing(w, c.gains.period)
     contacts = c.on_second if foot == 0 else c.on_first
     contacts.limited[0] = 0
     solve_contacts(c, contacts)
@@ -380,7 +402,7 @@ def has_stopped(t: WalkTick) -> bool:
         return False
     if g.starting[0]:
         return True
-    if abs(v[2]) * g.width > g.speed_margin:
+    if abs(v[2]) * g.width > g.speed_margin or (footholds_given(t) and not feet_are_level(t)):
         return False
     feet, level, xi = c.state.sole_point, c.memory.level_frame, c.state.capture_point
     outside = distance_beyond(

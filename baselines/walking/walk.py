@@ -1,6 +1,8 @@
 """Walking at a commanded velocity, and standing as `capture-step` does where none is asked for."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,18 +21,23 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.pendulum import Units
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
+from poise.envs.terrain.flat import Flat
+from poise.envs.terrain.terrain import Surface, Terrain
 
 from .blocks import Gait, WalkTick
 from .command import GaitCommand
 from .config import GaitConfig, WalkConfig
+from .given import allocate_treads, given_footholds
 from .models.leg_rows import leg_task
 from .models.legs import leg_arrays, no_legs
 from .models.reference import allocate_reference
 from .tick import walk_tick
 
 
-def allocate_gait(config: GaitConfig, units: Units, limits: StepLimits | None) -> Gait:
-    """The gait of `config` for a robot with these units, at rest.
+def allocate_gait(
+    config: GaitConfig, units: Units, limits: StepLimits | None, surfaces: Sequence[Surface] = ()
+) -> Gait:
+    """The gait of `config` for a robot with these units, at rest, on given `surfaces` or free.
 
     `limits` are what its legs can do of those of `config`; None: no step, no command is one then.
     """
@@ -62,6 +69,25 @@ def allocate_gait(config: GaitConfig, units: Units, limits: StepLimits | None) -
         cop=guarded_zeros(2),
         middle=guarded_zeros(2),
         step_clock=guarded_zeros(1),
+        treads=allocate_treads(config.treads, list(surfaces), h),
+    )
+
+
+def limits_of_legs(robot: Robot, gait: GaitConfig) -> StepLimits | None:
+    """The limits of a gait's steps that this robot's legs can keep; None: they cannot step."""
+    return possible_limits(robot, gait.limits, gait.swing, gait.qp.torque.share)
+
+
+def over_treads(config: GaitConfig) -> GaitConfig:
+    """The same gait with the times and the height of one on given footholds."""
+    treads = config.treads
+    return replace(
+        config,
+        step_time=treads.step_time,
+        transfer_time=treads.transfer_time,
+        time_price=treads.time_price,
+        height=treads.height,
+        limits=replace(config.limits, time_max=max(treads.time_max, config.limits.time_max)),
     )
 
 
@@ -73,17 +99,20 @@ class Walk(CaptureStep):
     (`dcm.py`), so that a push moves the foothold and the walk goes on. When the command is zero
     again it walks until both soles hold the capture point, and stands. Steps stay within what the
     legs' motors can do; a robot whose feet could not be down again in time stands, whatever it is
-    told. Raises ConfigError as `CaptureStep` does.
+    told. On a `terrain` that gives footholds, such as stairs, each is on its tread (`treads.py`);
+    the CoM's height is that of the line through them then, whatever the gait's model. Raises
+    ConfigError as `CaptureStep` does.
     """
 
     def __init__(self, robot: Robot, config: WalkConfig | None = None):
         config = config or WalkConfig()
         prepare("contacts", "planner", "walking")
-        gait = self._gait_config = config.gait
+        gait = self._gait_config = self._level_gait = config.gait
         check_qps(config, gait__qp=gait.qp)
-        limits = possible_limits(robot, gait.limits, gait.swing, gait.qp.torque.share)
+        limits = limits_of_legs(robot, gait)
         self.gait_limits = limits or gait.limits  #: of the steps of a walk
         self.gait = allocate_gait(gait, robot.units, limits)
+        self._terrain: Terrain = Flat()
         self.gait_sets = ContactSets(robot, gait.qp, gait.torque_rate_limit)
         self._walk_tick: WalkTick | None = None
         legs = no_legs() if gait.model.keeps_height else leg_arrays(robot)
@@ -104,6 +133,29 @@ class Walk(CaptureStep):
     @command.setter
     def command(self, command: GaitCommand) -> None:
         self.gait.command[:] = command.array()
+
+    @property
+    def terrain(self) -> Terrain:
+        """What it believes to walk on; may be set between trials.
+
+        Setting it raises ConfigError with the limits of the robot for what it cannot step on.
+        """
+        return self._terrain
+
+    @terrain.setter
+    def terrain(self, terrain: Terrain) -> None:
+        level = self._level_gait
+        given = given_footholds(terrain, self.robot, level.treads)
+        self._gait_config = over_treads(level) if given else level
+        limits = limits_of_legs(self.robot, self._gait_config)
+        self.gait_limits = limits or self._gait_config.limits
+        gait = allocate_gait(self._gait_config, self.robot.units, limits, given)
+        kept: dict[str, Any] = {
+            name: each
+            for name, each in ((f.name, getattr(self.gait, f.name)) for f in fields(Gait))
+            if isinstance(each, np.ndarray)
+        }
+        self.gait, self._terrain, self._walk_tick = replace(gait, **kept), terrain, None
 
     @property
     def failures(self) -> int:

@@ -3,7 +3,9 @@
 import math
 from pathlib import Path
 
-from poise.configs.errors import ConfigError
+import yaml
+
+from poise.configs.errors import ConfigError, shown
 
 from .arguments import Allow
 
@@ -21,6 +23,7 @@ def walk(
     seed: int = 0,
     robot: str = "humanoid",
     controller: str = "walk",
+    terrain: str = "flat",
     video: Path | None = None,
     allow: Allow = (),
 ) -> None:
@@ -38,6 +41,7 @@ def walk(
         seed: of the start, which is a little disturbed.
         robot: a packaged robot (see poise list) or a .yaml description.
         controller: one that walks: a name, a .yaml file, or a folder written by poise train.
+        terrain: flat, stairs, slope or stones, or with fields: "{kind: stairs, rise: 0.15}".
         video: an MP4 or WebP file to write.
     """
     if not 0.0 < duration < math.inf:
@@ -49,8 +53,20 @@ def walk(
     from poise.training.sessions.walk import walk
 
     walk(speed, left=left, turn=math.radians(turn), step_time=step_time, width=width,
-         duration=duration, controller=controller, robot=robot, push=push, push_at=push_at,
-         seed=seed, video=video, say=_say, allow=allow)  # fmt: skip
+         duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
+         push=push, push_at=push_at, seed=seed, video=video, say=_say, allow=allow)  # fmt: skip
+
+
+def _terrain(text: str) -> str | dict[str, object]:
+    """A kind by its name, or the mapping that the text is as YAML.
+
+    Raises ConfigError for text that is no YAML, or neither of these.
+    """
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise ConfigError(f"is no YAML: {shown(text)}", source="walk", field="terrain") from None
+    return value if isinstance(value, dict) else text
 
 
 def _say(line: str) -> None:

@@ -54,6 +54,11 @@ def _falls(level: WalkLevel) -> str:
     return f"{level['falls_per_minute']:.2f} [{low:.2f}, {high:.2f}]"
 
 
+def _edges(level: WalkLevel) -> str:
+    """Where there is a terrain."""
+    return NONE if level.get("surfaces_passed") is None else _figure("edge_contacts", ".2f")(level)
+
+
 FOLLOWS: Columns = (
     ("fell", lambda level: f"{level['fallen']} of {level['trials']}"),
     ("falls a minute", _falls),
@@ -64,6 +69,8 @@ FOLLOWS: Columns = (
     ("RMS error [m/s]", _figure("speed_error_rms", ".3f")),
     ("of the turn [rad/s]", _figure("turn_error_rms", ".3f")),
     ("off the circle [m]", _figure("circle_error", ".3f")),
+    ("surfaces passed", _figure("surfaces_passed", ".1f")),
+    ("edges touched", _edges),
 )
 COSTS: Columns = (
     ("step [m]", _figure("step_length", ".3f")),

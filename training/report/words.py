@@ -58,6 +58,8 @@ def _world(trial: Trial) -> list[str]:
         said.append(f"sensors {1000.0 * conditions.delay:.0f}\u00a0ms late")
     if conditions.mass_error:
         said.append(number_text(conditions.mass_error, "+.0%") + " mass")
+    if trial.terrain is not None:
+        said.append(type(trial.terrain).__name__.lower())
     if len(trial.pushes) > 1:
         said.append(f"{len(trial.pushes)} pushes")
     return said

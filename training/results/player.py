@@ -20,7 +20,7 @@ def player(results: Results, name: str, trial: Trial) -> Agent:
 
     Raises ConfigError if it or the robot has changed since.
     """
-    return AgentVariants(_agent(results, name)).under(trial.conditions)
+    return AgentVariants(_agent(results, name)).under(trial.conditions, trial.terrain)
 
 
 def _agent(results: Results, name: str) -> Agent:

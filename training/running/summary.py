@@ -182,6 +182,8 @@ class WalkMeans(TypedDict, total=False):
     knee_peak: Number
     circle_error: Number
     foot_slide: Number
+    edge_contacts: Number
+    surfaces_passed: Number
 
 
 class WalkLevel(Rate, WalkMeans, total=False):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.terrain.terrain import make_terrain
 from poise.envs.viewing.camera import Camera, beside
 from poise.training.figures.encoder import FORMS
 from poise.training.figures.video import record
@@ -39,6 +40,7 @@ def walk(
     duration: float = 20.0,
     controller: str = "walk",
     robot: str = "humanoid",
+    terrain: str | Mapping[str, object] = "flat",
     push: str | None = None,
     push_at: float = 6.0,
     seed: int = 0,
@@ -55,6 +57,7 @@ def walk(
         duration: of the walk [s].
         controller: one that walks, as `load_agent` takes it.
         robot: a packaged robot or a path to its description.
+        terrain: a kind of terrain, or a mapping with its `kind`, see `make_terrain`.
         push: impulse [N·s] and direction [deg], such as "20@90", of a push of 0.1 s; None: none.
         push_at: the start of the push [s].
         seed: of the start, which is a little disturbed.
@@ -74,7 +77,8 @@ def walk(
     asked = {"ahead": speed, "left": left, "turn": turn, "step_time": step_time, "width": width}
     commands = parse_commands(asked, "command")
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
-    agent = load_agent(controller, loaded, duration=duration, pushes=None)
+    ground = make_terrain(terrain, "walk")
+    agent = load_agent(controller, loaded, duration=duration, pushes=None, terrain=ground)
     check_walks(controller, agent, "walk")
     trial = Trial(0, seed, pushes, commands=commands)
     command = commands[0]
@@ -134,7 +138,7 @@ def lines(outcome: Outcome, trial: Trial, agent: Agent) -> Iterator[str]:
     """The figures of a walk in words."""
     o, end = outcome, agent.env.simulation.time
     yield f"fell after {o.fall_time:.1f} s" if o.fallen else f"upright after {end:.0f} s"
-    if not o.fallen:
+    if not o.fallen and o.surfaces_passed is None:
         yield said_of_end(o, trial)
     if o.speed_ahead is not None and o.speed_left is not None and o.turn_rate is not None:
         yield (f"speed: {o.speed_ahead:.3f} m/s ahead, {o.speed_left:.3f} left, "
@@ -148,6 +152,10 @@ def lines(outcome: Outcome, trial: Trial, agent: Agent) -> Iterator[str]:
                f"{o.positive_cost_of_transport:.2f}")  # fmt: skip
     if o.knee_mean is not None:
         yield f"knee of the stance leg: {o.knee_mean:.2f} N·m/kg, at most {o.knee_peak:.2f}"
+    if o.surfaces_passed is not None:
+        count = len(agent.env.simulation.robot.terrain.surfaces()) - 1
+        yield (f"terrain: passed {o.surfaces_passed} of {count}, "
+               f"touched edges {o.edge_contacts} times")  # fmt: skip
     for push in trial.pushes:
         at = "" if o.push_phase is None else f", at {o.push_phase:.2f} of the stride"
         yield f"push: {push.impulse:g} N·s towards {push.direction:g}° at {push.start:g} s{at}"

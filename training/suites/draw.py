@@ -15,6 +15,7 @@ from poise.envs.balance.config import StartNoise
 from poise.envs.pushes.options import check_body
 from poise.envs.pushes.push import Kick, Push
 from poise.envs.pushes.sampler import Range, push_bodies
+from poise.envs.terrain.terrain import Terrain
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.trial import Conditions, Trial
 
@@ -47,6 +48,7 @@ class Marks(TypedDict, total=False):
     conditions: Conditions
     commands: tuple[TimedCommand, ...]
     kicks: tuple[Kick, ...]
+    terrain: Terrain | None
 
 
 class Draw:

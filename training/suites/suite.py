@@ -16,6 +16,7 @@ from .directions import Envelope, Grid, Margin
 from .draw import Part, Standard
 from .factors import Factors, Mix
 from .random import Quiet, Random, Sequence
+from .terrains import Terrains
 from .walking import WALKING, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
 
 
@@ -36,6 +37,7 @@ class Suite(Standard):
     walk_push: WalkPush | None = field(default=None, metadata={"omit": "default"})
     walk_kick: WalkKick | None = field(default=None, metadata={"omit": "default"})
     walk_repeated: WalkRepeated | None = field(default=None, metadata={"omit": "default"})
+    terrains: Terrains | None = field(default=None, metadata={"omit": "default"})
 
     def __post_init__(self) -> None:
         if not self.parts:

@@ -163,4 +163,5 @@ class WalkRepeated(PushSequence):
         ]
 
 
-WALKING = ("walk", "velocity", "walk_push", "walk_kick", "walk_repeated")  #: parts of a suite
+#: parts of a suite for controllers that walk
+WALKING = ("walk", "velocity", "walk_push", "walk_kick", "walk_repeated", "terrains")

@@ -51,7 +51,7 @@ def play(job: Job) -> Outcome:
     """
     variants = _loaded(job.stage, job.controller)
     try:
-        return run_trial(variants.under(job.trial.conditions), job.trial)
+        return run_trial(variants.under(job.trial.conditions, job.trial.terrain), job.trial)
     except MemoryError:  # of this process, not of the controller
         raise
     except Exception as error:  # a controller from outside may raise anything

@@ -75,7 +75,8 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     """The outcome of a trial with commands, with the figures of its walk.
 
     Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
-    (`Walk.as_commanded`); there is no time of recovery then, and no drift.
+    (`Walk.as_commanded`), on a terrain to be beyond its last edge; there is no time of recovery
+    then, and no drift.
     """
     walk = Walk(record.arrays(), trial.commands, outcome.fall_time)
     figures: dict[str, Any] = {
@@ -93,7 +94,11 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     left = int(np.argmax(foot_signs(env.robot)))
     phase = None if first is None else walk.phase_at(first, left)
     outcome = replace(outcome, **figures, push_phase=phase, com_drift=None, recovery_time=None)
-    if trial.commands[-1].array()[:3].any():
+    terrain = env.simulation.robot.terrain
+    if not terrain.flat:
+        last, passed = len(terrain.surfaces()) - 1, outcome.surfaces_passed
+        outcome = replace(outcome, recovered=not env.fallen and passed == last)
+    elif trial.commands[-1].array()[:3].any():
         recovered = not env.fallen and walk.as_commanded(first)
         outcome = replace(outcome, recovered=recovered)
     return outcome
@@ -127,7 +132,16 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
         final_speed=_finite(float(np.linalg.norm(env.simulation.state.com_vel))),
         final_lean=_finite(lean(env)),
         root_force=_finite(m[episode.ROOT_FORCE]),
+        edge_contacts=int(m[episode.EDGE_CONTACTS]),
+        surfaces_passed=surfaces_passed(env),
     )
+
+
+def surfaces_passed(env: BalanceEnv) -> int | None:
+    """The surfaces of the terrain, without the start's, of which the CoM has passed the beginning;
+    None on level ground."""
+    surfaces, com = env.simulation.robot.terrain.surfaces(), env.simulation.state.com
+    return sum(bool(com[0] > each.x_min) for each in surfaces[1:]) if surfaces else None
 
 
 def lean(env: BalanceEnv) -> float:

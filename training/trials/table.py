@@ -11,8 +11,9 @@ from typing import Any
 from poise.baselines.walking.schedule import TimedCommand
 from poise.configs.errors import ConfigError
 from poise.configs.reading import parse_json
-from poise.configs.schema import build
+from poise.configs.schema import build, to_dict
 from poise.envs.pushes.push import Kick, Push
+from poise.envs.terrain.terrain import Terrain, make_terrain
 
 from .trial import Conditions, Outcome, Trial
 
@@ -24,7 +25,7 @@ PUSH_COLUMNS = (
 CONDITION_COLUMNS = tuple(Conditions.__dataclass_fields__)
 CASE_COLUMNS = (
     *("trial", "controller", "seed", "stage", "part", "factor", "level"),
-    *(*PUSH_COLUMNS, *CONDITION_COLUMNS, "limit_fraction", "later", "commands", "kicks"),
+    *(*PUSH_COLUMNS, *CONDITION_COLUMNS, "limit_fraction", "later", "commands", "kicks", "terrain"),
 )
 OUTCOME_COLUMNS = tuple(
     "stepped" if name == "foot_displaced" else name for name in Outcome.__dataclass_fields__
@@ -36,7 +37,8 @@ MANY: dict[str, type] = {"commands": TimedCommand, "kicks": Kick}  # fields of a
 def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell]:
     """The line of a trial and a controller.
 
-    `later` has the pushes after the first as JSON, `commands` and `kicks` all of these.
+    `later` has the pushes after the first as JSON, `commands` and `kicks` all of these, `terrain`
+    its fields.
     """
     later = [asdict(push) for push in trial.pushes[1:]]
     return {
@@ -52,6 +54,7 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
         "limit_fraction": trial.limit_fraction,
         "later": json.dumps(later) if later else None,
         **{name: _many(getattr(trial, name)) for name in MANY},
+        "terrain": None if trial.terrain is None else json.dumps(to_dict(trial.terrain)),
         **outcome_cells(outcome),
     }
 
@@ -99,6 +102,7 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
             level=line["level"] or None,
             commands=many["commands"],
             kicks=many["kicks"],
+            terrain=_read_terrain(line["terrain"], path),
         )
     except (ValueError, TypeError) as error:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None
@@ -111,6 +115,10 @@ def _read_push(line: Mapping[str, str]) -> dict[str, object]:
     }
     data["point"] = [data.pop(key) for key in ("point_x", "point_y", "point_z")]
     return data
+
+
+def _read_terrain(text: str, path: Path) -> Terrain | None:
+    return make_terrain(parse_json(text), str(path)) if text else None
 
 
 def _number(text: str) -> float | None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.pushes.push import Kick, Push
+from poise.envs.terrain.terrain import Terrain
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class Trial:
         level: the factor's value, as text.
         commands: that a controller that walks follows, in the order of time; none: it stands.
         kicks: sudden changes of the root's velocity.
+        terrain: that it is played on; None: that of the environment.
     """
 
     number: int
@@ -57,6 +59,7 @@ class Trial:
     level: str | None = None
     commands: tuple[TimedCommand, ...] = ()
     kicks: tuple[Kick, ...] = ()
+    terrain: Terrain | None = None
 
     @property
     def command(self) -> TimedCommand | None:
@@ -82,7 +85,8 @@ class Outcome:
 
     Attributes:
         recovered: upright, quiet and with feet at rest for the last second; of a walk that goes on,
-            not fallen, and in the last two strides as commanded, see `Walk.as_commanded`.
+            not fallen, and in the last two strides as commanded, see `Walk.as_commanded`; on a
+            terrain, not fallen and beyond its last edge.
         fallen: whether it fell; `fall_time` counts from the reset.
         recovery_time: from the start of the last push to the last moment that was not quiet.
         foot_displaced: a foot moved more than 5 cm; the column `stepped` of trials.csv.
@@ -124,6 +128,8 @@ class Outcome:
         foot_slide: largest way of a sole that bears the robot alone.
         push_phase: phase of the stride at the start of the first push or kick: 0 where the left
             foot lands, 0.5 where the right one does.
+        edge_contacts: times that a foot came to touch an edge of the terrain.
+        surfaces_passed: of a terrain, of which the CoM has passed the beginning; stairs climbed.
         error: what the controller raised, on one line; the trial then counts as not recovered.
     """
 
@@ -167,6 +173,8 @@ class Outcome:
     circle_error: float | None = None
     foot_slide: float | None = None
     push_phase: float | None = None
+    edge_contacts: int = 0
+    surfaces_passed: int | None = None
     error: str | None = None
 
 

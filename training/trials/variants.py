@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.robot import on_terrain
 from poise.envs.robots.variants import perturbed_robot
 from poise.envs.sensors.delayed import DelayedState
+from poise.envs.terrain.terrain import Terrain
 
 from .agents import Agent
 from .trial import Conditions
@@ -21,16 +23,20 @@ class AgentVariants:
         self.agent = agent
         self._standard = agent.env.simulation
 
-    def under(self, conditions: Conditions) -> Agent:
-        """Return the agent, whose environment has these conditions from its next reset on."""
+    def under(self, conditions: Conditions, terrain: Terrain | None = None) -> Agent:
+        """Return the agent, whose environment has these conditions from its next reset on.
+
+        `terrain` takes the place of the environment's own.
+        """
         env = self.agent.env
+        body = env.robot if terrain is None else on_terrain(env.robot, terrain)
         known = conditions.mass_error == 0.0  # the controller's masses are the true ones
         if known and conditions.friction is None:
-            env.simulation = self._standard
+            env.simulation = self._standard if body is env.robot else Simulation(body)
         else:
             env.simulation = Simulation(
                 perturbed_robot(
-                    env.robot, friction=conditions.friction, mass_error=conditions.mass_error
+                    body, friction=conditions.friction, mass_error=conditions.mass_error
                 )
             )
         if not known or conditions.delay > 0.0:

@@ -43,3 +43,28 @@ def test_a_fall_is_told(tmp_path: Path) -> None:
     outcome = walk(0.3, duration=4.0, push="90@90", push_at=0.5, video=path, say=told.append)
     assert outcome.fallen and f"fell after {outcome.fall_time:.1f} s" in told
     assert path.stat().st_size > 1000 and told[-1] == str(path)
+
+
+def test_a_walk_over_stairs_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    args = ["walk", "--terrain", "{kind: stairs, count: 2}", "--duration", "4"]
+    assert main(args) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert "terrain: passed 2 of 2, touched edges 0 times" in told
+    assert not any(line.startswith("the last two strides") for line in told)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("hills", "no such kind: 'hills'"),
+        ("{kind: stairs", "terrain: is no YAML"),
+        ("{kind: stairs, tread: 0.2}", "a tread of 0.2 m cannot be stepped: 'humanoid' needs"),
+        ("{kind: stones, gap: 0.5}", "cannot be stepped: 'humanoid' steps at most"),
+    ],
+)
+def test_a_terrain_that_cannot_be_walked_is_told_in_a_line(
+    text: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["walk", "--terrain", text, "--duration", "2"]) == 2
+    told = capsys.readouterr().err.strip()
+    assert says in told and "\n" not in told
