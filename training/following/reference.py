@@ -84,7 +84,7 @@ class ReferenceBodies:
         return sample.q_ref, data.xpos[self.bodies].copy()
 
     def _miss(self, stance: Stance, com: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(15,) CoM and both soles from where they are to be [m, rad], and its (15, nv) Jacobian."""
+        """(15,) misses of CoM and soles [m, rad], and their (15, nv) Jacobian."""
         robot, data, model = self.robot, self._data, self.robot.model
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
