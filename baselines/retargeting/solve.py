@@ -18,7 +18,9 @@ from .limbs import Limbs
 from .targets import BodyTargets, low_pass
 from .tasks import HeightTask, SegmentTask, SolesTask
 
-COM, HEIGHT, POSTURE = 10.0, 10.0, 0.1  # costs beside those of the segments: 1/m, 1/m, 1/rad
+COM, HEIGHT = 10.0, 5.0  # costs beside those of the segments [1/m]
+POSTURE, TRUNK = 0.1, 1.0  # the same of joints out of standing [1/rad]: a deep squat is to be
+# shallower rather than made by the waist alone, once the hips are at their limit
 PLANTING = 3  # iterations from near postures to planted soles
 MARGIN = 0.005  # [rad] kept from the joint limits, for splines between the frames
 MOST, STEP = 10, 1e-3  # iterations, and the largest move [rad, m] that ends them
@@ -90,7 +92,7 @@ class _FrameIk:
         self.standing = float((self.height.pelvis.place(data) - self.height.feet.place(data))[2])
         com = mink.ComTask(np.array([COM, COM, 0.0]))
         com.set_target_from_configuration(self.configuration)
-        posture = mink.PostureTask(self.model, POSTURE)
+        posture = mink.PostureTask(self.model, _posture_costs(limbs, self.model, data))
         posture.set_target_from_configuration(self.configuration)
         self.near = mink.PostureTask(self.model, 1.0)
         self.tasks = [self.segments, self.height, com, posture]
@@ -157,6 +159,14 @@ class _FrameIk:
         data = self.configuration.data
         gaps = [_corners(self.robot, data, i) - self.planted[i] for i in range(2)]
         return float(max(np.linalg.norm(gap, axis=1).max() for gap in gaps))
+
+
+def _posture_costs(limbs: Limbs, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """(nv,) costs of joints out of standing: the trunk's are those between pelvis and chest."""
+    pelvis, chest = (limbs.points[role].jacobian(model, data) for role in ("pelvis", "chest"))
+    trunk = np.abs(chest - pelvis).max(axis=0) > 1e-9
+    trunk[:6] = False
+    return np.where(trunk, TRUNK, POSTURE)
 
 
 def _corners(robot: Robot, data: mujoco.MjData, foot: int) -> np.ndarray:

@@ -24,7 +24,7 @@ FLOORS = """
  1 configs, training/statistics
  2 envs/compiled, baselines/allowance
  3 envs/maths, baselines/clips, baselines/solvers, baselines/warmup, training/running
- 4 envs/robots
+ 4 envs/robots, baselines/joining
  5 envs/pushes
  6 envs/physics
  7 envs/sensors, envs/viewing, baselines/controller

@@ -12,12 +12,15 @@ from scipy.spatial.transform import Rotation
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.configs.errors import ConfigError, shown
+from poise.configs.files import packaged
 from poise.configs.numbers import whole_number
 from poise.envs.balance.episode import FAILURES
 from poise.envs.balance.termination import FallLimits
 from poise.envs.physics.state import RobotState
+from poise.envs.pushes.sampler import LimitTable
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.trials.agents import Agent, load_agent
+from poise.training.trials.push_limits import load_limits
 
 from .reference import ReferenceBodies, Stance
 
@@ -64,6 +67,7 @@ def follow(
     robot: str | Path | Robot = "humanoid",
     starts: int = 20,
     impulse: float = 0.0,
+    share: float = 0.0,
     directions: int = 8,
     seed: int = 0,
 ) -> list[Followed]:
@@ -73,17 +77,22 @@ def follow(
     ground, a CoM below 0.6 of the motion's height at that time, or a root that leans 90° away from
     the motion's. A trial goes on for 3 s after the motion's end. With an `impulse` [N·s] trial k is
     pushed once at the robot's first push body, in direction 360° k / `directions`, at a random time
-    within the motion; the same for every controller.
+    within the motion; the same for every controller. With a `share` the impulse is that share of
+    the J50 that the robot's file of limits has for the direction: what momentum-qp stands half of.
 
     Raises:
         ConfigError: no such motion, controller or robot, one that does not play motions, counts
-            below 1, an impulse below 0.
+            below 1, an impulse or a share below 0, both at once, a share without measured limits.
     """
     for name, count in (("starts", starts), ("directions", directions)):
         whole_number(count, 1, name)
-    if not 0.0 <= impulse < np.inf:
-        raise ConfigError(f"must be at least 0, not {impulse:g}", field="impulse")
+    for name, size in (("impulse", impulse), ("share", share)):
+        if not 0.0 <= size < np.inf:
+            raise ConfigError(f"must be at least 0, not {size:g}", field=name)
+    if impulse and share:
+        raise ConfigError("give either an impulse or a share of J50", field="share")
     body = robot if isinstance(robot, Robot) else load_robot(robot)
+    half = _half(body) if share else None
     reference = load_motion(motion, body)
     agent = _agent(controller, body, reference)
     bodies = ReferenceBodies(reference, body)
@@ -91,10 +100,21 @@ def follow(
     trials = []
     for k in range(starts):
         start = float(rng.uniform(0.1, 0.9)) * reference.duration
-        push = {"impulse": impulse, "direction": 360.0 * k / directions % 360.0, "start": start,
+        direction = 360.0 * k / directions % 360.0
+        size = impulse if half is None else share * half(direction)
+        push = {"impulse": size, "direction": direction, "start": start,
                 "duration": PUSH_TIME, "body": _pushed(body)}  # fmt: skip
-        trials.append(play(agent, bodies, seed + k, push if impulse else None))
+        trials.append(play(agent, bodies, seed + k, push if size else None))
     return trials
+
+
+def _half(robot: Robot) -> LimitTable:
+    """J50 [N·s] by direction, of 0.1 s pushes; raises ConfigError where none was measured."""
+    table = load_limits(robot).table
+    if table is None:
+        raise ConfigError(f"no J50 of {robot.name!r} was measured: give an impulse", field="share",
+                          choices=packaged("limits"))  # fmt: skip
+    return table
 
 
 def play(

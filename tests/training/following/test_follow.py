@@ -17,6 +17,7 @@ from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot
 from poise.training.following.follow import follow, lies
 from poise.training.following.reference import ReferenceBodies, Stance
+from poise.training.trials.push_limits import load_limits
 from tests.support.physics import robot_named
 
 
@@ -101,3 +102,17 @@ def test_what_follows_no_motion_is_said() -> None:
         follow("standing", "zero", robot=robot_named("humanoid"), starts=1)
     with pytest.raises(ConfigError, match="starts: must be at least 1"):
         follow("standing", starts=0)
+    with pytest.raises(ConfigError, match="share: give either an impulse or a share of J50"):
+        follow("standing", impulse=1.0, share=0.5)
+    with pytest.raises(ConfigError, match="share: no J50 of 'compact' was measured"):
+        follow("standing", robot=robot_named("compact"), share=0.5)
+
+
+def test_a_share_of_j50_is_that_of_the_direction() -> None:
+    robot = robot_named("humanoid")
+    table = load_limits(robot).table
+    trials = follow("standing", robot=robot, starts=2, directions=2, share=0.3)
+    assert [trial.push["impulse"] for trial in trials if trial.push] == pytest.approx(
+        [0.3 * table(0.0), 0.3 * table(180.0)]
+    )
+    assert not any(trial.fallen for trial in trials)
