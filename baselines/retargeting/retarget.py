@@ -25,7 +25,7 @@ class Retargeted(NamedTuple):
     Attributes:
         clip: the postures, from standing to standing.
         scale: the robot's legs over the clip's.
-        sole_error, direction_error, time_per_frame: as in `Solved`.
+        sole_error, direction_error, penetration, time_per_frame: as in `Solved`.
         limit_excess: largest excess over a joint limit [rad]; 0 if there is none.
     """
 
@@ -33,6 +33,7 @@ class Retargeted(NamedTuple):
     scale: float
     sole_error: float
     direction_error: dict[str, float]
+    penetration: float
     time_per_frame: float
     limit_excess: float
 
@@ -43,7 +44,8 @@ def retarget(
     """The postures in which a robot does what a clip shows, with both soles where it stands.
 
     Per frame: directions of pelvis, trunk, shoulders and arms as in the clip; the hips' height in
-    proportion to the legs; the CoM over its place; the soles fixed; the joints within their limits.
+    proportion to the legs; the CoM over its place; the soles fixed; the joints within their limits;
+    links off the floor and off each other.
 
     Args:
         clip: whose hips, knees, ankles, shoulders, elbows and wrists are known by name.
@@ -74,6 +76,7 @@ def retarget(
         limbs.leg_length / clip.skeleton.leg_length,
         solved.sole_error,
         solved.direction_error,
+        solved.penetration,
         solved.time_per_frame,
         float(max(excess.max(), 0.0)),
     )

@@ -13,16 +13,19 @@ import qpsolvers
 from poise.configs.errors import PoiseError
 from poise.envs.robots.robot import Robot
 
+from .clearance import ClearanceLimit
 from .limbs import Limbs
 from .targets import BodyTargets, low_pass
 from .tasks import HeightTask, SegmentTask, SolesTask
 
-COM, HEIGHT, POSTURE = 10.0, 10.0, 0.1  # costs beside those of the segments: 1/m, 1/m, 1/rad
+COM, HEIGHT = 10.0, 5.0  # costs beside those of the segments [1/m]
+POSTURE, TRUNK = 0.1, 1.0  # the same of joints out of standing [1/rad]: a deep squat is to be
+# shallower rather than made by the waist alone, once the hips are at their limit
 PLANTING = 3  # iterations from near postures to planted soles
 MARGIN = 0.005  # [rad] kept from the joint limits, for splines between the frames
 MOST, STEP = 10, 1e-3  # iterations, and the largest move [rad, m] that ends them
 LEAST_DAMPING, MOST_DAMPING = 1e-4, 10.0
-SOLES = 100.0  # weight of their errors [m, rad] where steps are compared
+SOLES = 100.0  # weight of their errors [m, rad] where steps are compared, and of lacking clearance
 
 
 class Solved(NamedTuple):
@@ -32,12 +35,14 @@ class Solved(NamedTuple):
         qpos: (F, nq).
         sole_error: largest distance of a sole's corner from where it is planted [m].
         direction_error: segment → root mean square of the angle to its target [rad].
+        penetration: largest depth of a link in the floor or in another link [m].
         time_per_frame: of the processor, median [s].
     """
 
     qpos: np.ndarray
     sole_error: float
     direction_error: dict[str, float]
+    penetration: float
     time_per_frame: float
 
 
@@ -45,8 +50,9 @@ def solve_frames(robot: Robot, limbs: Limbs, targets: BodyTargets, smooth: float
     """One QP after the other per frame, each begun where the last frame ended.
 
     min Σ‖W (J Δq + e)‖² over the segments, the height of the hips, the horizontal place of the CoM,
-    and the standing posture, s.t. J_soles Δq = −e_soles and the joint limits: where a limit is met
-    the other joints make up for it, nothing is cut. A step that makes things worse is taken back
+    and the standing posture, s.t. J_soles Δq = −e_soles, the joint limits and the clearance from
+    the floor and between links: where a limit is met the other joints make up for it, nothing is
+    cut. A step that makes things worse is taken back
     and tried again with more damping (Levenberg and Marquardt). The joints are then low-passed at
     `smooth` [Hz], and the nearest postures with planted soles are what remains.
 
@@ -60,6 +66,7 @@ def solve_frames(robot: Robot, limbs: Limbs, targets: BodyTargets, smooth: float
         times[frame] += time.thread_time() - begin
     wanted = low_pass(qpos[:, 7:], smooth)
     angles, sole_error = np.empty((len(targets), len(targets.directions))), 0.0
+    penetration = 0.0
     for frame in range(len(targets)):
         begin = time.thread_time()
         qpos[frame] = ik.planted_near(qpos[frame], wanted[frame])
@@ -67,9 +74,10 @@ def solve_frames(robot: Robot, limbs: Limbs, targets: BodyTargets, smooth: float
         ik.segments.aim(targets.directions, frame)
         angles[frame] = ik.angles()
         sole_error = max(sole_error, ik.sole_error())
+        penetration = max(penetration, ik.clearance.depth(ik.configuration.data))
     rms = np.sqrt((angles**2).mean(axis=0))
     errors = dict(zip(targets.directions, rms.tolist(), strict=True))
-    return Solved(qpos, sole_error, errors, float(np.median(times)))
+    return Solved(qpos, sole_error, errors, penetration, float(np.median(times)))
 
 
 class _FrameIk:
@@ -84,13 +92,14 @@ class _FrameIk:
         self.standing = float((self.height.pelvis.place(data) - self.height.feet.place(data))[2])
         com = mink.ComTask(np.array([COM, COM, 0.0]))
         com.set_target_from_configuration(self.configuration)
-        posture = mink.PostureTask(self.model, POSTURE)
+        posture = mink.PostureTask(self.model, _posture_costs(limbs, self.model, data))
         posture.set_target_from_configuration(self.configuration)
         self.near = mink.PostureTask(self.model, 1.0)
         self.tasks = [self.segments, self.height, com, posture]
         self.soles = SolesTask([sole.body for sole in robot.soles], self.configuration)
         self.damping = LEAST_DAMPING
-        self.limits = [mink.ConfigurationLimit(self.model, 1.0, MARGIN)]
+        self.clearance = ClearanceLimit(robot, data)
+        self.limits = [mink.ConfigurationLimit(self.model, 1.0, MARGIN), self.clearance]
 
     def solve(self, targets: BodyTargets, frame: int) -> np.ndarray:
         """(nq,) the posture of a frame."""
@@ -122,17 +131,21 @@ class _FrameIk:
 
     def _step(self, tasks: list[mink.Task], damping: float) -> np.ndarray:
         """(nv,) the displacement of one QP."""
-        problem = mink.build_ik(self.configuration, tasks, 1.0, damping,
-                                limits=self.limits, constraints=[self.soles])  # fmt: skip
-        step = qpsolvers.solve_problem(problem, solver="daqp").x
-        if step is None:
-            raise PoiseError(f"no posture of {self.robot.name!r} near this one keeps its soles "
-                             "where they stand within the joint limits")  # fmt: skip
-        return step
+        for parting in (True, False):  # soles and limits may leave no room to part
+            self.clearance.parting = parting
+            problem = mink.build_ik(self.configuration, tasks, 1.0, damping,
+                                    limits=self.limits, constraints=[self.soles])  # fmt: skip
+            step = qpsolvers.solve_problem(problem, solver="daqp").x
+            if step is not None:
+                return step
+        raise PoiseError(f"no posture of {self.robot.name!r} near this one keeps its soles "
+                         "where they stand within the joint limits")  # fmt: skip
 
     def _merit(self) -> float:
-        """Σ‖W e‖² of the tasks and, heavily, of the soles: what a step must make smaller."""
+        """Σ‖W e‖² of the tasks and, heavily, of the soles and of what lacks in clearance: what a
+        step must make smaller."""
         errors = [task.cost * task.compute_error(self.configuration) for task in self.tasks]
+        errors.append(SOLES * self.clearance.lacking(self.configuration.data))
         errors.append(SOLES * self.soles.whole_error(self.configuration))
         return float(sum(error @ error for error in errors))
 
@@ -146,6 +159,14 @@ class _FrameIk:
         data = self.configuration.data
         gaps = [_corners(self.robot, data, i) - self.planted[i] for i in range(2)]
         return float(max(np.linalg.norm(gap, axis=1).max() for gap in gaps))
+
+
+def _posture_costs(limbs: Limbs, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """(nv,) costs of joints out of standing: the trunk's are those between pelvis and chest."""
+    pelvis, chest = (limbs.points[role].jacobian(model, data) for role in ("pelvis", "chest"))
+    trunk = np.abs(chest - pelvis).max(axis=0) > 1e-9
+    trunk[:6] = False
+    return np.where(trunk, TRUNK, POSTURE)
 
 
 def _corners(robot: Robot, data: mujoco.MjData, foot: int) -> np.ndarray:

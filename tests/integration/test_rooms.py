@@ -25,7 +25,7 @@ FLOORS = """
  2 envs/compiled, baselines/allowance
  3 envs/maths, envs/terrain, baselines/clips, baselines/solvers, baselines/warmup
  3 training/running
- 4 envs/robots
+ 4 envs/robots, baselines/joining
  5 envs/pushes
  6 envs/physics
  7 envs/sensors, envs/viewing, baselines/controller

@@ -18,6 +18,7 @@ from poise.envs.robots.robot import load_robot
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Switch
+from .motion_join import join
 
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
@@ -151,6 +152,7 @@ def follow(
     robot: str = "humanoid",
     starts: int = 20,
     push: float = 0.0,
+    share: float = 0.0,
     directions: int = 8,
     seed: int = 0,
     out: Path | None = None,
@@ -164,6 +166,7 @@ def follow(
         robot: a packaged robot (see poise list) or a .yaml description.
         starts: number of trials, each from a start that is disturbed in another way.
         push: impulse of a push at a random time of the motion [N s]; 0 for none.
+        share: the same as a share of the J50 of the push's direction, standing (configs/limits).
         directions: of the pushes, spread evenly, one after the other.
         seed: of starts and pushes.
         out: a JSON file to write the trials to.
@@ -173,9 +176,10 @@ def follow(
     from poise.training.following.tables import print_followed
 
     with allowing([*named(controller), *allow]):
-        trials = follow(motion, controller, robot=robot, starts=starts, impulse=push,
+        trials = follow(motion, controller, robot=robot, starts=starts, impulse=push, share=share,
                         directions=directions, seed=seed)  # fmt: skip
     pushed = f"pushed by {push:g} N s" if push else "not pushed"
+    pushed = f"pushed by {share:g} of J50" if share else pushed
     print_followed(trials, f"{Path(motion).stem} by {controller} on {robot}, {pushed}", terminal())
     if out is not None:
         rows = [asdict(trial) for trial in trials]
@@ -188,6 +192,7 @@ MOTION: dict[str, Callable[..., object]] = {
     "convert": convert,
     "import": bring,
     "follow": follow,
+    "join": join,
 }
 
 

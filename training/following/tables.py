@@ -29,6 +29,7 @@ def print_followed(trials: Sequence[Followed], title: str, console: Console) -> 
         ("bodies, mean distance", "body_error", 1e3, "mm"),
         ("the same, from the root", "body_error_root", 1e3, "mm"),
         ("bodies in the last 0.5 s", "body_error_last", 1e3, "mm"),
+        ("a sole slid or stepped by", "slide", 1e3, "mm"),
     ):
         values = [factor * getattr(trial, field) for trial in stood]
         text = f"{np.mean(values):.1f} {unit}, largest {max(values):.1f}" if values else "-"
@@ -70,6 +71,7 @@ def print_retargeted(made: Retargeted, console: Console) -> None:
         ("legs over the clip's", f"{made.scale:.3f}"),
         ("soles off their places", f"{1000 * made.sole_error:.2g} mm at most"),
         ("over joint limits", f"{np.degrees(made.limit_excess):.2g}°"),
+        ("in the floor or in itself", f"{1000 * made.penetration:.2g} mm at most"),
         ("directions, RMS", directions),
         ("time a frame", f"{1000 * made.time_per_frame:.1f} ms of the processor"),
     ):

@@ -24,9 +24,8 @@ class Ghost:
     """The bodies of a reference motion, whose soles are where the robot stood at its reset."""
 
     def __init__(self, motion: ReferenceMotion, env: BalanceEnv):
-        state = env.simulation.state
         self._bodies = ReferenceBodies(motion, env.robot)
-        self._stance = Stance(state.origin.copy(), state.heading.copy())
+        self._stance = Stance.of(env.simulation.state)
 
     def __call__(self, time: float) -> Poses:
         """Where it is at a time [s] after the reset."""

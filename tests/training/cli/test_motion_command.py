@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.clips.bvh import read_bvh
+from poise.baselines.clips.library import find_bvh
 from poise.baselines.motions.robot_clip import read_robot_clip
 from poise.training.cli.entry import main
 from tests.support.motion_files import small_bvh
@@ -26,14 +27,29 @@ def test_info_convert_and_import(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert np.abs(robot.root - robot_clip.qpos[:, :3]).max() < 1e-6
 
 
+def test_join(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """T₁ + D + T₂; without a duration that of the least coefficient."""
+    out, lengths = tmp_path / "both.bvh", []
+    both = ["motion", "join", "cmu02_punch", "cmu02_squat", str(out)]
+    for duration in (["--duration", "0.8"], []):
+        assert main([*both, *duration]) == 0
+        lengths.append(read_bvh(out, "m", "y", "z").clip.duration)
+    parts = [read_bvh(find_bvh(name)).clip.duration for name in both[2:4]]
+    assert lengths[0] == pytest.approx(sum(parts) + 0.8, abs=0.02)
+    assert sum(parts) + 0.2 <= lengths[1] + 1e-3 and lengths[1] != lengths[0]
+    printed = capsys.readouterr().out.split("coefficient ")
+    assert float(printed[2].split()[0]) < float(printed[1].split()[0])
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["jump"], "no such command: motion jump (choices: info, convert, import, follow)"),
+        (["jump"], "no such command: motion jump (choices: info, convert, import, follow, join)"),
         (["info", "nothing"], "clip: no such name: 'nothing'; give a path to a .bvh file or a"),
         (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),
         (["import", "cmu02_walk", "--out", "x.npz"], "feet: its feet move by"),
         (["convert", "cmu02_stand", "x.txt"], "x.txt: must be the name of a .bvh file"),
+        (["join", "cmu02_punch", "fair1_wave_hello", "x.bvh"], "has another skeleton than"),
         (["follow", "nothing.npz"], "nothing.npz: cannot be read (No such file or directory)"),
     ],
 )

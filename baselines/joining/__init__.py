@@ -1,0 +1,1 @@
+"""How clips follow one another: joins, their price, and which may follow which."""
