@@ -107,12 +107,19 @@ class Browser:
             f".findLast(b => (b.innerText ?? '').trim() == {json.dumps(text)})"
         )
         self.wait(f"!!{button}")
-        place = self.run(
-            f"(b => {{b.scrollIntoView({{block: 'center'}}); const r = b.getBoundingClientRect();"
-            f"return [r.x + r.width / 2, r.y + r.height / 2]}})({button})"
-        )
+        place, before = self._middle(button), None
+        while place != before:  # what opens moves what is in it
+            time.sleep(0.2)
+            place, before = self._middle(button), place
         self.mouse("Pressed", *place)
         self.mouse("Released", *place)
+
+    def _middle(self, element: str) -> list[float]:
+        """Where the middle of an element is [pixels], which is brought into sight."""
+        return self.run(
+            f"(b => {{b.scrollIntoView({{block: 'center'}}); const r = b.getBoundingClientRect();"
+            f"return [r.x + r.width / 2, r.y + r.height / 2]}})({element})"
+        )
 
     def save_to(self, folder: Path) -> None:
         """Let the page save files into a folder, and read and write the clipboard."""

@@ -100,7 +100,7 @@ def test_a_browser_shows_it_and_pushes_it(
     url = f"http://127.0.0.1:{server.get_port()}"
     thread = threading.Thread(target=use, args=(url, view, page, tmp_path), daemon=True)
     thread.start()
-    run_until(view, lambda: not thread.is_alive(), 300.0)
+    run_until(view, lambda: not thread.is_alive(), 500.0)
     assert "failed" not in page, page["failed"]
     wrong = [text for text in page["errors"] if not any(known in text for known in HARMLESS)]
     assert wrong == []
@@ -138,7 +138,7 @@ def use(url: str, view: BrowserView, page: dict[str, Any], folder: Path) -> None
             chromium.save_to(folder)
             chromium.click("Save", "*")
             chromium.click("Picture (PNG)")
-            wait((folder / "poise.png").is_file)
+            wait((folder / "poise.png").is_file, 180.0)  # drawn once more, in software
             chromium.click("Copy")
             chromium.wait(
                 "[...document.querySelectorAll('button')].some(b => b.innerText == 'Copied')"
