@@ -142,8 +142,8 @@ def _draw(chart: Chart, s: Series, shift: float) -> None:
     with svg.group(class_=f"series {colour(s.index)}", data_series=str(s.index)):
         svg.path(x, y, "line", dash=dash(s.index))
         with svg.group(class_="detail"):
-            for k in np.flatnonzero(np.isfinite(s.low) & np.isfinite(s.high)):
-                svg.line(x[k], low[k], x[k], high[k], "whisker")
+            for at in np.flatnonzero(np.isfinite(s.low) & np.isfinite(s.high)):
+                svg.line(x[at], low[at], x[at], high[at], "whisker")
         for k, phase in enumerate(s.x):
             tip = f"{s.name}, {phase:.3f}: {s.y[k]:.1f} ({s.low[k]:.1f} to {s.high[k]:.1f}) N·s"
             svg.marker(x[k], y[k], s.index, tip)

@@ -62,8 +62,8 @@ def phases(*found: tuple[float, float, float, str | None]) -> list[dict[str, Any
 def test_j50_over_the_phase(results: Results) -> None:
     """A mark, an interval and a row for each phase of each controller, in its place."""
     found = phases((0.0625, 20.0, 21.0, None), (0.5625, 10.0, 12.0, "lower"))
-    entry = {**results.summary["controllers"]["walk"], "phases": found}
-    other = {**entry, "phases": []}
+    entry: Any = {**results.summary["controllers"]["walk"], "phases": found}
+    other: Any = {**entry, "phases": []}
     made = dataclasses.replace(
         results, summary={**results.summary, "controllers": {"walk": entry, "zero": other}}
     )

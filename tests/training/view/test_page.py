@@ -136,10 +136,10 @@ def use(url: str, view: BrowserView, page: dict[str, Any], folder: Path) -> None
             wait(lambda: view.paused)
             page["pictures"] = before, picture(chromium)
             chromium.save_to(folder)
-            chromium.click("Save", "*")
-            chromium.click("Picture (PNG)")
+            chromium.press("Save", "*")
+            chromium.press("Picture (PNG)")
             wait((folder / "poise.png").is_file, 180.0)  # drawn once more, in software
-            chromium.click("Copy")
+            chromium.press("Copy")
             chromium.wait(
                 "[...document.querySelectorAll('button')].some(b => b.innerText == 'Copied')"
             )
