@@ -32,6 +32,7 @@ from poise.training.view.browser import BrowserView
 from poise.training.view.origins import Visits
 from poise.training.view.server import check_port, greeting, serving
 from poise.training.view.stage import FIELD_OF_VIEW, LANE, first_view
+from poise.training.view.walking import Throttle
 from tests.support.browser import CHROMIUM, Browser
 from tests.support.shared import robot
 
@@ -333,6 +334,21 @@ def test_sliders_command_a_walk(view: BrowserView) -> None:
     view.reset()
     assert view.play.session.command.ahead == 0.5
     run_until(view, lambda: sliders["ahead"].value == 0.5)
+
+
+def test_a_dragged_slider_gives_few_commands() -> None:
+    """The newest value each time, the last one too; also when time begins anew."""
+    throttle = Throttle(0.25)
+    taken: list[float] = []
+    for step in range(50):
+        throttle.waiting = {"ahead": float(step)}
+        if (value := throttle.take(step / 32)) is not None:
+            taken.append(value["ahead"])
+    assert taken == [0.0, 8.0, 16.0, 24.0, 32.0, 40.0, 48.0]
+    assert throttle.take(1.7) is None
+    assert throttle.take(1.75) == {"ahead": 49.0} and throttle.take(3.0) is None
+    throttle.waiting = {"ahead": 0.0}
+    assert throttle.take(0.0) == {"ahead": 0.0}
 
 
 def test_a_link_is_opened(server: viser.ViserServer, view: BrowserView) -> None:
