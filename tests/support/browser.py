@@ -99,20 +99,29 @@ class Browser:
         self.call("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button=button,
                   clickCount=1, **held)  # fmt: skip
 
-    def click(self, text: str, among: str = "button") -> None:
-        """Click on the button, or what else a CSS selector finds, that has this text, once it is
-        there: the innermost and last one."""
-        button = (
-            f"[...document.querySelectorAll({json.dumps(among)})]"
-            f".findLast(b => (b.innerText ?? '').trim() == {json.dumps(text)})"
-        )
-        self.wait(f"!!{button}")
+    def click(self, text: str) -> None:
+        """Click with the mouse on the button that has this text, once there is one."""
+        button = self._found(text, "button")
         place = self.run(
             f"(b => {{b.scrollIntoView({{block: 'center'}}); const r = b.getBoundingClientRect();"
             f"return [r.x + r.width / 2, r.y + r.height / 2]}})({button})"
         )
         self.mouse("Pressed", *place)
         self.mouse("Released", *place)
+
+    def press(self, text: str, among: str = "button") -> None:
+        """Click without the mouse, on what may still be moving as it unfolds: the innermost and
+        last element of a CSS selector that has this text."""
+        self.run(f"{self._found(text, among)}.click()")
+
+    def _found(self, text: str, among: str) -> str:
+        """JavaScript for the element, once there is one."""
+        element = (
+            f"[...document.querySelectorAll({json.dumps(among)})]"
+            f".findLast(b => (b.innerText ?? '').trim() == {json.dumps(text)})"
+        )
+        self.wait(f"!!{element}")
+        return element
 
     def save_to(self, folder: Path) -> None:
         """Let the page save files into a folder, and read and write the clipboard."""

@@ -16,6 +16,12 @@ from tests.support.benchmarks_small import InProcessExecutor, write_small
 from tests.support.evaluations import ENVELOPE, InProcess, random_suite, write_suite
 
 SOFT = 'a "soft" <b>&.yaml'  # a name that must be escaped wherever it is written
+WALKS = {
+    "duration": 7.0,
+    "walk": {"commands": [{"ahead": 0.0}, {"ahead": -0.3}], "trials": 1},
+    "walk_push": {"command": {"ahead": 0.4}, "directions": 2, "impulses": [0.1, 1.4],
+                  "first_trials": 4, "trials": 4, "start": 4.0},
+}  # fmt: skip
 _folders: list[tempfile.TemporaryDirectory] = []  # removed at the end of the process
 
 
@@ -25,7 +31,8 @@ def finished(kind: str) -> Path:
 
     Args:
         kind: "random" or "envelope" of `poise evaluate`, or "benchmark"; "envelope-steps" and
-            "benchmark-steps" with a controller that steps instead of no control.
+            "benchmark-steps" with a controller that steps instead of no control; "walk" of `walk`
+            alone, at two commands and pushed.
     """
     _folders.append(tempfile.TemporaryDirectory(prefix="poise-report-"))
     path = Path(_folders[-1].name)
@@ -39,7 +46,8 @@ def finished(kind: str) -> Path:
             InProcessExecutor.stop_after = None
             benchmark(names, write_small(path), out=path / "out", seed=2)
         return path / "out"
-    fields = {"random": random_suite(8), "envelope": ENVELOPE}[kind]
+    fields = {"random": random_suite(8), "envelope": ENVELOPE, "walk": WALKS}[kind]
+    names = ["walk"] if kind == "walk" else names
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evaluation, "Executor", InProcess)
         InProcess.stop_after = None

@@ -236,7 +236,7 @@ def performer(
 
 
 def fall_limits(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
-    """Limits of falls, as of `FallLimits`, that a robot does not reach which performs this motion."""
+    """`FallLimits` that a robot does not reach which performs this motion."""
     samples = [motion.sample(time) for time in np.arange(0.0, motion.duration, 0.05)]
     upright = min(Rotation.from_rotvec(sample.root).as_matrix()[2, 2] for sample in samples)
     tilt = float(np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))))

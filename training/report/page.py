@@ -21,7 +21,7 @@ from poise.training.results.read import Record, Results, load_results
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
 from poise.training.running.terminal import print_paths
 
-from . import factors, plots, words
+from . import factors, plots, walking, words
 from . import tables as report_tables
 from .cells import Download, download
 from .palette import CARDS, variables
@@ -89,6 +89,9 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         "indicators": factors.indicators(results, order),
         "seeds": factors.seed_table(results),
         "errors": factors.error_table(results),
+        "walks": walking.walk_table(results, order),
+        "walk_costs": walking.cost_table(results, order),
+        "phases": walking.phase_table(results, order),
         "smallest": report_tables.smallest(results, order),
     }
     cases, notes = _cases(results, baseline, order, films, console)
@@ -110,6 +113,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         envelope=envelope,
         own_envelopes=own_envelopes,
         step_lines=list(plots.step_lines(results)) if envelope else [],
+        phases=walking.phase_plot(results, order),
         falls=falls,
         curves=curves,
         factors=factors.factor_plots(results, order),

@@ -156,8 +156,9 @@ def ticks(low: float, high: float, count: int = 5) -> list[float]:
 
 
 def number_text(value: float, form: str) -> str:
-    """A number for people: with a real minus."""
-    return format(value, form).replace("-", "−")
+    """A number for people: with a real minus, and none before a zero."""
+    text = format(value, form)
+    return (text if set(text) & set("123456789") else text.lstrip("-")).replace("-", "−")
 
 
 def towards(direction: float) -> str:

@@ -182,7 +182,7 @@ def load_session(
 ) -> Session:
     """A session of these controllers in the standard conditions of an evaluation.
 
-    With a motion all perform it, and a fall is to be lower than it ever is, or further from upright.
+    With a motion all perform it; to be lower than it ever is is a fall, or further from upright.
 
     Raises ConfigError for a controller that is not valid, is for another robot, or plays no
     motions; for commands where none of them walks.

@@ -258,6 +258,7 @@ class BrowserView:
 
     def _picture(self, client: int) -> None:
         """In a thread of the server: it waits for the browser."""
+        self._pages.say("the browser draws the picture …")
         try:
             send_picture(self._server, client, BACKGROUND[self._dark])
         except (RuntimeError, TimeoutError) as error:  # viser's, of a page that draws nothing

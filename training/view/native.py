@@ -16,6 +16,8 @@ from poise.training.sessions.live import Live
 from poise.training.sessions.mouse import DURATION, WEIGHT, Pull, grabbed_point
 from poise.training.sessions.pace import Pace
 
+from .server import until_ctrl_c
+
 HELP = (
     "space: pause; right arrow: one step; backspace: reset; 8, 4, 5, 6: push forward, left, "
     "backward, right; or double-click on a body, then drag with Ctrl and the right button"
@@ -106,9 +108,8 @@ def run_native(live: Live, seconds: float | None, say: Callable[[str], object]) 
     view = NativeView(live, say)
     say(HELP)
     try:
-        view.run(seconds)
-    except KeyboardInterrupt:
-        pass
+        with until_ctrl_c():
+            view.run(seconds)
     finally:
         view.renderer.close()
     say(f"{view.pace.total:.3f} × real time over {view.pace.wanted:.1f} s")

@@ -13,7 +13,8 @@ from PIL import Image
 from poise.configs.errors import PoiseError
 from poise.training.sessions.live import Play
 
-TIMEOUT = 20.0  # [s] for a browser to draw a picture
+#: [s] for a browser to draw a picture: in software seconds, on a busy machine a minute
+TIMEOUT = 180.0
 
 
 def send_picture(server: viser.ViserServer, client: int, background: tuple[int, int, int]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import signal
 import socket
 import threading
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.extras import how_to_install
+from poise.training.running.stopping import stop_code
 
 from .origins import LOOPBACK, Visits, own_pages_only
 
@@ -68,6 +70,16 @@ def serving(host: str, port: int, visits: Visits | None = None) -> Iterator[vise
             ending = threading.Thread(target=server.stop, daemon=True)
             ending.start()
             ending.join(STOPPING)
+
+
+@contextlib.contextmanager
+def until_ctrl_c() -> Iterator[None]:
+    """Ctrl-C ends the block, as it is meant to be ended; SIGTERM ends the command."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if stop_code() == 128 + signal.SIGTERM:
+            raise
 
 
 def greeting(host: str, port: int, link: str = "") -> list[str]:

@@ -178,7 +178,7 @@ def first_view(
     e = np.radians(CAMERA.elevation)
     away = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     width = (LANE * (count - 1) + ALONE) * size
-    height = max(TALL * size * (2.3 if phone else 1.0), width / aspect)  # that is seen [m]
-    look_at = np.array([0.0, 0.0, LOOK_AT * size - (0.27 * height if phone else 0.0)])
+    height = max(TALL * size * (2.6 if phone else 1.0), width / aspect)  # that is seen [m]
+    look_at = np.array([0.0, 0.0, LOOK_AT * size - (0.3 * height if phone else 0.0)])
     distance = 0.5 * height / np.tan(0.5 * np.radians(FIELD_OF_VIEW))
     return look_at + distance * away, look_at

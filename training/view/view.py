@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from poise.baselines.allowance import allows
@@ -16,7 +15,7 @@ from poise.training.sessions.spec import MOST, STANDING, SessionSpec, Spec, Tria
 from poise.training.trials.agents import check_name
 
 from .origins import Visits
-from .server import check_installed, check_port, greeting, serving
+from .server import check_installed, check_port, greeting, serving, until_ctrl_c
 
 DEFAULT = "feedback-step"
 Say = Callable[[str], object]
@@ -146,7 +145,7 @@ def _serve(
         link = play.spec.link if isinstance(play.spec, TrialSpec) else ""
         for line in greeting(host, server.get_port(), link):
             say(line)
-        with suppress(KeyboardInterrupt):
+        with until_ctrl_c():
             if seconds is None:
                 say("Ctrl-C ends it")
             browser.run(seconds)

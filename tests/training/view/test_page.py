@@ -32,6 +32,7 @@ from poise.training.view.browser import BrowserView
 from poise.training.view.origins import Visits
 from poise.training.view.server import check_port, greeting, serving
 from poise.training.view.stage import FIELD_OF_VIEW, LANE, first_view
+from poise.training.view.walking import Throttle
 from tests.support.browser import CHROMIUM, Browser
 from tests.support.shared import robot
 
@@ -100,7 +101,7 @@ def test_a_browser_shows_it_and_pushes_it(
     url = f"http://127.0.0.1:{server.get_port()}"
     thread = threading.Thread(target=use, args=(url, view, page, tmp_path), daemon=True)
     thread.start()
-    run_until(view, lambda: not thread.is_alive(), 300.0)
+    run_until(view, lambda: not thread.is_alive(), 500.0)
     assert "failed" not in page, page["failed"]
     wrong = [text for text in page["errors"] if not any(known in text for known in HARMLESS)]
     assert wrong == []
@@ -136,10 +137,10 @@ def use(url: str, view: BrowserView, page: dict[str, Any], folder: Path) -> None
             wait(lambda: view.paused)
             page["pictures"] = before, picture(chromium)
             chromium.save_to(folder)
-            chromium.click("Save", "*")
-            chromium.click("Picture (PNG)")
-            wait((folder / "poise.png").is_file)
-            chromium.click("Copy")
+            chromium.press("Save", "*")
+            chromium.press("Picture (PNG)")
+            wait((folder / "poise.png").is_file, 180.0)  # drawn once more, in software
+            chromium.press("Copy")
             chromium.wait(
                 "[...document.querySelectorAll('button')].some(b => b.innerText == 'Copied')"
             )
@@ -333,6 +334,21 @@ def test_sliders_command_a_walk(view: BrowserView) -> None:
     view.reset()
     assert view.play.session.command.ahead == 0.5
     run_until(view, lambda: sliders["ahead"].value == 0.5)
+
+
+def test_a_dragged_slider_gives_few_commands() -> None:
+    """The newest value each time, the last one too; also when time begins anew."""
+    throttle = Throttle(0.25)
+    taken: list[float] = []
+    for step in range(50):
+        throttle.waiting = {"ahead": float(step)}
+        if (value := throttle.take(step / 32)) is not None:
+            taken.append(value["ahead"])
+    assert taken == [0.0, 8.0, 16.0, 24.0, 32.0, 40.0, 48.0]
+    assert throttle.take(1.7) is None
+    assert throttle.take(1.75) == {"ahead": 49.0} and throttle.take(3.0) is None
+    throttle.waiting = {"ahead": 0.0}
+    assert throttle.take(0.0) == {"ahead": 0.0}
 
 
 def test_a_link_is_opened(server: viser.ViserServer, view: BrowserView) -> None:

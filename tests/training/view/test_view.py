@@ -101,8 +101,9 @@ def test_it_ends_by_itself_and_says_how_fast_it_was(capsys: pytest.CaptureFixtur
     assert 0.2 < float(factor) <= 1.01 and words.startswith("real time over 0.")
 
 
-def test_ctrl_c_ends_it_at_once() -> None:
-    """Without a word of a library, with what was reached."""
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_a_signal_ends_it_at_once(number: int, code: int) -> None:
+    """Without a word of a library; Ctrl-C, which is meant to end it, with what was reached."""
     pytest.importorskip("viser", reason="not installed: pip install 'poise[view]'")
     command = [sys.executable, "-m", "poise.training.cli", "view", "zero", "--port", "0"]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
@@ -115,11 +116,12 @@ def test_ctrl_c_ends_it_at_once() -> None:
     timer.start()
     while not (line := process.stdout.readline()).startswith("Ctrl-C"):
         assert line
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     out, err = process.communicate()
     timer.cancel()
-    assert process.returncode == 0
-    assert out.endswith("s\n") and "real time" in out and "viser" not in out + err
+    assert process.returncode == code
+    assert ("real time" in out) == (code == 0) and "viser" not in out + err
+    assert ("poise: stopped" in err) == (code != 0) and "Traceback" not in err
 
 
 def test_a_trial_of_a_result_is_shown_as_it_was() -> None:
