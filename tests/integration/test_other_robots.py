@@ -69,6 +69,22 @@ def test_feet_that_stand_a_little_turned_do_not_make_short_legs_lean():
     assert np.degrees(np.arccos(state.root_axes[2, 2])) < 1.0
 
 
+@pytest.mark.parametrize(("direction", "specific"), [(0.0, 0.4), (112.5, 0.72)])
+def test_gains_for_the_t1(direction, specific):
+    """They hold pushes 15 % below their limit, feet in place."""
+    pytest.importorskip(WHEEL, reason="its model is not installed: pip install 'poise[robots]'")
+    t1 = load_robot("booster_t1")
+    env = ResidualBalanceEnv(t1, controller="momentum-qp-t1", pushes=None, duration=5.0)
+    feet = env.simulation.state.sole_points.copy()
+    push = {"specific_impulse": specific, "direction": direction, "duration": 0.1, "start": 0.2}
+    env.reset(seed=0, options={"push": push})
+    over = fallen = False
+    while not (over or fallen):
+        _, fallen, over = env.step_without_info(np.zeros(4))
+    assert env.recovered
+    np.testing.assert_allclose(env.simulation.state.sole_points, feet, atol=0.05)
+
+
 def test_gains_scale_with_mass_and_height():
     """One configuration becomes other numbers: forces by m g, moments by m g h, rates by √(g/h)."""
     humanoid, tall = (ResidualBalanceEnv(robot_named(n), pushes=None) for n in ("humanoid", "tall"))

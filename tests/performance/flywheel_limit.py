@@ -6,7 +6,8 @@ The largest impulse J in each direction for which a control exists, found by lin
 
     m c̈ = m ω² (c − p) − e(L̇_g)/z + F      pendulum at constant height z, ω² = g/z
     L̇ = L̇_g + (r × F)                      the push F itself turns the body: lever r above c
-    p in the soles, within the ankles' torque; |L̇_g| within the hips' torque
+    p where both soles can put it with the torques of their ankles (`CopRegion`)
+    |L̇_g| within the hips' torque
     |∫ L dt| ≤ Λ                             the turn that the joints allow
     at the end: ċ = 0, L = 0, c over the soles
 
@@ -23,7 +24,9 @@ import mujoco
 import numpy as np
 from scipy.optimize import linprog
 
-from poise.baselines.whole_body.parameters import joint_kinds
+from poise.baselines.registry import controller_config
+from poise.baselines.stepping.cop_region import CopRegion, nominal_feet
+from poise.baselines.whole_body.momentum_qp import com_offset
 from poise.envs.maths.polygons import half_planes
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
@@ -53,27 +56,9 @@ def turn_budget(simulation):
     return budget
 
 
-def cop_rows(simulation):
-    """N, b with N p ≤ b: the soles' polygon, and what the motors of the ankles can turn."""
-    state, robot = simulation.state, simulation.robot
-    N, b = half_planes(state.support_polygon)
-    model, arrays = robot.model, simulation.arrays
-    kinds = joint_kinds(arrays)
-    torque, place = 0.0, []
-    for i, sole in enumerate(robot.soles):  # the last joint of each leg that turns about y
-        for dof in arrays.chain[i, : arrays.chain_length[i]][::-1]:
-            joint = model.dof_jntid[dof]
-            axis = simulation.data.xaxis[joint]
-            motor = np.flatnonzero(robot.motor_dofs == dof)
-            if kinds[dof - 6] == 1 and abs(axis[1]) > 0.8 and len(motor):
-                torque += robot.torque_limit[motor[0]]
-                place.append(simulation.data.xanchor[joint][0])
-                break
-        else:
-            raise SystemExit(f"{robot.name}: no ankle motor above {sole.name}")
-    reach, middle = torque / (robot.mass * arrays.gravity), float(np.mean(place))
-    N = np.vstack([N, [[1.0, 0.0], [-1.0, 0.0]]])
-    return N, np.concatenate([b, [middle + reach, reach - middle]])
+def cop_rows(robot):
+    """N, b with N p ≤ b: where both soles put p with the torques of their ankles [m]."""
+    return half_planes(CopRegion(robot, fraction=1.0).both(nominal_feet(robot), 0.0))
 
 
 def limit(simulation, start, direction, duration, lever, hip_torque):
@@ -84,7 +69,7 @@ def limit(simulation, start, direction, duration, lever, hip_torque):
     n, unknowns = STEPS, 4 * STEPS + 1  # p (n, 2), L̇_g (n, 2), J
     along = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
     budget = turn_budget(simulation)
-    N, b = cop_rows(simulation)
+    N, b = cop_rows(robot)
     c, v = np.zeros((2, unknowns)), np.zeros((2, unknowns))
     L, turn, rest = np.zeros((2, unknowns)), np.zeros((2, unknowns)), start.copy()
     rest_v, rows, bounds = np.zeros(2), [], []
@@ -129,7 +114,6 @@ def main() -> None:
     parser.add_argument("--body", default="torso")
     parser.add_argument("--duration", type=float, default=0.1)
     parser.add_argument("--hips", type=float, default=240.0, help="largest L̇ of the ground [N·m]")
-    parser.add_argument("--offset", type=float, default=-0.028, help="c_ref's, over h, as gains")
     given = parser.parse_args()
     robot = load_robot(given.robot)
     simulation = Simulation(robot)
@@ -138,17 +122,20 @@ def main() -> None:
     budget = turn_budget(simulation)
     print(f"lever of {given.body} above the CoM {lever:.2f} m; Λ about x {budget[0].round(2)},")
     print(f"about y {budget[1].round(2)} kg m² rad (−, +); L̇ within {given.hips:.0f} N·m")
-    start = simulation.state.origin[:2] + [given.offset * robot.height_com, 0.0]
+    ahead = com_offset(robot, controller_config("momentum-qp").com)
+    start = nominal_feet(robot)[:, :2].mean(axis=0) + [ahead, 0.0]
     limits = load_limits(robot)
-    print("direction  flywheel limit  baseline J50  J50/limit")
+    print("direction  flywheel limit  baseline J50  J50/limit  limit per mass")
     best, measured = [], []
     for direction in np.arange(0.0, 360.0, 22.5):
         best.append(limit(simulation, start, direction, given.duration, lever, given.hips))
         j50 = float("nan") if limits.table is None else limits.table(direction)
         measured.append(j50)
-        print(f"{direction:8.1f}°  {best[-1]:10.1f} N·s  {j50:8.1f} N·s  {j50 / best[-1]:8.2f}")
+        print(f"{direction:8.1f}°  {best[-1]:10.1f} N·s  {j50:8.1f} N·s  {j50 / best[-1]:8.2f}"
+              f"  {best[-1] / robot.mass:10.3f} N·s/kg")  # fmt: skip
     ratio = np.mean(measured) / np.mean(best)
-    print(f"    mean   {np.mean(best):10.1f} N·s  {np.mean(measured):8.1f} N·s  {ratio:8.2f}")
+    print(f"    mean   {np.mean(best):10.1f} N·s  {np.mean(measured):8.1f} N·s  {ratio:8.2f}"
+          f"  {np.mean(best) / robot.mass:10.3f} N·s/kg")  # fmt: skip
 
 
 if __name__ == "__main__":

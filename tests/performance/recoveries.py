@@ -11,6 +11,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config
 from poise.baselines.solvers import QP
 from poise.envs.physics.state import RobotState
+from poise.envs.robots.robot import load_robot
 
 DIRECTIONS = (0.0, 45.0, 90.0, 135.0, 180.0, 270.0)
 IMPULSES = (9.0, 13.0, 16.0, 19.0)  # [N·s]
@@ -26,16 +27,25 @@ class Tick:
     problem: QP
 
 
-def record(seconds: float = 1.5, every: int = 10) -> tuple[ResidualBalanceEnv, list[list[Tick]]]:
+def impulses(name: str) -> list[float]:
+    """Impulses of the default humanoid, by the robot's mass [N·s]."""
+    share = load_robot(name).mass / load_robot("humanoid").mass
+    return [share * impulse for impulse in IMPULSES]
+
+
+def record(
+    seconds: float = 1.5, every: int = 10, robot: str = "humanoid"
+) -> tuple[ResidualBalanceEnv, list[list[Tick]]]:
     """The environment, and every `every`-th control tick after each push, up to a fall."""
     period = controller_config(CONTROLLER).period  # a policy step is one tick
     env = ResidualBalanceEnv(
-        controller=CONTROLLER, pushes=None, duration=0.5 + seconds, policy_period=period
-    )
+        load_robot(robot), controller=CONTROLLER, pushes=None, duration=0.5 + seconds,
+        policy_period=period,
+    )  # fmt: skip
     action = np.zeros(env.action_space.shape)
     recoveries = []
     for direction in DIRECTIONS:
-        for impulse in IMPULSES:
+        for impulse in impulses(robot):
             push = {"impulse": impulse, "direction": direction, "start": 0.1}
             env.reset(seed=len(recoveries), options={"push": push})
             ticks: list[Tick] = []

@@ -1,4 +1,6 @@
-"""The control tick and the environment's step against physics: `python -m tests.performance.step`.
+"""The control tick and the environment's step against physics.
+
+    python -m tests.performance.step [--robot humanoid]
 
 All on states of real push recoveries, in one process, interleaved. The yardstick is `mj_step` of
 the same robot in the same states. A tick is timed inside compiled code, in three parts: MuJoCo's
@@ -7,25 +9,27 @@ position and velocity stages (which the physics step shares), `update_state`, `m
 
 from __future__ import annotations
 
+import argparse
 import time
 
 import mujoco
 import numpy as np
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from tests.performance.recoveries import DIRECTIONS, IMPULSES, record
+from poise.envs.robots.robot import load_robot
+from tests.performance.recoveries import DIRECTIONS, impulses, record
 from tests.performance.tick_clock import TickClock
 
 PASSES = 5  # over the same ticks: the least time of each is what it takes undisturbed
 
 
-def tick_times() -> np.ndarray:
+def tick_times(robot: str) -> np.ndarray:
     """(ticks, 3) seconds of the parts of each control tick of the recoveries.
 
     All ticks, one after the other, since each starts from the solution of the one before. A tick
     does the same in every pass, for the controller's memory is reset with each recovery.
     """
-    env, recoveries = record(every=1)
+    env, recoveries = record(every=1, robot=robot)
     clock = TickClock(env.controller)
     clock.time(recoveries[0][0])  # compiled
     passes = []
@@ -38,14 +42,14 @@ def tick_times() -> np.ndarray:
     return np.array(passes).min(axis=0)
 
 
-def step_times() -> tuple[np.ndarray, np.ndarray]:
+def step_times(robot: str) -> tuple[np.ndarray, np.ndarray]:
     """Seconds of each environment step, and of as many `mj_step` calls from the same states."""
-    env = ResidualBalanceEnv(pushes=None, duration=2.0)
+    env = ResidualBalanceEnv(load_robot(robot), pushes=None, duration=2.0)
     model, shadow = env.robot.model, mujoco.MjData(env.robot.model)
     action = np.zeros(env.action_space.shape)
     steps, physics = [], []
     for direction in DIRECTIONS:
-        for impulse in IMPULSES:
+        for impulse in impulses(robot):
             push = {"impulse": impulse, "direction": direction, "start": 0.1}
             env.reset(seed=0, options={"push": push})
             ended = False
@@ -65,8 +69,11 @@ def step_times() -> tuple[np.ndarray, np.ndarray]:
 
 
 def main() -> None:
-    steps, physics = step_times()
-    parts = tick_times()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robot", default="humanoid")
+    robot = parser.parse_args().robot
+    steps, physics = step_times(robot)
+    parts = tick_times(robot)
     print("| path | median | p99 | over physics | p99 over median |")
     print("| --- | --- | --- | --- | --- |")
     floor = float(np.median(physics))
