@@ -134,7 +134,12 @@ def test_j50_by_phase() -> None:
         trial = Trial(k, k, (Push("torso", 5.0, 0.1, impulse, direction),), part="walk_push")
         played.append((trial, Outcome(bool(won), not won, push_phase=phase)))
     played.append((played[0][0], Outcome(True, False)))  # pushed before it walked
-    j50s = [{"direction": 0.0, "j50": 30.0}, {"direction": 90.0, "j50": 15.0}]
+    unknown = Trial(0, 0, (Push("torso", 5.0, 0.1, 9.0, 180.0),), part="walk_push")
+    played.append((unknown, Outcome(True, False, push_phase=0.1)))
+    j50s = [
+        {"direction": 0.0, "j50": 30.0}, {"direction": 90.0, "j50": 15.0},
+        {"direction": 180.0, "j50": 0.0},
+    ]  # fmt: skip
     envelope: EnvelopeFigures = {"j50_mean": 22.5, "directions": j50s}  # type: ignore[typeddict-item]
     found = phase_figures(played, envelope)
     assert [entry["phase"] for entry in found] == [(k + 0.5) / 8 for k in range(8)]

@@ -60,6 +60,8 @@ def test_pushes_come_at_all_phases(limits: PushLimits) -> None:
         for period in (0.5, 0.84):
             counts, _ = np.histogram(starts[chosen] % period / period, 8, (0.0, 1.0))
             assert counts.min() >= 0.5 * counts.mean()
+    other = Plan(load_suite("walk-push"), limits, 8, ["walk"]).first
+    assert other[0].pushes[0].start != starts[0]  # every seed has times of its own
 
 
 def test_second_stage_pushes_walk_too(limits: PushLimits) -> None:

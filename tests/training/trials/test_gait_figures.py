@@ -105,6 +105,19 @@ def test_lengths_times_and_costs() -> None:
     assert walk(0.05).figures()["energy_per_metre"] is None  # slower than 0.1 m/s
 
 
+def test_steps_are_those_that_end_settled_strides() -> None:
+    """A last step that is longer counts; on a curve lengths are along the heading at each step."""
+    record = recorded()
+    told = Walk(record, (TimedCommand(0.5),))
+    feet, row, foot = record.feet.copy(), told.landed.row[-1], told.landed.foot[-1]
+    feet[row, foot] += 0.7 * np.array([np.cos(0.3), np.sin(0.3)])
+    longer = Walk(replace(record, feet=feet), (TimedCommand(0.5),)).figures()["step_length"]
+    assert longer == pytest.approx(0.5 * STEP + 0.7 / np.count_nonzero(told.settled), abs=1e-9)
+    curve = walk(0.4, 0.0, 0.3).figures()
+    assert curve["step_length"] == pytest.approx(0.4 * STEP, abs=0.02)
+    assert curve["step_width"] == pytest.approx(2.0 * HALF_WIDTH, abs=0.02)
+
+
 def test_a_sole_that_slides_on_one_foot() -> None:
     """The largest way while the other foot is in the air, in the strides that are settled."""
     record = recorded()
@@ -191,6 +204,9 @@ def test_the_distance_from_a_circle() -> None:
     for speed, off in ((0.5, 0.0), (0.6, 0.4)):  # 2.4 m instead of 2 m
         found = Walk(recorded(speed, 0.0, 0.25, 40.0), told).figures()["circle_error"]
         assert found == pytest.approx(off, abs=0.03)
+    crab = (TimedCommand(0.3, left=0.4, turn=0.25),)  # the same circle, not along the heading
+    found = Walk(recorded(0.3, 0.4, 0.25, 40.0), crab).figures()["circle_error"]
+    assert found == pytest.approx(0.0, abs=0.03)
 
 
 def test_the_phase_of_a_push() -> None:
@@ -201,6 +217,10 @@ def test_the_phase_of_a_push() -> None:
     assert told.phase_at(4.1, left=0) == pytest.approx(0.625)
     assert told.phase_at(4.39, left=1) == pytest.approx(0.4875)
     assert told.phase_at(1.0, left=1) is None
+    stood = told.record.down.copy()
+    stood[told.record.time > 10.1] = True  # after the 25th touchdown
+    late = Walk(replace(told.record, down=stood), told.commands).phase_at(18.0, left=1)
+    assert late == pytest.approx(1.0) and late < 1.0  # no further than where the next foot lands
 
 
 def test_who_lands_on_both_feet_at_once_has_no_phase() -> None:
