@@ -298,6 +298,7 @@ def list_names() -> None:
         "motions",
         "tuning",
         "limits",
+        "human",
     )
     for kind in kinds:
         print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
