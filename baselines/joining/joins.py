@@ -7,6 +7,7 @@ at its entry, D the duration, α(u) = 10u³ − 15u⁴ + 6u⁵.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -140,7 +141,12 @@ def inertial(before: Clip, after: Clip, half_life: float) -> Clip:
 
 
 #: kind → join of two clips and a duration [s]
-JOINS = {"insert": insert, "cross": cross, "capture": capture, "inertial": inertial}
+JOINS: dict[str, Callable[[Clip, Clip, float], Clip]] = {
+    "insert": insert,
+    "cross": cross,
+    "capture": capture,
+    "inertial": inertial,
+}
 
 
 def ease(u: np.ndarray) -> np.ndarray:

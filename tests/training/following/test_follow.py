@@ -113,6 +113,7 @@ def test_what_follows_no_motion_is_said() -> None:
 def test_a_share_of_j50_is_that_of_the_direction() -> None:
     robot = robot_named("humanoid")
     table = load_limits(robot).table
+    assert table is not None
     trials = follow("standing", robot=robot, starts=2, directions=2, share=0.3)
     assert [trial.push["impulse"] for trial in trials if trial.push] == pytest.approx(
         [0.3 * table(0.0), 0.3 * table(180.0)]
