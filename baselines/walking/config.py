@@ -70,7 +70,7 @@ class GaitConfig:
             time_min=0.7, time_max=2.0,
         )
     )  # fmt: skip
-    treads: TreadConfig = field(default_factory=TreadConfig)
+    treads: TreadConfig = field(default_factory=TreadConfig, metadata={"omit": "default"})
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
 
