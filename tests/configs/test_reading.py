@@ -37,6 +37,7 @@ from poise.configs.schema import build
 from poise.configs.yaml_loader import DEPTH, DIGITS, NODES
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
+from poise.training.gaits.human import load_knee_moment
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.suites.suite import load_suite
@@ -56,6 +57,7 @@ LOADERS: dict[str, Callable[[Any], Any]] = {
     "training": train_config,
     "tuning": tune_config,
     "limits": lambda path: load_limits(robot(), path),
+    "human": load_knee_moment,
 }
 BOMB = "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 12))
 BOMB = f"a0: &a0 [x, x, x, x, x, x, x, x, x]\n{BOMB}"

@@ -268,27 +268,35 @@ def test_what_does_not_walk_takes_no_command(session: Session, walk: Session) ->
 
 
 def test_the_ghost_is_the_reference() -> None:
-    """Its joints are the motion's, and its soles stand where the robot's stood at the reset."""
+    """Trunk and arms are the motion's, and its soles stand where the robot's stood at the reset."""
     motion = load_motion("squat", robot())
     session = load_session(["momentum-qp"], robot(), seed=1, motion=motion)
     live, env = Live(session), session.sides[0].env
     state = env.simulation.state
-    origin, heading = state.origin.copy(), state.heading.copy()
+    soles, axes = state.sole_points.copy(), state.sole_axes.copy()
     for _ in range(60):
         live.step()
     frame = live.history[-1][0]
     assert frame.ghost is not None
-    data = mujoco.MjData(robot().model)
+    model, data = robot().model, mujoco.MjData(robot().model)
     data.qpos[:3], data.qpos[3:7] = frame.ghost.positions[1], frame.ghost.quaternions[1]
     data.qpos[7:] = motion.sample(frame.time).q_ref
-    mujoco.mj_kinematics(robot().model, data)
-    assert np.allclose(data.xpos[1:], frame.ghost.positions[1:], atol=1e-9)
-    assert np.allclose(np.abs(np.sum(data.xquat * frame.ghost.quaternions, axis=1))[1:], 1.0)
-    feet = [(data.xmat[s.body_id].reshape(3, 3), data.xpos[s.body_id], s) for s in robot().soles]
-    middle = np.mean([place + turn @ sole.position for turn, place, sole in feet], axis=0)
-    ahead = sum((turn @ sole.rotation)[:2, 0] for turn, _, sole in feet)
-    assert np.allclose(middle, origin, atol=1e-9)
-    assert np.allclose(ahead / np.linalg.norm(ahead), heading, atol=1e-9)
+    mujoco.mj_kinematics(model, data)
+    legs = {sole.body_id for sole in robot().soles}
+    for _ in range(model.nbody):
+        legs |= {int(model.body_parentid[body]) for body in legs} - {0, robot().root_body_id}
+    others = [body for body in range(1, model.nbody) if body not in legs]
+    assert len(others) > 5
+    assert np.allclose(data.xpos[others], frame.ghost.positions[others], atol=1e-9)
+    turns = np.abs(np.sum(data.xquat * frame.ghost.quaternions, axis=1))
+    assert np.allclose(turns[others], 1.0)
+    for sole, place, wanted in zip(robot().soles, soles, axes, strict=True):
+        quat, found = frame.ghost.quaternions[sole.body_id], np.zeros(9)
+        mujoco.mju_quat2Mat(found, quat)
+        turn = found.reshape(3, 3)
+        point = frame.ghost.positions[sole.body_id] + turn @ sole.position
+        assert np.allclose(point, place, atol=1e-4)
+        assert np.allclose(turn @ sole.rotation, wanted, atol=1e-4)
     apart = np.linalg.norm(frame.positions - frame.ghost.positions, axis=1)[1:]
     assert 1e-4 < apart.max() < 0.06  # it is followed, not copied
     between_two = between(live.history[-2][0], frame, 0.5).ghost
