@@ -139,6 +139,7 @@ def scale_of(term: Term, scales: Scales) -> str:
         "0.1 m h² ω": scales.momentum,
         "m g": scales.weight,
         "ω": omega,
+        "0.2 ω": 0.2 * omega,
         "3 ω": 3.0 * omega,
         "1/ω": 1.0 / omega,
     }
