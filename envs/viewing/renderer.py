@@ -18,7 +18,7 @@ from .window import Viewer
 
 MAX_GEOMS = 10_000
 XRAY = 0.55  # how strongly an overlay shines through what hides it
-LOOK_AT = 0.92  # height that the camera looks at, over the CoM height
+LOOK_AT = 0.92  # height above the ground that the camera looks at, over the CoM height
 FOLLOW = 0.4  # [s] time constant with which the camera follows
 
 
@@ -99,7 +99,8 @@ class SceneRenderer:
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
         state, size = self.simulation.state, self.simulation.robot.height_com
-        target = np.array([*state.com[:2], LOOK_AT * size])
+        height = float(state.ground.mean()) + LOOK_AT * size
+        target = np.array([*state.com[:2], height])
         elapsed = self.simulation.time - self.shown
         self.shown = self.simulation.time
         if elapsed < 0.0 or self.shown == 0.0:  # another episode

@@ -14,7 +14,8 @@ import pytest
 from poise.configs.errors import PoiseError
 from poise.envs.physics.simulation import Simulation
 from poise.envs.pushes.push import Push
-from poise.envs.robots.robot import load_robot
+from poise.envs.robots.robot import load_robot, on_terrain
+from poise.envs.terrain.stairs import Stairs
 from poise.envs.viewing import renderer as rendering
 from poise.envs.viewing import window as viewer
 from poise.envs.viewing.appearance import FIELD_OF_VIEW
@@ -159,6 +160,24 @@ def test_camera_follows_with_a_delay_and_starts_afresh(can_render, simulation, r
     simulation.reset(robot.standing_qpos)
     renderer.render()
     assert renderer.view.lookat[0] == pytest.approx(simulation.state.com[0], abs=1e-9)
+    renderer.close()
+
+
+def test_camera_climbs_with_the_robot(can_render, robot):
+    """On the landing above nine stairs it looks as high above the ground as at their foot."""
+    climber = on_terrain(robot, Stairs())
+    simulation = Simulation(climber)
+    renderer = SceneRenderer(simulation, human=False, width=32, height=32)
+    renderer.render()
+    at_the_foot = renderer.view.lookat[2]
+    landing = climber.terrain.surfaces()[-1]
+    above = robot.standing_qpos.copy()
+    above[0] += landing.x_min + 0.5
+    above[2] += landing.height
+    simulation.reset(above)
+    renderer.render()
+    assert landing.height == pytest.approx(0.9)
+    assert renderer.view.lookat[2] - at_the_foot == pytest.approx(landing.height, abs=1e-9)
     renderer.close()
 
 
