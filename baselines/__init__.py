@@ -15,8 +15,13 @@ __all__ = [
     "CompiledController",
     "Controller",
     "GaitCommand",
+    "IkGoal",
+    "IkOptions",
+    "IkResult",
+    "InverseKinematics",
     "MomentumQP",
     "MomentumQPConfig",
+    "PosePrior",
     "ReferenceMotion",
     "ResidualBalanceEnv",
     "ResidualScales",
@@ -31,6 +36,7 @@ __all__ = [
     "WrappedController",
     "load_controller",
     "load_motion",
+    "solve_ik",
 ]
 
 if TYPE_CHECKING:
@@ -46,6 +52,10 @@ if TYPE_CHECKING:
     from poise.baselines.environments.stepping import ResidualStepEnv
     from poise.baselines.environments.walking import ResidualWalkEnv
     from poise.baselines.environments.whole import ResidualWholeEnv
+    from poise.baselines.inverse_kinematics.goals import IkGoal
+    from poise.baselines.inverse_kinematics.options import IkOptions, IkResult
+    from poise.baselines.inverse_kinematics.prior import PosePrior
+    from poise.baselines.inverse_kinematics.solve import InverseKinematics, solve_ik
     from poise.baselines.motions.motion import load_motion
     from poise.baselines.motions.reference_motion import ReferenceMotion
     from poise.baselines.registry import load_controller
@@ -72,6 +82,10 @@ else:
             "environments.stepping": ("ResidualStepEnv",),
             "environments.walking": ("ResidualWalkEnv",),
             "environments.whole": ("ResidualWholeEnv",),
+            "inverse_kinematics.goals": ("IkGoal",),
+            "inverse_kinematics.options": ("IkOptions", "IkResult"),
+            "inverse_kinematics.prior": ("PosePrior",),
+            "inverse_kinematics.solve": ("InverseKinematics", "solve_ik"),
             "motions.motion": ("load_motion",),
             "motions.reference_motion": ("ReferenceMotion",),
             "registry": ("load_controller",),

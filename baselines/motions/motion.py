@@ -4,13 +4,15 @@ A motion names no joint of any robot. Its keyframes move *roles* such as `knees`
 robot's description maps to its own joints (`roles:` in configs/robots/*.yaml).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from scipy.interpolate import BSpline, PPoly
 
+from poise.baselines.clips.interpolation import MOST_OF_POLYNOMIAL, curve_through
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
@@ -24,6 +26,7 @@ from .splines import piecewise, rest_spline
 
 SAMPLING = 0.02  # [s] between the postures whose height and root orientation are computed
 BALANCE_TOLERANCE = 1e-6  # [m]
+Interpolation = Literal["rest", "linear", "hermite", "catmull-rom", "cubic", "polynomial"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class Keyframe:
     time: float = field(metadata={"min": 0.0})  # [s]
     roles: dict[str, float] = field(default_factory=dict)  # role → offset from standing [deg]
     com: tuple[float, float] = (0.0, 0.0)  # offset forward, left, in `com_unit`
+    rates: dict[str, float] = field(default_factory=dict)  # role → [deg/s], for `hermite`
 
 
 @dataclass(frozen=True)
@@ -47,8 +51,9 @@ class Balance:
 class MotionDescription:
     """A motion as data, for any robot that has its roles; configs/motions/*.yaml.
 
-    Every motion starts and ends at rest. With `loop` it repeats for ever, which needs a last
-    keyframe equal to the first; without, the last keyframe is held.
+    Between the keyframes angles and CoM go as `interpolation` says: `rest` is C² and at rest at
+    both ends, the others are in `clips.interpolation`. With `loop` the motion repeats for ever,
+    which needs a last keyframe equal to the first; without, the last keyframe is held.
     `com_unit` fraction: of the half size of the box around the soles, forward and left.
     """
 
@@ -56,6 +61,7 @@ class MotionDescription:
     loop: bool = False
     com_unit: Literal["fraction", "m"] = "fraction"
     balance: Balance = field(default_factory=Balance)
+    interpolation: Interpolation = "rest"
 
     def __post_init__(self):
         times = [key.time for key in self.keyframes]
@@ -64,8 +70,14 @@ class MotionDescription:
         if any(b - a < 0.05 for a, b in pairwise(times)):
             raise ValueError(f"keyframes: times must increase by at least 0.05 s, not {times}")
         first, last = self.keyframes[0], self.keyframes[-1]
-        if self.loop and (first.roles, first.com) != (last.roles, last.com):
+        if self.loop and replace(first, time=0.0) != replace(last, time=0.0):
             raise ValueError("keyframes: the last of a loop must be equal to the first")
+        if self.interpolation != "hermite" and any(key.rates for key in self.keyframes):
+            raise ValueError("keyframes: rates are for the interpolation hermite only")
+        if not self.loop and (first.rates or last.rates):
+            raise ValueError("keyframes: the first and the last are held and have no rates")
+        if self.interpolation == "polynomial" and len(times) > MOST_OF_POLYNOMIAL:
+            raise ValueError(f"keyframes: a polynomial goes through at most {MOST_OF_POLYNOMIAL}")
 
 
 def load_motion(motion: str | Path | ReferenceMotion, robot: Robot) -> ReferenceMotion:
@@ -102,7 +114,10 @@ def make_motion(
     times = np.array([key.time for key in description.keyframes])
     if len(times) == 1:  # a posture that is held
         times, postures, com = np.array([0.0, 1.0]), postures[[0, 0]], com[[0, 0]]
-    joints, com_xy = rest_spline(times, postures), rest_spline(times, com)
+    standing = robot.standing_qpos[7:]
+    keys = description.keyframes
+    rates = [_posture(key.rates, robot, source, "rates") - standing for key in keys]
+    joints, com_xy = _curves(description.interpolation, times, postures, com, np.array(rates))
 
     # height and root orientation follow from the joints
     dense = np.linspace(times[0], times[-1], 1 + int(np.ceil(times[-1] / SAMPLING)))
@@ -115,7 +130,19 @@ def make_motion(
     return ReferenceMotion(name, knots, coeffs, description.loop)
 
 
-def _posture(roles: dict[str, float], robot: Robot, source: str) -> np.ndarray:
+def _curves(
+    kind: Interpolation, times: np.ndarray, joints: np.ndarray, com: np.ndarray, rates: np.ndarray
+) -> tuple[BSpline | PPoly, BSpline | PPoly]:
+    """Curves of joints (n, nj) and CoM (n, 2); the CoM has no rates of its own."""
+    if kind == "rest":
+        return rest_spline(times, joints), rest_spline(times, com)
+    given = rates if kind == "hermite" and len(rates) == len(times) else None
+    return curve_through(kind, times, joints, given), curve_through(kind, times, com)
+
+
+def _posture(
+    roles: dict[str, float], robot: Robot, source: str, field: str = "roles"
+) -> np.ndarray:
     """(nj,) standing posture plus the roles' offsets [deg]."""
     q = robot.standing_qpos[7:].copy()
     names = list(robot.joint_names)
@@ -125,7 +152,7 @@ def _posture(roles: dict[str, float], robot: Robot, source: str) -> np.ndarray:
             raise ConfigError(
                 f"robot {robot.name!r} has no role {shown(role)}",
                 source=source,
-                field="roles",
+                field=field,
                 choices=known,
             )
         scales = match_names(known[role], names, robot.name, f"roles.{role}")

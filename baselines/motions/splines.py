@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline, PPoly, make_interp_spline
 
 from poise.envs.compiled.jit import compiled
 
@@ -26,12 +26,12 @@ def rest_spline(times: np.ndarray, values: np.ndarray) -> BSpline:
     return make_interp_spline(times, values, k=3, t=knots, bc_type=(rest, rest))
 
 
-def piecewise(splines: Sequence[BSpline]) -> tuple[np.ndarray, np.ndarray]:
-    """Knots (k+1,) and coefficients (k, 4, m) of cubic splines over one span, side by side.
+def piecewise(splines: Sequence[BSpline | PPoly]) -> tuple[np.ndarray, np.ndarray]:
+    """Knots (k+1,) and coefficients (k, 4, m) of cubic curves over one span, side by side.
 
     On [knots[i], knots[i+1]) the value is Σ_p coeffs[i, p] (t − knots[i])^p.
     """
-    knots = np.unique(np.concatenate([spline.t for spline in splines]))
+    knots = np.unique(np.concatenate([s.t if isinstance(s, BSpline) else s.x for s in splines]))
     keep = np.concatenate([[True], np.diff(knots) > 1e-9 * (knots[-1] - knots[0])])
     knots = knots[keep]
     left, middle = knots[:-1], 0.5 * (knots[:-1] + knots[1:])

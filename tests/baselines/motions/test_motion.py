@@ -188,3 +188,74 @@ def test_an_unknown_motion_lists_the_known(robot):
     """load_motion names the packaged motions."""
     with pytest.raises(ConfigError, match="arm_swing"):
         load_motion("dance", robot)
+
+
+KEYED = {
+    "keyframes": [
+        {"time": 0.0},
+        {"time": 1.0, "roles": {"shoulder_pitch_left": 20.0}, "com": [0.2, 0.0]},
+        {"time": 1.6, "roles": {"shoulder_pitch_left": 5.0}},
+        {"time": 3.0},
+    ]
+}
+
+
+@pytest.mark.parametrize("kind", ["linear", "hermite", "catmull-rom", "cubic", "polynomial"])
+def test_keyframes_are_met_whatever_is_between_them(robot, kind):
+    """Angles and CoM; `rest` is what a motion is without the field."""
+    motion = motion_of({**KEYED, "interpolation": kind}, robot)
+    default, rest = (motion_of(data, robot) for data in (KEYED, {**KEYED, "interpolation": "rest"}))
+    assert np.array_equal(default.coeffs, rest.coeffs)
+    assert not np.allclose(motion.sample(0.5).q_ref, rest.sample(0.5).q_ref, atol=1e-4)
+    for key in KEYED["keyframes"]:
+        ours, theirs = motion.sample(key["time"]), rest.sample(key["time"])
+        np.testing.assert_allclose(ours.q_ref, theirs.q_ref, atol=1e-9)
+        np.testing.assert_allclose(ours.com_offset[:2], theirs.com_offset[:2], atol=1e-9)
+        np.testing.assert_allclose(ours.com_offset[2], theirs.com_offset[2], atol=2e-4)
+
+
+def test_rates_of_keyframes_are_those_of_the_motion(robot):
+    """Given in degrees a second, per role; what has none stands still in the keyframe."""
+    data = {"interpolation": "hermite", "keyframes": [dict(key) for key in KEYED["keyframes"]]}
+    data["keyframes"][1]["rates"] = {"shoulder_pitch_left": -30.0}
+    motion = motion_of(data, robot)
+    still = motion_of({**KEYED, "interpolation": "hermite"}, robot)
+    assert not still.sample(1.0).v_ref.any()
+    rate = motion.sample(1.0).v_ref
+    turn = motion.sample(1.0).q_ref - robot.standing_qpos[7:]
+    np.testing.assert_allclose(rate, -1.5 * turn, atol=1e-9)  # 20 degrees, -30 a second
+    assert rate.any()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"interpolation": "bezier"}, ["interpolation", "'bezier'", "catmull-rom"]),
+        (
+            {"keyframes": [{"time": 0.0, "rates": {"shoulder_pitch_left": 1.0}}]},
+            ["rates", "hermite"],
+        ),
+        (
+            {
+                "interpolation": "hermite",
+                "keyframes": [{"time": 0.0, "rates": {"shoulder_pitch_left": 1.0}}],
+            },
+            ["first and the last", "rates"],
+        ),
+        (
+            {"interpolation": "polynomial", "keyframes": [{"time": 0.1 * i} for i in range(17)]},
+            ["polynomial", "at most 16"],
+        ),
+        (
+            {
+                "interpolation": "hermite",
+                "keyframes": [{"time": 0.0}, {"time": 1.0, "rates": {"tail": 1.0}}, {"time": 2.0}],
+            },
+            ["rates", "'tail'", "knees"],
+        ),
+    ],
+)
+def test_wrong_interpolations_are_errors(robot, change, words):
+    with pytest.raises(ConfigError) as caught:
+        motion_of({**KEYED, **change}, robot)
+    assert all(word in str(caught.value) for word in ["x.yaml", *words]), caught.value
