@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -42,6 +42,7 @@ class Skeleton:
         end_parents: (E,) joints on which an end site hangs.
         end_offsets: (E, 3) place of the end sites in the axes of these joints [m].
         orders: of the three rotations that a file gives for each joint, such as ``ZYX``.
+        known: role → joint where this is known otherwise than by the names.
     """
 
     names: tuple[str, ...]
@@ -50,6 +51,7 @@ class Skeleton:
     end_parents: np.ndarray
     end_offsets: np.ndarray
     orders: tuple[str, ...]
+    known: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for array in (self.parents, self.offsets, self.end_parents, self.end_offsets):
@@ -82,8 +84,16 @@ class Skeleton:
 
     @cached_property
     def roles(self) -> dict[str, int]:
-        """Role, such as ``knee_left``, → joint, as far as the names tell them."""
-        return find_roles(self.names)
+        """Role, such as ``knee_left``, → joint, as far as it is known or the names tell it."""
+        return {**find_roles(self.names), **self.known}
+
+    def same_as(self, other: Skeleton) -> bool:
+        """True for the same names, parents and offsets, to a micrometre."""
+        return (
+            self.names == other.names
+            and np.array_equal(self.parents, other.parents)
+            and np.allclose(self.offsets[1:], other.offsets[1:], rtol=0.0, atol=1e-6)
+        )
 
     def joint(self, role: str, source: str | None = None) -> int:
         """The joint of a role; raises ConfigError if no joint has a name that says it."""

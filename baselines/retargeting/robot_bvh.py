@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.rotations import from_scipy, inverse, multiply, to_scipy
-from poise.baselines.clips.skeleton import Skeleton
+from poise.baselines.clips.skeleton import ROLES, Skeleton
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .limbs import find_limbs
+from .limbs import Point, find_limbs
 
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
@@ -33,7 +33,8 @@ def robot_skeleton(robot: Robot) -> Skeleton:
     above = [_joint_above(model, joint) for joint in range(1, model.njnt)]
     anchors = np.array([data.qpos[:3], *data.xanchor[1:]])
     offsets = np.array([np.zeros(3), *(anchors[j + 1] - anchors[p] for j, p in enumerate(above))])
-    hands = [(body, place) for role, point in find_limbs(robot).points.items()
+    points = find_limbs(robot).points
+    hands = [(body, place) for role, point in points.items()
              if role.startswith("hand") for body, place in point.parts]  # fmt: skip
     feet = [(sole.body_id, sole.position) for sole in robot.soles]
     ends = [(_last_joint(model, body), data.xpos[body] + data.xmat[body].reshape(3, 3) @ place)
@@ -45,6 +46,7 @@ def robot_skeleton(robot: Robot) -> Skeleton:
         np.array([joint for joint, _ in ends]),
         np.array([place - anchors[joint] for joint, place in ends]),
         ("ZYX",) * model.njnt,
+        {role: _hinge_at(model, points[role]) for role in ROLES if role in points},
     )
 
 
@@ -105,6 +107,14 @@ def _last_joint(model: mujoco.MjModel, body: int) -> int:
     while model.body_jntnum[body] == 0:
         body = int(model.body_parentid[body])
     return int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
+
+
+def _hinge_at(model: mujoco.MjModel, point: Point) -> int:
+    """The first joint at an anchor: other hinges of the same limb's joint hang on it."""
+    body, place = point.parts[0]
+    first = int(model.body_jntadr[body])
+    joints = range(first, first + int(model.body_jntnum[body]))
+    return next(joint for joint in joints if np.array_equal(model.jnt_pos[joint], place))
 
 
 def _joint_above(model: mujoco.MjModel, joint: int) -> int:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.clips.bvh import read_bvh, write_bvh
+from poise.baselines.clips.groups import GROUPS
 from poise.baselines.retargeting.robot_bvh import clip_of_robot, robot_qpos
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
@@ -57,3 +58,15 @@ def test_what_no_robot_can_do_is_refused() -> None:
     bent = type(clip)("bent", clip.skeleton, clip.dt, clip.root, rotations)
     with pytest.raises(ConfigError, match="beside its axis in frame 1"):
         robot_qpos(bent, robot)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_limbs_are_roles_of_the_skeleton(name: str) -> None:
+    """So groups of links are found, and the standing robot faces x."""
+    robot = robot_named(name)
+    clip = clip_of_robot(robot, np.repeat(robot.standing_qpos[None], 2, axis=0), 0.02, name)
+    legs = GROUPS["legs"].joints(clip.skeleton)
+    hinges = {clip.skeleton.names.index(joint) for joint in robot.joint_names}
+    assert set(legs) <= hinges and len(legs) >= 8
+    assert not set(legs) & set(GROUPS["arms"].joints(clip.skeleton))
+    assert clip.facing() == pytest.approx(0.0, abs=1e-6)

@@ -1,0 +1,66 @@
+"""A tree as text: what `parse` reads as the same tree."""
+
+from __future__ import annotations
+
+from poise.configs.errors import ConfigError, shown
+
+from .tree import Arrow, ClipName, Modifier, Overlay, Script, Sequence, StateName, Term
+
+
+def text_of(script: Script) -> str:
+    """The text of a script: a line for each definition, one for the sequence.
+
+    Raises ConfigError for a name with a quote or a line break in it, which no text has.
+    """
+    lines = [f"{define.name} = {sequence_text(define.sequence)};" for define in script.defines]
+    return "\n".join([*lines, sequence_text(script.sequence)]) + "\n"
+
+
+def sequence_text(sequence: Sequence) -> str:
+    """A sequence without brackets about it."""
+    parts = [overlay_text(sequence.overlays[0])]
+    for arrow, overlay in zip(sequence.arrows, sequence.overlays[1:], strict=True):
+        parts += [arrow_text(arrow), overlay_text(overlay)]
+    return " ".join(parts)
+
+
+def overlay_text(overlay: Overlay) -> str:
+    """Terms with `|` between them."""
+    return " | ".join(term_text(term) for term in overlay.terms)
+
+
+def term_text(term: Term) -> str:
+    """A motion and its modifiers."""
+    return " ".join([_body(term.body), *(_modifier(modifier) for modifier in term.modifiers)])
+
+
+def arrow_text(arrow: Arrow) -> str:
+    """`->`, or with what was chosen by hand."""
+    if not arrow.kind:
+        return "->"
+    options = [f"{name}: {number_text(value)}" for name, value in arrow.options]
+    return f"->{{{', '.join([arrow.kind, *options])}}}"
+
+
+def number_text(value: float) -> str:
+    """The shortest text of a number that is read as the same."""
+    return repr(float(value)).removesuffix(".0")
+
+
+def _body(body: ClipName | StateName | Sequence) -> str:
+    if isinstance(body, Sequence):
+        return f"({sequence_text(body)})"
+    if isinstance(body, StateName):
+        return f"<{body.name}>"
+    if '"' in body.name or "\n" in body.name:
+        raise ConfigError(f"cannot be quoted: {shown(body.name)}", field="clip")
+    return f'"{body.name}"' if body.quoted else body.name
+
+
+def _modifier(modifier: Modifier) -> str:
+    numbers = [number_text(value) for value in modifier.numbers]
+    if modifier.kind == "[":
+        return f"[{numbers[0]}:{numbers[1]}]"
+    if modifier.kind == "on":
+        return f"on {', '.join(modifier.names)}"
+    return " ".join([modifier.kind, *numbers])

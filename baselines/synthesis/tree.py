@@ -1,0 +1,112 @@
+"""What a script says, as a tree. Places in the text are kept for errors and count in no comparison.
+
+    script   = { define } sequence ;
+    define   = NAME "=" sequence ";" ;
+    sequence = overlay { arrow overlay } ;
+    arrow    = "->" [ "{" kind { "," option } "}" ] ;
+    overlay  = term { "|" term } ;
+    term     = ( clip | state | "(" sequence ")" ) { modifier } ;
+    clip     = STRING | NAME ;
+    state    = "<" NAME ">" ;
+    modifier = "*" NUMBER | "@" NUMBER | "[" NUMBER ":" NUMBER "]" | "on" NAME { "," NAME }
+             | "mirrored" | "weight" NUMBER ;
+    kind     = "insert" | "cross" | "capture" | "inertial" | "physical" ;
+    option   = NUMBER | NAME ":" NUMBER ;
+
+`|` is overlay, both at once, and binds tighter than `->`; the first term of an overlay is the base.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+KINDS = ("insert", "cross", "capture", "inertial", "physical")
+OPTIONS = ("duration",)  # the first is the one without a name
+
+ModifierKind = Literal["*", "@", "[", "on", "mirrored", "weight"]
+
+
+@dataclass(frozen=True)
+class ClipName:
+    """A clip by its name; one that is quoted is never a name that the script defines."""
+
+    name: str
+    quoted: bool = False
+    at: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True)
+class StateName:
+    """A posture by its name: where the whole begins, or ends."""
+
+    name: str
+    at: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True)
+class Modifier:
+    """What is done with a term.
+
+    Attributes:
+        kind: `*` repeats, `@` is the speed, `[` cuts, `on` are link groups.
+        numbers: one of `*`, `@` and weight; two times [s] of `[`.
+        names: the link groups of `on`.
+    """
+
+    kind: ModifierKind
+    numbers: tuple[float, ...] = ()
+    names: tuple[str, ...] = ()
+    at: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True)
+class Term:
+    """A clip, a state or a sequence in brackets, with its modifiers in order."""
+
+    body: ClipName | StateName | Sequence
+    modifiers: tuple[Modifier, ...] = ()
+    at: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Terms at once; the first one is the base."""
+
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """A transition: any if `kind` is empty, else one by hand, with its options."""
+
+    kind: str = ""
+    options: tuple[tuple[str, float], ...] = ()
+    at: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """Overlays one after the other, with an arrow before each but the first."""
+
+    overlays: tuple[Overlay, ...]
+    arrows: tuple[Arrow, ...] = ()
+
+
+@dataclass(frozen=True)
+class Define:
+    """A name for a sequence, in what follows."""
+
+    name: str
+    sequence: Sequence
+    at: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True)
+class Script:
+    """A script; `text` and `source` are for errors."""
+
+    defines: tuple[Define, ...]
+    sequence: Sequence
+    text: str = field(default="", compare=False)
+    source: str = field(default="script", compare=False)
