@@ -106,7 +106,20 @@ class ResidualBalanceEnv(ControlledEnv):
         self.motion = load_motion(motion, self.robot)
         self.targets = Targets.standing(self.robot, self.simulation.state)
         self._targets = self.targets.arrays()
-        self._motion = motion_arrays(self.motion)
+
+    @property
+    def motion(self) -> ReferenceMotion:
+        """The reference; may be replaced between episodes.
+
+        Raises ConfigError for one of another robot.
+        """
+        return self._reference
+
+    @motion.setter
+    def motion(self, motion: ReferenceMotion) -> None:
+        self._reference = load_motion(motion, self.robot)
+        self._motion = motion_arrays(self._reference)
+        self._unbind()
 
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; robot and motion are shared.

@@ -36,10 +36,10 @@ FLOORS = """
 10 baselines/walking
 11 baselines/registry
 12 baselines/environments
-13 training/learning
+13 training/learning, training/tracking
 14 training/trials
-15 training/figures, training/standalone, training/suites, training/tuning
-16 training/evaluation, training/following, training/qp_set, training/robot_check
+15 training/figures, training/following, training/standalone, training/suites, training/tuning
+16 training/evaluation, training/qp_set, training/robot_check
 17 training/gaits, training/results
 18 training/export, training/report, training/sessions
 19 training/view

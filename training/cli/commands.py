@@ -66,6 +66,7 @@ def evaluate(
     trials: int | None = None,
     limits: str | None = None,
     write_limits: Path | None = None,
+    motions: tuple[str, ...] = (),
     overwrite: Switch = False,
     allow: Allow = (),
 ) -> int:
@@ -79,8 +80,8 @@ def evaluate(
         controllers: a name of `poise list`, such as residual (a shipped policy), zero (no torque),
             a .yaml file of a controller, a folder written by poise train, with --seeds too, or
             module:Class.
-        suite: random, envelope, grid, quiet, repeated, in-step, those of poise benchmark, or a
-            .yaml file.
+        suite: random, envelope, grid, quiet, repeated, in-step, follow, those of poise benchmark,
+            or a .yaml file.
         out: folder to write to; out/SUITE if not given.
         robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the trials.
@@ -92,6 +93,8 @@ def evaluate(
         limits: a .yaml file that pushes are measured by; if not given, the packaged file of the
             robot, else its ankle limit.
         write_limits: write the first controller's J50s to this file, for --limits.
+        motions: what is performed in the suite follow: packaged clips or motions, .bvh, .npz or
+            .yaml files; its own if not given.
         overwrite: replace what the folder holds.
     """
     from poise.training.evaluation.evaluate import evaluate, measured_limits
@@ -99,7 +102,8 @@ def evaluate(
     folder = Path("out") / Path(suite).stem if out is None else out
     summary = evaluate(
         controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, limits=limits, overwrite=overwrite, console=terminal(), allow=allow,
+        trials=trials, limits=limits, motions=motions, overwrite=overwrite, console=terminal(),
+        allow=allow,
     )  # fmt: skip
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)

@@ -35,6 +35,7 @@ def evaluate(
     backend: str = "local",
     trials: int | None = None,
     limits: str | Path | None = None,
+    motions: Sequence[str] = (),
     overwrite: bool = False,
     console: Console | None = None,
     allow: str | Iterable[str] = (),
@@ -58,6 +59,7 @@ def evaluate(
         trials: instead of the number of the suite's only part (of an envelope, in its second
             stage); of a suite of several parts, at most as many in every cell.
         limits: what pushes are measured by, see `load_limits`.
+        motions: names and files of motions, for a suite that performs some, instead of its own.
         overwrite: replace what `out` holds.
         console: where progress and tables are printed; None: nowhere.
         allow: controllers from outside (``module:Class``) that may run though they are not among
@@ -71,7 +73,7 @@ def evaluate(
         raise ConfigError("give at least one", field="controller")
     run = Run(
         controllers, suite, out, robot, seed, workers, backend, trials, overwrite, console,
-        reference=None, measured=lambda loaded: load_limits(loaded, limits),
+        reference=None, measured=lambda loaded: load_limits(loaded, limits), motions=motions,
     )  # fmt: skip
     return run.play(plots=True)
 

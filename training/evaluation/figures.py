@@ -25,6 +25,7 @@ from poise.training.trials.step_limits import NStepLimit
 from poise.training.trials.trial import Outcome
 
 from .factors import eurobench_figures, factor_figures
+from .motions import in_motion, motion_levels
 from .played import (
     DIRECTIONAL,
     Played,
@@ -54,6 +55,8 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
         entry["phases"] = phase_figures(pushed, entry)
     if walks := walk_levels(played, plan.suite.duration):
         entry["walks"] = walks
+    if motions := motion_levels(played):
+        entry["motions"], entry["in_motion"] = motions, in_motion(played)
     if random := part(played, "random"):
         entry.update(_fractions(random, plan.limits))
     if factors := factor_figures(part(played, "factors"), plan.standard):

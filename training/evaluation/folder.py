@@ -42,6 +42,7 @@ class Settings:
         limits: what pushes are measured by; None: the ankle limit.
         versions: of what computes the result.
         controllers: name → fingerprint, in the order in which they came.
+        motions: name → hash of the motions that are performed.
     """
 
     format: int
@@ -53,6 +54,7 @@ class Settings:
     limits: LimitTable | None
     versions: dict[str, str]
     controllers: dict[str, str]
+    motions: dict[str, str] = field(default_factory=dict, metadata={"omit": "default"})
 
 
 class ResultFolder:

@@ -13,7 +13,7 @@ from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.trial import Outcome, Trial
 
 Played = Sequence[tuple[Trial, Outcome]]  # by one controller, in the order of the numbers
-RATED = "mix"  # the part that the counts are of, where a suite has it
+RATED = ("mix", "motions")  # parts that the counts are of, where a suite has one
 DIRECTIONAL = ("envelope", "grid", "walk_push")  # parts that J50 of each direction is fitted to
 SECTOR = 45.0  # [deg] in which random directions are counted together
 
@@ -25,7 +25,7 @@ def part(played: Played, *names: str) -> Played:
 
 def rated(played: Played) -> Played:
     """The trials that a controller is rated by: those of the mix, else all."""
-    return part(played, RATED) or played
+    return part(played, *RATED) or played
 
 
 def pushes(played: Played) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -26,8 +26,8 @@ from poise.training.running.terminal import print_paths, progress_bar
 from poise.training.suites.draw import MOST_TRIALS
 from poise.training.suites.plan import Plan
 from poise.training.suites.suite import load_suite
-from poise.training.trials.agents import Agent, check_walks
-from poise.training.trials.jobs import Job, Stage, play
+from poise.training.trials.agents import Agent, check_follows, check_walks
+from poise.training.trials.jobs import Job, play
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import NStepLimit, curves, stepping_limits
 from poise.training.trials.table import trial_row
@@ -35,6 +35,7 @@ from poise.training.trials.trial import Trial
 
 from .figures import controller_entry, robot_figures
 from .folder import ResultFolder, Settings
+from .motions import suite_repertoire, suite_stage
 from .pairs import pair_figures
 from .played import RATED, Played
 from .plots import draw_plots
@@ -49,6 +50,7 @@ class Run:
     """One call of `evaluate` or `benchmark`, whose arguments it takes; checks them.
 
     Args:
+        motions: that are performed instead of the suite's; none: its own.
         reference: whom others are compared with, if it takes part; None: the first.
         measured: what pushes on the robot are measured by.
     """
@@ -57,23 +59,31 @@ class Run:
         self, controllers: Sequence[str], suite: str | Path, out: str | Path, robot: str, seed: int,
         workers: int | None, backend: str, trials: int | None, overwrite: bool,
         console: Console | None, *, reference: str | None,
-        measured: Callable[[Robot], PushLimits],
+        measured: Callable[[Robot], PushLimits], motions: Sequence[str] = (),
     ):  # fmt: skip
         self.started, self.console = time.perf_counter(), console or Console(quiet=True)
         names = expand_seeds(controllers)
         _check(names, seed, workers, trials)
         check_backend(backend)
-        self.suite = load_suite(suite) if trials is None else load_suite(suite).resized(trials)
+        self.suite = load_suite(suite)
+        if motions:
+            self.suite = self.suite.performing(motions)
+        if trials is not None:
+            self.suite = self.suite.resized(trials)
         self.robot, self.out = load_robot(robot), Path(out)
         self.limits, self.reference = measured(self.robot), reference
         self.executor, self.overwrite = Executor(backend, workers), overwrite
-        Plan(self.suite, self.limits, seed, names)  # refuses what does not fit the robot
+        self.repertoire = suite_repertoire(self.suite, self.robot, self.out, overwrite)
+        self._plan(seed, names)  # refuses what does not fit the robot
         prepare()
-        self.stage = Stage(robot, self.suite.duration, self.suite.noise)
+        self.stage = suite_stage(self.suite, robot, self.out)
         self.agents = {name: self.stage.load(name, self.robot) for name in names}
         if self.suite.walks:
             for name, agent in self.agents.items():
                 check_walks(name, agent, f"suite {suite}")
+        if self.suite.motions is not None:
+            for name, agent in self.agents.items():
+                check_follows(name, agent, f"suite {suite}")
         self.settings = Settings(
             format=FORMAT,
             suite_name=str(suite),
@@ -84,7 +94,11 @@ class Run:
             limits=self.limits.table,
             versions=versions(("mujoco", "numpy", "numba")),
             controllers={name: agent.fingerprint for name, agent in self.agents.items()},
+            motions=self.repertoire.digests,
         )
+
+    def _plan(self, seed: int, names: Sequence[str]) -> Plan:
+        return Plan(self.suite, self.limits, seed, names, self.repertoire.durations)
 
     def play(self, plots: bool = False, timed: bool = False) -> Summary:
         """Play what is missing and write the result; returns the summary."""
@@ -94,9 +108,10 @@ class Run:
               "the same command goes on")  # fmt: skip
         with closing(folder):
             self._announce(folder)
+            self.repertoire.write(self.out)
             names = tuple(folder.settings.controllers)
             agents = {name: self.agents[name] for name in names}
-            plan = Plan(self.suite, self.limits, self.settings.seed, names)
+            plan = self._plan(self.settings.seed, names)
             _warm_up(agents.values())
             self._play(folder, plan)
             played: dict[str, Played] = {
@@ -136,7 +151,7 @@ class Run:
             "suite": settings.suite_name,
             "seed": settings.seed,
             "robot": robot_figures(self.limits),
-            "rated": RATED if RATED in suite.parts else None,
+            "rated": next((name for name in RATED if name in suite.parts), None),
             "scale": self.limits.scale,
             "reference": reference,
             "ranking": ranked(entries),

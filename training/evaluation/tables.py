@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from poise.training.following.motion_tables import motion_tables
 from poise.training.running.summary import Entry, Interval, Summary
 
 from .seed_groups import seed_lines
@@ -77,7 +78,7 @@ def print_summary(summary: Summary, console: Console) -> None:
         place = str(rank[name] or NONE)
         table.add_row(place, escape(name), *(text(name) for _, text in columns))
     console.print(table)
-    for each in walk_tables(summary):
+    for each in (*walk_tables(summary), *motion_tables(summary)):
         console.print(each)
     if summary["pairs"]:
         console.print(_pairs(summary))

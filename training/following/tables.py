@@ -28,8 +28,9 @@ def print_followed(trials: Sequence[Followed], title: str, console: Console) -> 
         ("joints, RMS", "joint_rms", np.degrees(1.0), "°"),
         ("bodies, mean distance", "body_error", 1e3, "mm"),
         ("the same, from the root", "body_error_root", 1e3, "mm"),
-        ("bodies in the last 0.5 s", "body_error_last", 1e3, "mm"),
-        ("a sole slid or stepped by", "slide", 1e3, "mm"),
+        ("bodies in the last second", "body_error_last", 1e3, "mm"),
+        ("centre of mass", "com_error", 1e3, "mm"),
+        ("a sole slid or stepped by", "sole_slide", 1e3, "mm"),
     ):
         values = [factor * getattr(trial, field) for trial in stood]
         text = f"{np.mean(values):.1f} {unit}, largest {max(values):.1f}" if values else "-"

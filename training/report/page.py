@@ -21,7 +21,7 @@ from poise.training.results.read import Record, Results, load_results
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
 from poise.training.running.terminal import print_paths
 
-from . import factors, plots, walking, words
+from . import factors, motions, plots, walking, words
 from . import tables as report_tables
 from .cells import Download, download
 from .palette import CARDS, variables
@@ -92,6 +92,8 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         "walks": walking.walk_table(results, order),
         "walk_costs": walking.cost_table(results, order),
         "phases": walking.phase_table(results, order),
+        "motions": motions.motion_table(results, order),
+        "in_motion": motions.in_motion_table(results, order),
         "smallest": report_tables.smallest(results, order),
     }
     cases, notes = _cases(results, baseline, order, films, console)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build
 from poise.envs.robots.robot import load_robot
+from poise.training.evaluation.motions import suite_stage
 from poise.training.running.files import SETTINGS
 from poise.training.suites.suite import Suite
 from poise.training.trials.agents import Agent
@@ -20,18 +21,21 @@ def player(results: Results, name: str, trial: Trial) -> Agent:
 
     Raises ConfigError if it or the robot has changed since.
     """
-    return AgentVariants(_agent(results, name)).under(trial.conditions, trial.terrain)
+    agent, stage = _agent(results, name)
+    motion = stage.motion(trial, agent.env.robot)
+    return AgentVariants(agent).under(trial.conditions, trial.terrain, motion)
 
 
-def _agent(results: Results, name: str) -> Agent:
+def _agent(results: Results, name: str) -> tuple[Agent, Stage]:
     settings, folder = results.settings, results.folder
     robot = load_robot(settings.robot)
     if robot.fingerprint != settings.robot_fingerprint:
         raise ConfigError(f"the robot {shown(settings.robot)} has changed since", source=folder,
                           field="robot_fingerprint")  # fmt: skip
     suite = build(Suite, settings.suite, str(folder / SETTINGS))
-    agent = Stage(settings.robot, suite.duration, suite.noise).load(name, robot)
+    stage = suite_stage(suite, settings.robot, folder)
+    agent = stage.load(name, robot)
     if agent.fingerprint != settings.controllers[name]:
         raise ConfigError(f"the controller {shown(name)} has changed since", source=folder,
                           field="controllers")  # fmt: skip
-    return agent
+    return agent, stage

@@ -199,6 +199,48 @@ class WalkLevel(Rate, WalkMeans, total=False):
     falls_per_minute_ci95: Interval | None
 
 
+class MotionMeans(TypedDict, total=False):
+    """Means over the trials that did not fall, see `Outcome`."""
+
+    joint_rms: Number
+    body_error: Number
+    body_error_root: Number
+    body_error_last: Number
+    com_error: Number
+    sole_slide: Number
+    mean_power: Number
+
+
+class MotionLevel(MotionMeans):
+    """A motion pushed by a share of J50; `motion` is null for all together."""
+
+    motion: str | None
+    share: float
+    trials: int
+    fallen: int
+    fallen_rate: float
+    fallen_ci95: Interval
+    solver_failures: int
+    steps_mean: Number
+
+
+class InMotion(TypedDict):
+    """J50 in a motion, as a share of the J50 by which its pushes were chosen.
+
+    `over_standing` is that over the same of standing. `motion` is null for the mean over all
+    motions, "standing" where it only stands; null where nothing was measured standing.
+    """
+
+    motion: str | None
+    trials: int
+    recovered: int
+    share50: float
+    share50_ci95: Interval
+    share50_bound: Bound
+    over_standing: Number
+    over_standing_ci95: Interval | None
+
+
 class PhaseJ50(TypedDict):
     """Pushes that begin in an eighth of a stride; `phase` is its middle, 0 where the left foot
     lands."""
@@ -236,6 +278,8 @@ class Entry(Played, Counts, EnvelopeFigures, Fractions, total=False):
     eurobench: Eurobench
     walks: list[WalkLevel]
     phases: list[PhaseJ50]
+    motions: list[MotionLevel]
+    in_motion: list[InMotion]
 
 
 class Paired(TypedDict, total=False):

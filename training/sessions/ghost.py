@@ -8,7 +8,7 @@ import numpy as np
 
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.envs.balance.base import BalanceEnv
-from poise.training.following.reference import ReferenceBodies, Stance
+from poise.training.tracking.reference import ReferenceBodies, Stance
 
 STILL = 1e-6  # [rad, m] by which a motion that only stands may change
 

@@ -43,7 +43,7 @@ class Envelope(Part):
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
         return draw.spread(
-            number, ((a, *self._range(draw, a), self.first_trials) for a in self._angles()), stage=1
+            number, ((a, *self._range(draw, a), self.first_trials) for a in self.angles), stage=1
         )
 
     def second_count(self, controllers: int) -> int:
@@ -53,8 +53,8 @@ class Envelope(Part):
         self, draw: Draw, number: int, first: Sequence[Trial], recovered: Recovered
     ) -> dict[str, list[Trial]]:
         def around(names: Iterable[str]) -> list[Trial]:
-            rough = ((angle, self._rough(first, recovered[name], angle))
-                     for angle in self._angles() for name in names)  # fmt: skip
+            rough = ((angle, self.rough(first, recovered[name], angle))
+                     for angle in self.angles for name in names)  # fmt: skip
             ranges = ((angle, (1.0 - self.spread) * j50, (1.0 + self.spread) * j50, self.trials)
                       for angle, j50 in rough)  # fmt: skip
             return draw.spread(number, ranges, stage=2)
@@ -63,7 +63,9 @@ class Envelope(Part):
             return dict.fromkeys(recovered, around(tuple(recovered)))
         return {name: around((name,)) for name in recovered}
 
-    def _angles(self) -> list[float]:
+    @property
+    def angles(self) -> list[float]:
+        """The directions [deg]."""
         return [360.0 * k / self.directions for k in range(self.directions)]
 
     def _range(self, draw: Draw, angle: float) -> Range:
@@ -75,7 +77,7 @@ class Envelope(Part):
             low, high = (fraction * limit for fraction in self.fractions)
         return low, high
 
-    def _rough(self, first: Sequence[Trial], recovered: Sequence[bool], angle: float) -> float:
+    def rough(self, first: Sequence[Trial], recovered: Sequence[bool], angle: float) -> float:
         """J50 [N·s] by the first stage."""
         here = [(trial.pushes[0].impulse, won) for trial, won in zip(first, recovered, strict=True)
                 if trial.pushes[0].direction == angle]  # fmt: skip

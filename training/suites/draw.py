@@ -49,6 +49,8 @@ class Marks(TypedDict, total=False):
     commands: tuple[TimedCommand, ...]
     kicks: tuple[Kick, ...]
     terrain: Terrain | None
+    motion: str | None
+    share: float | None
 
 
 class Draw:
@@ -59,10 +61,18 @@ class Draw:
         limits: what pushes are measured by.
         seed: of the suite.
         bodies: that are pushed; the first one by the standard push.
+        motions: name → duration [s] of the motions that are performed.
     """
 
-    def __init__(self, standard: Standard, limits: PushLimits, seed: int):
+    def __init__(
+        self,
+        standard: Standard,
+        limits: PushLimits,
+        seed: int,
+        motions: Mapping[str, float] | None = None,
+    ):
         self.standard, self.limits, self.seed = standard, limits, seed
+        self.motions = dict(motions or {})
         self.robot = limits.robot
         self.bodies = push_bodies(self.robot)
         if standard.body is not None:

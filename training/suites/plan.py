@@ -21,14 +21,22 @@ class Plan:
         suite: whose trials they are.
         limits: what pushes are measured by.
         names: of the controllers.
+        motions: name → duration [s] of the motions that are performed.
         first: trials of the first stage, which all controllers play.
         standard: factor → level of the standard case, as text; empty without factors.
         count: trials of all stages and controllers.
     """
 
-    def __init__(self, suite: Suite, limits: PushLimits, seed: int, names: Sequence[str]):
+    def __init__(
+        self,
+        suite: Suite,
+        limits: PushLimits,
+        seed: int,
+        names: Sequence[str],
+        motions: Mapping[str, float] | None = None,
+    ):
         self.suite, self.limits, self.names = suite, limits, tuple(names)
-        self._draw = Draw(suite, limits, seed)
+        self._draw = Draw(suite, limits, seed, motions)
         self._parts: list[tuple[Part, list[Trial], int]] = []  # with the second stage's number
         self.standard = standard_levels(self._draw) if suite.factors else {}
         number = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Many
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from poise.configs.schema import build, read_yaml
 from .directions import Envelope, Grid, Margin
 from .draw import Part, Standard
 from .factors import Factors, Mix
+from .motions import Motions
 from .random import Quiet, Random, Sequence
 from .terrains import Terrains
 from .walking import WALKING, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
@@ -38,12 +40,15 @@ class Suite(Standard):
     walk_kick: WalkKick | None = field(default=None, metadata={"omit": "default"})
     walk_repeated: WalkRepeated | None = field(default=None, metadata={"omit": "default"})
     terrains: Terrains | None = field(default=None, metadata={"omit": "default"})
+    motions: Motions | None = field(default=None, metadata={"omit": "default"})
 
     def __post_init__(self) -> None:
         if not self.parts:
             raise ValueError(f"needs one part or more: {', '.join(PARTS)}")
         if self.walk_push is not None and (self.envelope or self.grid):
             raise ValueError("walk_push: J50 is that of a walk or of standing, not of both")
+        if self.motions is not None and len(self.parts) > 1:
+            raise ValueError("motions: must be the only part: what a fall is, depends on them")
 
     @property
     def parts(self) -> dict[str, Part]:
@@ -60,6 +65,12 @@ class Suite(Standard):
     def walks(self) -> bool:
         """True if it is for controllers that walk alone."""
         return any(name in WALKING for name in self.parts)
+
+    def performing(self, names: Many[str]) -> Suite:
+        """The suite with other motions; raises ConfigError where none is performed."""
+        if self.motions is None:
+            raise ConfigError("this suite performs no motions", field="motions")
+        return replace(self, motions=self.motions.performing(names))
 
     def resized(self, trials: int) -> Suite:
         """The suite with another number of trials in its only part; of several parts, with at most

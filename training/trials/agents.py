@@ -100,6 +100,15 @@ def check_walks(name: str, agent: Agent, source: str) -> None:
                           field="controller", choices=walking_controllers())  # fmt: skip
 
 
+def check_follows(name: str, agent: Agent, source: str) -> None:
+    """Raise ConfigError unless an agent tracks a reference; `source` is what asks for it."""
+    if not isinstance(agent.env, ResidualBalanceEnv):
+        raise ConfigError(
+            f"{shown(name)} follows no motion: name a controller that tracks a reference, or a "
+            "policy on one", source=source, field="controller",
+        )  # fmt: skip
+
+
 def _wherever(config: ControllerConfig) -> ControllerConfig:
     """The same for a policy's files in any folder: their digest tells them apart."""
     if isinstance(config, PolicyFileConfig):

@@ -5,9 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
+from poise.baselines.motions.motion import load_motion
+from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.envs.balance.config import StartNoise
 from poise.envs.robots.robot import Robot, load_robot
+from poise.training.tracking.record import ANYWHERE
 
 from .agents import Agent, load_agent
 from .play import run_trial
@@ -23,16 +27,28 @@ class Stage:
         robot: name or path.
         duration: of a trial [s].
         noise: of the start.
+        motions: name and file (or packaged name) of each motion that trials perform. Falls are
+            relative to these then.
     """
 
     robot: str | Path
     duration: float
     noise: StartNoise
+    motions: tuple[tuple[str, str], ...] = ()
 
     def load(self, controller: str, robot: Robot | None = None) -> Agent:
         """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
         robot = robot or _robot(self.robot)
-        return load_agent(controller, robot, duration=self.duration, pushes=None, noise=self.noise)
+        given: dict[str, Any] = {"duration": self.duration, "pushes": None, "noise": self.noise}
+        if self.motions:
+            given["fall"] = ANYWHERE
+        return load_agent(controller, robot, **given)
+
+    def motion(self, trial: Trial, robot: Robot | None = None) -> ReferenceMotion | None:
+        """The motion that a trial performs, or None. Raises ConfigError."""
+        if trial.motion is None:
+            return None
+        return load_motion(dict(self.motions)[trial.motion], robot or _robot(self.robot))
 
 
 @dataclass(frozen=True)
@@ -50,13 +66,25 @@ def play(job: Job) -> Outcome:
     Raises PoiseError when the controller cannot be loaded here: that is no trial.
     """
     variants = _loaded(job.stage, job.controller)
+    motion = _motion(job.stage, job.trial)
     try:
-        return run_trial(variants.under(job.trial.conditions, job.trial.terrain), job.trial)
+        agent = variants.under(job.trial.conditions, job.trial.terrain, motion)
+        return run_trial(agent, job.trial)
     except MemoryError:  # of this process, not of the controller
         raise
     except Exception as error:  # a controller from outside may raise anything
         del _variants[job.stage, job.controller]  # it may be broken: the next trial gets a new one
         return failed(error)
+
+
+def _motion(stage: Stage, trial: Trial) -> ReferenceMotion | None:
+    key = (stage, trial.motion)
+    if key not in _motions:
+        _motions[key] = stage.motion(trial)
+    return _motions[key]
+
+
+_motions: dict[tuple[Stage, str | None], ReferenceMotion | None] = {}  # of this process
 
 
 @lru_cache(maxsize=1)

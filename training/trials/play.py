@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
+from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.stepping.cop_region import foot_signs
 from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
+from poise.training.tracking.record import Tracking
 
 from .agents import Agent
 from .gait_figures import AIR_TIME, Walk
@@ -29,13 +31,17 @@ class SteppedTrial:
 
     Attributes:
         done: whether it has ended, by a fall or by time.
+        tracking: the record of the motion that the trial performs, or None.
     """
 
     def __init__(self, agent: Agent, trial: Trial):
-        self._agent, self.done = agent, False
-        self._observation, _ = agent.env.reset(seed=trial.seed, options=trial.options)
+        self._agent, self.done, env = agent, False, agent.env
+        self._observation, _ = env.reset(seed=trial.seed, options=trial.options)
         if agent.begin is not None:
             agent.begin()
+        self.tracking: Tracking | None = None
+        if trial.motion is not None and isinstance(env, ResidualBalanceEnv):
+            self.tracking = Tracking(env, [push.start for push in trial.pushes])
 
     def step(self) -> np.ndarray:
         """Take a policy step; returns its action (na,). Raises what the controller raises."""
@@ -43,6 +49,9 @@ class SteppedTrial:
         _, terminated, truncated = env.step_without_info(action)
         self._observation = env.episode.observation.astype(np.float32)
         self.done = terminated or truncated
+        if self.tracking is not None:
+            self.tracking.update()
+            self.done |= self.tracking.ended
         return action
 
 
@@ -51,7 +60,8 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     env, stepped = agent.env, SteppedTrial(agent, trial)
     settled = Settled()
     touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
-    sway = Sway() if trial.pushes and not trial.commands else None
+    stands = not trial.commands and stepped.tracking is None
+    sway = Sway() if trial.pushes and stands else None
     walk = WalkRecord() if trial.commands else None
     watches = [each for each in (sway, walk, watch) if each is not None]
     while not stepped.done:
@@ -65,6 +75,8 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
     outcome = _outcome(env, trial, settled, touchdowns.count)
     if walk is not None:
         return walked(env, trial, outcome, walk)
+    if stepped.tracking is not None:
+        return followed(env, outcome, stepped.tracking)
     if sway is None or not outcome.recovered:
         return outcome
     body, recovery = sway.of(trial.pushes[0], env.config.policy_period)
@@ -102,6 +114,18 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
         recovered = not env.fallen and walk.as_commanded(first)
         outcome = replace(outcome, recovered=recovered)
     return outcome
+
+
+def followed(env: BalanceEnv, outcome: Outcome, tracking: Tracking) -> Outcome:
+    """The outcome of a trial that performs a motion: `recovered` is to have not fallen."""
+    figures: dict[str, Any] = {
+        name: _finite(value) for name, value in asdict(tracking.figures()).items()
+    }
+    fallen, time = tracking.fallen, env.simulation.time
+    return replace(
+        outcome, **figures, fallen=fallen, fall_time=time if fallen else None,
+        recovered=not fallen, recovery_time=None, com_drift=None, foot_drift=None,
+    )  # fmt: skip
 
 
 def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -> Outcome:

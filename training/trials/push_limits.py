@@ -32,13 +32,16 @@ class PushLimits:
     Attributes:
         robot: the robot.
         table: J50 [N·s] of the baseline for 0.1 s square pushes, or None.
+        controller: whose J50 the table has, or None.
         standing: the robot's state at rest.
         scale: what `fraction` is a fraction of: "baseline J50", or "ankle limit" without a table.
     """
 
-    def __init__(self, robot: Robot, table: LimitTable | None = None):
+    def __init__(
+        self, robot: Robot, table: LimitTable | None = None, controller: str | None = None
+    ):
         prepare()  # several kernels at once, before this process compiles one after the other
-        self.robot, self.table = robot, table
+        self.robot, self.table, self.controller = robot, table, controller
         self.scale = "ankle limit" if table is None else "baseline J50"
         self.omega = robot.omega
         self.standing = Simulation(robot).state.copy()
@@ -56,6 +59,13 @@ class PushLimits:
         rays = self.standing.support_polygon - self.standing.com[:2]
         angles = np.arctan2(rays[:, 1], rays[:, 0]) - self.standing.heading_yaw
         return np.union1d(np.arange(0.0, 360.0, spacing), np.degrees(angles) % 360.0)
+
+    def j50(self) -> LimitTable:
+        """The table; raises ConfigError where none was measured."""
+        if self.table is None:
+            raise ConfigError(f"no J50 of {self.robot.name!r} was measured", field="share",
+                              choices=packaged("limits"))  # fmt: skip
+        return self.table
 
     def ankle(self, direction: float, duration: float) -> float:
         """Impulse J [N·s] of a square push that the ankles alone hold."""
@@ -90,7 +100,7 @@ def load_limits(robot: Robot, name: str | Path | None = None) -> PushLimits:
             source=path,
             field="fingerprint",
         )
-    return PushLimits(robot, measured.table)
+    return PushLimits(robot, measured.table, measured.controller)
 
 
 def write_limits(path: Path, robot: Robot, controller: str, table: LimitTable) -> None:

@@ -26,6 +26,7 @@ CONDITION_COLUMNS = tuple(Conditions.__dataclass_fields__)
 CASE_COLUMNS = (
     *("trial", "controller", "seed", "stage", "part", "factor", "level"),
     *(*PUSH_COLUMNS, *CONDITION_COLUMNS, "limit_fraction", "later", "commands", "kicks", "terrain"),
+    *("motion", "share"),
 )
 OUTCOME_COLUMNS = tuple(
     "stepped" if name == "foot_displaced" else name for name in Outcome.__dataclass_fields__
@@ -55,6 +56,8 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
         "later": json.dumps(later) if later else None,
         **{name: _many(getattr(trial, name)) for name in MANY},
         "terrain": None if trial.terrain is None else json.dumps(to_dict(trial.terrain)),
+        "motion": trial.motion,
+        "share": trial.share,
         **outcome_cells(outcome),
     }
 
@@ -103,6 +106,8 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
             commands=many["commands"],
             kicks=many["kicks"],
             terrain=_read_terrain(line["terrain"], path),
+            motion=line["motion"] or None,
+            share=_number(line["share"]),
         )
     except (ValueError, TypeError) as error:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None

@@ -46,6 +46,8 @@ class Trial:
         commands: that a controller that walks follows, in the order of time; none: it stands.
         kicks: sudden changes of the root's velocity.
         terrain: that it is played on; None: that of the environment.
+        motion: that is performed, by its name in the suite; None: that of the environment.
+        share: of the controller's J50 that the push is.
     """
 
     number: int
@@ -60,6 +62,8 @@ class Trial:
     commands: tuple[TimedCommand, ...] = ()
     kicks: tuple[Kick, ...] = ()
     terrain: Terrain | None = None
+    motion: str | None = None
+    share: float | None = None
 
     @property
     def command(self) -> TimedCommand | None:
@@ -86,7 +90,7 @@ class Outcome:
     Attributes:
         recovered: upright, quiet and with feet at rest for the last second; of a walk that goes on,
             not fallen, and in the last two strides as commanded, see `Walk.as_commanded`; on a
-            terrain, not fallen and beyond its last edge.
+            terrain, not fallen and beyond its last edge; where a motion is performed, not fallen.
         fallen: whether it fell; `fall_time` counts from the reset.
         recovery_time: from the start of the last push to the last moment that was not quiet.
         foot_displaced: a foot moved more than 5 cm; the column `stepped` of trials.csv.
@@ -130,6 +134,8 @@ class Outcome:
             foot lands, 0.5 where the right one does.
         edge_contacts: times that a foot came to touch an edge of the terrain.
         surfaces_passed: of a terrain, of which the CoM has passed the beginning; stairs climbed.
+        joint_rms, body_error, body_error_root, body_error_last, com_error, sole_slide: of a motion
+            that is performed, see `TrackingFigures`.
         error: what the controller raised, on one line; the trial then counts as not recovered.
     """
 
@@ -175,6 +181,12 @@ class Outcome:
     push_phase: float | None = None
     edge_contacts: int = 0
     surfaces_passed: int | None = None
+    joint_rms: float | None = None
+    body_error: float | None = None
+    body_error_root: float | None = None
+    body_error_last: float | None = None
+    com_error: float | None = None
+    sole_slide: float | None = None
     error: str | None = None
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import on_terrain
 from poise.envs.robots.variants import perturbed_robot
@@ -22,13 +24,22 @@ class AgentVariants:
     def __init__(self, agent: Agent):
         self.agent = agent
         self._standard = agent.env.simulation
+        self._motion = getattr(agent.env, "motion", None)
 
-    def under(self, conditions: Conditions, terrain: Terrain | None = None) -> Agent:
+    def under(
+        self,
+        conditions: Conditions,
+        terrain: Terrain | None = None,
+        motion: ReferenceMotion | None = None,
+    ) -> Agent:
         """Return the agent, whose environment has these conditions from its next reset on.
 
-        `terrain` takes the place of the environment's own.
+        `terrain` and `motion` take the place of the environment's own.
         """
         env = self.agent.env
+        motion = motion or self._motion
+        if isinstance(env, ResidualBalanceEnv) and motion is not None and motion is not env.motion:
+            env.motion = motion
         body = env.robot if terrain is None else on_terrain(env.robot, terrain)
         known = conditions.mass_error == 0.0  # the controller's masses are the true ones
         if known and conditions.friction is None:

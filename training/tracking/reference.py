@@ -46,6 +46,7 @@ class ReferenceBodies:
 
     Attributes:
         bodies: (n,) bodies that are compared: the robot's own, which move.
+        com: (3,) where the CoM is to be, at the last time that was asked for [m].
     """
 
     def __init__(self, motion: ReferenceMotion, robot: Robot):
@@ -57,6 +58,7 @@ class ReferenceBodies:
         self.bodies = np.flatnonzero(moving)
         self._legs = _leg_dofs(robot)
         self._correction = np.zeros(len(self._legs))  # where the last search ended
+        self.com = np.zeros(3)
 
     def at(self, time: float, stance: Stance) -> tuple[np.ndarray, np.ndarray]:
         """Joints (nj,) [rad] as the motion has them and places of the bodies (n, 3) [m].
@@ -71,10 +73,10 @@ class ReferenceBodies:
         data.qpos[7:] = sample.q_ref
         data.qpos[self._legs + 1] += self._correction
         mujoco.mju_mat2Quat(data.qpos[3:7], np.ascontiguousarray(turn @ posture.root_axes).ravel())
-        data.qpos[:3] = stance.origin + turn @ posture.com
-        com = stance.origin + turn @ posture.com
+        self.com = stance.origin + turn @ posture.com
+        data.qpos[:3] = self.com
         for _ in range(MOST):
-            error, jacobian = self._miss(stance, com)
+            error, jacobian = self._miss(stance, self.com)
             if np.abs(error).max() < CLOSE:
                 break
             step = np.linalg.lstsq(jacobian[:, free], -error, rcond=RANK)[0]

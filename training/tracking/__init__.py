@@ -1,0 +1,1 @@
+"""How far a robot is from the motion that it performs, policy step by policy step."""
