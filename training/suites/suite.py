@@ -17,7 +17,7 @@ from .draw import Part, Standard
 from .factors import Factors, Mix
 from .random import Quiet, Random, Sequence
 from .terrains import Terrains
-from .walking import WALKING, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
+from .walking import WALKING, Gait, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,7 @@ class Suite(Standard):
     sequence: Sequence | None = None
     quiet: Quiet | None = None
     walk: Walk | None = field(default=None, metadata={"omit": "default"})
+    gait: Gait | None = field(default=None, metadata={"omit": "default"})
     velocity: Velocity | None = field(default=None, metadata={"omit": "default"})
     walk_push: WalkPush | None = field(default=None, metadata={"omit": "default"})
     walk_kick: WalkKick | None = field(default=None, metadata={"omit": "default"})

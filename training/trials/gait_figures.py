@@ -12,6 +12,7 @@ from poise.baselines.walking.command import GaitCommand
 from poise.baselines.walking.schedule import TimedCommand
 
 from .gait_record import WalkArrays
+from .step_figures import step_error, steps_of
 
 AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 SETTLING = 4.0  # [s] after a change of the command, from which strides are compared with it
@@ -149,19 +150,21 @@ class Walk:
             **self._knees(),
             "circle_error": self._circle_error(),
             "foot_slide": self._slide(),
+            "yaw_momentum": _root_mean_square(self.record.spin[self._known]),
         }
 
     def _steps(self) -> dict[str, float | None]:
-        """Mean length, width [m] and time [s] of the steps that end settled strides."""
-        r, rows, feet = self.record, self.landed.row, self.landed.foot
-        steps = []
-        for k in np.flatnonzero(self.settled) + 2:
-            way = r.feet[rows[k], feet[k]] - r.feet[rows[k], 1 - feet[k]]
-            yaw = self.mean_yaw(rows[k - 2], rows[k])
-            ahead, left = np.cos(yaw) * way + np.sin(yaw) * np.array([way[1], -way[0]])
-            steps.append((ahead, abs(left), r.time[rows[k]] - r.time[rows[k - 1]]))
-        length, width, time = np.array(steps).reshape(-1, 3).T
-        return {"step_length": _mean(length), "step_width": _mean(width), "step_time": _mean(time)}
+        """Means of the steps that end settled strides, and their error."""
+        rows, times = self.landed.row, self.record.time
+        ends = np.flatnonzero(self.settled) + 2
+        yaws = [self.mean_yaw(rows[k - 2], rows[k]) for k in ends]
+        measures = steps_of(self.record, rows[ends], self.landed.foot[ends], yaws, self.command_at)
+        names = ("step_length", "step_width", "swing_time", "step_clearance")
+        return {
+            **{name: _mean(measures[name]) for name in names},
+            "step_time": _mean(times[rows[ends]] - times[rows[ends - 1]]),
+            "step_error": step_error(measures, times[rows[ends]], self.command_at),
+        }
 
     def _costs(self) -> dict[str, float | None]:
         """∫ Σ |τ q̇| dt over the way [J/m] from the first settled stride to the last, and of the

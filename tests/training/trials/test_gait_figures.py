@@ -12,7 +12,12 @@ from poise.training.trials.gait_figures import Walk, touchdowns
 from poise.training.trials.gait_record import WalkArrays
 
 PERIOD, STEP, DOWN = 0.02, 0.4, 0.1  # [s] of the rows, of a step, of it with both feet down
-HALF_WIDTH, SWAY = 0.1, 0.03  # [m]
+HALF_WIDTH, SWAY, CLEARANCE = 0.1, 0.03, 0.06  # [m]
+
+
+def step_of(time: np.ndarray) -> np.ndarray:
+    """(n,) the step that a time is of."""
+    return np.floor((time + 1e-9) / STEP)
 
 
 def recorded(
@@ -29,10 +34,12 @@ def recorded(
     middle = np.cumsum(speed) * PERIOD - speed * PERIOD
     com = middle + 1j * axes * SWAY * np.cos(np.pi * time / STEP)
     down, feet = np.ones((len(time), 2), dtype=bool), np.zeros((len(time), 2), dtype=complex)
+    heights = np.zeros((len(time), 2))
     for i, t in enumerate(time):
         step, phase = divmod(t + 1e-9, STEP)
         swinging = int(step) % 2  # the right one first
         down[i, swinging] = phase < DOWN or (step == 0 and t < DOWN)
+        heights[i, swinging] = 0.0 if down[i, swinging] else CLEARANCE
         for foot, side in ((0, -1.0), (1, 1.0)):
             landings = [k for k in range(int(step) + 1) if k % 2 != foot or k == 0]
             row = round(landings[-1] * STEP / PERIOD)
@@ -41,6 +48,7 @@ def recorded(
     knees[:, 1] *= 0.5
     return WalkArrays(
         time=time, com=_plane(com), yaw=yaw, down=down, feet=_plane(feet), knees=knees,
+        heights=heights, spin=np.where(step_of(time) % 2 == 0, 0.3, -0.3),
         energy=40.0 * time, work=25.0 * time,
     )  # fmt: skip
 
