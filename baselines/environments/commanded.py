@@ -50,6 +50,11 @@ class CommandedEnv(BalanceEnv):
         self._timetable.clear()
         walker.command = command
 
+    @property
+    def transfer_time(self) -> float | None:
+        """T_d on both feet between two steps [s]; None for a controller that does not walk."""
+        return None if self._walker is None else float(self._walker.gait.transfer_time)
+
     def _expect_walker(self, source: str) -> WalkingController:
         """The controller; raises ConfigError for one that does not walk."""
         if self._walker is None:

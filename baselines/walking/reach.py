@@ -1,7 +1,7 @@
 """Which commands are within the reach of a robot."""
 
-from poise.baselines.stepping.cop_region import foot_signs
 from poise.baselines.stepping.config import StepLimits, SwingTask
+from poise.baselines.stepping.cop_region import foot_signs
 from poise.baselines.stepping.swing_speed import highest_lift, swing_time
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
@@ -14,9 +14,9 @@ APART = 0.01  # [m] between soles side by side
 
 
 def least_width(robot: Robot) -> float:
-    """The distance of the soles' points across the heading at which the soles are 1 cm apart [m]."""
-    inner = [sole.polygon[:, 1] * -sign for sole, sign in zip(robot.soles, foot_signs(robot), strict=True)]
-    return float(sum(reach.max() for reach in inner)) + APART
+    """The distance of the soles' middles across the heading with 1 cm between the soles [m]."""
+    feet = zip(robot.soles, foot_signs(robot), strict=True)
+    return float(sum((-sign * sole.polygon[:, 1]).max() for sole, sign in feet)) + APART
 
 
 def check_command(
@@ -49,7 +49,7 @@ def _check_steps(command: GaitCommand, robot: Robot, gait: Gait, limits: StepLim
     if abs(command.ahead) * period > most:
         raise _out_of_reach("ahead", f"{command.ahead:g} m/s is steps of "
                             f"{abs(command.ahead) * period:.3g} m in {period:.3g} s", robot,
-                            f"at most {most:.3g} m in that time, {most / period:.3g} m/s")  # fmt: skip
+                            f"at most {most:.3g} m in it, {most / period:.3g} m/s")  # fmt: skip
     if command.step_length is not None:
         least = command.speed * (gait.time_min + gait.transfer_time)
         if command.step_length < least - 1e-9:

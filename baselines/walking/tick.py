@@ -54,8 +54,8 @@ from .dcm import (
 )
 from .models.reference import share_load
 from .treads import (
-    apex_of_step,
     advance_over_edges,
+    apex_of_step,
     feet_are_level,
     follow_line,
     footholds_given,

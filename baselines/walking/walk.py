@@ -189,7 +189,8 @@ class Walk(CaptureStep):
             known = WalkTick(
                 capture=capture, walk=walk, gait=self.gait, reference=self.reference,
                 model=model.bind(self.robot, capture.state, self.reference),
-                arms=self.arms, constant_height=int(model.keeps_height), stance=pair, swinging=guarded_zeros(2),
+                arms=self.arms, constant_height=int(model.keeps_height),
+                stance=pair, swinging=guarded_zeros(2),
             )  # fmt: skip
             self._walk_tick = known
         return known

@@ -15,8 +15,8 @@ from .cells import Cell, Column, Table, cell, figure_cell, name_cell
 from .charts import Series
 from .svg import Chart, Svg, colour, dash, ticks
 
-PARTS = {"walk": "walk", "gait": "steps", "velocity": "course", "walk_push": "pushed", "walk_kick": "kicked",
-         "walk_repeated": "pushed again and again"}  # fmt: skip
+PARTS = {"walk": "walk", "gait": "steps", "velocity": "course", "walk_push": "pushed",
+         "walk_kick": "kicked", "walk_repeated": "pushed again and again"}  # fmt: skip
 Figures = dict[str, tuple[str, str, str]]
 #: key of a level → title, note, format
 REACHED: Figures = {

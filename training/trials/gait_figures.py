@@ -57,6 +57,8 @@ class Walk:
     Velocities are means over a stride, two steps from touchdown to touchdown, of the CoM along the
     mean heading of that stride.
 
+    `transfer_time` is T_d, of the gait that is to follow a commanded step time [s].
+
     Attributes:
         landed: its touchdowns.
         velocity: (k − 2, 3) of the stride that ends with touchdown 2, 3, …: ahead, left [m/s], turn
@@ -67,9 +69,10 @@ class Walk:
     """
 
     def __init__(
-        self, record: WalkArrays, commands: Sequence[TimedCommand], fall_time: float | None = None
-    ):
-        self.record, self.commands = record, commands
+        self, record: WalkArrays, commands: Sequence[TimedCommand], fall_time: float | None = None,
+        transfer_time: float = 0.0,
+    ):  # fmt: skip
+        self.record, self.commands, self._transfer_time = record, commands, transfer_time
         until = np.inf if fall_time is None else fall_time - FALLING
         self.landed = touchdowns(record)
         rows = self.landed.row
@@ -160,10 +163,15 @@ class Walk:
         yaws = [self.mean_yaw(rows[k - 2], rows[k]) for k in ends]
         measures = steps_of(self.record, rows[ends], self.landed.foot[ends], yaws, self.command_at)
         names = ("step_length", "step_width", "swing_time", "step_clearance")
+        periods = times[rows[ends]] - times[rows[ends - 1]]
         return {
             **{name: _mean(measures[name]) for name in names},
-            "step_time": _mean(times[rows[ends]] - times[rows[ends - 1]]),
-            "step_error": step_error(measures, times[rows[ends]], self.command_at),
+            "step_time": _mean(periods),
+            "step_error": step_error(
+                {**measures, "duration": periods - self._transfer_time},
+                times[rows[ends]],
+                self.command_at,
+            ),
         }
 
     def _costs(self) -> dict[str, float | None]:

@@ -122,7 +122,8 @@ class Outcome:
         swing_time, step_clearance: from lift-off to touchdown [s]; of the sole's middle at its
             highest above where it lands [m]; means over the steps.
         step_error: largest deviation of a step parameter from its command, as a fraction, among
-            those that are commanded: step time, step length, width, clearance.
+            those that are commanded: step time, step length, width, clearance. A step time is
+            that from touchdown to touchdown but for the gait's time on both feet.
         yaw_momentum: root mean square of the angular momentum about the vertical [N·m·s].
         cost_of_transport: ∫ Σ |τ q̇| dt / (m g d), d the way; `positive_cost_of_transport` of the
             work Σ max(τ q̇, 0) alone.

@@ -1,6 +1,7 @@
 """Step parameters that a walk is told: clearance, step length, width, the swing of its arms."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -32,7 +33,9 @@ class Played:
                 state = self.env.simulation.state
                 rows.append((state.sole_points.copy(), state.contacts > 0.5, state.q.copy(),
                              state.angular_momentum[2], state.heading.copy()))  # fmt: skip
-        self.feet, self.down, self.q, self.spin, self.heading = map(np.array, zip(*rows))
+        self.feet, self.down, self.q, self.spin, self.heading = (
+            np.array(column) for column in zip(*rows, strict=True)
+        )
 
     def last(self, seconds):
         return slice(-round(seconds / PERIOD), None)
@@ -43,9 +46,8 @@ class Played:
         for foot in range(2):
             height, air = self.feet[part, foot, 2], ~self.down[part, foot]
             edges = np.flatnonzero(np.diff(air.astype(int)))
-            swings = [height[a + 1 : b + 1].max() for a, b in zip(edges[:-1], edges[1:])
+            found += [height[a + 1 : b + 1].max() for a, b in pairwise(edges)
                       if air[a + 1] and b - a > 4]  # fmt: skip
-            found += swings
         return np.array(found)
 
     def arms(self, seconds):
@@ -57,7 +59,8 @@ class Played:
     def ahead(self, seconds):
         """(n,) by how much the first foot is ahead of the second one [m]."""
         part = self.last(seconds)
-        return np.sum((self.feet[part, 0, :2] - self.feet[part, 1, :2]) * self.heading[part], axis=1)
+        apart = self.feet[part, 0, :2] - self.feet[part, 1, :2]
+        return np.sum(apart * self.heading[part], axis=1)
 
 
 def test_a_foot_clears_the_ground_by_what_is_commanded():
