@@ -6,7 +6,7 @@ from typing import Any
 from poise.baselines.controller import BaseController
 from poise.baselines.registry import walking_controllers
 from poise.baselines.walking.command import GaitCommand
-from poise.baselines.walking.controller import TerrainWalker, WalkingController
+from poise.baselines.walking.controller import LimitedWalker, TerrainWalker, WalkingController
 from poise.baselines.walking.schedule import (
     Follower,
     TimedCommand,
@@ -37,7 +37,7 @@ class CommandedEnv(BalanceEnv):
         """What a controller that walks is told to do now; None for one that does not walk.
 
         Setting it ends the commands of the reset. Raises ConfigError for a controller that does not
-        walk.
+        walk, and for a command out of the robot's reach.
         """
         return None if self._walker is None else self._walker.command
 
@@ -46,8 +46,14 @@ class CommandedEnv(BalanceEnv):
         if not isinstance(command, GaitCommand):
             command = build(GaitCommand, to_dict(command), "command")
         walker = self._expect_walker("environment")
+        _check(walker, command)
         self._timetable.clear()
         walker.command = command
+
+    @property
+    def transfer_time(self) -> float | None:
+        """T_d on both feet between two steps [s]; None for a controller that does not walk."""
+        return None if self._walker is None else float(self._walker.gait.transfer_time)
 
     def _expect_walker(self, source: str) -> WalkingController:
         """The controller; raises ConfigError for one that does not walk."""
@@ -75,7 +81,9 @@ class CommandedEnv(BalanceEnv):
         self._tell_terrain()
         commands = self._commands(options)
         if "command" in options:
-            self._expect_walker("reset")
+            walker = self._expect_walker("reset")
+            for command in commands:
+                _check(walker, command)
         self._timetable.fill(commands)
         if self._walker is not None:
             follow_timetable(self._follower(self._walker))
@@ -84,3 +92,9 @@ class CommandedEnv(BalanceEnv):
         """The block by which the controller is told its commands."""
         clock = self.simulation.clock
         return Follower(self._timetable, clock, self.arrays.timestep, walker.gait.command)
+
+
+def _check(walker: WalkingController, command: GaitCommand) -> None:
+    """Raise ConfigError for a command out of the reach of a controller that knows its limits."""
+    if isinstance(walker, LimitedWalker):
+        walker.check_command(command)

@@ -97,9 +97,15 @@ def clip_to_limits(q: Search, x: float, y: float) -> tuple[float, float]:
     The place is limited to a box. The mean velocities vx and vy of the swing are limited to the
     ellipse (vx/`speed`)² + (vy/`side_speed`)² ≤ 1: the way from the start is shortened to it.
     """
+    return clip_to_width(q, x, y, q.width_min)
+
+
+@compiled
+def clip_to_width(q: Search, x: float, y: float, least: float) -> tuple[float, float]:
+    """The same with another `least` distance of the feet across the heading [m]."""
     side, start = q.foot_sign[q.foot[0]], to_step_frame(q, q.start[0], q.start[1])
     x = min(max(x, -q.behind), q.ahead)
-    y = side * min(max(side * y, q.width_min), q.width_max)
+    y = side * min(max(side * y, least), q.width_max)
     way_x, way_y = x - start[0], y - start[1]
     pace_x, pace_y = way_x / (q.speed * q.time[0]), way_y / (q.side_speed * q.time[0])
     cut = 1.0 - 1.0 / max(np.sqrt(pace_x * pace_x + pace_y * pace_y), 1.0)

@@ -79,6 +79,12 @@ def _lead(
 @compiled
 def advance_swing(w: SwingArrays, dt: float) -> None:
     """Go `dt` [s] further: up to the apex, down to the ground, on at the landing speed."""
+    advance_over(w, w.apex, dt)
+
+
+@compiled
+def advance_over(w: SwingArrays, apex: float, dt: float) -> None:
+    """The same with another `apex` above the ground [m]."""
     rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
     for a in range(2):
         if rest > dt:
@@ -87,7 +93,7 @@ def advance_swing(w: SwingArrays, dt: float) -> None:
             now[0, a], now[1, a], now[2, a] = w.foothold[a], 0.0, 0.0
     lift = w.lift * w.duration[0]
     if w.time[0] + dt < lift:
-        _lead(now, 2, ground + w.apex, 0.0, lift - w.time[0], dt)
+        _lead(now, 2, ground + apex, 0.0, lift - w.time[0], dt)
     elif rest > dt:
         _lead(now, 2, ground, -speed, rest, dt)
     else:

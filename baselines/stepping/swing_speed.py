@@ -24,6 +24,7 @@ from .config import StepLimits, SwingTask
 
 PEAK = 15.0 / 8.0  # of a speed over its mean, from rest to rest
 ROUNDS, STEP, CLOSE = 60, 0.05, 1e-6  # of the lift; most that a round turns a joint [rad]; [m]
+NEAR = 1e-3  # [m] where only whether a place is reached counts
 STILL = 1e-6  # [m/s] of a foot that its joints do not move at all
 ROLL, PITCH = 3, 4  # rows of a sole's Jacobian, after those of its place
 UNBOUNDED = 3  # status of a linear program
@@ -62,8 +63,7 @@ def possible_limits(
     speed = swing_speed(robot, swing.clearance * h, torque_share)
     if min(speed) <= STILL:
         return None
-    shorter = min(swing.lift, 1.0 - swing.lift)
-    time = swing.clearance * h * omega / (shorter * speed.lift)
+    time = swing_time(robot, swing, swing.clearance * h, torque_share) * omega
     if time > limits.time_max:
         return None
     return replace(
@@ -72,6 +72,58 @@ def possible_limits(
         side_speed=min(limits.side_speed, speed.sideways / (h * omega)),
         time_min=max(limits.time_min, time),
     )
+
+
+def swing_time(
+    robot: Robot, swing: SwingTask, clearance: float, torque_share: float = 1.0
+) -> float:
+    """The least time of a swing that lifts the foot by `clearance` [m] and puts it down [s]."""
+    lift = swing_speed(robot, clearance, torque_share).lift
+    return clearance / (min(swing.lift, 1.0 - swing.lift) * lift) if lift > 0.0 else np.inf
+
+
+@lru_cache(maxsize=16)
+def highest_lift(robot: Robot) -> float:
+    """The height to which either foot can be lifted straight up in the standing posture, within
+    its joints' ranges, to 1 mm [m]."""
+    low, high = 0.0, robot.height_com
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        if all(_lifts(robot, sole, middle) for sole in range(len(robot.soles))):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _lifts(robot: Robot, sole: int, clearance: float) -> bool:
+    """Whether the leg's joints, within their ranges, lift the sole by `clearance`, level or not."""
+    model, data = robot.model, mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    dofs = np.array([dof for dof in dof_chain(model, robot.soles[sole].body_id) if dof >= 6])
+    low, high = _ranges(model, dofs)
+    mujoco.mj_kinematics(model, data)
+    goal = _point(robot, data, sole) + [0.0, 0.0, clearance]
+    for _ in range(ROUNDS):
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        off = goal - _point(robot, data, sole)
+        if np.abs(off).max() < NEAR:
+            return True
+        place, rows = data.qpos[dofs + 1], _jacobian(robot, data, sole, dofs)[:3]
+        rows = rows * ((low < place) & (place < high))  # what is at its end stays there
+        change = np.linalg.lstsq(rows, off, rcond=1e-4)[0]
+        change *= min(1.0, STEP / max(np.abs(change).max(), STEP))
+        data.qpos[dofs + 1] = np.clip(place + change, low, high)
+    return False
+
+
+def _ranges(model: mujoco.MjModel, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) where the joints of these degrees of freedom end, infinite where they do not."""
+    joints = model.dof_jntid[dofs]
+    limited = model.jnt_limited[joints].astype(bool)
+    low, high = model.jnt_range[joints].T
+    return np.where(limited, low, -np.inf), np.where(limited, high, np.inf)
 
 
 def _foot_speed(robot: Robot, sole: int, clearance: float, share: float) -> SwingSpeed:

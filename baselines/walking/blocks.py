@@ -49,7 +49,7 @@ class Gait(Block):
     start_time: float  # [s]
     speed_margin: float  # [m/s]
     time_min: float  # of a step, whatever the command says [s]
-    command: np.ndarray  # (5,) see `GaitCommand.array`
+    command: np.ndarray  # (8,) see `GaitCommand.array`
     velocity: np.ndarray  # (3,) ahead, left, turn, which follow the command
     error: np.ndarray  # (2,) what the sum of the velocity's errors adds to it [m/s]
     planned: np.ndarray  # (2,) the velocity with it [m/s]
@@ -64,6 +64,17 @@ class Gait(Block):
 
 
 @dataclass(frozen=True, eq=False)
+class Arms(Block):
+    """The joints that swing the arms; as many arms as feet, none where `scales` are zero."""
+
+    scales: np.ndarray  # (2, nj) of the arm on the side of each foot: about the robot's left axis
+    weight: np.ndarray  # (nv,) of the posture in the QP while the arms swing as commanded
+    free_weight: np.ndarray  # (nv,) else
+    least_step: float  # [m] for the whole swing; less where steps are shorter
+    swinging: np.ndarray  # (1,) int: 1 while they swing as commanded
+
+
+@dataclass(frozen=True, eq=False)
 class WalkTick(Block):
     """All that a tick of `Walk` works on."""
 
@@ -72,6 +83,7 @@ class WalkTick(Block):
     gait: Gait
     reference: Reference  # what the model of the gait is told, and what it answers
     model: Program  # its kernel
+    arms: Arms
     constant_height: int  # 1: the gait's own height holds, and no model is asked
     stance: np.ndarray  # (2,) scratch: the middle of what the stance sole reaches [m]
     swinging: np.ndarray  # (2,) scratch: the same of the other one

@@ -19,8 +19,12 @@ class GaitCommand:
         turn: to the left [rad/s].
         step_time: from lift-off to touchdown [s], at most 5; None: the gait's own.
         width: between the soles [m]; None: the gait's own.
+        clearance: of the swinging sole above the ground at its highest [m]; None: the gait's own.
+        arm_swing: of each arm about the robot's left axis, to either side, against the leg of its
+            side [rad]; None or 0: arms are free to balance the robot.
+        step_length: [m], in place of `step_time`.
 
-    With the gait's T_d on both feet a step is as long as `ahead` · (`step_time` + T_d).
+    With the gait's T_d on both feet a step is as long as the speed · (`step_time` + T_d).
     """
 
     ahead: float = 0.0
@@ -30,6 +34,9 @@ class GaitCommand:
         default=None, kw_only=True, metadata={"above": 0.0, "max": MOST_STEP_TIME}
     )
     width: float | None = field(default=None, kw_only=True, metadata={"above": 0.0})
+    clearance: float | None = field(default=None, kw_only=True, metadata={"above": 0.0})
+    arm_swing: float | None = field(default=None, kw_only=True, metadata={"min": 0.0})
+    step_length: float | None = field(default=None, kw_only=True, metadata={"above": 0.0})
 
     def __post_init__(self) -> None:
         for name in ("ahead", "left", "turn"):
@@ -38,9 +45,41 @@ class GaitCommand:
         if self.step_time is not None and not 0.0 < self.step_time <= MOST_STEP_TIME:
             raise ConfigError(f"must be above 0 and at most {MOST_STEP_TIME:g}, not "
                               f"{self.step_time:g}", field="command.step_time")  # fmt: skip
-        if self.width is not None and not 0.0 < self.width < np.inf:
-            raise ConfigError("must be a finite number above 0", field="command.width")
+        for name in ("width", "clearance", "step_length"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < np.inf:
+                raise ConfigError("must be a finite number above 0", field=f"command.{name}")
+        if self.arm_swing is not None and not 0.0 <= self.arm_swing < np.inf:
+            raise ConfigError("must be a finite number, 0 or above", field="command.arm_swing")
+        if self.step_length is not None:
+            self._check_step_length()
+
+    def _check_step_length(self) -> None:
+        if self.step_time is not None:
+            raise ConfigError("give step_time or step_length, not both",
+                              field="command.step_length")  # fmt: skip
+        if not self.speed:
+            raise ConfigError("needs a speed ahead or to the left", field="command.step_length")
+
+    @property
+    def speed(self) -> float:
+        """√(ahead² + left²) [m/s]."""
+        return float(np.hypot(self.ahead, self.left))
 
     def array(self) -> np.ndarray:
-        """(5,) ahead, left [m/s], turn [rad/s], step time [s], width [m]; 0: the gait's own."""
-        return np.array([self.ahead, self.left, self.turn, self.step_time or 0, self.width or 0])
+        """(8,) ahead, left [m/s], turn [rad/s], step time [s], width, clearance [m], arm swing
+        [rad], step length [m]; 0: the gait's own."""
+        own = (self.step_time, self.width, self.clearance, self.arm_swing, self.step_length)
+        return np.array([self.ahead, self.left, self.turn, *(value or 0.0 for value in own)])
+
+
+def command_of(array: np.ndarray) -> GaitCommand:
+    """The command that `GaitCommand.array` gives as (8,)."""
+    ahead, left, turn, *own = (float(value) for value in array)
+    step_time, width, clearance, arm_swing, step_length = (value or None for value in own)
+    return GaitCommand(ahead, left, turn, step_time=step_time, width=width, clearance=clearance,
+                       arm_swing=arm_swing, step_length=step_length)  # fmt: skip
+
+
+ENTRIES = 8  #: of the array of a command
+STEP_TIME, WIDTH, CLEARANCE, ARM_SWING, STEP_LENGTH = range(3, ENTRIES)  #: of its entries

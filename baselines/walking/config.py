@@ -60,6 +60,8 @@ class GaitConfig:
     start_radius: float = field(default=0.025, metadata=POSITIVE)  # of ξ before the first step
     start_time: float = field(default=5.0, metadata=POSITIVE)  # then it begins anyway
     speed_margin: float = field(default=0.01, metadata=NOT_NEGATIVE)  # slower is standing [h ω]
+    # of the joints of arms that swing as commanded, in the posture of the QP
+    arm_weight: float = field(default=30.0, metadata={**POSITIVE, "omit": "default"})
     torque_rate_limit: float = field(default=0.6, metadata=POSITIVE)  # as in `CaptureStepConfig`
     root_accel: float = field(default=60.0, metadata=POSITIVE)
     swing_accel: float = field(default=14.0, metadata=POSITIVE)

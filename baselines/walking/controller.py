@@ -27,6 +27,14 @@ class WalkingController(Protocol):
 
 
 @runtime_checkable
+class LimitedWalker(Protocol):
+    """What a controller that walks and knows its robot's limits has."""
+
+    def check_command(self, command: GaitCommand) -> None:
+        """Raise ConfigError with these limits for a command out of reach."""
+
+
+@runtime_checkable
 class TerrainWalker(Protocol):
     """What a controller that plans its steps on a terrain has: environments set it at the reset."""
 

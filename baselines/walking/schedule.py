@@ -13,7 +13,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.pushes.sampler import Range
 
-from .command import GaitCommand
+from .command import ENTRIES, GaitCommand
 
 MOST_COMMANDS = 256  # of an episode
 SOON = 1e-9  # [s] by which times may round
@@ -68,8 +68,9 @@ def command_sampler(value: object) -> CommandSampler:
     if isinstance(value, CommandSampler):
         return value
     if isinstance(value, GaitCommand):
-        entries = ("ahead", "left", "turn", "step_time", "width")  # the last two are not drawn
-        value = {name: x for name in entries if (x := getattr(value, name)) is not None}
+        given = {each.name: getattr(value, each.name) for each in fields(GaitCommand)}
+        drawn = {each.name for each in fields(CommandSampler)}  # the others are refused below
+        value = {name: x for name, x in given.items() if x or name in drawn}
     if not isinstance(value, Mapping):
         raise ConfigError(
             f"must be a command or ranges of commands, not {shown(value)}",
@@ -118,7 +119,7 @@ class Timetable(Block):
     """The commands of an episode as compiled code reads them."""
 
     start: np.ndarray  # (256,) [s]; infinite behind the last one
-    commands: np.ndarray  # (256, 5)
+    commands: np.ndarray  # (256, 8) see `GaitCommand.array`
     following: np.ndarray  # (1,) int: the row that comes next
 
     def fill(self, commands: Sequence[TimedCommand]) -> None:
@@ -137,7 +138,7 @@ def empty_timetable() -> Timetable:
     """A timetable without a command."""
     table = Timetable(
         start=guarded_zeros(MOST_COMMANDS),
-        commands=guarded_zeros((MOST_COMMANDS, 5)),
+        commands=guarded_zeros((MOST_COMMANDS, ENTRIES)),
         following=guarded_zeros(1, dtype=np.int64),
     )
     table.clear()
@@ -151,7 +152,7 @@ class Follower(Block):
     timetable: Timetable
     clock: np.ndarray  # (1,) int: physics steps since the reset
     timestep: float  # [s]
-    command: np.ndarray  # (5,) of the controller's gait
+    command: np.ndarray  # (8,) of the controller's gait
 
 
 @compiled

@@ -23,12 +23,12 @@ from poise.baselines.stepping.cop_region import (
 from poise.baselines.stepping.guidance import copy_reference, limit_posture
 from poise.baselines.stepping.recentring import set_level_frame, stop_recentring
 from poise.baselines.stepping.search import (
-    clip_to_limits,
+    clip_to_width,
     set_start,
     to_step_frame,
     to_world,
 )
-from poise.baselines.stepping.swing import FROZEN, advance_swing, aim_swing, start_swing, time_left
+from poise.baselines.stepping.swing import FROZEN, advance_over, aim_swing, start_swing, time_left
 from poise.baselines.stepping.tick import (
     FIRST_LOAD,
     capture_tick,
@@ -41,7 +41,9 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.maths.polygons import find_nearest
 from poise.envs.maths.vectors import along, copy_into, turned
 
+from .arms import swing_arms
 from .blocks import Gait, WalkTick
+from .command import MOST_STEP_TIME, STEP_LENGTH, STEP_TIME, WIDTH
 from .dcm import (
     constant_cop,
     gait_offset,
@@ -53,6 +55,7 @@ from .dcm import (
 from .models.reference import share_load
 from .treads import (
     advance_over_edges,
+    apex_of_step,
     feet_are_level,
     follow_line,
     footholds_given,
@@ -64,7 +67,6 @@ TIMES = 8  # step times that are weighed against the planned one
 LEAST_TIME = 0.06  # [s] for which the CoP on one foot is planned at least
 LOADED, UNLOADED = 1.5, 1.15  # rates at which the load may go to a foot, and must leave one [1/T_d]
 LEAST_LOAD = 0.03  # [m g] that a foot may bear until it leaves
-STEP_TIME, WIDTH = 3, 4  # entries of a command
 ROOM = 0.01  # [m] between the soles of a step to the side, besides the least width
 
 
@@ -88,6 +90,10 @@ def go_on_from(contacts: ContactTick, torques: np.ndarray) -> None:
 def step_time(g: Gait) -> float:
     """T [s]: as commanded, or the gait's own; no shorter than the legs can."""
     wanted = g.command[STEP_TIME] if g.command[STEP_TIME] > 0.0 else g.step_time
+    if g.command[STEP_LENGTH] > 0.0:
+        speed = np.sqrt(g.command[0] * g.command[0] + g.command[1] * g.command[1])
+        period = g.command[STEP_LENGTH] / max(speed, 1e-9)
+        wanted = min(period - g.transfer_time, MOST_STEP_TIME)
     return max(wanted, g.time_min)
 
 
@@ -132,12 +138,19 @@ def follow_command(t: WalkTick) -> None:
 
 
 @compiled
+def least_width(t: WalkTick) -> float:
+    """The least distance of the feet across the heading [m]; less where a command asks for it."""
+    least, wanted = t.walk.search.width_min, t.gait.command[WIDTH]
+    return min(least, wanted - ROOM) if wanted > 0.0 else least
+
+
+@compiled
 def step_width(t: WalkTick) -> float:
     """W [m]: wider where steps to the side need it, so that the feet do not meet."""
     g = t.gait
     way = abs(g.velocity[1]) * (step_time(g) + g.transfer_time)
     wanted = g.command[WIDTH] if g.command[WIDTH] > 0.0 else g.width
-    return max(wanted, t.walk.search.width_min + way + ROOM)
+    return max(wanted, least_width(t) + way + ROOM)
 
 
 @compiled
@@ -181,6 +194,7 @@ def ask_for(t: WalkTick, ground: float, stride_x: float, stride_y: float, p: np.
     elif not t.constant_height:
         follow_model(t)
     limit_posture(c)
+    swing_arms(t, step_time(t.gait) + t.gait.transfer_time)
 
 
 @compiled
@@ -336,7 +350,7 @@ def foothold_after(t: WalkTick, time: float) -> float:
     q.time[0] = time
     x, y = to_step_frame(q, c.pair[0], c.pair[1])
     x, y = x + c.offsets[FOOTHOLD_X], y + c.offsets[FOOTHOLD_Y]
-    near_x, near_y = clip_to_limits(q, x, y)
+    near_x, near_y = clip_to_width(q, x, y, least_width(t))
     q.foothold[0], q.foothold[1] = to_world(q, near_x, near_y)
     return np.sqrt((near_x - x) ** 2 + (near_y - y) ** 2)
 
@@ -388,7 +402,7 @@ def swing_tick(t: WalkTick) -> None:
     if footholds_given(t):
         advance_over_edges(t)
     else:
-        advance_swing(w, c.gains.period)
+        advance_over(w, apex_of_step(t), c.gains.period)
     contacts = c.on_second if foot == 0 else c.on_first
     contacts.limited[0] = 0
     solve_contacts(c, contacts)

@@ -13,6 +13,7 @@ from poise.envs.maths.vectors import turned
 from poise.envs.terrain.arrays import X_MAX, X_MIN, surface_below, surface_height
 
 from .blocks import Treads, WalkTick
+from .command import CLEARANCE
 
 FREE = 1.0  # [m] a surface that is longer leaves footholds free: several steps fit on it
 SIDE_BY_SIDE = 0.08  # [m] between feet that are not one behind the other
@@ -156,6 +157,13 @@ def _lead(t: WalkTick, a: int, place: float, speed: float, until: float) -> None
 
 
 @compiled
+def apex_of_step(t: WalkTick) -> float:
+    """How high a step on one surface lifts the sole [m]: as commanded, or the gait's own."""
+    wanted = t.gait.command[CLEARANCE]
+    return wanted if wanted > 0.0 else t.walk.swing.apex
+
+
+@compiled
 def advance_over_edges(t: WalkTick) -> None:
     """Move the swing a tick further: up before it goes forward, and down when it is there."""
     w, r, dt = t.walk.swing, t.gait.treads, t.walk.gains.period
@@ -166,10 +174,11 @@ def advance_over_edges(t: WalkTick) -> None:
     plain = own == surface_below(r.surfaces, w.foothold[0], w.foothold[1])
     way = DOWN if end < start - LEVEL else UP
     hold, arrive, rise = r.hold[way] * whole, r.arrive * whole, r.rise[way] * whole
-    lower, apex = r.lower[way] * whole, max(start, end, between) + r.clearance
+    lower, apex = r.lower[way] * whole, max(start, end, between)
+    apex += max(r.clearance, t.gait.command[CLEARANCE])
     if plain:
         hold, arrive, rise, lower = 0.0, whole, w.lift * whole, w.lift * whole
-        apex = end + w.apex
+        apex = end + apex_of_step(t)
     for a in range(2):
         if after < hold:
             _lead(t, a, r.left[a], 0.0, hold)

@@ -24,13 +24,15 @@ from poise.envs.robots.robot import Robot
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.terrain import Surface, Terrain
 
+from .arms import allocate_arms
 from .blocks import Gait, WalkTick
-from .command import GaitCommand
+from .command import ENTRIES, GaitCommand, command_of
 from .config import GaitConfig, WalkConfig
 from .given import allocate_treads, given_footholds
 from .models.leg_rows import leg_task
 from .models.legs import leg_arrays, no_legs
 from .models.reference import allocate_reference
+from .reach import check_command
 from .tick import walk_tick
 
 
@@ -58,7 +60,7 @@ def allocate_gait(
         start_time=c.start_time / omega,
         speed_margin=c.speed_margin * h * omega if limits else np.inf,
         time_min=(limits or c.limits).time_min / omega,
-        command=guarded_zeros(5),
+        command=guarded_zeros(ENTRIES),
         velocity=guarded_zeros(3),
         error=guarded_zeros(2),
         planned=guarded_zeros(2),
@@ -117,6 +119,7 @@ class Walk(CaptureStep):
         self._walk_tick: WalkTick | None = None
         legs = no_legs() if gait.model.keeps_height else leg_arrays(robot)
         self.reference = allocate_reference(robot, gait.qp.period, legs)
+        self.arms = allocate_arms(robot, self.gait_sets.parameters.accel_weight, gait.arm_weight)
         super().__init__(robot, config)
 
     @property
@@ -127,12 +130,15 @@ class Walk(CaptureStep):
     @property
     def command(self) -> GaitCommand:
         """The velocity and turn that are asked for; may be set at any time."""
-        ahead, left, turn, step_time, width = self.gait.command.tolist()
-        return GaitCommand(ahead, left, turn, step_time=step_time or None, width=width or None)
+        return command_of(self.gait.command)
 
     @command.setter
     def command(self, command: GaitCommand) -> None:
         self.gait.command[:] = command.array()
+
+    def check_command(self, command: GaitCommand) -> None:
+        """Raise ConfigError with the limits of this robot for a command out of its reach."""
+        check_command(command, self.robot, self.gait, self.gait_limits, self._gait_config.swing)
 
     @property
     def terrain(self) -> Terrain:
@@ -183,7 +189,8 @@ class Walk(CaptureStep):
             known = WalkTick(
                 capture=capture, walk=walk, gait=self.gait, reference=self.reference,
                 model=model.bind(self.robot, capture.state, self.reference),
-                constant_height=int(model.keeps_height), stance=pair, swinging=guarded_zeros(2),
+                arms=self.arms, constant_height=int(model.keeps_height),
+                stance=pair, swinging=guarded_zeros(2),
             )  # fmt: skip
             self._walk_tick = known
         return known

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.envs.physics.legs import find_legs, standing_data
 from poise.envs.robots.menagerie import WHEEL
 from poise.envs.robots.robot import load_robot
 from tests.support.physics import robot_named
@@ -26,7 +27,7 @@ def trial(name, push, duration):
     return env
 
 
-@pytest.mark.parametrize("name", ["humanoid", "tall", "compact"])
+@pytest.mark.parametrize("name", ["humanoid", "tall", "compact", "human"])
 def test_standing(name):
     """From a slightly disturbed start it stands for 5 s, all but at rest, and fails at no tick."""
     env = trial(name, [], 5.0)
@@ -38,13 +39,30 @@ def test_standing(name):
 
 
 @pytest.mark.parametrize("direction", [0.0, 90.0, 180.0, 270.0])
-@pytest.mark.parametrize("name", ["humanoid", "tall", "compact"])
+@pytest.mark.parametrize("name", ["humanoid", "tall", "compact", "human"])
 def test_light_pushes(name, direction):
     """0.15 N·s/kg from any side: it recovers, and comes back to where it stood to 1 cm."""
     env = trial(name, (0.15, direction), 3.5)
     assert not env.fallen and env.recovered
     state = env.simulation.state
     np.testing.assert_allclose(state.com[:2], env.targets.com[:2], atol=0.01)
+
+
+@pytest.mark.parametrize("name", ["tall", "compact", "toddler", "human"])
+def test_walking(name):
+    """At v = √(0.05 g l), l the hip's height, with the same gains, scaled: as commanded."""
+    robot = robot_named(name)
+    data = standing_data(robot)
+    hip = data.xanchor[robot.model.joint(find_legs(robot)[0].hip).id, 2]
+    speed = float(np.sqrt(0.05 * robot.units.gravity * hip))
+    env = ResidualBalanceEnv(robot, controller="walk", pushes=None, duration=7.0)
+    env.reset(seed=1, options={"command": {"ahead": speed}})
+    places = []
+    for _ in range(env.max_steps):
+        env.step_without_info(np.zeros(4))
+        places.append(env.simulation.state.com[0])
+        assert not env.fallen
+    assert (places[-1] - places[-151]) / 3.0 == pytest.approx(speed, rel=0.05)
 
 
 def test_single_axis_ankles():

@@ -16,7 +16,10 @@ def walk(
     left: float = 0.0,
     turn: float = 0.0,
     step_time: float | None = None,
+    step_length: float | None = None,
     width: float | None = None,
+    clearance: float | None = None,
+    arm_swing: float | None = None,
     duration: float = 20.0,
     push: str | None = None,
     push_at: float = 6.0,
@@ -34,7 +37,10 @@ def walk(
         left: sideways [m/s].
         turn: to the left [deg/s].
         step_time: from lift-off to touchdown [s]; by default the controller's own.
+        step_length: [m], in place of the step time.
         width: between the soles [m]; by default the controller's own.
+        clearance: of the swinging sole at its highest [m]; by default the controller's own.
+        arm_swing: of the arms against the legs, to either side [rad]; by default free to balance.
         duration: of the walk [s].
         push: an impulse [N·s] and a direction [deg, 0 ahead, 90 left] such as 20@90, for 0.1 s.
         push_at: when it is pushed [s].
@@ -52,7 +58,8 @@ def walk(
         choose_gl_backend()
     from poise.training.sessions.walk import walk
 
-    walk(speed, left=left, turn=math.radians(turn), step_time=step_time, width=width,
+    walk(speed, left=left, turn=math.radians(turn), step_time=step_time,
+         step_length=step_length, width=width, clearance=clearance, arm_swing=arm_swing,
          duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
          push=push, push_at=push_at, seed=seed, video=video, say=_say, allow=allow)  # fmt: skip
 

@@ -7,7 +7,13 @@ from typing import cast
 
 import numpy as np
 
-from poise.training.running.summary import EnvelopeFigures, PhaseJ50, WalkLevel, WalkMeans
+from poise.training.running.summary import (
+    EnvelopeFigures,
+    PhaseJ50,
+    StepsAsTold,
+    WalkLevel,
+    WalkMeans,
+)
 from poise.training.statistics.bootstrap import mean_over_directions
 from poise.training.statistics.rates import poisson_interval, wilson_interval
 from poise.training.suites.walking import WALKING
@@ -16,6 +22,7 @@ from poise.training.trials.trial import Outcome
 from .played import Played, part, rate
 
 PHASES = 8  # of a stride
+AS_TOLD = 0.1  # of a step parameter, within which a walk follows its command
 #: figures of a trial that a level has the mean of
 MEANS = tuple(WalkMeans.__annotations__)
 
@@ -36,6 +43,11 @@ def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -
     minutes = sum(times) / 60.0
     low, high = poisson_interval(fallen)
     means = {key: _mean(outcomes, key) for key in MEANS}
+    told: StepsAsTold = {}
+    if name == "gait":
+        kept = [not each.fallen and each.error is None and (each.step_error or 0.0) <= AS_TOLD
+                for each in outcomes]  # fmt: skip
+        told = {"steps_as_told_rate": sum(kept) / len(kept)}
     return {
         "part": name,
         "level": text,
@@ -46,6 +58,7 @@ def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -
         "minutes": minutes,
         "falls_per_minute": fallen / minutes if minutes else None,
         "falls_per_minute_ci95": (low / minutes, high / minutes) if minutes else None,
+        **told,
         **cast(WalkMeans, means),
     }
 

@@ -15,11 +15,13 @@ from .cells import Cell, Column, Table, cell, figure_cell, name_cell
 from .charts import Series
 from .svg import Chart, Svg, colour, dash, ticks
 
-PARTS = {"walk": "walk", "velocity": "course", "walk_push": "pushed", "walk_kick": "kicked",
-         "walk_repeated": "pushed again and again"}  # fmt: skip
+PARTS = {"walk": "walk", "gait": "steps", "velocity": "course", "walk_push": "pushed",
+         "walk_kick": "kicked", "walk_repeated": "pushed again and again"}  # fmt: skip
 Figures = dict[str, tuple[str, str, str]]
 #: key of a level → title, note, format
 REACHED: Figures = {
+    "steps_as_told_rate": ("Steps as told", "no fall, all within 10 %", ".0%"),
+    "step_error": ("off by", "largest of the step parameters told", ".1%"),
     "speed_ahead": ("Ahead [m/s]", "mean over the strides", ".3f"),
     "speed_left": ("Left [m/s]", "mean over the strides", ".3f"),
     "turn_rate": ("Turn [rad/s]", "to the left, mean over the strides", ".3f"),
@@ -31,6 +33,9 @@ COSTS: Figures = {
     "step_length": ("Step [m]", "length, along the heading", ".3f"),
     "step_width": ("Width [m]", "of a step, across the heading", ".3f"),
     "step_time": ("Time [s]", "between touchdowns", ".3f"),
+    "swing_time": ("In the air [s]", "from lift-off to touchdown", ".3f"),
+    "step_clearance": ("Clearance [m]", "of the sole's middle at its highest", ".3f"),
+    "yaw_momentum": ("Yaw momentum [N·m·s]", "root mean square about the vertical", ".2f"),
     "cost_of_transport": ("Cost of transport", "∫ Σ |τ q̇| dt / (m g d)", ".2f"),
     "positive_cost_of_transport": ("of positive work", "∫ Σ max(τ q̇, 0) dt / (m g d)", ".2f"),
     "knee_mean": ("Stance knee [N·m/kg]", "mean of |τ|/m", ".2f"),

@@ -176,6 +176,10 @@ class WalkMeans(TypedDict, total=False):
     step_length: Number
     step_width: Number
     step_time: Number
+    swing_time: Number
+    step_clearance: Number
+    step_error: Number
+    yaw_momentum: Number
     cost_of_transport: Number
     positive_cost_of_transport: Number
     knee_mean: Number
@@ -186,7 +190,14 @@ class WalkMeans(TypedDict, total=False):
     surfaces_passed: Number
 
 
-class WalkLevel(Rate, WalkMeans, total=False):
+class StepsAsTold(TypedDict, total=False):
+    """Of commands with step parameters: the rate of walks that do not fall and whose steps are
+    within 10 % of each."""
+
+    steps_as_told_rate: float
+
+
+class WalkLevel(Rate, StepsAsTold, WalkMeans, total=False):
     """Trials that walk by one command, one course, or kicked alike."""
 
     part: str

@@ -10,7 +10,7 @@ import numpy as np
 from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.registry import walking_controllers
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.command import GaitCommand, command_of
 from poise.baselines.walking.schedule import MOST_COMMANDS, TimedCommand, parse_commands
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.pushes.options import parse_pushes
@@ -157,10 +157,7 @@ class Session:
             raise PoiseError(f"at most {MOST_COMMANDS} commands: begin anew by Reset")
         self.commands = (*before, command)
         for walker in walkers:
-            walker.command = GaitCommand(
-                command.ahead, command.left, command.turn,
-                step_time=command.step_time, width=command.width,
-            )  # fmt: skip
+            walker.command = command_of(command.array())
         return command
 
     def _expect_walkers(self) -> list[CommandedEnv]:

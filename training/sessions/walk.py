@@ -36,7 +36,10 @@ def walk(
     left: float = 0.0,
     turn: float = 0.0,
     step_time: float | None = None,
+    step_length: float | None = None,
     width: float | None = None,
+    clearance: float | None = None,
+    arm_swing: float | None = None,
     duration: float = 20.0,
     controller: str = "walk",
     robot: str = "humanoid",
@@ -53,7 +56,7 @@ def walk(
     Args:
         speed, left: of the command [m/s].
         turn: of the command [rad/s].
-        step_time, width: of the command, see `GaitCommand`.
+        step_time, step_length, width, clearance, arm_swing: of the command, see `GaitCommand`.
         duration: of the walk [s].
         controller: one that walks, as `load_agent` takes it.
         robot: a packaged robot or a path to its description.
@@ -74,7 +77,9 @@ def walk(
     if seed < 0:
         raise ConfigError(f"must be at least 0, not {seed}", field="seed")
     loaded = load_robot(robot)
-    asked = {"ahead": speed, "left": left, "turn": turn, "step_time": step_time, "width": width}
+    asked = {"ahead": speed, "left": left, "turn": turn, "step_time": step_time,
+             "step_length": step_length, "width": width, "clearance": clearance,
+             "arm_swing": arm_swing}  # fmt: skip
     commands = parse_commands(asked, "command")
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
     ground = make_terrain(terrain, "walk")

@@ -19,7 +19,7 @@ from .factors import Factors, Mix
 from .motions import Motions
 from .random import Quiet, Random, Sequence
 from .terrains import Terrains
-from .walking import WALKING, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
+from .walking import WALKING, Gait, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Suite(Standard):
     sequence: Sequence | None = None
     quiet: Quiet | None = None
     walk: Walk | None = field(default=None, metadata={"omit": "default"})
+    gait: Gait | None = field(default=None, metadata={"omit": "default"})
     velocity: Velocity | None = field(default=None, metadata={"omit": "default"})
     walk_push: WalkPush | None = field(default=None, metadata={"omit": "default"})
     walk_kick: WalkKick | None = field(default=None, metadata={"omit": "default"})

@@ -59,6 +59,16 @@ class Walk(Part):
 
 
 @dataclass(frozen=True)
+class Gait(Walk):
+    """The same for commands with step parameters: whether the steps are as told."""
+
+    commands: tuple[GaitCommand, ...] = (GaitCommand(0.5, step_length=0.2),)
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        return [replace(trial, part="gait") for trial in super().first(draw, number)]
+
+
+@dataclass(frozen=True)
 class Velocity(Part):
     """Courses of commands that change while it walks, `trials` times each."""
 
@@ -164,4 +174,4 @@ class WalkRepeated(PushSequence):
 
 
 #: parts of a suite for controllers that walk
-WALKING = ("walk", "velocity", "walk_push", "walk_kick", "walk_repeated", "terrains")
+WALKING = ("walk", "gait", "velocity", "walk_push", "walk_kick", "walk_repeated", "terrains")

@@ -12,6 +12,7 @@ from poise.baselines.walking.command import GaitCommand
 from poise.baselines.walking.schedule import TimedCommand
 
 from .gait_record import WalkArrays
+from .step_figures import step_error, steps_of
 
 AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 SETTLING = 4.0  # [s] after a change of the command, from which strides are compared with it
@@ -56,6 +57,8 @@ class Walk:
     Velocities are means over a stride, two steps from touchdown to touchdown, of the CoM along the
     mean heading of that stride.
 
+    `transfer_time` is T_d, of the gait that is to follow a commanded step time [s].
+
     Attributes:
         landed: its touchdowns.
         velocity: (k − 2, 3) of the stride that ends with touchdown 2, 3, …: ahead, left [m/s], turn
@@ -66,9 +69,10 @@ class Walk:
     """
 
     def __init__(
-        self, record: WalkArrays, commands: Sequence[TimedCommand], fall_time: float | None = None
-    ):
-        self.record, self.commands = record, commands
+        self, record: WalkArrays, commands: Sequence[TimedCommand], fall_time: float | None = None,
+        transfer_time: float = 0.0,
+    ):  # fmt: skip
+        self.record, self.commands, self._transfer_time = record, commands, transfer_time
         until = np.inf if fall_time is None else fall_time - FALLING
         self.landed = touchdowns(record)
         rows = self.landed.row
@@ -149,19 +153,26 @@ class Walk:
             **self._knees(),
             "circle_error": self._circle_error(),
             "foot_slide": self._slide(),
+            "yaw_momentum": _root_mean_square(self.record.spin[self._known]),
         }
 
     def _steps(self) -> dict[str, float | None]:
-        """Mean length, width [m] and time [s] of the steps that end settled strides."""
-        r, rows, feet = self.record, self.landed.row, self.landed.foot
-        steps = []
-        for k in np.flatnonzero(self.settled) + 2:
-            way = r.feet[rows[k], feet[k]] - r.feet[rows[k], 1 - feet[k]]
-            yaw = self.mean_yaw(rows[k - 2], rows[k])
-            ahead, left = np.cos(yaw) * way + np.sin(yaw) * np.array([way[1], -way[0]])
-            steps.append((ahead, abs(left), r.time[rows[k]] - r.time[rows[k - 1]]))
-        length, width, time = np.array(steps).reshape(-1, 3).T
-        return {"step_length": _mean(length), "step_width": _mean(width), "step_time": _mean(time)}
+        """Means of the steps that end settled strides, and their error."""
+        rows, times = self.landed.row, self.record.time
+        ends = np.flatnonzero(self.settled) + 2
+        yaws = [self.mean_yaw(rows[k - 2], rows[k]) for k in ends]
+        measures = steps_of(self.record, rows[ends], self.landed.foot[ends], yaws, self.command_at)
+        names = ("step_length", "step_width", "swing_time", "step_clearance")
+        periods = times[rows[ends]] - times[rows[ends - 1]]
+        return {
+            **{name: _mean(measures[name]) for name in names},
+            "step_time": _mean(periods),
+            "step_error": step_error(
+                {**measures, "duration": periods - self._transfer_time},
+                times[rows[ends]],
+                self.command_at,
+            ),
+        }
 
     def _costs(self) -> dict[str, float | None]:
         """∫ Σ |τ q̇| dt over the way [J/m] from the first settled stride to the last, and of the

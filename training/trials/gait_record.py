@@ -20,6 +20,8 @@ class Row(NamedTuple):
     yaw: float  # of the heading [rad]
     down: np.ndarray  # (2,) whether a foot touches the ground
     feet: np.ndarray  # (2, 2) soles along the ground [m]
+    heights: np.ndarray  # (2,) of the soles [m]
+    spin: float  # angular momentum about the vertical through the CoM [N·m·s]
     knees: np.ndarray  # (2,) |τ|/m of each leg's knee [N·m/kg]; NaN where none is known
     energy: float  # ∫ Σ |τ q̇| dt [J]
     work: float  # ∫ Σ max(τ q̇, 0) dt [J]
@@ -34,6 +36,8 @@ class WalkArrays:
     yaw: np.ndarray
     down: np.ndarray
     feet: np.ndarray
+    heights: np.ndarray
+    spin: np.ndarray
     knees: np.ndarray
     energy: np.ndarray
     work: np.ndarray
@@ -55,7 +59,8 @@ class WalkRecord:
         self._rows.append(
             Row(
                 env.simulation.time, state.com[:2].copy(), state.heading_yaw,
-                state.contacts > 0.5, state.sole_points[:, :2].copy(), np.array(knees),
+                state.contacts > 0.5, state.sole_points[:, :2].copy(),
+                state.sole_points[:, 2].copy(), float(state.angular_momentum[2]), np.array(knees),
                 float(metrics[ENERGY]), float(metrics[POSITIVE_WORK]),
             )
         )  # fmt: skip

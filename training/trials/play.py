@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.stepping.cop_region import foot_signs
 from poise.envs.balance import episode
@@ -90,7 +91,8 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     (`Walk.as_commanded`), on a terrain to be beyond its last edge; there is no time of recovery
     then, and no drift.
     """
-    walk = Walk(record.arrays(), trial.commands, outcome.fall_time)
+    assert isinstance(env, CommandedEnv)  # it has taken the commands
+    walk = Walk(record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0)
     figures: dict[str, Any] = {
         name: _finite_or_none(value) for name, value in walk.figures().items()
     }

@@ -122,7 +122,13 @@ class Outcome:
             of their velocity from the command [m/s].
         turn_error_rms: root mean square over the strides of the turn's error [rad/s].
         step_length, step_width, step_time: means over the steps [m, m, s], of a sole that lands
-            from the other one, along the heading and across it.
+            from the other one, along the heading and across it, and between touchdowns.
+        swing_time, step_clearance: from lift-off to touchdown [s]; of the sole's middle at its
+            highest above where it lands [m]; means over the steps.
+        step_error: largest deviation of a step parameter from its command, as a fraction, among
+            those that are commanded: step time, step length, width, clearance. A step time is
+            that from touchdown to touchdown but for the gait's time on both feet.
+        yaw_momentum: root mean square of the angular momentum about the vertical [N·m·s].
         cost_of_transport: ∫ Σ |τ q̇| dt / (m g d), d the way; `positive_cost_of_transport` of the
             work Σ max(τ q̇, 0) alone.
         knee_mean, knee_peak: |τ|/m of the stance leg's knee on one foot [N·m/kg], at the ends of
@@ -172,6 +178,10 @@ class Outcome:
     step_length: float | None = None
     step_width: float | None = None
     step_time: float | None = None
+    swing_time: float | None = None
+    step_clearance: float | None = None
+    step_error: float | None = None
+    yaw_momentum: float | None = None
     cost_of_transport: float | None = None
     positive_cost_of_transport: float | None = None
     knee_mean: float | None = None

@@ -32,7 +32,8 @@ def test_one_command_or_a_list_of_them():
         ({"ahead": float("nan")}, "reset: command: ahead: must be a finite number, not nan"),
         (
             {"speed": 1.0},
-            r"speed: unknown field \(choices: ahead, left, turn, step_time, width, start\)",
+            r"speed: unknown field \(choices: ahead, left, turn, step_time, width, clearance, "
+            r"arm_swing, step_length, start\)",
         ),
         ({"start": -1.0}, "start: must be at least 0.0, not -1.0"),
         ([{}, {}], "start: must increase from command to command"),

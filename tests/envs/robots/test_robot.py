@@ -16,7 +16,7 @@ from poise.envs.robots.robot import Robot, load_robot
 from tests.envs.robots.test_menagerie import ROBOTS as OF_OTHERS
 from tests.support.small_biped import BOX_FOOT, LEG, motors, write_biped
 
-ROBOTS = ("compact", "humanoid", "tall", "toddler")
+ROBOTS = ("compact", "human", "humanoid", "tall", "toddler")
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -283,7 +283,9 @@ def test_wrong_descriptions(tmp_path: Path, change: dict, words: list[str]) -> N
 
 def test_unknown_robot_lists_names() -> None:
     """A robot that does not exist is refused with the names of those that do."""
-    with pytest.raises(ConfigError, match=r"atlas.*compact, humanoid, .*tall, toddler, unitree_g1"):
+    with pytest.raises(
+        ConfigError, match=r"atlas.*compact, human, humanoid, .*tall, toddler, unitree_g1"
+    ):
         load_robot("atlas")
 
 

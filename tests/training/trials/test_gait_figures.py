@@ -12,7 +12,12 @@ from poise.training.trials.gait_figures import Walk, touchdowns
 from poise.training.trials.gait_record import WalkArrays
 
 PERIOD, STEP, DOWN = 0.02, 0.4, 0.1  # [s] of the rows, of a step, of it with both feet down
-HALF_WIDTH, SWAY = 0.1, 0.03  # [m]
+HALF_WIDTH, SWAY, CLEARANCE = 0.1, 0.03, 0.06  # [m]
+
+
+def step_of(time: np.ndarray) -> np.ndarray:
+    """(n,) the step that a time is of."""
+    return np.floor((time + 1e-9) / STEP)
 
 
 def recorded(
@@ -29,10 +34,12 @@ def recorded(
     middle = np.cumsum(speed) * PERIOD - speed * PERIOD
     com = middle + 1j * axes * SWAY * np.cos(np.pi * time / STEP)
     down, feet = np.ones((len(time), 2), dtype=bool), np.zeros((len(time), 2), dtype=complex)
+    heights = np.zeros((len(time), 2))
     for i, t in enumerate(time):
         step, phase = divmod(t + 1e-9, STEP)
         swinging = int(step) % 2  # the right one first
         down[i, swinging] = phase < DOWN or (step == 0 and t < DOWN)
+        heights[i, swinging] = 0.0 if down[i, swinging] else CLEARANCE
         for foot, side in ((0, -1.0), (1, 1.0)):
             landings = [k for k in range(int(step) + 1) if k % 2 != foot or k == 0]
             row = round(landings[-1] * STEP / PERIOD)
@@ -41,6 +48,7 @@ def recorded(
     knees[:, 1] *= 0.5
     return WalkArrays(
         time=time, com=_plane(com), yaw=yaw, down=down, feet=_plane(feet), knees=knees,
+        heights=heights, spin=np.where(step_of(time) % 2 == 0, 0.3, -0.3),
         energy=40.0 * time, work=25.0 * time,
     )  # fmt: skip
 
@@ -98,11 +106,47 @@ def test_lengths_times_and_costs() -> None:
     assert figures["step_time"] == pytest.approx(STEP)
     assert figures["step_length"] == pytest.approx(0.5 * STEP, abs=1e-9)
     assert figures["step_width"] == pytest.approx(2.0 * HALF_WIDTH, abs=1e-9)
+    assert figures["swing_time"] == pytest.approx(STEP - DOWN)
+    assert figures["step_clearance"] == pytest.approx(CLEARANCE) and figures["step_error"] is None
+    assert figures["yaw_momentum"] == pytest.approx(0.3)
     assert figures["energy_per_metre"] == pytest.approx(40.0 / 0.5, rel=1e-6)
     assert figures["work_per_metre"] == pytest.approx(25.0 / 0.5, rel=1e-6)
     assert figures["knee_mean"] == pytest.approx(0.75, abs=0.01) and figures["knee_peak"] == 1.0
     assert figures["foot_slide"] == 0.0 and figures["circle_error"] is None
     assert walk(0.05).figures()["energy_per_metre"] is None  # slower than 0.1 m/s
+
+
+@pytest.mark.parametrize(
+    ("told", "error"),
+    [
+        ({"step_time": STEP - DOWN}, 0.0),
+        ({"step_time": 0.25}, 0.2),
+        ({"step_length": 0.25}, 0.2),
+        ({"width": 0.16}, 0.25),
+        ({"clearance": 0.05, "width": 0.2}, 0.2),
+    ],
+)
+def test_the_error_of_steps_is_the_largest_of_what_was_told(told: dict, error: float) -> None:
+    """0.3 s in the air, 0.2 m long and wide, 0.06 m high, beside what was commanded."""
+    figures = Walk(recorded(), (TimedCommand(0.5, **told),), transfer_time=DOWN).figures()
+    assert figures["step_error"] == pytest.approx(error, abs=1e-6)
+
+
+def test_a_sole_that_goes_on_after_it_has_landed_stands_further() -> None:
+    """The error is of where it stands when the other foot leaves, 0.1 s after it has landed."""
+    record = recorded()
+    feet = record.feet.copy()
+    for row, foot in list(zip(*touchdowns_of(record), strict=True))[:-1]:  # where the record ends
+        feet[row, foot] -= 0.02 * np.array([np.cos(0.3), np.sin(0.3)])  # at touchdown alone
+    figures = Walk(replace(record, feet=feet), (TimedCommand(0.5, step_length=0.2),)).figures()
+    assert figures["step_length"] == pytest.approx(0.18, abs=0.001)
+    assert figures["step_error"] == pytest.approx(0.0, abs=1e-9)
+
+
+def touchdowns_of(record: WalkArrays) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and feet of all touchdowns."""
+    found = touchdowns(record)
+    return found.row, found.foot
 
 
 def test_steps_are_those_that_end_settled_strides() -> None:

@@ -1,0 +1,203 @@
+"""Step parameters that a walk is told: clearance, step length, width, the swing of its arms."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+import pytest
+
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.registry import load_controller
+from poise.baselines.walking.arms import arm_scales, largest_swing
+from poise.baselines.walking.command import GaitCommand, command_of
+from poise.baselines.walking.reach import least_width
+from poise.configs.errors import ConfigError
+from tests.support.shared import robot
+
+PERIOD = 0.02
+ROBOTS = ("humanoid", "tall", "compact", "toddler", "human")
+
+
+class Played:
+    """A walk by commands, (seconds, command) after each other, and what its feet and arms did."""
+
+    def __init__(self, *commands, name="humanoid", seed=1):
+        self.env = ResidualBalanceEnv(robot(name), controller="walk", pushes=None, duration=60.0)
+        self.env.reset(seed=seed)
+        rows = []
+        for seconds, command in commands:
+            self.env.command = command
+            for _ in range(round(seconds / PERIOD)):
+                self.env.step(np.zeros(len(self.env.action_names)))
+                state = self.env.simulation.state
+                rows.append((state.sole_points.copy(), state.contacts > 0.5, state.q.copy(),
+                             state.angular_momentum[2], state.heading.copy()))  # fmt: skip
+        self.feet, self.down, self.q, self.spin, self.heading = (
+            np.array(column) for column in zip(*rows, strict=True)
+        )
+
+    def last(self, seconds):
+        return slice(-round(seconds / PERIOD), None)
+
+    def clearances(self, seconds):
+        """The largest height of each foot in each of its swings."""
+        found, part = [], self.last(seconds)
+        for foot in range(2):
+            height, air = self.feet[part, foot, 2], ~self.down[part, foot]
+            edges = np.flatnonzero(np.diff(air.astype(int)))
+            found += [height[a + 1 : b + 1].max() for a, b in pairwise(edges)
+                      if air[a + 1] and b - a > 4]  # fmt: skip
+        return np.array(found)
+
+    def arms(self, seconds):
+        """(n, 2) the turn of the arm on the side of each foot about the robot's left axis."""
+        scales, part = arm_scales(self.env.robot), self.last(seconds)
+        off = self.q[part] - self.env.robot.standing_qpos[7:]
+        return off @ scales.T / np.sum(scales**2, axis=1)
+
+    def ahead(self, seconds):
+        """(n,) by how much the first foot is ahead of the second one [m]."""
+        part = self.last(seconds)
+        apart = self.feet[part, 0, :2] - self.feet[part, 1, :2]
+        return np.sum(apart * self.heading[part], axis=1)
+
+
+def test_a_foot_clears_the_ground_by_what_is_commanded():
+    """Within 15 % or 8 mm, as soon as it is asked for; the gait's own comes back."""
+    own = Played((5.0, GaitCommand(0.5)))
+    free = own.clearances(2.0).mean()
+    for wanted in (0.03, 0.08, 0.11):
+        found = Played((2.0, GaitCommand(0.5)), (3.0, GaitCommand(0.5, clearance=wanted)))
+        assert not found.env.fallen
+        assert found.clearances(2.0).mean() == pytest.approx(wanted, abs=max(0.008, 0.15 * wanted))
+    found.env.command = GaitCommand(0.5)
+    again = Played((2.0, GaitCommand(0.5, clearance=0.11)), (4.0, GaitCommand(0.5)))
+    assert again.clearances(2.0).mean() == pytest.approx(free, abs=0.004)
+
+
+def test_arms_swing_against_the_legs():
+    """By what is commanded, each against the leg of its side; else they only balance the robot."""
+    swung = Played((8.0, GaitCommand(0.6, arm_swing=0.4)))
+    assert not swung.env.fallen
+    arms, ahead = swung.arms(4.0), swung.ahead(4.0)
+    for arm, sign in ((0, 1.0), (1, -1.0)):  # positive is backward
+        turn = arms[:, arm] - arms[:, arm].mean()
+        assert np.corrcoef(turn, sign * ahead)[0, 1] > 0.9
+        assert 0.5 * np.ptp(turn) == pytest.approx(0.4, abs=0.08)
+
+
+def test_no_arm_swing_is_the_walk_as_it_was_bit_for_bit():
+    """Zero or None; and the weights of the posture are as before when it is taken back."""
+    ends = [Played((3.0, GaitCommand(0.5, arm_swing=swing))).env for swing in (None, 0.0)]
+    np.testing.assert_array_equal(*(env.simulation.data.qpos for env in ends))
+    weight = ends[0].controller.gait_sets.parameters.accel_weight.copy()
+    env = Played((1.5, GaitCommand(0.5, arm_swing=0.4))).env
+    assert np.any(env.controller.gait_sets.parameters.accel_weight != weight)
+    env.command = GaitCommand(0.5)
+    env.step(np.zeros(len(env.action_names)))
+    np.testing.assert_array_equal(env.controller.gait_sets.parameters.accel_weight, weight)
+
+
+def test_a_step_length_is_commanded():
+    """Steps of 0.2 m at 0.5 m/s last 0.4 s from one to the next."""
+    found = Played((8.0, GaitCommand(0.5, step_length=0.22)))
+    assert not found.env.fallen
+    assert np.abs(found.ahead(4.0)).max() == pytest.approx(0.22, abs=0.03)
+
+
+@pytest.mark.parametrize("width", [0.12, 0.28])
+def test_a_width_is_commanded(width):
+    """Also one below what the planner chooses itself."""
+    found = Played((6.0, GaitCommand(0.4, width=width)))
+    across = np.stack([-found.heading[:, 1], found.heading[:, 0]], axis=1)
+    apart = np.abs(np.sum((found.feet[:, 0, :2] - found.feet[:, 1, :2]) * across, axis=1))
+    both = found.down.all(axis=1)[found.last(3.0)]
+    assert not found.env.fallen
+    assert apart[found.last(3.0)][both].mean() == pytest.approx(width, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ({"ahead": 9.0}, r"command\.ahead: 9 m/s is steps of .* 'humanoid' can at most .* m/s"),
+        ({"ahead": 0.5, "clearance": 0.9}, r"clearance: 0\.9 m is out of reach.* joints end"),
+        ({"ahead": 0.5, "width": 0.05}, r"width: 0\.05 m is out of reach.* soles do not overlap"),
+        ({"ahead": 0.5, "width": 1.0}, r"width: 1 m is out of reach"),
+        ({"ahead": 0.5, "arm_swing": 3.0}, r"arm_swing: 3 rad is out of reach.* at most"),
+        ({"ahead": 0.8, "step_length": 0.1}, r"step_length: 0\.1 m at 0\.8 m/s is out of reach"),
+    ],
+)
+def test_a_command_out_of_reach_is_refused_with_the_limits_of_the_robot(command, said):
+    """At the reset, and while it walks; the command that held goes on."""
+    env = ResidualBalanceEnv(robot(), controller="walk", pushes=None, duration=1.0)
+    with pytest.raises(ConfigError, match=said):
+        env.reset(seed=0, options={"command": command})
+    env.reset(seed=0, options={"command": {"ahead": 0.4}})
+    with pytest.raises(ConfigError, match=said):
+        env.command = command
+    assert env.command == GaitCommand(0.4)
+
+
+def test_a_robot_without_named_arms_swings_none():
+    body = robot("humanoid")
+    description = replace(body.description, roles={})
+    env = ResidualBalanceEnv(replace(body, description=description), controller="walk", pushes=None)
+    with pytest.raises(ConfigError, match="lacks the roles shoulder_pitch_right and"):
+        env.reset(seed=0, options={"command": {"ahead": 0.2, "arm_swing": 0.2}})
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_packaged_robot_says_what_swings_its_arms(name):
+    """The arm that swings ahead is before its shoulder: a turn about the left axis is backward."""
+    body = robot(name)
+    scales = arm_scales(body)
+    assert np.all(np.abs(scales).sum(axis=1) > 0.0) and 0.3 < largest_swing(body) < 3.0
+    found = Played((0.04, GaitCommand()), name=name)
+    for foot, sign in enumerate((1.0, -1.0)):
+        assert _hand_ahead(found.env, scales[foot]) < -0.02, (name, foot, sign)
+    assert 0.0 < least_width(body) < 0.3 * body.height_com
+
+
+def _hand_ahead(env, scales):
+    """By how much the arms' farthest bodies go ahead for a turn of 0.3 rad [m]."""
+    model, data = env.robot.model, mujoco.MjData(env.robot.model)
+    data.qpos[:] = env.robot.standing_qpos
+    mujoco.mj_kinematics(model, data)
+    before = data.xpos.copy()
+    data.qpos[7:] += 0.3 * scales
+    mujoco.mj_kinematics(model, data)
+    moved = data.xpos[:, 0] - before[:, 0]
+    return moved[np.argmax(np.abs(moved))]
+
+
+def test_a_command_and_its_array_say_the_same():
+    for command in (
+        GaitCommand(0.3, 0.1, -0.2),
+        GaitCommand(0.5, width=0.2, clearance=0.07, arm_swing=0.3, step_length=0.25),
+        GaitCommand(0.5, step_time=0.4),
+    ):
+        assert command_of(command.array()) == command
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"clearance": 0.0}, "clearance: must be a finite number above 0"),
+        ({"arm_swing": -0.1}, "arm_swing: must be a finite number, 0 or above"),
+        ({"ahead": 0.5, "step_length": 0.3, "step_time": 0.4}, "step_length: give step_time or"),
+        ({"step_length": 0.3}, "step_length: needs a speed"),
+    ],
+)
+def test_bad_step_parameters(fields, said):
+    with pytest.raises(ConfigError, match=said):
+        GaitCommand(**fields)
+
+
+def test_limits_are_those_of_the_robots_size():
+    """A larger body takes larger clearances and widths."""
+    walkers = [load_controller("walk", robot(name)) for name in ("toddler", "tall")]
+    wide = GaitCommand(0.3, width=0.7)
+    walkers[1].check_command(wide)
+    with pytest.raises(ConfigError, match="'toddler' can"):
+        walkers[0].check_command(wide)
