@@ -5,6 +5,7 @@ if __name__ == "envs":
 
 from typing import TYPE_CHECKING
 
+from poise.envs.viewing.gl import load_osmesa_alone
 from poise.lazy import lazy
 
 __all__ = [
@@ -36,6 +37,8 @@ __all__ = [
     "parse_pushes",
     "replicate",
 ]
+
+load_osmesa_alone()  # before anything of ours loads MuJoCo
 
 if TYPE_CHECKING:
     from poise.envs.balance.base import BalanceEnv

@@ -17,6 +17,8 @@ if sys.platform == "linux":
     off_screen = "osmesa" if ctypes.util.find_library("OSMesa") else "egl"
     os.environ.setdefault("MUJOCO_GL", off_screen)
 
+import poise.envs  # noqa: E402, F401 - before any test imports MuJoCo: it sees to OSMesa
+
 
 @functools.cache
 def _rendering_problem() -> str | None:

@@ -17,14 +17,36 @@ def choose_gl_backend() -> str | None:
     # Mesa's cache of shaders is a thread of least priority: on a busy machine it ends seconds late
     # (sched(7): nice 19), and the process with it. To do without costs a report a second.
     os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
+    load_osmesa_alone()
     chosen = os.environ.get("MUJOCO_GL")
     if chosen or not sys.platform.startswith("linux") or "mujoco" in sys.modules or _has_display():
         return chosen
     for backend, library in (("osmesa", "OSMesa"), ("egl", "EGL")):
         if ctypes.util.find_library(library):
             os.environ["MUJOCO_GL"] = backend
+            load_osmesa_alone()
             return backend
     return None
+
+
+def load_osmesa_alone() -> None:
+    """Load OSMesa, if MuJoCo is to draw with it, so that other libraries do not see its symbols.
+
+    Call it before anything imports MuJoCo. PyOpenGL, which loads OSMesa for MuJoCo, shows its
+    symbols to all that is loaded later. Mesa brings an LLVM with it, which would take the place of
+    Triton's own: a build of torch with CUDA would end the process when it makes an optimizer.
+    """
+    if os.environ.get("MUJOCO_GL", "").lower() != "osmesa" or "OpenGL.platform" in sys.modules:
+        return
+    os.environ.setdefault("PYOPENGL_PLATFORM", "osmesa")  # as MuJoCo does
+    shown = ctypes.RTLD_GLOBAL
+    ctypes.RTLD_GLOBAL = ctypes.RTLD_LOCAL  # PyOpenGL has no setting of it
+    try:
+        import OpenGL.platform  # noqa: F401
+    except Exception:
+        pass  # MuJoCo tells what is missing
+    finally:
+        ctypes.RTLD_GLOBAL = shown
 
 
 def _has_display() -> bool:

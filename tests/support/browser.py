@@ -126,7 +126,10 @@ class Browser:
     def save_to(self, folder: Path) -> None:
         """Let the page save files into a folder, and read and write the clipboard."""
         self._browser("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
-        self._browser("Browser.grantPermissions", permissions=["clipboardReadWrite"])
+        # what is not named is refused; which of the two a write needs depends on whether the user
+        # has just touched the page
+        permissions = ["clipboardReadWrite", "clipboardSanitizedWrite"]
+        self._browser("Browser.grantPermissions", permissions=permissions)
 
     def _browser(self, method: str, **params: Any) -> dict[str, Any]:
         """A command to the browser, not to its page."""

@@ -24,12 +24,20 @@ from .walking import WalkSliders
 
 SPEEDS = {"1×": 1.0, "1/2×": 0.5, "1/4×": 0.25, "1/10×": 0.1}  # label → simulated over real time
 OPACITY = 0.75  # of the robot, with which marks inside are seen
-#: where a page may not write to the clipboard, by another address than this machine's, the link
-#: itself can be copied
+#: A page may write to the clipboard on localhost and by https alone; by another name it copies
+#: what it has selected, which any browser allows. The link itself is there where both fail.
 LINK = """<div style="font-size: 0.85em; padding: 0 0.75em"><a href="{link}">Link to this</a>
-<button style="margin-left: 0.5em; cursor: pointer" onclick="const b = this;
-navigator.clipboard.writeText(b.previousElementSibling.href).then(() => b.innerText = 'Copied')"
->Copy</button></div>"""
+<button style="margin-left: 0.5em; cursor: pointer" onclick="
+const button = this, link = button.previousElementSibling.href;
+const tell = done => {{ button.innerText = done ? 'Copied' : 'Refused: copy the link itself'; }};
+const select = () => {{
+  const area = document.createElement('textarea');
+  area.value = link; button.after(area); area.select();
+  try {{ return document.execCommand('copy'); }} finally {{ area.remove(); }}
+}};
+const other = () => tell(select());
+navigator.clipboard ? navigator.clipboard.writeText(link).then(() => tell(true), other) : other();
+">Copy</button></div>"""
 Ask = Callable[..., None]  # has a function called with arguments, by the loop that plays
 
 

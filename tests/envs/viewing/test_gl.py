@@ -1,5 +1,6 @@
 """The choice of an off-screen renderer, and what our modules leave alone."""
 
+import ctypes.util
 import os
 import subprocess
 import sys
@@ -75,5 +76,19 @@ def test_imports_set_no_variable_and_choosing_loads_no_mujoco():
         "assert not new, new"
     )
     environment = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
+
+
+@pytest.mark.skipif(ctypes.util.find_library("OSMesa") is None, reason="no OSMesa is installed")
+def test_other_libraries_do_not_see_osmesa():
+    """Nor the LLVM that comes with it: Triton, whose own has the same names, would not survive."""
+    code = (
+        "import ctypes, poise.envs, mujoco;"
+        "everything = ctypes.CDLL(None);"
+        "assert not hasattr(everything, 'OSMesaCreateContextExt'), 'shown';"
+        "mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 16, 16).render()"
+    )
+    environment = {**os.environ, "MUJOCO_GL": "osmesa"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True)
     assert done.returncode == 0, done.stderr.decode()

@@ -140,9 +140,9 @@ def use(url: str, view: BrowserView, page: dict[str, Any], folder: Path) -> None
             chromium.press("Save", "*")
             chromium.press("Picture (PNG)")
             wait((folder / "poise.png").is_file, 180.0)  # drawn once more, in software
-            # the clipboard is not every browser's: without focus it refuses
-            button = "[...document.querySelectorAll('button')].find(b => b.innerText == 'Copy')"
-            page["link"] = chromium.run(f"{button}.previousElementSibling.href")
+            chromium.press("Copy")
+            chromium.wait("document.body.innerText.includes('Copied')")
+            page["link"] = chromium.run("navigator.clipboard.readText()")
     except BaseException as error:
         page["failed"] = repr(error)
         raise
