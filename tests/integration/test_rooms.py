@@ -31,7 +31,8 @@ FLOORS = """
  7 envs/sensors, envs/viewing, baselines/controller
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
- 9 envs/vector, baselines/in_place, baselines/policy_files, baselines/retargeting
+ 9 envs/vector, baselines/feasibility, baselines/in_place, baselines/policy_files
+ 9 baselines/retargeting
  9 baselines/stepping, baselines/walking/models
 10 baselines/walking
 11 baselines/registry

@@ -1,0 +1,107 @@
+"""Postures with a given centre of mass, trunk and arms whose legs reach the planted soles."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from poise.baselines.motions.postures import LevelKinematics
+from poise.envs.robots.robot import Robot
+
+MOST, CLOSE = 15, 1e-7  # iterations, and the error [m, rad] that ends them
+FURTHEST = 0.3  # [m, rad] of a step
+RANK = 1e-3  # of the largest singular value: legs that cannot reach a sole do not try
+SMALL = 1e-6  # [rad] by which φ is turned for its derivative
+
+
+class PlantedLegs:
+    """Inverse kinematics of the legs of one robot, both soles where it stands.
+
+    Attributes:
+        legs: (k,) entries of q that move one sole and not the other.
+        others: (nj − k,) the other joints.
+    """
+
+    def __init__(self, robot: Robot):
+        self.robot, self._data = robot, mujoco.MjData(robot.model)
+        self._standing = LevelKinematics(robot).standing
+        self._data.qpos[:] = robot.standing_qpos
+        mujoco.mj_kinematics(robot.model, self._data)
+        mujoco.mj_comPos(robot.model, self._data)
+        dofs = _leg_dofs(robot, self._data)
+        self.legs = dofs - 6
+        self.others = np.setdiff1d(np.arange(len(robot.joint_names)), self.legs)
+        self._soles = [self._sole(i) for i in range(len(robot.soles))]
+        self._middle = np.mean([point for point, _ in self._soles], axis=0)
+        self._free = np.array([0, 1, 2, *dofs])
+
+    def reach(
+        self, com: np.ndarray, root: np.ndarray, others: np.ndarray, guess: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """The posture (nq,) and the largest error [m, rad] of CoM and soles that is left.
+
+        `com` (3,) is that of a `MotionSample`: relative to the middle of the soles and, over the
+        ground, to that of the standing posture; `root` (3,) its φ; `others` the joints that are no
+        legs; `guess` (nj,) what the search begins with.
+        """
+        data = self._data
+        com = self._middle + com + self._standing.com * [1.0, 1.0, 0.0]
+        axes = Rotation.from_rotvec(root).as_matrix() @ self._standing.root_axes
+        mujoco.mju_mat2Quat(data.qpos[3:7], np.ascontiguousarray(axes).ravel())
+        data.qpos[7:] = guess
+        data.qpos[7 + self.others] = others
+        data.qpos[:3] = com
+        for i in range(MOST + 1):
+            error, jacobian = self._miss(com)
+            if np.abs(error).max() < CLOSE or i == MOST:
+                break
+            step = np.linalg.lstsq(jacobian[:, self._free], -error, rcond=RANK)[0]
+            step *= min(1.0, FURTHEST / float(np.abs(step).max()))
+            data.qpos[:3] += step[:3]
+            data.qpos[7 + self.legs] += step[3:]
+        return data.qpos.copy(), float(np.abs(error).max())
+
+    def sensitivity(self, root: np.ndarray) -> np.ndarray:
+        """(k, 6) how the legs of the last `reach` change with the CoM and with φ, `root`."""
+        _, jacobian = self._miss(np.zeros(3))
+        now = Rotation.from_rotvec(root)
+        turns = [(now.inv() * Rotation.from_rotvec(root + SMALL * axis)).as_rotvec() / SMALL
+                 for axis in np.eye(3)]  # fmt: skip
+        body = self._standing.root_axes.T @ np.array(turns).T  # in the root's axes
+        wanted = np.zeros((len(jacobian), 6))
+        wanted[:3, :3] = np.eye(3)
+        wanted[:, 3:] = -jacobian[:, 3:6] @ body
+        return np.asarray(np.linalg.lstsq(jacobian[:, self._free], wanted, rcond=RANK)[0][3:])
+
+    def _miss(self, com: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Misses of CoM and soles [m, rad], and their Jacobian."""
+        robot, data, model = self.robot, self._data, self.robot.model
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        count = 3 + 6 * len(robot.soles)
+        error, jacobian = np.zeros(count), np.zeros((count, model.nv))
+        error[:3] = data.subtree_com[robot.root_body_id] - com
+        mujoco.mj_jacSubtreeCom(model, data, jacobian[:3], robot.root_body_id)
+        for i, (wanted, wanted_axes) in enumerate(self._soles):
+            point, axes = self._sole(i)
+            at = 3 + 6 * i
+            error[at : at + 3] = point - wanted
+            error[at + 3 : at + 6] = Rotation.from_matrix(axes @ wanted_axes.T).as_rotvec()
+            mujoco.mj_jac(model, data, jacobian[at : at + 3], jacobian[at + 3 : at + 6], point,
+                          robot.soles[i].body_id)  # fmt: skip
+        return error, jacobian
+
+    def _sole(self, foot: int) -> tuple[np.ndarray, np.ndarray]:
+        sole = self.robot.soles[foot]
+        axes = self._data.xmat[sole.body_id].reshape(3, 3)
+        return self._data.xpos[sole.body_id] + axes @ sole.position, axes @ sole.rotation
+
+
+def _leg_dofs(robot: Robot, data: mujoco.MjData) -> np.ndarray:
+    moved = []
+    for sole in robot.soles:
+        turns = np.zeros((3, robot.model.nv))
+        mujoco.mj_jacBody(robot.model, data, None, turns, sole.body_id)
+        moved.append(np.any(turns != 0.0, axis=0))
+    return np.flatnonzero(np.logical_xor(*moved))
