@@ -26,7 +26,7 @@ FLOORS = """
  3 envs/maths, envs/terrain, baselines/clips, baselines/solvers, baselines/warmup
  3 training/running
  4 envs/robots, baselines/joining
- 5 envs/pushes, baselines/inverse_kinematics, baselines/synthesis
+ 5 envs/pushes, baselines/inverse_kinematics, baselines/matching, baselines/synthesis
  6 envs/physics
  7 envs/sensors, envs/viewing, baselines/controller
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
