@@ -1,0 +1,364 @@
+"""The cheapest way through a motion graph that plays wanted clips in order: layers and Dijkstra.
+
+A node is a moment of a clip at which something may begin or end, in one of the layers: layer 2k has
+the wanted clips up to number k behind it and plays any clip on the way; layer 2k + 1 plays wanted
+clip number k, which is entered in its first quarter and left in its last one. So a way is a way of
+moments; of two moments of one clip the later one is reached by playing on.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra, yen
+
+from poise.configs.errors import ConfigError, shown
+
+from .motion_graph import MotionGraph, Transition, earliest_part, latest_part
+
+UNSEEN = -1  # predecessor of what has none
+SHORT = 1e-6  # of the price of time: of two ways that cost the same the shorter one is taken
+OFFSET = 1.0  # of the edges out of the start, as a sparse graph has no edges of 0
+CHECKS = 200  # of the best path, before the search gives up
+
+Place = tuple[str, float]  # a clip and a time in it [s]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a path must do.
+
+    Attributes:
+        actions: names of the clips to be played, in this order.
+        arrows: number of an action → the transition by hand that follows it.
+        start: places where the path may begin, each with a cost; none for the first action's begin.
+        goal: likewise where it may end; none for the last action's end.
+    """
+
+    actions: tuple[str, ...]
+    arrows: Mapping[int, Transition] = field(default_factory=dict)
+    start: Mapping[Place, float] = field(default_factory=dict)
+    goal: Mapping[Place, float] = field(default_factory=dict)
+
+
+class Step(NamedTuple):
+    """A clip from one time to another [s]; `after` is the transition that follows, if any."""
+
+    clip: str
+    enter: float
+    leave: float
+    wanted: bool
+    after: Transition | None
+
+
+class Path(NamedTuple):
+    """Steps in order and their cost."""
+
+    steps: tuple[Step, ...]
+    cost: float
+
+
+class Moments:
+    """The moments of all clips of a graph, and the edges between them, as arrays.
+
+    Attributes:
+        place: (n,) clip and time of each moment, of a clip in order of time.
+        plays: (p, 2) moments that follow each other in a clip; `lasts` (p,) [s].
+        joins: (t, 2) moments of each of `transitions`; `costs` (t,).
+        way_plays, way_joins: which of them a way uses: of two between the same moments the cheaper.
+    """
+
+    def __init__(self, graph: MotionGraph, extra: Iterable[Place] = ()):
+        self.names, self.lengths = graph.names, {c.name: c.duration for c in graph.clips}
+        order = {name: i for i, name in enumerate(self.names)}
+        cheapest: dict[tuple[Place, Place], Transition] = {}
+        for t in sorted(graph.transitions, key=graph.cost, reverse=True):
+            cheapest[(t.before, t.leave), (t.after, t.enter)] = t
+        places = {place for pair in cheapest for place in pair} | set(extra)
+        places |= {(name, time) for name, end in self.lengths.items() for time in (0.0, end)}
+        self.place: list[Place] = sorted(places, key=lambda place: (order[place[0]], place[1]))
+        self.index = {place: i for i, place in enumerate(self.place)}
+        self.clip = np.array([order[name] for name, _ in self.place])
+        self.time = np.array([time for _, time in self.place])
+        follow = np.flatnonzero(np.diff(self.clip) == 0)
+        self.plays = np.stack([follow, follow + 1], axis=1)
+        self.lasts = self.time[follow + 1] - self.time[follow]
+        self.transitions = list(cheapest.values())
+        self.joins = np.array(
+            [(self.index[a], self.index[b]) for a, b in cheapest], int).reshape(-1, 2)  # fmt: skip
+        self.costs = np.array([graph.cost(t) for t in self.transitions])
+        self.way_plays = np.ones(len(self.plays), bool)
+        self.way_joins = np.ones(len(self.joins), bool)
+        self._part(graph.thresholds.time_price)
+        self.joined = {(int(a), int(b)): t for (a, b), t in zip(
+            self.joins, self.transitions, strict=True)}  # fmt: skip
+        self.way_joined = {pair for pair, kept in zip(self.joined, self.way_joins, strict=True)
+                           if kept}  # fmt: skip
+
+    def _part(self, price: float) -> None:
+        """Leave out the dearer of playing on and jumping between the same two moments."""
+        play_at = {int(start): i for i, start in enumerate(self.plays[:, 0])}
+        for i in np.flatnonzero(self.joins[:, 1] == self.joins[:, 0] + 1):
+            play = play_at.get(int(self.joins[i, 0]))
+            if play is not None:
+                jump = self.costs[i] < price * self.lasts[play]
+                self.way_plays[play], self.way_joins[i] = not jump, jump
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    def number(self, name: str) -> int:
+        """The number of a clip."""
+        return self.names.index(name)
+
+
+def best_paths(
+    graph: MotionGraph,
+    task: Task,
+    k: int = 1,
+    check: Callable[[Transition], str] | None = None,
+) -> list[Path]:
+    """The k cheapest paths, the best first; fewer if there are no more.
+
+    A transition costs w K + λ D, a clip on the way λ a second, and of a wanted clip what is left
+    out costs λ a second.
+
+    Args:
+        graph: the clips and transitions.
+        task: what must be done.
+        k: at least 1.
+        check: says why a transition cannot be made after all, or nothing. It is asked about the
+            transitions of the best paths alone; one with a reason is left out and the search begins
+            again.
+
+    Raises:
+        ConfigError: no way; the text has what can be reached, and what comes nearest.
+    """
+    _check(graph, task, k)
+    known: dict[Transition, str] = {}
+    for _ in range(CHECKS):
+        left = graph.without({t for t, reason in known.items() if reason})
+        layers = _Layers(left, task)
+        paths = layers.best(k)
+        if not paths:
+            raise layers.no_way(known)
+        used = {s.after for path in paths for s in path.steps if s.after is not None}
+        new = sorted(used - set(known) - set(task.arrows.values()), key=_order)
+        if check is None or not new:
+            return paths
+        known |= {transition: check(transition) for transition in new}
+        if not any(known[transition] for transition in new):
+            return paths
+    raise ConfigError(f"no way was found after {CHECKS} searches: transitions are refused one by "
+                      "one", source="graph")  # fmt: skip
+
+
+def _check(graph: MotionGraph, task: Task, k: int) -> None:
+    if k < 1:
+        raise ConfigError(f"must be at least 1, not {k}", field="k")
+    if not task.actions:
+        raise ConfigError("a path needs an action", field="actions", choices=graph.names)
+    for name in (*task.actions, *(name for name, _ in (*task.start, *task.goal))):
+        if name not in graph.names:
+            raise ConfigError(f"no clip is called {shown(name)}", field="actions",
+                              choices=graph.names)  # fmt: skip
+
+
+def _order(transition: Transition) -> tuple[str, str, float, float]:
+    return transition.before, transition.after, transition.leave, transition.enter
+
+
+class _Layers:
+    """The layered graph of a task; node = layer · moments + moment, then start and end."""
+
+    def __init__(self, graph: MotionGraph, task: Task):
+        self.task, self.graph = task, graph
+        self.moments = Moments(graph, [*task.start, *task.goal])
+        self.size = len(self.moments)
+        self.begin = self.size * (2 * len(task.actions) + 1)
+        self.end = self.begin + 1
+        self.price = graph.thresholds.time_price
+        self._edges: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self._link()
+
+    def best(self, k: int) -> list[Path]:
+        rows, columns, costs = (np.concatenate(part) for part in zip(*self._edges, strict=True))
+        matrix = csr_array((costs, (rows, columns)), shape=(self.end + 1, self.end + 1))
+        self._ahead, before = dijkstra(matrix, indices=self.begin, return_predecessors=True)
+        ahead = self._ahead
+        if not np.isfinite(ahead[self.end]):
+            return []
+        if k == 1:
+            return [self._path(before, float(ahead[self.end]))]
+        return self._several(matrix, ahead, k)
+
+    def no_way(self, known: Mapping[Transition, str]) -> ConfigError:
+        """The error of a task without a path: how far it goes, and what would be nearest."""
+        actions, moments = self.task.actions, self.moments
+        seen = np.isfinite(self._ahead[: self.begin]).reshape(-1, self.size)
+        met = [bool(seen[2 * k + 1].any()) for k in range(len(actions))]
+        k = met.index(False) if False in met else len(actions)
+        before = repr(actions[k - 1]) if k else "the start"
+        after = repr(actions[k]) if k < len(actions) else "the goal"
+        numbers = {int(i) for i in moments.clip[seen[2 * k] | (seen[2 * k - 1] if k else False)]}
+        reached = [moments.names[i] for i in sorted(numbers)]
+        wanted = actions[k : k + 1] or tuple(name for name, _ in self.task.goal)
+        reasons = [reason for a, b, reason in self.graph.refused if a in reached and b in wanted]
+        reasons += [text for t, text in known.items() if text and t.after in wanted]
+        said = f"; nearest to it: {min(reasons, key=_size)}" if reasons else ""
+        return ConfigError(f"no way from {before} to {after} (reachable: "
+                           f"{', '.join(reached[:20]) or 'nothing'}{said})")  # fmt: skip
+
+    def _several(self, matrix: csr_array, ahead: np.ndarray, k: int) -> list[Path]:
+        """Yen's algorithm among the nodes that paths below a bound can meet.
+
+        A path through any other node costs more than the bound; so if k paths below it are found
+        they are the cheapest ones. If not, the bound is raised.
+        """
+        back = dijkstra(matrix.T.tocsr(), indices=self.end)
+        through, bound = ahead + back, float(ahead[self.end])
+        reachable = int(np.isfinite(through).sum())
+        extra = self.price
+        while True:
+            kept = np.flatnonzero(through <= bound + extra)
+            small = matrix[kept][:, kept]
+            small.indices, small.indptr = (part.astype(np.int32)  # which `yen` asks for
+                                           for part in (small.indices, small.indptr))  # fmt: skip
+            ends = [int(np.searchsorted(kept, node)) for node in (self.begin, self.end)]
+            costs, before = yen(small, *ends, k, return_predecessors=True)
+            whole = len(kept) == reachable
+            if whole or (len(costs) == k and costs[-1] <= bound + extra):
+                return [self._path(_expanded(row, kept, self.end + 1), float(cost))
+                        for row, cost in zip(before, costs, strict=True)]  # fmt: skip
+            extra *= 4.0
+
+    def _path(self, before: np.ndarray, cost: float) -> Path:
+        nodes = [self.end]
+        while nodes[-1] != self.begin:
+            nodes.append(int(before[nodes[-1]]))
+        return Path(self._steps(nodes[-2:0:-1]), cost - OFFSET)
+
+    def _steps(self, nodes: list[int]) -> tuple[Step, ...]:
+        """Nodes between which a clip is played on are one step."""
+        groups, after = [[nodes[0]]], []
+        for last, node in pairwise(nodes):
+            transition = self._transition(last, node)
+            if transition is None:
+                groups[-1].append(node)
+            else:
+                groups.append([node])
+                after.append(transition)
+        ends = [(self.moments.place[g[0] % self.size], self.moments.place[g[-1] % self.size])
+                for g in groups]  # fmt: skip
+        return tuple(
+            Step(name, enter, leave, bool(g[0] // self.size % 2), t)
+            for ((name, enter), (_, leave)), g, t in zip(ends, groups, [*after, None], strict=True)
+        )
+
+    def _transition(self, last: int, node: int) -> Transition | None:
+        """The transition of an edge, or None for playing on."""
+        layer, pair = last // self.size, (last % self.size, node % self.size)
+        if layer == node // self.size:
+            way = layer % 2 == 0 and pair in self.moments.way_joined
+            return self.moments.joined[pair] if way else None
+        if layer % 2 and (arrow := self.task.arrows.get(layer // 2)) is not None:
+            return arrow
+        return self.moments.joined[pair]
+
+    def _link(self) -> None:
+        moments, actions = self.moments, self.task.actions
+        for layer in range(0, 2 * len(actions) + 1, 2):  # any clips on the way
+            base = layer * self.size
+            plays, joins = moments.way_plays, moments.way_joins
+            self._add(base + moments.plays[plays], self.price * moments.lasts[plays])
+            self._add(base + moments.joins[joins], moments.costs[joins])
+        for k, name in enumerate(actions):
+            self._link_action(k, name)
+        self._link_ends()
+
+    def _link_action(self, k: int, name: str) -> None:
+        moments, layer = self.moments, (2 * k + 1) * self.size
+        inside = moments.clip[moments.plays[:, 0]] == moments.number(name)
+        self._add(layer + moments.plays[inside], SHORT * self.price * moments.lasts[inside])
+        into = self._enters(k)
+        self._add_joins(into, layer - self.size, layer, self._skipped_before(k, into))
+        out = self._leaves(k)
+        if (arrow := self.task.arrows.get(k)) is not None:
+            ends = [moments.index[arrow.before, arrow.leave], moments.index[arrow.after, 0.0]]
+            self._add(np.array([[layer + ends[0], layer + 2 * self.size + ends[1]]]),
+                      np.array([self.graph.cost(arrow)]))  # fmt: skip
+            return
+        skipped = self.price * (moments.lengths[name] - moments.time[moments.joins[out, 0]])
+        self._add_joins(out, layer, layer + self.size, skipped)
+        if k + 1 < len(self.task.actions):
+            both = np.intersect1d(out, self._enters(k + 1))
+            cost = self.price * (moments.lengths[name] - moments.time[moments.joins[both, 0]])
+            self._add_joins(both, layer, layer + 2 * self.size,
+                            cost + self._skipped_before(k + 1, both))  # fmt: skip
+
+    def _enters(self, k: int) -> np.ndarray:
+        """The transitions into an action."""
+        moments, name = self.moments, self.task.actions[k]
+        there = moments.clip[moments.joins[:, 1]] == moments.number(name)
+        early = moments.time[moments.joins[:, 1]] <= earliest_part(moments.lengths[name])
+        return np.flatnonzero(there & early)
+
+    def _leaves(self, k: int) -> np.ndarray:
+        """The transitions out of an action."""
+        moments, name = self.moments, self.task.actions[k]
+        there = moments.clip[moments.joins[:, 0]] == moments.number(name)
+        late = moments.time[moments.joins[:, 0]] >= latest_part(moments.lengths[name])
+        return np.flatnonzero(there & late)
+
+    def _skipped_before(self, k: int, joins: np.ndarray) -> np.ndarray:
+        return self.price * self.moments.time[self.moments.joins[joins, 1]]
+
+    def _link_ends(self) -> None:
+        moments, actions = self.moments, self.task.actions
+        lengths = moments.lengths
+        last = 2 * len(actions) - 1
+        start = dict(self.task.start) or {(actions[0], 0.0): 0.0}
+        for (name, time), cost in start.items():
+            node = moments.index[name, time]
+            if actions and name == actions[0] and time <= earliest_part(lengths[name]):
+                self._add_one(self.begin, self.size + node, OFFSET + cost + self.price * time)
+            if self.task.start:
+                self._add_one(self.begin, node, OFFSET + cost)
+        goal = dict(self.task.goal) or {(actions[-1], lengths[actions[-1]]): 0.0}
+        for (name, time), cost in goal.items():
+            node = moments.index[name, time]
+            if actions and name == actions[-1] and time >= latest_part(lengths[name]):
+                self._add_one(last * self.size + node, self.end,
+                              SHORT + cost + self.price * (lengths[name] - time))  # fmt: skip
+            if self.task.goal:
+                self._add_one((last + 1) * self.size + node, self.end, SHORT + cost)
+
+    def _add(self, pairs: np.ndarray, costs: np.ndarray) -> None:
+        self._edges.append((pairs[:, 0], pairs[:, 1], np.maximum(costs, SHORT * 1e-6)))
+
+    def _add_one(self, start: int, end: int, cost: float) -> None:
+        self._add(np.array([[start, end]]), np.array([cost]))
+
+    def _add_joins(self, joins: np.ndarray, start: int, end: int, more: np.ndarray) -> None:
+        pairs = self.moments.joins[joins] + np.array([start, end])
+        self._add(pairs, self.moments.costs[joins] + more)
+
+
+def _expanded(row: np.ndarray, kept: np.ndarray, size: int) -> np.ndarray:
+    """Predecessors of the kept nodes as those of all."""
+    whole = np.full(size, UNSEEN)
+    seen = row >= 0
+    whole[kept[seen]] = kept[row[seen]]
+    return whole
+
+
+def _size(reason: str) -> float:
+    """K in the text of a reason; those without come last."""
+    found = re.match(r"K = ([0-9.e+]+) ", reason)
+    return float(found.group(1)) if found else np.inf

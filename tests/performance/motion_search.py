@@ -1,0 +1,48 @@
+"""Search in motion graphs: 1,000 random ones against brute force, and how long a plan takes.
+
+python -m tests.performance.motion_search [GRAPHS]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+from poise.baselines.synthesis.search import Task, best_paths
+from poise.configs.errors import ConfigError
+from tests.support.motion_graphs import check_search, random_graph
+
+CLIPS, ACTIONS, REPEATS = 50, 20, 5
+
+
+def plan_times(share: float, k: int, seed: int = 0) -> tuple[int, list[float]]:
+    """Transitions of a graph of 50 clips, and processor times [s] of plans of 20 actions."""
+    rng = np.random.default_rng(seed)
+    graph = random_graph(rng, CLIPS, 2, share)
+    task, times = Task(tuple(str(name) for name in rng.choice(graph.names, ACTIONS))), []
+    for _ in range(REPEATS):
+        begin = time.process_time()
+        best_paths(graph, task, k)
+        times.append(time.process_time() - begin)
+    return len(graph.transitions), times
+
+
+def main(graphs: int = 1000) -> None:
+    counts = [check_search(seed) for seed in range(graphs)]
+    without = counts.count(0)
+    print(f"{graphs} graphs equal to brute force, of which {without} have no path")
+    for share in (0.3, 0.6, 0.9):
+        for k in (1, 3):
+            try:
+                transitions, times = plan_times(share, k)
+            except ConfigError as error:
+                print(f"  {share:g} of the pairs: {error}")
+                continue
+            print(f"  {CLIPS} clips, {transitions} transitions, {ACTIONS} actions, k = {k}: "
+                  f"{1e3 * np.median(times):.0f} ms")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(*(int(argument) for argument in sys.argv[1:2]))
