@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from poise.baselines.motions.postures import LevelKinematics
 from poise.baselines.motions.reference_motion import ReferenceMotion
@@ -99,7 +98,7 @@ class ReferenceBodies:
         robot, data, model = self.robot, self._data, self.robot.model
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        error, jacobian = np.zeros(15), np.zeros((15, model.nv))
+        error, jacobian, quaternion = np.zeros(15), np.zeros((15, model.nv)), np.zeros(4)
         error[:3] = data.subtree_com[robot.root_body_id] - com
         mujoco.mj_jacSubtreeCom(model, data, jacobian[:3], robot.root_body_id)
         for i, sole in enumerate(robot.soles):
@@ -108,7 +107,8 @@ class ReferenceBodies:
             point = data.xpos[sole.body_id] + axes @ sole.position
             error[rows[0]] = point - stance.points[i]
             between = axes @ sole.rotation @ stance.axes[i].T
-            error[rows[1]] = Rotation.from_matrix(between).as_rotvec()
+            mujoco.mju_mat2Quat(quaternion, between.ravel())
+            mujoco.mju_quat2Vel(error[rows[1]], quaternion, 1.0)
             mujoco.mj_jac(model, data, jacobian[rows[0]], jacobian[rows[1]], point, sole.body_id)
         return error, jacobian
 
