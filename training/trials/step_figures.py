@@ -19,8 +19,8 @@ Commanded = Callable[[float], GaitCommand]  # the command at a time [s]
 
 def steps_of(
     record: WalkArrays,
-    rows: Sequence[int],
-    feet: Sequence[int],
+    rows: np.ndarray,
+    feet: np.ndarray,
     yaws: Sequence[float],
     command_at: Commanded,
 ) -> dict[str, np.ndarray]:
