@@ -11,7 +11,8 @@ from importlib.resources import files
 from pathlib import Path
 
 from .errors import ConfigError, PoiseError, shown
-from .reading import exists, is_file, is_folder, whole_path
+from .outputs import check_out_folder
+from .reading import is_file, is_folder
 
 
 def packaged(kind: str) -> list[str]:
@@ -82,11 +83,9 @@ def write_atomic(path: str | Path, content: str | bytes) -> None:
 
 
 def check_new_folder(out: str | Path) -> None:
-    """Raise ConfigError, about `out`, for a file and for a folder that is not empty."""
+    """Refuse what `check_out_folder` refuses, and, by ConfigError, a folder that is not empty."""
     out = Path(out)
-    whole_path(out, field="out")
-    if exists(out) and not is_folder(out):
-        raise ConfigError("is not a folder", source=out, field="out")
+    check_out_folder(out)
     with _writing(out):
         if is_folder(out) and any(out.iterdir()):
             raise ConfigError("is not empty: choose another folder", source=out, field="out")

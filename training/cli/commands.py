@@ -97,8 +97,11 @@ def evaluate(
             .yaml files; its own if not given.
         overwrite: replace what the folder holds.
     """
+    from poise.configs.outputs import check_out_file
     from poise.training.evaluation.evaluate import evaluate, measured_limits
 
+    if write_limits is not None:
+        check_out_file(write_limits, "write_limits")
     folder = Path("out") / Path(suite).stem if out is None else out
     summary = evaluate(
         controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, backend=backend,
@@ -257,13 +260,18 @@ def robot(
         out: a JSON file to write the figures to.
         picture: a PNG file to write: the robot standing, and its soles.
     """
-    if picture is not None:
-        from poise.envs.viewing.gl import choose_gl_backend
-
-        choose_gl_backend()
     import json
 
     from poise.configs.files import write_atomic
+    from poise.configs.outputs import check_out_file
+
+    if out is not None:
+        check_out_file(out)
+    if picture is not None:
+        from poise.envs.viewing.gl import choose_gl_backend
+
+        check_out_file(picture, "picture")
+        choose_gl_backend()
     from poise.envs.robots.robot import load_robot
     from poise.training.robot_check.check import check_robot
     from poise.training.robot_check.tables import print_check

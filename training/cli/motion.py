@@ -14,6 +14,7 @@ from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import find_bvh
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
+from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
 from poise.training.running.terminal import terminal
 
@@ -132,6 +133,7 @@ def bring(
     from poise.baselines.retargeting.retarget import retarget
     from poise.training.following.tables import print_retargeted
 
+    check_out_file(out)
     clip = read_bvh(find_bvh(file), unit, up, forward).clip
     clip = clip.cut(*cut) if cut is not None else clip
     clip = clip.at_speed(speed) if speed != 1.0 else clip
@@ -175,6 +177,8 @@ def follow(
     from poise.training.following.follow import follow
     from poise.training.following.tables import print_followed
 
+    if out is not None:
+        check_out_file(out)
     with allowing([*named(controller), *allow]):
         trials = follow(motion, controller, robot=robot, starts=starts, impulse=push, share=share,
                         directions=directions, seed=seed)  # fmt: skip

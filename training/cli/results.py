@@ -79,9 +79,13 @@ def replay(
         from poise.envs.viewing.gl import choose_gl_backend
 
         choose_gl_backend()
+    from poise.configs.outputs import check_out_file
     from poise.training.results.film import film
     from poise.training.results.replay import replay
 
+    for file, field in ((video, "video"), (plot, "plot")):
+        if file is not None:
+            check_out_file(file, field)
     if plot is not None and len(controller) > 1:
         raise ConfigError("of one controller alone", field="plot")
     played = [replay(folder, trial, name, plot=plot, allow=allow) for name in controller or (None,)]
@@ -119,6 +123,9 @@ def report(
     from poise.envs.viewing.gl import choose_gl_backend
 
     choose_gl_backend()
+    from poise.configs.outputs import check_out_file
     from poise.training.report.page import write_report
 
+    if out is not None:
+        check_out_file(out)
     write_report(folder, out, films=films, console=terminal(), allow=allow)

@@ -16,7 +16,8 @@ from typing import Any
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import write_atomic
-from poise.configs.reading import exists, is_folder
+from poise.configs.outputs import check_out_folder
+from poise.configs.reading import exists
 from poise.configs.schema import build, read_yaml, to_yaml
 from poise.envs.pushes.sampler import LimitTable
 from poise.training.running.files import FILES, LOG, REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
@@ -82,8 +83,7 @@ class ResultFolder:
     ):  # fmt: skip
         self.path, self.settings, self.damaged = path, settings, 0
         self.finished: dict[Key, Outcome] = {}
-        if exists(path) and not is_folder(path):
-            raise ConfigError("is not a folder", source=path, field="out")
+        check_out_folder(path)
         self._lock = FolderLock(path)
         try:
             self._open(overwrite, closed, ready)
@@ -98,7 +98,7 @@ class ResultFolder:
         if overwrite:
             for name in (*FILES, REPORT):
                 (path / name).unlink(missing_ok=True)
-        elif any(exists(path / name) for name in FILES):
+        elif holds_files(path):
             before = self._check(closed)
             self.settings = replace(
                 settings, controllers={**before.controllers, **settings.controllers}
@@ -129,16 +129,8 @@ class ResultFolder:
     def _check(self, closed: bool) -> Settings:
         """Refuse to go on from anything but this result; returns its settings."""
         path = self.path
-        if not (path / SETTINGS).exists():
-            raise ConfigError(f"holds files of something else: {ADVICE}", source=path, field="out")
-        before = read_settings(path)
-        for name in Settings.__dataclass_fields__:
-            old, new = getattr(before, name), getattr(self.settings, name)
-            if old != new and (name != "controllers" or closed):
-                raise ConfigError(
-                    f"holds a result with {_difference(name, old, new)}: {ADVICE}",
-                    source=path / SETTINGS, field=name,
-                )  # fmt: skip
+        fixed = [name for name in Settings.__dataclass_fields__ if closed or name != "controllers"]
+        before = _check_same(path, {name: getattr(self.settings, name) for name in fixed})
         for name, mark in self.settings.controllers.items():
             if before.controllers.get(name, mark) != mark:
                 raise ConfigError(
@@ -148,6 +140,35 @@ class ResultFolder:
         if (path / SUMMARY).exists() and not (path / LOG).exists():
             raise ConfigError(f"is missing, and with it the trials: {ADVICE}", source=path / LOG)
         return before
+
+
+def check_folder(path: Path, known: Mapping[str, object], overwrite: bool) -> None:
+    """Refuse, before anything is loaded, what `ResultFolder` would for the settings `known`.
+
+    Raises ConfigError and PoiseError as `ResultFolder`.
+    """
+    check_out_folder(path)
+    if not overwrite and holds_files(path):
+        _check_same(path, known)
+
+
+def holds_files(path: Path) -> bool:
+    """Return whether a folder holds files of the names that a result has."""
+    return any(exists(path / name) for name in FILES)
+
+
+def _check_same(path: Path, known: Mapping[str, object]) -> Settings:
+    """Refuse to go on from a result whose settings are not those `known`; returns them all."""
+    if not (path / SETTINGS).exists():
+        raise ConfigError(f"holds files of something else: {ADVICE}", source=path, field="out")
+    before = read_settings(path)
+    for name, new in known.items():
+        if (old := getattr(before, name)) != new:
+            raise ConfigError(
+                f"holds a result with {_difference(name, old, new)}: {ADVICE}",
+                source=path / SETTINGS, field=name,
+            )  # fmt: skip
+    return before
 
 
 def read_outcomes(folder: Path) -> tuple[dict[Key, Outcome], int]:

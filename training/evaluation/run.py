@@ -8,12 +8,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
 from poise.baselines.allowance import allowing
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError, shown
+from poise.configs.outputs import check_out_folder
 from poise.configs.schema import to_dict
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.learning.seeds import expand_seeds
@@ -34,7 +36,7 @@ from poise.training.trials.table import trial_row
 from poise.training.trials.trial import Trial
 
 from .figures import controller_entry, robot_figures
-from .folder import ResultFolder, Settings
+from .folder import ResultFolder, Settings, check_folder
 from .motions import suite_repertoire, suite_stage
 from .pairs import pair_figures
 from .played import RATED, Played
@@ -70,9 +72,20 @@ class Run:
             self.suite = self.suite.performing(motions)
         if trials is not None:
             self.suite = self.suite.resized(trials)
-        self.robot, self.out = load_robot(robot), Path(out)
+        self.out, self.overwrite, self.executor = Path(out), overwrite, Executor(backend, workers)
+        check_out_folder(out)
+        self.robot = load_robot(robot)
+        known: dict[str, Any] = {
+            "format": FORMAT,
+            "suite_name": str(suite),
+            "suite": to_dict(self.suite),
+            "robot": str(robot),
+            "robot_fingerprint": self.robot.fingerprint,
+            "seed": seed,
+            "versions": versions(("mujoco", "numpy", "numba")),
+        }
+        check_folder(self.out, known, overwrite)
         self.limits, self.reference = measured(self.robot), reference
-        self.executor, self.overwrite = Executor(backend, workers), overwrite
         self.repertoire = suite_repertoire(self.suite, self.robot, self.out, overwrite)
         self._plan(seed, names)  # refuses what does not fit the robot
         prepare()
@@ -85,14 +98,8 @@ class Run:
             for name, agent in self.agents.items():
                 check_follows(name, agent, f"suite {suite}")
         self.settings = Settings(
-            format=FORMAT,
-            suite_name=str(suite),
-            suite=to_dict(self.suite),
-            robot=str(robot),
-            robot_fingerprint=self.robot.fingerprint,
-            seed=seed,
+            **known,
             limits=self.limits.table,
-            versions=versions(("mujoco", "numpy", "numba")),
             controllers={name: agent.fingerprint for name, agent in self.agents.items()},
             motions=self.repertoire.digests,
         )

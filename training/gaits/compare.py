@@ -15,6 +15,7 @@ from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, write_atomic
 from poise.configs.numbers import whole_number
+from poise.configs.outputs import check_out_folder
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.evaluation.evaluate import evaluate
 from poise.training.evaluation.tick_times import Clocked
@@ -115,6 +116,7 @@ def compare_gaits(
     from .plot import stance_plot
 
     _check(models, speeds, starts, duration, seed)
+    check_out_folder(out)
     band, body = load_knee_moment(human), load_robot(robot)
     StanceRecord(body)  # raises where a leg has no knee
     names = [controller_of(model) for model in models]

@@ -20,6 +20,7 @@ from poise.baselines.registry import controller_config
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
+from poise.configs.outputs import check_out_folder
 from poise.configs.schema import build, read_yaml, to_yaml
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot, load_robot
@@ -232,6 +233,7 @@ def _env_seed(seed: int) -> int:
 
 def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
     """The checkpoint to go on from, or None for a new run; raises ConfigError as `train`."""
+    check_out_folder(out)
     checkpoint = find_checkpoint(out / LAST)
     if not resume:
         if checkpoint is not None:

@@ -15,6 +15,7 @@ from rich.console import Console
 from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.files import write_atomic
+from poise.configs.outputs import check_out_folder
 from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
 from poise.training.running.executor import Executor, check_backend
@@ -74,6 +75,7 @@ def train_seeds(
     """
     console, started = console or Console(quiet=True), time.perf_counter()
     out = whole_path(out, field="out")
+    check_out_folder(out)
     check_backend(backend)
     if workers is not None and workers < 1:
         raise ConfigError(f"must be at least 1, not {workers}", field="workers")

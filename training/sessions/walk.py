@@ -11,6 +11,7 @@ import numpy as np
 from poise.baselines.allowance import allows
 from poise.baselines.walking.schedule import parse_commands
 from poise.configs.errors import ConfigError, shown
+from poise.configs.outputs import check_out_file
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import Push
@@ -74,6 +75,8 @@ def walk(
     """
     if video is not None and Path(video).suffix.lower() not in FORMS:
         raise ConfigError(f"the name of a video must end in {' or '.join(FORMS)}", source=video)
+    if video is not None:
+        check_out_file(video, "video")
     if seed < 0:
         raise ConfigError(f"must be at least 0, not {seed}", field="seed")
     loaded = load_robot(robot)

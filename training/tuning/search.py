@@ -17,6 +17,7 @@ from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError
 from poise.configs.extras import how_to_install
 from poise.configs.files import resolve, write_atomic
+from poise.configs.outputs import check_out_folder
 from poise.configs.reading import is_file, parse_json, read_lines
 from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
 from poise.envs.robots.robot import load_robot
@@ -109,13 +110,14 @@ def tune(
     that holds another search, or where the library `cma` is missing; PoiseError when another
     process searches there, or a file cannot be written.
     """
+    check_out_folder(out)
+    _known(config, out, resume)  # what is refused makes no folder
     gains = Gains(config.controller, config.gains, config.robot)
     if config.policy is not None:
         from poise.training.learning.policy import load_policy
 
         load_policy(config.policy, load_robot(config.robot))
     search = _Search(config, gains)
-    _known(config, out, resume)  # what is refused makes no folder
     console = console or Console(quiet=True)
     keeps(out / HISTORY, f"the finished generations are kept in {out}; go on with --resume")
     with FolderLock(out), Executor("local", workers) as executor:

@@ -1,0 +1,47 @@
+"""What a command is to write: refused before anything is computed, and nothing is made."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+from .errors import ConfigError, PoiseError
+from .reading import exists, is_folder, whole_path
+
+
+def check_out_folder(out: str | Path, field: str = "out") -> None:
+    """Refuse a folder that cannot be written to; it need not exist yet.
+
+    Raises:
+        ConfigError: it is a file, or no file can have this name.
+        PoiseError: nothing may be written there.
+    """
+    whole_path(out, field=field)
+    if exists(out) and not is_folder(out):
+        raise ConfigError("is not a folder", source=out, field=field)
+    _check_place(out, Path(out))
+
+
+def check_out_file(out: str | Path, field: str = "out") -> None:
+    """Refuse a file that cannot be written; neither it nor its folder need exist yet.
+
+    Raises ConfigError and PoiseError as `check_out_folder`, ConfigError for a folder.
+    """
+    whole_path(out, field=field)
+    if is_folder(out):
+        raise ConfigError("is a folder: name a file", source=out, field=field)
+    _check_place(out, Path(out).parent)
+
+
+def _check_place(out: str | Path, folder: Path) -> None:
+    """Refuse `out` if nothing can be written in `folder`, or in the nearest one above it."""
+    while not exists(folder) and folder != folder.parent:
+        folder = folder.parent
+    if not is_folder(folder):
+        problem = errno.ENOTDIR
+    elif not os.access(folder, os.W_OK | os.X_OK):
+        problem = errno.EROFS if os.statvfs(folder).f_flag & os.ST_RDONLY else errno.EACCES
+    else:
+        return
+    raise PoiseError(f"{out}: cannot be written ({os.strerror(problem)})")

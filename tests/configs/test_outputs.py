@@ -1,0 +1,51 @@
+"""configs/outputs.py: what cannot be written is refused, and nothing is made."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from poise.configs import outputs
+from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.outputs import check_out_file, check_out_folder
+
+
+def test_what_can_be_written_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Folders above it need not be there; a path may be relative."""
+    monkeypatch.chdir(tmp_path)
+    for out in (tmp_path, tmp_path / "a/b", Path("c"), Path("d/e")):
+        check_out_folder(out)
+        check_out_file(out / "f.json")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_wrong_kind(tmp_path: Path) -> None:
+    """A file is no folder, a folder no file, and in a file there is nothing."""
+    file = tmp_path / "file"
+    file.write_text("mine")
+    with pytest.raises(ConfigError, match="file: out: is not a folder"):
+        check_out_folder(file)
+    with pytest.raises(ConfigError, match="plot: is a folder: name a file"):
+        check_out_file(tmp_path, "plot")
+    for check in (check_out_folder, check_out_file):
+        with pytest.raises(PoiseError, match="file/a/b: cannot be written .Not a directory"):
+            check(file / "a/b")
+        with pytest.raises(ConfigError, match="out: is no name of a file"):
+            check("a\0b")
+
+
+def test_where_nothing_may_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The nearest folder that is there decides; the superuser may everywhere."""
+    asked: list[object] = []
+
+    def access(path: Path, mode: int) -> bool:
+        asked.append(path)
+        assert mode == os.W_OK | os.X_OK
+        return False
+
+    monkeypatch.setattr(outputs.os, "access", access)
+    with pytest.raises(PoiseError, match="a/b: cannot be written .Permission denied"):
+        check_out_folder(tmp_path / "a/b")
+    assert asked == [tmp_path]
