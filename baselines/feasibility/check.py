@@ -79,8 +79,8 @@ class Criterion(NamedTuple):
     def __str__(self) -> str:
         place = f" ({self.where})" if self.where else ""
         word = "at least" if self.least else "at most"
-        return (f"{self.name} {_shown(self.worst, self.unit)} at {self.time:.2f} s{place}, "
-                f"{word} {_shown(self.bound, self.unit)} is needed")  # fmt: skip
+        return (f"{self.name} {shown(self.worst, self.unit)} at {self.time:.2f} s{place}, "
+                f"{word} {shown(self.bound, self.unit)} is needed")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +222,8 @@ def ground_friction(robot: Robot) -> float:
     return contact_friction(robot.model, robot.ground_geom_id, geoms)
 
 
-def _shown(value: float, unit: str) -> str:
+def shown(value: float, unit: str) -> str:
+    """A value as a person reads it: lengths in cm, angles in degrees."""
     if unit == "m":
         return f"{100 * value:.1f} cm"
     if unit == "rad":

@@ -91,8 +91,9 @@ def physical_join(
 
     CoM, root and the joints that are no legs follow the curve of the fifth order between both
     states, of duration D and with up to three knots moved; the legs follow from soles that stay
-    planted. Chosen is the least K + λ D, D from 0.2 to 2.5 s, that keeps `FeasibilityLimits`. A
-    motion is a C² spline through its frames, so the join is C².
+    planted. Chosen is the least K + λ D, D from 0.2 to 2.5 s, that keeps `FeasibilityLimits`;
+    within 0.1 s of a cut it may be as bad as the clip is there. A motion is a C² spline through
+    its frames, so the join is C².
 
     Args:
         robot: whose motions they are.

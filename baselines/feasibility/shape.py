@@ -13,10 +13,11 @@ from poise.baselines.solvers import QP, make_solver
 from poise.envs.maths.polygons import half_planes
 
 from .bearable import bearable_region
-from .check import Feasibility, FeasibilityLimits, judge
+from .check import Feasibility, FeasibilityLimits, check_joints, judge
 from .curve import Boundary, Curve, bend_shapes, jerk_matrix
+from .edges import EDGE, between_clips
 from .planted import PlantedLegs
-from .trajectory import PlantedRobot, Trajectory, sample_trajectory
+from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 
 NEIGHBOURS = 10  # frames of the clips beside a join that are looked at with it
 ROUNDS = 5  # times that a curve is bent
@@ -36,6 +37,7 @@ class End(NamedTuple):
     q: np.ndarray
     boundary: Boundary
     region: np.ndarray  # (k, 2) where the motors can bear the weight
+    own: Feasibility  # of the motion about the join, whether it is played or not
 
 
 class Attempt(NamedTuple):
@@ -85,7 +87,11 @@ class Shaper:
             np.concatenate([s.com_acc, s.root_acc, s.a_ref[others]]),
         )
         region = bearable_region(self.planted, s.q_ref)
-        return End(frames, s.q_ref, state, np.zeros((0, 2)) if region is None else region)
+        region = np.zeros((0, 2)) if region is None else region
+        times = time + np.arange(-0.5 * EDGE, 0.5 * EDGE + 1e-9, FINE)
+        times = times[(times >= 0.0) & (times <= motion.duration)]
+        own = check_joints(self.planted, joints_of(motion), times, self.limits)
+        return End(frames, s.q_ref, state, region, own)
 
     def attempt(self, a: End, b: End, count: int) -> Attempt:
         """The join that lasts `count` frames."""
@@ -99,9 +105,11 @@ class Shaper:
             if qpos is None:
                 return Attempt(None, curve, None, "the legs cannot reach the ground")
             judged, path = self._judged(a, b, qpos, COARSE)
-            if judged.feasible:
+            reason = between_clips(judged, a.own, b.own)
+            if not reason:
                 judged, path = self._judged(a, b, qpos, FINE)
-            if judged.feasible:
+                reason = between_clips(judged, a.own, b.own)
+            if not reason:
                 return Attempt(qpos, curve, judged, "")
             step, lacking = self._step(curve, qpos, slopes, judged, path, (a, b))
             if step is None or lacking > HOPELESS or np.abs(step).max() < 1e-7:
@@ -109,7 +117,7 @@ class Shaper:
             bends = curve.bends.copy()
             bends[:, :MOVED] += step
             curve = curve._replace(bends=bends)
-        return Attempt(None, curve, judged, judged.reason)
+        return Attempt(None, curve, judged, reason)
 
     def _bent_joints(self, curve: Curve) -> tuple[np.ndarray, str]:
         """Least bends (3, n) that keep the joints in range, each by itself; or what cannot."""
@@ -187,6 +195,10 @@ class Shaper:
         self, curve: Curve, judged: Feasibility, path: Trajectory, ends: tuple[End, End]
     ) -> tuple[np.ndarray, np.ndarray]:
         s = judged.times[1:-1] / curve.duration
+        # beside a cut where the clip itself is out, bends change next to nothing
+        inner = np.ones(len(s), dtype=bool)
+        for end, away in ((ends[0], s), (ends[1], 1.0 - s)):
+            inner &= end.own.feasible | (away * curve.duration > EDGE)
         g = self.planted.robot.units.gravity
         h = (path.com[1:-1, 2] - path.height) / (path.com_acc[1:-1, 2] + g)
         moved = bend_shapes(s) - h[:, None] * bend_shapes(s, 2) / curve.duration**2
@@ -205,8 +217,8 @@ class Shaper:
             block = np.zeros((len(s), len(normals), 3 * MOVED))
             block[:, :, 0:3] = normals[:, 0, None] * moved[:, None, :]
             block[:, :, 3:6] = normals[:, 1, None] * moved[:, None, :]
-            rows.append(block.reshape(-1, 3 * MOVED))
-            bounds.append(room.ravel())
+            rows.append(block[inner].reshape(-1, 3 * MOVED))
+            bounds.append(room[inner].ravel())
         return np.vstack(rows), np.concatenate(bounds)
 
     def _leg_rows(self, qpos: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

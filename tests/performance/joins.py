@@ -146,13 +146,14 @@ def judge_pair(
         join = physical_join(robot, clips[pair.before], clips[pair.after],
                              leave=pair.leave, enter=pair.enter)  # fmt: skip
     except JoinRefused as refusal:
-        record |= {"given": False, "reason": str(refusal).split(": ", 1)[1]}
+        record |= {"given": False, "reason": str(refusal).split(": ", 1)[1],
+                   "made_in": time.thread_time() - begun}  # fmt: skip
     else:
+        record["made_in"] = time.thread_time() - begun
         done = perform(robot, join.clip, join.start, join.end, seed)
         record |= {"given": True, "through": join.through_standing, **done._asdict(),
                    "durations": [part.duration for part in join.parts],
                    "bent": any(part.bent for part in join.parts)}  # fmt: skip
-    record["made_in"] = time.thread_time() - begun if not record["given"] else None
     try:
         rule = perform(robot, by_rule(robot, clips, pair), pair.leave, pair.leave + FIXED, seed)
     except ConfigError as error:  # soles that leave the ground are no motion
@@ -183,8 +184,9 @@ def print_summary(records: list[dict[str, Any]]) -> None:
     """Falls, errors and refusals, with intervals."""
     given = [r for r in records if r["given"]]
     refused = [r for r in records if not r["given"]]
-    print(f"{len(records)} pairs, {len(given)} given, {sum(r['through'] for r in given)} of them "
-          f"through standing, {sum(r['bent'] for r in given)} bent, {len(refused)} refused")  # fmt: skip
+    through, bent = (sum(r[name] for r in given) for name in ("through", "bent"))
+    print(f"{len(records)} pairs, {len(given)} given, {through} of them through standing, "
+          f"{bent} bent, {len(refused)} refused")  # fmt: skip
     _print_falls("physical", [r["fallen"] for r in given], [r["error"] for r in given])
     for name, part in (("the rule, the same pairs", given), ("the rule, all", records)):
         played = [r for r in part if "rule_fallen" in r]

@@ -120,8 +120,7 @@ def _run(args: list[str]) -> int:
     if args[:1] == ["motion"]:  # it has sub-commands
         from .motion import run as run_motion
 
-        run_motion(args[1:])
-        return 0
+        return run_motion(args[1:])
     code = tyro.extras.subcommand_cli_from_dict(
         COMMANDS,
         prog="poise",

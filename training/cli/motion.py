@@ -19,6 +19,7 @@ from poise.envs.robots.robot import load_robot
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Switch
+from .motion_check import check
 from .motion_join import join
 
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
@@ -197,19 +198,21 @@ MOTION: dict[str, Callable[..., object]] = {
     "import": bring,
     "follow": follow,
     "join": join,
+    "check": check,
 }
 
 
-def run(args: Sequence[str]) -> None:
-    """Run a sub-command of `poise motion`."""
+def run(args: Sequence[str]) -> int:
+    """Run a sub-command of `poise motion`; returns 0, or 1 (see `check`)."""
     if args and not args[0].startswith("-") and args[0] not in MOTION:
         raise ConfigError(f"no such command: motion {args[0]}", choices=MOTION)
-    tyro.extras.subcommand_cli_from_dict(
+    code = tyro.extras.subcommand_cli_from_dict(
         MOTION,
         prog="poise motion",
         description="Motion capture: what files hold, a robot's motion of them, and performing it.",
         args=list(args),
     )
+    return code if isinstance(code, int) else 0
 
 
 def _clip(file: Path, unit: str, up: str, forward: str, robot: str) -> Clip:

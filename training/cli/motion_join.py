@@ -9,6 +9,8 @@ from poise.baselines.clips.bvh import read_bvh, write_bvh
 from poise.baselines.clips.library import find_bvh
 from poise.baselines.joining.coefficient import best_duration, coefficient, moved_shares
 from poise.baselines.joining.joins import JOINS, ends
+from poise.configs.errors import ConfigError
+from poise.envs.robots.robot import load_robot
 
 Clips = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
@@ -19,19 +21,33 @@ def join(
     out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")],
     /,
     *,
-    kind: Literal["insert", "cross", "capture", "inertial"] = "insert",
+    kind: Literal["insert", "cross", "capture", "inertial", "physical"] = "insert",
     duration: float | None = None,
+    leave: float | None = None,
+    enter: float = 0.0,
+    robot: str = "humanoid",
 ) -> None:
     """Play one clip after the other, with a transition between them; see docs/motions.md.
 
     Args:
-        first: a .bvh file, or the name of a packaged clip.
-        second: the same, of the same skeleton.
-        out: the .bvh file to write.
-        kind: of the transition.
+        first: a .bvh file, or the name of a packaged clip; for physical a robot's .npz.
+        second: the same, of the same skeleton or robot.
+        out: the .bvh file to write; for physical a .npz.
+        kind: of the transition; physical lasts as long and bends as much as the robot needs.
         duration: of the transition [s]; of inertial the half-life. None: where the coefficient is
             least.
+        leave: time at which physical leaves the first [s]; None for its end.
+        enter: time at which physical enters the second [s].
+        robot: whose .npz they are.
     """
+    if kind == "physical":
+        if duration is not None:
+            raise ConfigError("a physical join lasts as long as the robot needs", field="duration")
+        _physical(first, second, out, robot, leave, enter)
+        return
+    if leave is not None or enter:
+        raise ConfigError("is for physical joins: use poise motion convert --cut",
+                          field="enter" if leave is None else "leave")  # fmt: skip
     before, after = (read_bvh(find_bvh(file)).clip for file in (first, second))
     shares = moved_shares(before.skeleton)
     gap, rate, next_rate = ends(before, after)
@@ -40,4 +56,25 @@ def join(
     write_bvh(JOINS[kind](before, after, duration), out)
     price = float(coefficient(gap, rate, next_rate, shares, duration))
     print(f"{kind}, {duration:.2f} s, coefficient {price:.3g}")
+    print(out)
+
+
+def _physical(
+    first: Path, second: Path, out: Path, robot: str, leave: float | None, enter: float
+) -> None:
+    """Join two motions of a robot by what it can do."""
+    from poise.baselines.feasibility.physical import physical_join
+    from poise.baselines.motions.robot_clip import read_robot_clip, write_robot_clip
+
+    clips = [read_robot_clip(file) for file in (first, second)]
+    made = physical_join(load_robot(robot), *clips, leave=leave, enter=enter)
+    write_robot_clip(made.clip, out)
+    for part in made.parts:
+        bent = ", bent" if part.bent else ""
+        inside = 100.0 * part.feasibility.zmp_margin.min()
+        torque = part.feasibility.torque.max()
+        print(f"physical, {part.duration:.2f} s{bent}, coefficient {part.coefficient:.3g}, "
+              f"ZMP {inside:.1f} cm inside, torque {torque:.0%}")  # fmt: skip
+    if made.through_standing:
+        print("through standing: there is no direct way")
     print(out)

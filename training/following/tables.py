@@ -12,6 +12,7 @@ from rich.table import Table
 from poise.baselines.clips.axes import FileAxes
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.contacts import measure_contacts
+from poise.baselines.feasibility.check import Feasibility, shown
 from poise.baselines.retargeting.retarget import Retargeted
 
 from .follow import Followed
@@ -77,6 +78,18 @@ def print_retargeted(made: Retargeted, console: Console) -> None:
         ("time a frame", f"{1000 * made.time_per_frame:.1f} ms of the processor"),
     ):
         table.add_row(name, value)
+    console.print(table)
+
+
+def print_feasibility(judged: Feasibility, title: str, console: Console) -> None:
+    """Each criterion at its worst sample."""
+    table = Table(title=escape(title), title_justify="left")
+    for name in ("criterion", "worst", "at", "where", "needed", ""):
+        table.add_column(name)
+    for c in judged.criteria:
+        sign = "≥" if c.least else "≤"
+        table.add_row(c.name, shown(c.worst, c.unit), f"{c.time:.2f} s", c.where,
+                      f"{sign} {shown(c.bound, c.unit)}", "" if c.holds else "no")  # fmt: skip
     console.print(table)
 
 

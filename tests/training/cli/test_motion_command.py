@@ -1,5 +1,6 @@
 """`poise motion`: files in and out, and errors as one line with exit code 2."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 
 from poise.baselines.clips.bvh import read_bvh
 from poise.baselines.clips.library import find_bvh
-from poise.baselines.motions.robot_clip import read_robot_clip
+from poise.baselines.motions.robot_clip import read_robot_clip, write_robot_clip
 from poise.training.cli.entry import main
 from tests.support.motion_files import small_bvh
+from tests.support.physics import robot_named
+from tests.support.robot_clips import packaged_clip
 
 
 def test_info_convert_and_import(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -41,15 +44,46 @@ def test_join(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert float(printed[2].split()[0]) < float(printed[1].split()[0])
 
 
+def test_check_and_physical_join(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """0 for what the robot can do, 1 for what it cannot; what is fitted can be done."""
+    robot = robot_named("humanoid")
+    squat, hasty, fitted, both = (tmp_path / f"{name}.npz" for name in ("a", "b", "c", "d"))
+    clip = packaged_clip(robot, "squat")
+    write_robot_clip(clip, squat)
+    write_robot_clip(replace(clip, dt=clip.dt / 3.0), hasty)
+    assert main(["motion", "check", str(squat)]) == 0
+    assert main(["motion", "check", str(hasty), "--qp"]) == 1
+    printed = capsys.readouterr().out
+    assert "ZMP inside the soles by" in printed and "gap of the QP" in printed
+    assert main(["motion", "check", str(hasty), "--fit", "--out", str(fitted)]) == 0
+    assert "tempo 0." in capsys.readouterr().out
+    assert main(["motion", "check", str(fitted)]) == 0
+    joined = ["motion", "join", str(squat), str(squat), str(both), "--kind", "physical"]
+    assert main([*joined, "--leave", "0.8", "--enter", "0.4"]) == 0
+    assert "physical, 0." in capsys.readouterr().out
+    assert read_robot_clip(both).duration < 2.0 * clip.duration
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["jump"], "no such command: motion jump (choices: info, convert, import, follow, join)"),
+        (
+            ["jump"],
+            "no such command: motion jump (choices: info, convert, import, follow, join, check)",
+        ),
         (["info", "nothing"], "clip: no such name: 'nothing'; give a path to a .bvh file or a"),
         (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),
         (["import", "cmu02_walk", "--out", "x.npz"], "feet: its feet move by"),
         (["convert", "cmu02_stand", "x.txt"], "x.txt: must be the name of a .bvh file"),
         (["join", "cmu02_punch", "fair1_wave_hello", "x.bvh"], "has another skeleton than"),
+        (
+            ["join", "a.npz", "b.npz", "c.npz", "--kind", "physical", "--duration", "1"],
+            "duration: a physical join lasts as long as the robot needs",
+        ),
+        (["join", "cmu02_punch", "cmu02_squat", "x.bvh", "--enter", "1"], "enter: is for physical"),
+        (["check", "squat", "--fit"], "out: --fit and --out go together"),
+        (["check", "squat", "--fit", "--out", "x.npz"], "squat: fit: only a .npz of poise motion"),
+        (["check", "squat", "--qp", "--controller", "pd"], "controller: 'pd' is of kind"),
         (["follow", "nothing.npz"], "nothing.npz: cannot be read (No such file or directory)"),
     ],
 )

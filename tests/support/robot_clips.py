@@ -1,0 +1,38 @@
+"""A robot's clips for tests: packaged motions and motions of the centre of mass, as frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from poise.baselines.feasibility.planted import PlantedLegs
+from poise.baselines.feasibility.trajectory import PlantedRobot
+from poise.baselines.motions.motion import load_motion
+from poise.baselines.motions.robot_clip import About, RobotClip
+from poise.envs.robots.robot import Robot
+
+RATE = 1.0 / 30.0  # [s]
+
+
+def packaged_clip(robot: Robot, name: str, dt: float = RATE) -> RobotClip:
+    """A packaged motion as frames on the robot's soles."""
+    motion, planted = load_motion(name, robot), PlantedRobot(robot)
+    times = np.arange(0.0, motion.duration + 1e-9, dt)
+    qpos = np.array([planted.placed(motion.sample(time).q_ref) for time in times])
+    return RobotClip(About(robot.name, robot.fingerprint, name), dt, qpos)
+
+
+def com_clip(
+    robot: Robot, offset: Callable[[float], np.ndarray], duration: float, dt: float = RATE
+) -> RobotClip:
+    """Standing with the CoM moved by `offset(t)` (3,) [m]; the trunk upright, the arms at rest."""
+    legs, standing = PlantedLegs(robot), load_motion("standing", robot).sample(0.0)
+    q, frames = robot.standing_qpos[7:], []
+    for time in np.arange(0.0, duration + 1e-9, dt):
+        com = standing.com_offset + offset(time)
+        qpos, error = legs.reach(com, standing.root, standing.q_ref[legs.others], q)
+        assert error < 1e-6
+        frames.append(qpos)
+        q = qpos[7:]
+    return RobotClip(About(robot.name, robot.fingerprint, "moved"), dt, np.array(frames))
