@@ -38,7 +38,7 @@ FLOORS = """
 12 baselines/environments
 13 training/learning
 14 training/trials
-15 training/figures, training/standalone, training/suites, training/tuning
+15 training/figures, training/open_loop, training/standalone, training/suites, training/tuning
 16 training/evaluation, training/following, training/qp_set, training/robot_check
 17 training/gaits, training/results
 18 training/export, training/report, training/sessions
