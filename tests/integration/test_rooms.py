@@ -39,7 +39,8 @@ FLOORS = """
 12 baselines/environments
 13 training/learning, training/tracking
 14 training/trials
-15 training/figures, training/following, training/standalone, training/suites, training/tuning
+15 training/figures, training/following, training/open_loop, training/standalone
+15 training/suites, training/tuning
 16 training/evaluation, training/qp_set, training/robot_check
 17 training/gaits, training/results
 18 training/export, training/report, training/sessions

@@ -1,6 +1,7 @@
 """Whole solves: goals of all kinds are reached by every method, and what comes back is true."""
 
 import copy
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -158,7 +159,7 @@ def test_a_prior_makes_a_posture_more_usual(robot: Robot) -> None:
 
 
 def test_the_result_is_frozen(robot: Robot) -> None:
-    result = solve_ik(robot, [at(robot, robot.standing_qpos, HAND)])
+    result: Any = solve_ik(robot, [at(robot, robot.standing_qpos, HAND)])
     assert result.reached and result.residual < 1e-9
     with pytest.raises(AttributeError):
         result.residual = 1.0

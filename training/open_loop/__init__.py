@@ -1,0 +1,1 @@
+"""Motions tracked without feedback of balance: targets of servos that samples have found."""
