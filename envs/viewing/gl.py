@@ -39,14 +39,14 @@ def load_osmesa_alone() -> None:
     if os.environ.get("MUJOCO_GL", "").lower() != "osmesa" or "OpenGL.platform" in sys.modules:
         return
     os.environ.setdefault("PYOPENGL_PLATFORM", "osmesa")  # as MuJoCo does
-    shown = ctypes.RTLD_GLOBAL
-    ctypes.RTLD_GLOBAL = ctypes.RTLD_LOCAL  # PyOpenGL has no setting of it
+    names, shown = vars(ctypes), ctypes.RTLD_GLOBAL
+    names["RTLD_GLOBAL"] = ctypes.RTLD_LOCAL  # PyOpenGL has no setting of it
     try:
         import OpenGL.platform  # noqa: F401
     except Exception:
         pass  # MuJoCo tells what is missing
     finally:
-        ctypes.RTLD_GLOBAL = shown
+        names["RTLD_GLOBAL"] = shown
 
 
 def _has_display() -> bool:
