@@ -19,6 +19,7 @@ from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Switch
 from .motion_join import join
+from .motion_script import graph, plan, synth
 
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
@@ -193,6 +194,9 @@ MOTION: dict[str, Callable[..., object]] = {
     "import": bring,
     "follow": follow,
     "join": join,
+    "graph": graph,
+    "plan": plan,
+    "synth": synth,
 }
 
 

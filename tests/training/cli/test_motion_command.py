@@ -44,7 +44,7 @@ def test_join(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["jump"], "no such command: motion jump (choices: info, convert, import, follow, join)"),
+        (["jump"], "no such command: motion jump (choices: info, convert, import, follow, join,"),
         (["info", "nothing"], "clip: no such name: 'nothing'; give a path to a .bvh file or a"),
         (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),
         (["import", "cmu02_walk", "--out", "x.npz"], "feet: its feet move by"),
