@@ -80,6 +80,44 @@ def solve_frames(robot: Robot, limbs: Limbs, targets: BodyTargets, smooth: float
     return Solved(qpos, sole_error, errors, penetration, float(np.median(times)))
 
 
+def plant(robot: Robot, limbs: Limbs, qpos: np.ndarray, close: float = 1e-5) -> np.ndarray:
+    """(F, nq) postures near others, with both soles where the robot stands, within joint limits.
+
+    A posture whose soles are as far from each other as they are to be is moved as a whole; where a
+    sole is then off by more than `close` [m], or a joint out of its range, the nearest posture
+    with planted soles is taken.
+
+    Raises PoiseError if there is none.
+    """
+    ik, made = _FrameIk(robot, limbs, []), np.empty_like(qpos)
+    low, high = robot.joint_range[:, 0] + MARGIN, robot.joint_range[:, 1] - MARGIN
+    sole = robot.soles[0]
+    wanted = ik.configuration.data
+    place, axes = wanted.xpos[sole.body_id].copy(), wanted.xquat[sole.body_id].copy()
+    for frame, given in enumerate(qpos):
+        joints = np.clip(given[7:], low, high)
+        ik.configuration.update(np.concatenate([robot.standing_qpos[:7], joints]))
+        root = _root_for(ik.configuration.data, sole.body_id, place, axes, robot.standing_qpos)
+        made[frame] = np.concatenate([root, joints])
+        ik.configuration.update(made[frame])
+        if ik.sole_error() > close:
+            made[frame] = ik.planted_near(made[frame], joints)
+    return made
+
+
+def _root_for(
+    data: mujoco.MjData, body: int, place: np.ndarray, axes: np.ndarray, standing: np.ndarray
+) -> np.ndarray:
+    """(7,) place and orientation of the root at which a body is at a place, turned as `axes`."""
+    turn, back = np.empty(4), np.empty(4)
+    mujoco.mju_negQuat(back, data.xquat[body])
+    mujoco.mju_mulQuat(turn, axes, back)
+    moved, root = np.empty(3), np.empty(4)
+    mujoco.mju_rotVecQuat(moved, standing[:3] - data.xpos[body], turn)
+    mujoco.mju_mulQuat(root, turn, standing[3:7])
+    return np.concatenate([place + moved, root])
+
+
 class _FrameIk:
     """The tasks of one robot, from frame to frame."""
 

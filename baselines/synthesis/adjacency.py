@@ -30,6 +30,7 @@ from .motion_graph import (
 SAMPLING = 1.0 / 15.0  # [s] between frames that are compared
 DURATIONS = 8  # that are tried where all pairs of frames are
 WHOLE = 2  # frames at either end of a clip in which it is neither left nor entered
+MOST_REFUSED = 40  # pairs that are tried before two clips are given up
 SAME = 1.0  # [s] by which a clip must jump in itself
 
 
@@ -104,18 +105,21 @@ def transitions_between(
     """The transitions from one clip to another, and why there is none if there is none.
 
     K and its best duration are looked at for all pairs of frames at once, rotations as vectors
-    about a common posture. The pair of end and begin, the best pair that plays both clips nearly
+    about a common posture. The pair of end and begin, the best ones that play both clips nearly
     whole, and the local minima of K + λD over `apart` [s] are then computed exactly, and kept if
     the thresholds allow.
     """
     prices = _prices(before, after, thresholds)
     prices[~_possible(before, after, thresholds)] = np.inf
     minima = _minima(prices, before.times, after.times, thresholds.apart)
-    first = [(len(before.times) - 1, 0), _least_whole(prices, before, after)]
-    ranked = [*first, *sorted(minima, key=lambda pair: prices[pair])]
+    whole = _whole_minima(prices, before, after, thresholds.apart)[: thresholds.each // 2]
+    ranked = [(len(before.times) - 1, 0), *whole, *sorted(minima, key=lambda pair: prices[pair])]
     pairs = dict.fromkeys(pair for pair in ranked if np.isfinite(prices[pair]))
-    found, reasons = [], []
-    for pair in list(pairs)[: thresholds.each]:
+    found: list[Transition] = []
+    reasons = []
+    for pair in pairs:
+        if len(found) == thresholds.each or len(reasons) == MOST_REFUSED:
+            break
         transition, reason = _exact(before, after, pair, thresholds)
         if reason:
             reasons.append((transition.coefficient, reason))
@@ -124,13 +128,15 @@ def transitions_between(
     return found, "" if found else min(reasons, default=(0.0, "other feet are planted"))[1]
 
 
-def _least_whole(prices: np.ndarray, before: Frames, after: Frames) -> tuple[int, int]:
-    """The cheapest pair that leaves the one clip late and enters the other one early."""
+def _whole_minima(
+    prices: np.ndarray, before: Frames, after: Frames, apart: float
+) -> list[tuple[int, int]]:
+    """The minima among pairs that leave the one clip late and enter the other one early."""
     late = int(np.searchsorted(before.times, latest_part(before.duration)))
     early = int(np.searchsorted(after.times, earliest_part(after.duration), side="right"))
     corner = prices[late:, :early]
-    i, j = np.unravel_index(np.argmin(corner), corner.shape)
-    return late + int(i), int(j)
+    found = _minima(corner, before.times[late:], after.times[:early], apart)
+    return [(late + i, j) for i, j in sorted(found, key=lambda pair: corner[pair])]
 
 
 def end_to_begin(before: Frames, after: Frames, thresholds: Thresholds) -> Transition:
@@ -239,12 +245,9 @@ def _minima(
     prices: np.ndarray, leave: np.ndarray, enter: np.ndarray, apart: float
 ) -> list[tuple[int, int]]:
     """Pairs of frames whose price is the least within `apart` [s] on both sides, in both clips."""
-    step = SAMPLING
-    for times in (leave, enter):
-        if len(times) > 2:
-            step = float(times[1] - times[0])
-    reach = 2 * int(apart / step) + 1
-    least = minimum_filter(prices, size=reach, mode="constant", cval=np.inf)
+    reach = [2 * int(apart / float(times[1] - times[0])) + 1 if len(times) > 1 else 1
+             for times in (leave, enter)]  # fmt: skip
+    least = minimum_filter(prices, size=tuple(reach), mode="constant", cval=np.inf)
     rows, columns = np.nonzero((prices == least) & np.isfinite(prices))
     return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True)]
 

@@ -35,13 +35,13 @@ class Thresholds:
     """
 
     coefficient: float = field(default=20.0, metadata={"above": 0.0})
-    angle: float = field(default=100.0, metadata={"above": 0.0, "max": 180.0})
+    angle: float = field(default=120.0, metadata={"above": 0.0, "max": 180.0})
     contacts: bool = True
     least: float = field(default=0.2, metadata={"min": 0.05, "max": 60.0})
     most: float = field(default=2.0, metadata={"min": 0.05, "max": 60.0})
     time_price: float = field(default=5.0, metadata={"above": 0.0, "max": 1e6})
     apart: float = field(default=1.0 / 3.0, metadata={"min": 0.0, "max": 60.0})
-    each: int = field(default=4, metadata={"min": 1, "max": 100})
+    each: int = field(default=6, metadata={"min": 1, "max": 100})
 
     def __post_init__(self) -> None:
         if self.least > self.most:

@@ -297,6 +297,7 @@ def motion() -> None:
 def list_names() -> None:
     """List what can be named: robots, environments, controllers, policies, suites and the like."""
     from poise.baselines.clips.library import packaged_clips
+    from poise.baselines.synthesis.library import packaged_scripts
     from poise.configs.files import packaged
 
     kinds = (
@@ -315,6 +316,7 @@ def list_names() -> None:
     for kind in kinds:
         print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
     print(f"clips: {', '.join(packaged_clips())}")
+    print(f"scripts: {', '.join(packaged_scripts())}")
     print("also as controllers: policies, zero, a folder written by poise train, module:Class")
 
 

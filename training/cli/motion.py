@@ -21,6 +21,7 @@ from poise.training.running.terminal import terminal
 from .arguments import Allow, Switch
 from .motion_check import check
 from .motion_join import join
+from .motion_script import graph, plan, synth
 
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
@@ -199,6 +200,9 @@ MOTION: dict[str, Callable[..., object]] = {
     "follow": follow,
     "join": join,
     "check": check,
+    "graph": graph,
+    "plan": plan,
+    "synth": synth,
 }
 
 

@@ -1,0 +1,45 @@
+"""Which parts of a motion graph reach each other: its largest strongly connected component."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from .motion_graph import MotionGraph, Transition
+from .search import Moments, Place
+
+
+def strong_part(graph: MotionGraph) -> MotionGraph:
+    """The graph with those transitions alone from which one can go on for ever.
+
+    Both moments of a transition lie in the largest strongly connected component of all moments, in
+    which playing on leads from a moment of a clip to the next one.
+    """
+    inside = _inside(graph)
+    return replace(graph, transitions=tuple(t for t in graph.transitions if _ends(t) <= inside))
+
+
+def strong_clips(graph: MotionGraph) -> list[str]:
+    """The clips of which some part lies in that component."""
+    names = {name for name, _ in _inside(graph)}
+    return [name for name in graph.names if name in names]
+
+
+def _ends(transition: Transition) -> set[Place]:
+    return {(transition.before, transition.leave), (transition.after, transition.enter)}
+
+
+def _inside(graph: MotionGraph) -> set[Place]:
+    """The moments of the largest component; none if no moment is reached again."""
+    moments = Moments(graph)
+    pairs = np.concatenate([moments.plays, moments.joins])
+    size = len(moments)
+    matrix = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    _, labels = connected_components(matrix, connection="strong")
+    counts = np.bincount(labels)
+    if counts.max() < 2:
+        return set()
+    return {moments.place[i] for i in np.flatnonzero(labels == np.argmax(counts))}

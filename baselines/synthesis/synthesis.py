@@ -1,0 +1,204 @@
+"""A script and a graph become one clip, with a record of every choice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from poise.baselines.clips.clip import Clip
+from poise.baselines.joining.joins import JOINS
+from poise.configs.errors import ConfigError, shown
+
+from .actions import Actions, Reader
+from .motion_graph import MotionGraph, StatePlace, Transition
+from .nearest import nearest_places
+from .printer import text_of
+from .search import Path, Place, Step, Task, best_paths
+from .stage import LONGEST, Stage
+from .tokens import wrong
+from .tree import Script, StateName
+
+Join = Callable[[Clip, Clip, float], Clip]
+Check = Callable[[Transition], str]
+
+
+@dataclass(frozen=True)
+class Played:
+    """A clip, or a transition, as it is played.
+
+    Attributes:
+        what: name of the clip, or the kind of the transition.
+        begins, ends: in the whole [s].
+        enter, leave: times in the clip [s]; of a transition those of the clips about it.
+        wanted: whether the script asks for it.
+        coefficient: K of a transition; None for a clip.
+    """
+
+    what: str
+    begins: float
+    ends: float
+    enter: float
+    leave: float
+    wanted: bool
+    coefficient: float | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Paths of a script through a graph, the best one first.
+
+    Attributes:
+        actions: what is wanted.
+        paths: with their costs.
+        kinds: number of an action → the kind of the transition by hand after it.
+    """
+
+    actions: Actions
+    paths: tuple[Path, ...]
+    kinds: dict[int, str]
+
+
+class Synthesis:
+    """The way from a script to a clip.
+
+    Args:
+        graph: clips and transitions.
+        clips: name → clip, of all that the graph has.
+        kind: of transitions that the script leaves open.
+        joins: kind → how two clips are joined; those that need no robot by default.
+        check: says why a transition cannot be made, or nothing; see `best_paths`.
+    """
+
+    def __init__(
+        self,
+        graph: MotionGraph,
+        clips: Mapping[str, Clip],
+        kind: str = "insert",
+        joins: Mapping[str, Join] = JOINS,
+        check: Check | None = None,
+    ):
+        if kind not in joins:
+            raise ConfigError(f"no transition {shown(kind)} here", field="kind", choices=joins)
+        self.stage = Stage(graph, dict(clips))
+        self.kind, self.joins, self.check = kind, joins, check
+
+    def plan(self, script: Script, k: int = 1) -> Plan:
+        """The k best paths; what the script makes of clips becomes part of the stage.
+
+        Raises ConfigError with line and column, or for a script that has no way.
+        """
+        reader = Reader(script, self.stage, lambda inner: self._inner(inner, script))
+        actions = reader.actions()
+        return self._plan(actions, k, script)
+
+    def make(self, script: Script, plan: Plan | None = None) -> tuple[Clip, dict[str, Any]]:
+        """The clip of the best path, and the record of what was chosen, as plain values."""
+        plan = self.plan(script) if plan is None else plan
+        clip, played = self._play(plan)
+        return clip, {
+            "script": text_of(script),
+            "robot": self.stage.graph.robot,
+            "duration": clip.duration,
+            "cost": plan.paths[0].cost,
+            "made": sorted(self.stage.derived),
+            "played": [asdict(part) for part in played],
+            "others": [{"cost": path.cost, "clips": [step.clip for step in path.steps]}
+                       for path in plan.paths[1:]],
+        }  # fmt: skip
+
+    def _inner(self, actions: Actions, script: Script) -> Clip:
+        """A sequence in brackets as one clip."""
+        return self._play(self._plan(actions, 1, script))[0]
+
+    def _plan(self, actions: Actions, k: int, script: Script) -> Plan:
+        arrows, kinds = {}, {}
+        for i, arrow in enumerate(actions.arrows):
+            if not arrow.kind:
+                continue
+            if arrow.kind not in self.joins:
+                raise wrong(f"no transition {shown(arrow.kind)} here", script.text, arrow.at,
+                            script.source, self.joins)  # fmt: skip
+            duration = dict(arrow.options).get("duration")
+            arrows[i] = self.stage.by_hand(actions.names[i], actions.names[i + 1], duration)
+            kinds[i] = arrow.kind
+        ends = [self._places(state, script) for state in (actions.start, actions.goal)]
+        task = Task(actions.names, arrows, *ends)
+        try:
+            paths = best_paths(self.stage.graph, task, k, self.check)
+        except ConfigError as error:
+            raise ConfigError(error.message, source=script.source, choices=error.choices) from None
+        return Plan(actions, tuple(paths), kinds)
+
+    def _places(self, state: StateName | None, script: Script) -> dict[Place, float]:
+        if state is None:
+            return {}
+        states = self.stage.graph.states
+        place = states.get(state.name)
+        if place is None and (name := self.stage.find(state.name)) is not None:
+            place = StatePlace(name)  # how the clip begins
+        if place is None:
+            raise wrong(f"no posture {shown(state.name)}", script.text, state.at, script.source,
+                        [*states, *self.stage.packed])  # fmt: skip
+        posture = self.stage.posture(place.clip, place.time)
+        try:
+            return nearest_places(self.stage.frames, posture,
+                                  price=self.stage.graph.thresholds.time_price)  # fmt: skip
+        except ConfigError as error:
+            raise wrong(error.message, script.text, state.at, script.source) from None
+
+    def _play(self, plan: Plan) -> tuple[Clip, list[Played]]:
+        """The steps of the best path, one after the other."""
+        steps = plan.paths[0].steps
+        seconds = sum(s.leave - s.enter + (s.after.duration if s.after else 0.0) for s in steps)
+        if seconds > 2.0 * LONGEST:  # joins that overlap take time away, at most half
+            raise self._too_long()
+        last, done = self._part(steps[0]), list[Clip]()
+        played = [Played(steps[0].clip, 0.0, last.duration, *steps[0][1:4])]
+        number, kind, frames = 0 if steps[0].wanted else -1, self.kind, 0
+        for before, step in pairwise(steps):
+            transition, part = before.after, self._part(step)
+            assert transition is not None
+            kind = plan.kinds.get(number, self.kind) if before.wanted else self.kind
+            number += step.wanted
+            both = self.joins[kind](last, part, transition.duration)
+            head, last = _split(both, len(both) - len(part))
+            done.append(head)
+            frames += len(head)
+            begins = frames * last.dt
+            ends = sorted((played[-1].ends, begins))
+            played += [
+                Played(kind, ends[0], ends[1], transition.leave, transition.enter, False,
+                       transition.coefficient),
+                Played(step.clip, begins, begins + part.duration, *step[1:4]),
+            ]  # fmt: skip
+        whole = _together([*done, last])
+        if whole.duration > LONGEST:
+            raise self._too_long()
+        return replace(whole, name=plan.actions.names[0]), played
+
+    def _too_long(self) -> ConfigError:
+        return ConfigError(f"lasts longer than {LONGEST:g} s", source="script")
+
+    def _part(self, step: Step) -> Clip:
+        """A clip from one time to another, at least two frames of it."""
+        clip, enter, leave = self.stage.clips[step.clip], step.enter, step.leave
+        if leave - enter < 1.5 * clip.dt:
+            enter = min(enter, clip.duration - clip.dt)
+            leave = enter + clip.dt
+        return clip.cut(enter, leave)
+
+
+def _split(clip: Clip, frame: int) -> tuple[Clip, Clip]:
+    """The frames before one, and those from it on."""
+    head = replace(clip, root=clip.root[:frame], rotations=clip.rotations[:frame])
+    return head, replace(clip, root=clip.root[frame:], rotations=clip.rotations[frame:])
+
+
+def _together(clips: list[Clip]) -> Clip:
+    root, rotations = (np.concatenate([getattr(clip, name) for clip in clips])
+                       for name in ("root", "rotations"))  # fmt: skip
+    return replace(clips[0], root=root, rotations=rotations)

@@ -1,0 +1,241 @@
+"""`poise motion graph`, `plan` and `synth`: which clip may follow which, and a script performed."""
+
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from poise.baselines.clips.bvh import write_bvh
+from poise.baselines.clips.clip import Clip
+from poise.baselines.clips.library import packaged_clips
+from poise.baselines.retargeting.performed import load_clip, robot_clip_of
+from poise.baselines.synthesis.adjacency import make_graph
+from poise.baselines.synthesis.library import between, find_script
+from poise.baselines.synthesis.motion_graph import (
+    GraphClip,
+    StatePlace,
+    Thresholds,
+    Weight,
+    read_graph,
+    write_graph,
+)
+from poise.baselines.synthesis.printer import sequence_text
+from poise.baselines.synthesis.synthesis import Synthesis
+from poise.baselines.synthesis.table import to_csv
+from poise.configs.errors import ConfigError, shown
+from poise.configs.files import write_atomic
+from poise.configs.reading import is_file, read_yaml
+from poise.configs.schema import build
+from poise.envs.robots.robot import Robot, load_robot
+from poise.training.running.terminal import terminal
+
+from .arguments import Switch
+
+ScriptFile = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCRIPT")]
+Files = Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+
+
+def graph(
+    files: Files,
+    /,
+    *,
+    out: Path,
+    robot: str | None = None,
+    coefficient: float = Thresholds.coefficient,
+    angle: float = Thresholds.angle,
+    any_feet: Switch = False,
+    least: float = Thresholds.least,
+    most: float = Thresholds.most,
+    time_price: float = Thresholds.time_price,
+    each: int = Thresholds.each,
+    weights: Path | None = None,
+    state: tuple[str, ...] = (),
+    plot: Path | None = None,
+) -> None:
+    """Find out which clips may follow which, and where: a motion graph as YAML.
+
+    Args:
+        files: .bvh files or names of packaged clips, all of one skeleton; with a robot .npz too.
+        out: the .yaml file to write.
+        robot: whose motions the clips become.
+        coefficient: largest K of a transition.
+        angle: largest turn of a joint in it [degrees].
+        any_feet: do not ask that the same feet be planted before and after it.
+        least: shortest transition [s].
+        most: longest transition [s].
+        time_price: price of a second of transition, or of what no script asks for, in units of K.
+        each: most transitions of a pair of clips.
+        weights: a .yaml file of an expert: weights, a list of before, after and weight.
+        state: postures by name, as NAME=CLIP@SECONDS.
+        plot: a .png file for the adjacency matrix and the graph.
+    """
+    from poise.training.following.script_tables import print_graph
+
+    limits = build(Thresholds, {
+        "coefficient": coefficient, "angle": angle, "contacts": not any_feet, "least": least,
+        "most": most, "time_price": time_price, "each": each}, "graph")  # fmt: skip
+    loaded = _load([str(file) for file in files], robot)
+    made = make_graph(loaded, limits, _weights(weights), _states(state), robot or "")
+    write_graph(made, out)
+    print_graph(made, terminal())
+    print(out)
+    if plot is not None:
+        from poise.training.figures.motion_graph import plot_graph
+
+        plot_graph(plot, made)
+        print(plot)
+
+
+def plan(
+    script: ScriptFile,
+    /,
+    *,
+    graph: Path | None = None,
+    robot: str | None = None,
+    k: int = 1,
+    table: Switch = False,
+    kind: Literal["insert", "cross", "capture", "inertial"] = "insert",
+) -> None:
+    """The cheapest ways of a script through a motion graph, without making the motion.
+
+    Args:
+        script: a .motion file, the name of a packaged script, or the script itself.
+        graph: a file of poise motion graph. None: the packaged clips.
+        robot: for whom the packaged clips are retargeted. None: their own skeleton.
+        k: how many ways.
+        table: print the script as a table, comma-separated, too.
+        kind: of transitions that the script leaves open.
+    """
+    from poise.training.following.script_tables import print_plan
+
+    tree = find_script(script)
+    synthesis = _synthesis(graph, robot, kind)
+    print_plan(synthesis.plan(tree, k), sequence_text(tree.sequence), terminal())
+    if table:
+        print(to_csv(tree), end="")
+
+
+def synth(
+    script: ScriptFile,
+    /,
+    *,
+    out: Path,
+    robot: str | None = None,
+    graph: Path | None = None,
+    start: Annotated[str | None, tyro.conf.arg(name="from")] = None,
+    goal: Annotated[str | None, tyro.conf.arg(name="to")] = None,
+    kind: Literal["insert", "cross", "capture", "inertial"] = "insert",
+    least: float | None = None,
+) -> None:
+    """Make the motion of a script, and a file beside it with every choice (.plan.json).
+
+    Args:
+        script: a .motion file, the name of a packaged script, or the script itself.
+        out: the file to write: .npz for a robot to follow, or .bvh.
+        robot: whose motion it becomes. None: that of the clips' own skeleton, as .bvh.
+        graph: a file of poise motion graph. None: the packaged clips.
+        start: a posture from which the motion begins, as <NAME> in a script.
+        goal: a posture in which it ends.
+        kind: of transitions that the script leaves open.
+        least: shortest transition of the packaged clips [s]; a graph has its own.
+    """
+    if out.suffix not in ((".npz", ".bvh") if robot else (".bvh",)):
+        raise ConfigError("must be the name of a .npz or .bvh file; a .npz needs --robot",
+                          source=out, field="out")  # fmt: skip
+    tree = between(find_script(script), start, goal)
+    synthesis = _synthesis(graph, robot, kind, least)
+    begin = time.monotonic()
+    clip, record = synthesis.make(tree)
+    if robot is None:
+        write_bvh(clip, out)
+    else:
+        _write_robot(clip, load_robot(robot), out, tree.source)
+    record["seconds"] = round(time.monotonic() - begin, 3)
+    text = json.dumps(record, indent=1, ensure_ascii=False)
+    write_atomic(out.with_suffix(".plan.json"), text + "\n")
+    print(f"{clip.duration:.1f} s, made in {record['seconds']:.1f} s")
+    print(out)
+
+
+def _synthesis(
+    file: Path | None, robot: str | None, kind: str, least: float | None = None
+) -> Synthesis:
+    """The clips of a graph, or the packaged ones, ready for scripts."""
+    if file is not None:
+        made = read_graph(file)
+        if (robot or "") != made.robot:
+            raise ConfigError(f"is of {made.robot or 'no robot'}, not of {robot or 'none'}",
+                              source=file, field="robot")  # fmt: skip
+        loaded = _load([_beside(clip.file, file) for clip in made.clips], robot,
+                       [clip.name for clip in made.clips])  # fmt: skip
+        for told, (found, _) in zip(made.clips, loaded, strict=True):
+            if told.digest and told.digest != found.digest:
+                raise ConfigError(f"is not the file that it was: {told.file}; make the graph again",
+                                  source=file, field=f"clips.{told.name}")  # fmt: skip
+        return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind)
+    names = [name for name in packaged_clips() if _fits(name, robot)]
+    limits = Thresholds() if least is None else build(Thresholds, {"least": least}, "synth")
+    loaded = _load(names, robot)
+    return Synthesis(make_graph(loaded, limits, robot=robot or ""),
+                     {entry.name: clip for entry, clip in loaded}, kind)  # fmt: skip
+
+
+def _fits(name: str, robot: str | None) -> bool:
+    """Without a robot the clips of one skeleton; with one those whose feet stay."""
+    return name.startswith("cmu02") if robot is None else not name.endswith("walk")
+
+
+def _load(
+    files: Sequence[str], robot: str | None, names: Sequence[str] | None = None
+) -> list[tuple[GraphClip, Clip]]:
+    body = None if robot is None else load_robot(robot)
+    loaded = []
+    for file, name in zip(files, names or [Path(file).stem for file in files], strict=True):
+        clip, digest = load_clip(file, body)
+        loaded.append((GraphClip(name, file, clip.duration, digest), clip))
+    return loaded
+
+
+def _beside(file: str, graph_file: Path) -> str:
+    """A clip's file, looked for beside the graph's file too."""
+    beside = graph_file.parent / file
+    return str(beside) if Path(file).suffix and not is_file(file) and is_file(beside) else file
+
+
+def _write_robot(clip: Clip, robot: Robot, out: Path, source: str) -> None:
+    from poise.baselines.motions.robot_clip import write_robot_clip
+    from poise.baselines.retargeting.robot_bvh import clip_of_robot
+
+    made = robot_clip_of(clip, robot, out.stem, source)
+    if out.suffix == ".npz":
+        write_robot_clip(made, out)
+    else:
+        write_bvh(clip_of_robot(robot, made.qpos, made.dt, out.stem), out)
+
+
+def _weights(path: Path | None) -> tuple[Weight, ...]:
+    if path is None:
+        return ()
+    data = read_yaml(path)
+    rows = data.get("weights")
+    if set(data) != {"weights"} or not isinstance(rows, list):
+        raise ConfigError("must hold a list, weights, and nothing else", source=path)
+    return tuple(build(Weight, row, f"{path}: weights[{i}]") for i, row in enumerate(rows))
+
+
+def _states(texts: Sequence[str]) -> dict[str, StatePlace]:
+    states = {}
+    for text in texts:
+        name, _, place = text.partition("=")
+        clip, _, seconds = place.rpartition("@")
+        try:
+            data = {"clip": clip, "time": float(seconds)}
+        except ValueError:
+            data = {}
+        if not name.isidentifier() or not data:
+            raise ConfigError(f"must be NAME=CLIP@SECONDS, not {shown(text)}", field="state")
+        states[name] = build(StatePlace, data, f"state {name}")
+    return states
