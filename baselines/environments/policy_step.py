@@ -6,6 +6,7 @@ import numpy as np
 
 from poise.baselines.controller import TargetArrays
 from poise.baselines.motions.targets import Motion, update_targets
+from poise.baselines.motions.tempo import played_time
 from poise.envs.balance.episode import (
     FAILURES,
     ROOT_FORCE,
@@ -110,9 +111,10 @@ class TargetInputs(Block):
 @compiled
 def set_targets(a: TargetInputs):
     """Targets of this tick."""
-    now = a.clock[0] * a.robot.timestep
+    now, motion = a.clock[0] * a.robot.timestep, a.motion
+    time = played_time(motion.pace, a.state, a.targets.com, motion.knots[0], now)
     update_targets(
-        a.robot, a.state, a.motion, now, a.com_offset, a.residual.offsets, a.targets
+        a.robot, a.state, motion, time, a.com_offset, a.residual.offsets, a.targets
     )  # fmt: skip
 
 

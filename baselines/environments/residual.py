@@ -12,17 +12,20 @@ from poise.baselines.controller import Controller, Targets
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.motions.targets import motion_arrays
+from poise.baselines.motions.tempo import TIME, Tempo
 from poise.baselines.registry import ControllerConfig, load_controller
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.base import EnvConfig
-from poise.envs.balance.observation import Term, mirror_terms
+from poise.envs.balance.observation import Term, View, mirror_terms
+from poise.envs.compiled.block import Block
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
 from .controlled import ControlledEnv
+from .motion_terms import MOTION_TERMS, MotionView
 from .policy_step import TargetInputs, set_targets
 from .scales import Lag, ResidualScales, action_term, make_residual
 
@@ -67,13 +70,15 @@ class ResidualBalanceEnv(ControlledEnv):
     or a mapping), `controller` (a name, a .yaml file, a mapping or a `Controller`),
     `motion` (a name, a .yaml file, a .npz file or a `ReferenceMotion`), `residual` (what an action
     of 1 adds, a `ResidualScales`), `smoothing` (time constant of the action [s]), `gate` (distance
-    from rest at which the residual opens [m]), <arguments>
+    from rest at which the residual opens [m]), `tempo` (whether and how the motion waits while
+    the robot catches itself, a `Tempo`), <arguments>
 
     Version history: v0, first release.
     """
 
     scales_class: type[ResidualScales] = ResidualScales  #: whose fields `residual` has
     only_targets = True  #: the action moves targets and nothing else
+    known_terms = MOTION_TERMS
 
     def __init__(
         self,
@@ -85,6 +90,7 @@ class ResidualBalanceEnv(ControlledEnv):
         residual: ResidualScales | Mapping | None = None,
         smoothing: float = 0.0,
         gate: float = 0.0,
+        tempo: Tempo | Mapping | None = None,
         render_mode: str | None = None,
         **overrides: Any,
     ):
@@ -103,6 +109,7 @@ class ResidualBalanceEnv(ControlledEnv):
         self._offsets = self._residual.offsets
         with allowing(named(controller)):  # the user hands it over, not a file
             self.controller = load_controller(controller, self.robot)
+        self.tempo = build(Tempo, {} if tempo is None else to_dict(tempo), "tempo")
         self.motion = load_motion(motion, self.robot)
         self.targets = Targets.standing(self.robot, self.simulation.state)
         self._targets = self.targets.arrays()
@@ -118,8 +125,15 @@ class ResidualBalanceEnv(ControlledEnv):
     @motion.setter
     def motion(self, motion: ReferenceMotion) -> None:
         self._reference = load_motion(motion, self.robot)
-        self._motion = motion_arrays(self._reference)
+        tempo = self.tempo if self._reference.moves else Tempo()
+        self._motion = motion_arrays(self._reference, tempo, self.robot.height_com)
         self._unbind()
+
+    @property
+    def motion_time(self) -> float:
+        """The time of the motion that is played now; that since the reset unless it waits [s]."""
+        pace = self._motion.pace
+        return float(pace.memory[TIME]) if pace.waits else self.simulation.time
 
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; robot and motion are shared.
@@ -133,6 +147,7 @@ class ResidualBalanceEnv(ControlledEnv):
             "residual": self.residual,
             "smoothing": self.smoothing,
             "gate": self.gate,
+            "tempo": self.tempo,
         }
 
     def _action_names(self) -> tuple[str, ...]:
@@ -147,12 +162,20 @@ class ResidualBalanceEnv(ControlledEnv):
             terms.append(Term("motors", names[targets:], "1", "", "motors"))
         return mirror_terms(terms, parts)
 
+    def _view(self, kind: type[Block], out: np.ndarray) -> Block:
+        if kind is not MotionView:
+            return super()._view(kind, out)
+        view = super()._view(View, out)
+        assert isinstance(view, View)
+        return MotionView(view, self._motion)
+
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref
 
     def _begin(self, options: Mapping[str, Any]) -> None:
         self.controller.reset(self.state_source.state)
         self._begin_walk(options)
+        self._motion.pace.clear()
         self._offsets[:] = 0.0
         self._residual.torques[:] = 0.0
         set_targets(self._target_inputs())

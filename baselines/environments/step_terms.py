@@ -7,9 +7,11 @@ import numpy as np
 from poise.baselines.stepping.blocks import StepMemory, SwingArrays
 from poise.baselines.stepping.swing import time_left as remaining_time
 from poise.envs.balance.observation import GROUND, SPACE, Terms, View
-from poise.envs.balance.terms import TERMS, put_local
+from poise.envs.balance.terms import put_local
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+
+from .motion_terms import MOTION_TERMS
 
 # entries of what a controller tells of its steps, see `Stepping.entries`
 STEPS, FOOT, FOOTHOLD, PHASE, REMAINING, SINCE = 0, 1, 2, 4, 5, 6
@@ -45,7 +47,7 @@ def report_steps(t: StepReporter):
         report[PHASE], report[REMAINING] = w.time[0] / w.duration[0], remaining_time(w)
 
 
-STEP_TERMS = Terms(TERMS, StepView)  #: by name; those of every environment come first
+STEP_TERMS = Terms(MOTION_TERMS, StepView)  #: by name; those of every environment come first
 
 
 @compiled

@@ -86,9 +86,11 @@ class ResidualStepEnv(ResidualBalanceEnv):
         self._residual = replace(self._residual, offsets=self._offsets)
 
     def _view(self, kind: type[Block], out: np.ndarray) -> Block:
+        if kind is not StepView:
+            return super()._view(kind, out)
         view = super()._view(View, out)
         assert isinstance(view, View)
-        return StepView(view, self._step_report) if kind is StepView else view
+        return StepView(view, self._step_report)
 
     def _observe(self) -> None:
         self._step_report[:] = self.stepper.stepping().entries()

@@ -9,6 +9,8 @@ from poise.envs.compiled.copies import Copyable
 
 from .splines import evaluate
 
+STILL = 1e-6  # [rad, m] by which a posture that is held may change
+
 
 class MotionSample(NamedTuple):
     """A reference motion at one time; nj = nv − 6 joints in dof order.
@@ -46,6 +48,11 @@ class ReferenceMotion(Copyable):
     def duration(self) -> float:
         """Time of the last keyframe [s]."""
         return float(self.knots[-1])
+
+    @property
+    def moves(self) -> bool:
+        """False for a posture that is held."""
+        return bool(np.ptp(self.coeffs[:, 0], axis=0).max() >= STILL)
 
     def sample(self, t: float) -> MotionSample:
         """The reference at time t [s]."""

@@ -25,6 +25,7 @@ from .offsets import (
 )
 from .reference_motion import ReferenceMotion
 from .splines import evaluate
+from .tempo import Pace, Tempo, make_pace, slow_down
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +36,16 @@ class Motion(Block):
     coeffs: np.ndarray
     loop: bool
     samples: np.ndarray  # (3, nj + 6) scratch: position, velocity and acceleration
+    pace: Pace
 
 
-def motion_arrays(motion: ReferenceMotion) -> Motion:
-    """The block of `motion`, with scratch of its own."""
+def motion_arrays(
+    motion: ReferenceMotion, tempo: Tempo | None = None, height: float = 1.0
+) -> Motion:
+    """The block of `motion`, with scratch and a memory of its own; `height` is h [m]."""
     samples = guarded_zeros((3, motion.coeffs.shape[2]))
-    return Motion(motion.knots, motion.coeffs, motion.loop, samples)
+    pace = make_pace(tempo or Tempo(), height)
+    return Motion(motion.knots, motion.coeffs, motion.loop, samples, pace)
 
 
 @compiled
@@ -53,7 +58,7 @@ def update_targets(
     residual: np.ndarray,
     t: TargetArrays,
 ):
-    """Fill `t` for `time`: the motion's joints and CoM, moved by the residual.
+    """Fill `t` for the motion's `time` [s]: its joints and CoM, moved by the residual.
 
     Heading frame: the motion's CoM is relative to the mean of the sole points, `com_offset` [m]
     forward of it; p_ref lies under it. `residual` (≥ 9,), in the order of `offsets.py`, adds
@@ -65,6 +70,7 @@ def update_targets(
     """
     nj, samples = t.q_ref.shape[0], motion.samples
     evaluate(motion.knots, motion.coeffs, motion.loop, time, samples[0], samples[1], samples[2])
+    slow_down(motion.pace, samples)
     copy_into(samples[0], t.q_ref)
     copy_into(samples[1], t.v_ref)
     copy_into(samples[2], t.a_ref)

@@ -3,6 +3,7 @@
 from tests.performance import (
     flywheel_limit,
     momentum_qp,
+    motion_tick,
     qp_set,
     scaling,
     solvers,
@@ -18,6 +19,7 @@ for benchmark in (
     stepping,
     steps,
     vector,
+    motion_tick,
     momentum_qp,
     solvers,
     qp_set,

@@ -33,9 +33,10 @@ def suite_repertoire(suite: Suite, robot: Robot, folder: Path, anew: bool) -> Re
 
 def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
     """What all trials of a suite share, whose results are in `folder`."""
-    if suite.motions is None:
+    chosen = suite.motions
+    if chosen is None:
         return Stage(robot, suite.duration, suite.noise)
-    return stage_of(robot, suite.noise, suite.motions.names, suite.motions.labels, folder)
+    return stage_of(robot, suite.noise, chosen.names, chosen.labels, folder, chosen.tempo)
 
 
 def motion_levels(played: Played) -> list[MotionLevel]:

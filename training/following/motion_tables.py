@@ -21,6 +21,7 @@ FIGURES: dict[str, tuple[str, float, str]] = {
     "last second": ("body_error_last", 1e3, ".1f"),
     "CoM \\[mm]": ("com_error", 1e3, ".1f"),
     "slide \\[mm]": ("sole_slide", 1e3, ".1f"),
+    "late \\[s]": ("motion_delay", 1.0, ".2f"),
     "steps": ("steps_mean", 1.0, ".1f"),
     "power \\[W]": ("mean_power", 1.0, ".0f"),
 }

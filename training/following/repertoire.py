@@ -16,6 +16,7 @@ from poise.baselines.motions.robot_clip import (
     reference_from,
     write_robot_clip,
 )
+from poise.baselines.motions.tempo import Tempo
 from poise.baselines.retargeting.retarget import retarget
 from poise.configs.files import resolve
 from poise.configs.reading import is_file
@@ -56,12 +57,13 @@ def kept(folder: Path, name: str) -> Path:
 
 
 def stage_of(
-    robot: str | Path, noise: StartNoise, names: Sequence[str], labels: Sequence[str], folder: Path
-) -> Stage:
+    robot: str | Path, noise: StartNoise, names: Sequence[str], labels: Sequence[str], folder: Path,
+    tempo: Tempo,
+) -> Stage:  # fmt: skip
     """The stage of a suite that performs motions, which `folder` keeps."""
     files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
              for name, label in zip(names, labels, strict=True)]  # fmt: skip
-    return Stage(robot, LONGEST, noise, ((STANDING, STANDING), *files))
+    return Stage(robot, LONGEST, noise, ((STANDING, STANDING), *files), tempo)
 
 
 def is_clip(name: str) -> bool:

@@ -16,7 +16,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from poise.configs.files import write_atomic
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot
-from poise.envs.vector.batch import EnvBatch, replicate
+from poise.envs.vector.batch import EnvBatch
 from poise.training.running.terminal import ProgressLines
 
 from .checkpoints import controller_fingerprint, save_checkpoint
@@ -76,7 +76,7 @@ class Checkpoints(BaseCallback):
         pushes = evaluation.pushes or self.config.env.pushes
         count = min(evaluation.trials, 32)
         first = self.config.make_env(self.robot, pushes=pushes)
-        self._batch = EnvBatch(replicate(first, count), self.config.threads)
+        self._batch = EnvBatch(self.config.replicate(first, count), self.config.threads)
         if self.num_timesteps == 0:
             self._evaluate()  # the controller alone: what the policy must beat
 

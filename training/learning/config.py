@@ -10,6 +10,8 @@ from poise.baselines.environments.scales import ResidualScales, StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
+from poise.baselines.motions.motion import load_motion
+from poise.baselines.motions.tempo import Tempo
 from poise.baselines.registry import controller_config
 from poise.baselines.walking.schedule import CommandSampler
 from poise.configs.files import resolve
@@ -20,6 +22,7 @@ from poise.envs.balance.servos import ServoConfig
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.pushes.sampler import PushSampler
 from poise.envs.robots.robot import Robot
+from poise.envs.vector.batch import replicate
 
 MOST_STEPS = 4_000_000  # of a rollout, which is kept in memory
 MOST_SEED = 2**31 - 1  # that torch and NumPy take, also with a run's steps added
@@ -93,14 +96,17 @@ class TrainConfig:
     action adds instead of `residual`; with "walk" `poise/ResidualWalk-v0`, with these too and
     the `command` that it is given; with "whole" it is `poise/ResidualWhole-v0`, with these
     `servos` and `hand_over` and no `residual`. With "torque" it is `poise/TorqueBalance-v0`, with
-    "position" `poise/PositionBalance-v0` with these `servos`; then controller, motion, both
-    residuals, smoothing and gate are not used.
+    "position" `poise/PositionBalance-v0` with these `servos`; then controller, motions and their
+    tempo, both residuals, smoothing and gate are not used.
     """
 
     robot: str = "humanoid"
     action: Literal["residual", "step", "walk", "whole", "torque", "position"] = "residual"
     controller: str = "momentum-qp"
     motion: str = "standing"
+    # that the environments perform in turn instead of `motion`, one each
+    motions: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
+    tempo: Tempo = field(default_factory=Tempo, metadata={"omit": "default"})
     seed: int = field(default=0, metadata={"min": 0, "max": MOST_SEED})
     steps: int = field(default=3_000_000, metadata={"min": 1})  # [environment steps]
     threads: int = field(default=2, metadata={"min": 1})
@@ -140,8 +146,21 @@ class TrainConfig:
             "whole": (ResidualWholeEnv, {"servos": self.servos, "hand_over": self.hand_over}),
         }
         kind, own = kinds[self.action]
-        common = {"motion": self.motion, "smoothing": self.smoothing, "gate": self.gate}
+        common = {"motion": (*self.motions, self.motion)[0], "tempo": self.tempo,
+                  "smoothing": self.smoothing, "gate": self.gate}  # fmt: skip
         return kind(robot or self.robot, self.env, **{**common, **own, **overrides})
+
+    def replicate(self, env: BalanceEnv, count: int) -> list[BalanceEnv]:
+        """`env` and more like it, `count` in all; with `motions` they perform these in turn.
+
+        Raises ConfigError for a motion that there is not, or not for this robot.
+        """
+        envs = replicate(env, count)
+        references = [load_motion(name, env.robot) for name in self.motions]
+        for i, each in enumerate(envs):
+            if references and isinstance(each, ResidualBalanceEnv):
+                each.motion = references[i % len(references)]
+        return envs
 
 
 def train_config(name_or_path: str | Path) -> TrainConfig:

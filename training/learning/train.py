@@ -25,7 +25,6 @@ from poise.configs.schema import build, read_yaml, to_yaml
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.robots.variants import coarser_robot
-from poise.envs.vector.batch import replicate
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
 
@@ -198,7 +197,7 @@ def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormal
     env = config.make_env(robot)
     check_pushes(config, env)
     moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
-    vec = ThreadedVecEnv(replicate(env, config.ppo.n_envs), config.threads)
+    vec = ThreadedVecEnv(config.replicate(env, config.ppo.n_envs), config.threads)
     normalize = VecNormalize(vec, gamma=config.ppo.gamma, clip_obs=10.0, clip_reward=10.0)
     if moments is not None:
         normalize.obs_rms = moments

@@ -17,6 +17,7 @@ FIGURES = {
     "body_error_last": ("At the end [m]", "the same in the last second", ".4f"),
     "com_error": ("CoM [m]", "mean distance from where the motion has it", ".4f"),
     "sole_slide": ("Slide [m]", "how far a sole moved since it landed", ".4f"),
+    "motion_delay": ("Late [s]", "the motion at the end, where it waits", ".2f"),
     "steps_mean": ("Steps", "mean of the touchdowns", ".1f"),
     "mean_power": ("Power [W]", "∫ Σ |τ q̇| dt over the time", ".0f"),
 }

@@ -219,6 +219,7 @@ class MotionMeans(TypedDict, total=False):
     body_error_last: Number
     com_error: Number
     sole_slide: Number
+    motion_delay: Number
     mean_power: Number
 
 

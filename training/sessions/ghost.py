@@ -10,8 +10,6 @@ from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.envs.balance.base import BalanceEnv
 from poise.training.tracking.reference import ReferenceBodies, Stance
 
-STILL = 1e-6  # [rad, m] by which a motion that only stands may change
-
 
 class Poses(NamedTuple):
     """Where the bodies of a robot are, world axes: (nbody, 3) [m]; (nbody, 4), w first."""
@@ -38,6 +36,6 @@ def ghost_of(env: BalanceEnv) -> Ghost | None:
     None where there is no motion, or it only stands.
     """
     motion = getattr(env, "motion", None)
-    if not isinstance(motion, ReferenceMotion) or np.ptp(motion.coeffs[:, 0], axis=0).max() < STILL:
+    if not isinstance(motion, ReferenceMotion) or not motion.moves:
         return None
     return Ghost(motion, env)

@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import Literal, NamedTuple, Self
 
+from poise.baselines.motions.tempo import Tempo
 from poise.envs.pushes.sampler import LimitTable
 from poise.training.trials.trial import Trial
 
@@ -54,6 +55,7 @@ class Motions(Part):
     )
     trials: int = field(default=1, metadata={"min": 1, "max": MOST_TRIALS})  # in every cell
     of: Literal["own", "limits"] = "own"
+    tempo: Tempo = field(default_factory=Tempo, metadata={"omit": "default"})
     standing: Envelope = field(
         default_factory=lambda: Envelope(fractions=(0.3, 2.2), first_trials=16)
     )

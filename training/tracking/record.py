@@ -34,6 +34,7 @@ class TrackingFigures:
         body_error_last: `body_error` of the trial's last second [m].
         com_error: mean distance of the CoM from the motion's [m].
         sole_slide: largest distance of a sole from where it landed after the disturbed start [m].
+        motion_delay: by how much the motion is late at the end [s]; 0 unless it waits.
     """
 
     joint_rms: float
@@ -42,6 +43,7 @@ class TrackingFigures:
     body_error_last: float
     com_error: float
     sole_slide: float
+    motion_delay: float
 
 
 class Tracking:
@@ -59,14 +61,16 @@ class Tracking:
         self.fallen = False  #: so far
         self._env, self._reference = env, ReferenceBodies(env.motion, env.robot)
         self._footing = Footing(env.simulation.state)
-        self._end = max([env.motion.duration + AFTER, *(start + SETTLING for start in pushes)])
+        self._end = max([0.0, *(start + SETTLING for start in pushes)])
         self._errors: list[tuple[float, float, float, float]] = []
+        self._counted = 0  # of them
 
     @property
     def ended(self) -> bool:
         """True after a fall, or once the trial has gone on long enough."""
-        half = 0.5 * self._env.config.policy_period
-        return self.fallen or self._env.simulation.time > self._end - half
+        env, half = self._env, 0.5 * self._env.config.policy_period
+        over = env.motion_time > env.motion.duration + AFTER - half
+        return self.fallen or (over and env.simulation.time > self._end - half)
 
     def update(self) -> None:
         """Call it after every policy step."""
@@ -75,13 +79,14 @@ class Tracking:
         self.fallen = bool(env.fallen) or lies(env)
         if not self.fallen:
             self._errors.append(_errors(env, self._reference, self._footing.stance))
+            self._counted += env.motion_time < env.motion.duration + COUNTED
 
     def figures(self) -> TrackingFigures:
         """What has been so far."""
         period = self._env.config.policy_period
         table = np.array(self._errors).reshape(-1, 4)
         last = table[-round(LAST / period) :]
-        table = table[: round((self._env.motion.duration + COUNTED) / period)]
+        table = table[: self._counted]
         if not len(table):
             table = last = np.full((1, 4), np.nan)
         joints, bodies, root, com = (float(value) for value in table.mean(axis=0))
@@ -92,6 +97,7 @@ class Tracking:
             body_error_last=float(last[:, 1].mean()),
             com_error=com,
             sole_slide=self._footing.slide,
+            motion_delay=self._env.simulation.time - self._env.motion_time,
         )
 
 
@@ -123,7 +129,7 @@ class Footing:
 def lies(env: ResidualBalanceEnv) -> bool:
     """True if the CoM is too low or the root leans too far for the motion at this time."""
     state, limits = env.simulation.state, FallLimits()
-    sample = env.motion.sample(env.simulation.time)
+    sample = env.motion.sample(env.motion_time)
     low = state.com[2] - state.origin[2] < limits.height * sample.com_offset[2]
     robot = env.simulation.arrays
     wanted = Rotation.from_rotvec(sample.root).as_matrix() @ robot.root_standing
@@ -138,7 +144,7 @@ def _errors(
     """Mean square of the joints, mean distance of the bodies, the same relative to the root, and
     the distance of the CoM."""
     sim = env.simulation
-    joints, places = reference.at(sim.time, stance)
+    joints, places = reference.at(env.motion_time, stance)
     root = int(np.searchsorted(reference.bodies, reference.robot.root_body_id))
     gap = sim.data.xpos[reference.bodies] - places
     return (

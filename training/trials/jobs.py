@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
+from poise.baselines.motions.tempo import Tempo
 from poise.envs.balance.config import StartNoise
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.tracking.record import ANYWHERE
@@ -29,12 +30,14 @@ class Stage:
         noise: of the start.
         motions: name and file (or packaged name) of each motion that trials perform. Falls are
             relative to these then.
+        tempo: at which they are played.
     """
 
     robot: str | Path
     duration: float
     noise: StartNoise
     motions: tuple[tuple[str, str], ...] = ()
+    tempo: Tempo = field(default_factory=Tempo)
 
     def load(self, controller: str, robot: Robot | None = None) -> Agent:
         """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
@@ -42,6 +45,8 @@ class Stage:
         given: dict[str, Any] = {"duration": self.duration, "pushes": None, "noise": self.noise}
         if self.motions:
             given["fall"] = ANYWHERE
+        if self.tempo.waits:
+            given["tempo"] = self.tempo
         return load_agent(controller, robot, **given)
 
     def motion(self, trial: Trial, robot: Robot | None = None) -> ReferenceMotion | None:

@@ -140,8 +140,8 @@ class Outcome:
             foot lands, 0.5 where the right one does.
         edge_contacts: times that a foot came to touch an edge of the terrain.
         surfaces_passed: of a terrain, of which the CoM has passed the beginning; stairs climbed.
-        joint_rms, body_error, body_error_root, body_error_last, com_error, sole_slide: of a motion
-            that is performed, see `TrackingFigures`.
+        joint_rms, body_error, body_error_root, body_error_last, com_error, sole_slide,
+            motion_delay: of a motion that is performed, see `TrackingFigures`.
         error: what the controller raised, on one line; the trial then counts as not recovered.
     """
 
@@ -197,6 +197,7 @@ class Outcome:
     body_error_last: float | None = None
     com_error: float | None = None
     sole_slide: float | None = None
+    motion_delay: float | None = None
     error: str | None = None
 
 

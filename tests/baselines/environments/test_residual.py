@@ -12,7 +12,7 @@ from poise.baselines.environments.policy_step import gate_opening
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales
 from poise.baselines.motions.motion import load_motion
-from poise.baselines.motions.targets import Motion, update_targets
+from poise.baselines.motions.targets import motion_arrays, update_targets
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.whole_body.gains import CoMTask
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
@@ -47,7 +47,7 @@ def test_action_zero_is_the_controller_alone(motion):
     controller = load_controller("momentum-qp", robot())
     controller.reset(state)
     m = load_motion(motion, robot())
-    reference = Motion(m.knots, m.coeffs, m.loop, np.zeros((3, m.coeffs.shape[2])))
+    reference = motion_arrays(m)
     targets, none = Targets.standing(robot(), state), np.zeros(len(env._offsets))
     count = round(controller.period / robot().model.opt.timestep)
     for _ in range(40):
@@ -382,3 +382,49 @@ def test_failures_and_the_root_wrench_are_reported(solver):
     assert info["root_wrench"].any()
     _, info = env.reset(seed=0)
     assert info["solver_failures"] == 0 and not info["root_wrench"].any()
+
+
+def test_a_motion_that_waits_is_late_and_the_standing_one_is_not_changed() -> None:
+    """Pushed hard, the squat waits and catches up; what stands has the same bits either way."""
+    push = {"push": {"impulse": 14.0, "direction": 0.0, "start": 0.3, "duration": 0.1}}
+    late = []
+    for tempo in ({}, {"waits": True}, {"waits": True, "after": "resume"}):
+        env = ResidualBalanceEnv(robot(), motion="squat", tempo=tempo, duration=8.0)
+        env.reset(seed=3, options=push)
+        for _ in range(100):
+            env.step(zero(env))
+        late.append(env.simulation.time - env.motion_time)
+        env.reset(seed=3, options=push)
+        assert env.motion_time == 0.0
+    assert late[0] == 0.0 and late[2] > 0.1 and 0.0 <= late[1] < late[2]
+    ends = []
+    for waits in (False, True):
+        env = ResidualBalanceEnv(robot(), tempo={"waits": waits})
+        env.reset(seed=3, options=push)
+        for _ in range(60):
+            env.step(zero(env))
+        ends.append(env.simulation.data.qpos.copy())
+    assert np.array_equal(*ends)
+
+
+def test_a_policy_sees_the_phase_of_the_motion() -> None:
+    """Sine, cosine and what is left, by the motion's own time; held at the end, over in a loop."""
+    names = {"observation": {"extra": ["motion_phase"]}}
+    env = ResidualBalanceEnv(robot(), names, motion="squat", duration=60.0)
+    plain = ResidualBalanceEnv(robot(), motion="squat")
+    size = plain.observation_space.shape[0]
+    assert env.observation_space.shape == (size + 3,)
+    observation, _ = env.reset(seed=3, options={"push": []})
+    assert observation[-3:] == pytest.approx([0.0, 1.0, 1.0])
+    for _ in range(20):
+        observation, *_ = env.step(zero(env))
+    over = 2.0 * np.pi * 0.4 / env.motion.duration
+    left = 1.0 if env.motion.loop else 1.0 - 0.4 / env.motion.duration
+    assert observation[-3:-1] == pytest.approx([np.sin(over), np.cos(over)], abs=1e-5)
+    assert observation[-1] == pytest.approx(1.0 - 0.4 / env.motion.duration, abs=1e-5) and left
+    slow = ResidualBalanceEnv(robot(), names, motion="squat", tempo={"waits": True}, duration=9.0)
+    slow.reset(seed=3, options={"push": {"impulse": 14.0, "start": 0.0, "duration": 0.1}})
+    for _ in range(20):
+        observation, *_ = slow.step(zero(slow))
+    assert observation[-1] == pytest.approx(1.0 - slow.motion_time / slow.motion.duration, abs=1e-5)
+    assert slow.motion_time < 0.4

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.baselines.controller import Targets
 from poise.baselines.motions.motion import load_motion
-from poise.baselines.motions.targets import Motion, update_targets
+from poise.baselines.motions.targets import motion_arrays, update_targets
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import robot_named
 
@@ -39,8 +39,7 @@ class Scene:
         m = self.motion
         update_targets(
             self.simulation.arrays, self.simulation.state_arrays,
-            Motion(m.knots, m.coeffs, m.loop, np.zeros((3, m.coeffs.shape[2]))),
-            time, offset, values, targets.arrays(),
+            motion_arrays(m), time, offset, values, targets.arrays(),
         )  # fmt: skip
         return targets
 

@@ -1,0 +1,122 @@
+"""How fast a motion's time runs: it may wait while the robot catches itself."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.physics.kinematics import StateArrays
+
+AFTER = ("resume", "catch-up", "restart")
+CATCH_UP, RESTART = 1, 2
+CALM = 0.8  # β above which the robot counts as recovered
+HELD = 0.5  # β below which the motion begins anew, where it does
+# what is remembered of a motion: its time [s], ṡ, s̈ [1/s], when the last tick was [s], 1 while it
+# goes back
+TIME, RATE, CHANGE, CLOCK, BACK = range(5)
+
+
+@dataclass(frozen=True)
+class Tempo:
+    """The rate ṡ of a motion's time s: it follows β by a lag, with `waits`; else it is 1.
+
+        β = exp(−(|c − c_ref|/d)²), horizontally,    τ s̈ = max(β, least) − ṡ
+
+    While a foot is in the air `least` is 0. After that the motion goes on from where it is
+    (`resume`), runs up to `fastest` times as fast until it is on time (`catch-up`), or goes back to
+    its begin first, if β fell below one half (`restart`).
+    """
+
+    waits: bool = False
+    distance: float = field(default=0.02, metadata={"above": 0.0})  # d, in h
+    lag: float = field(default=0.1, metadata={"above": 0.0})  # τ [s]
+    least: float = field(default=0.1, metadata={"min": 0.0, "max": 1.0})
+    after: Literal["resume", "catch-up", "restart"] = "catch-up"
+    fastest: float = field(default=1.25, metadata={"min": 1.0, "max": 10.0})
+
+
+@dataclass(frozen=True, eq=False)
+class Pace(Block):
+    """A tempo as compiled code reads it, and what is remembered of the motion."""
+
+    waits: bool
+    distance: float  # [m]
+    lag: float  # [s]
+    least: float
+    after: int  # index of `AFTER`
+    fastest: float
+    memory: np.ndarray  # (5,) TIME, RATE, CHANGE, CLOCK, BACK
+
+    def clear(self) -> None:
+        """Begin the motion."""
+        self.memory[:] = 0.0
+        self.memory[RATE] = 1.0
+
+
+def make_pace(tempo: Tempo, height: float) -> Pace:
+    """The pace of a motion that has not begun; `height` [m] is h."""
+    pace = Pace(
+        waits=tempo.waits,
+        distance=tempo.distance * height,
+        lag=tempo.lag,
+        least=tempo.least,
+        after=AFTER.index(tempo.after),
+        fastest=tempo.fastest,
+        memory=guarded_zeros(5),
+    )
+    pace.clear()
+    return pace
+
+
+@compiled
+def played_time(p: Pace, s: StateArrays, com_ref: np.ndarray, begin: float, now: float) -> float:
+    """The motion's time [s] at `now` [s] after the reset, as its time runs since the last call.
+
+    `com_ref` (3,) is where the CoM was to be then [m], `begin` [s] the motion's first time.
+    """
+    m = p.memory
+    dt = now - m[CLOCK]
+    if not p.waits or dt <= 0.0:
+        return now if not p.waits else m[TIME]
+    rate = m[RATE] + min(dt / p.lag, 1.0) * (_wanted(p, s, com_ref, begin) - m[RATE])
+    m[CLOCK] = now
+    m[CHANGE] = (rate - m[RATE]) / dt
+    m[RATE] = rate
+    m[TIME] = max(m[TIME] + rate * dt, begin)
+    return m[TIME]
+
+
+@compiled
+def _wanted(p: Pace, s: StateArrays, com_ref: np.ndarray, begin: float) -> float:
+    """The rate that is aimed at."""
+    m = p.memory
+    late = m[CLOCK] - m[TIME]
+    x, y = s.com[0] - com_ref[0], s.com[1] - com_ref[1]
+    beta, least = np.exp(-(x * x + y * y) / (p.distance * p.distance)), p.least
+    for i in range(s.contacts.shape[0]):
+        if s.contacts[i] < 0.5:
+            least = 0.0
+    if beta > CALM and p.after == CATCH_UP and late > 0.0:
+        return min(p.fastest, 1.0 + late)
+    if p.after == RESTART:
+        if m[TIME] <= begin:
+            m[BACK] = 0.0
+        elif beta < HELD:
+            m[BACK] = 1.0
+        if m[BACK] > 0.0 and beta > CALM:
+            return -1.0
+    return max(beta, least)
+
+
+@compiled
+def slow_down(p: Pace, samples: np.ndarray) -> None:
+    """Velocities and accelerations of a motion (3, n) by its time as those by the clock."""
+    if not p.waits:
+        return
+    rate, change = p.memory[RATE], p.memory[CHANGE]
+    for j in range(samples.shape[1]):
+        samples[2, j] = rate * rate * samples[2, j] + change * samples[1, j]
+        samples[1, j] *= rate
