@@ -90,7 +90,9 @@ def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
 def walking_controllers() -> list[str]:
     """The packaged controllers that walk."""
     found = {name: controller_config(name) for name in packaged("controllers")}
-    return [name for name, config in found.items() if isinstance(config, WalkConfig)]
+    return [
+        name for name, config in found.items() if isinstance(config, (WalkConfig, SimbiconConfig))
+    ]
 
 
 def load_controller(

@@ -14,11 +14,11 @@ Columns = tuple[tuple[str, Callable[[WalkLevel], str]], ...]  # heading, text of
 
 
 def walk_tables(summary: Summary) -> Iterator[Table]:
-    """Two of the levels of each controller, and one of J50 by phase; as far as there are any."""
+    """Three of the levels of each controller, and one of J50 by phase; as far as there are any."""
     entries = summary["controllers"]
     for name in summary["ranking"]:
         levels = entries[name].get("walks", [])
-        for columns in (FOLLOWS, COSTS):
+        for columns in (FOLLOWS, STEPS, COSTS):
             table = _levels(name, levels, columns)
             if len(table.columns) > 1:
                 yield table
@@ -63,8 +63,6 @@ FOLLOWS: Columns = (
     ("fell", lambda level: f"{level['fallen']} of {level['trials']}"),
     ("falls a minute", _falls),
     ("as told", lambda level: f"{level['recovered_rate']:.0%}"),
-    ("steps as told", _figure("steps_as_told_rate", ".0%")),
-    ("off by", _figure("step_error", ".0%")),
     ("ahead [m/s]", _figure("speed_ahead", ".3f")),
     ("left", _figure("speed_left", ".3f")),
     ("turn [rad/s]", _figure("turn_rate", ".3f")),
@@ -74,18 +72,22 @@ FOLLOWS: Columns = (
     ("surfaces passed", _figure("surfaces_passed", ".1f")),
     ("edges touched", _edges),
 )
-COSTS: Columns = (
+STEPS: Columns = (
+    ("as told", _figure("steps_as_told_rate", ".0%")),
+    ("off by", _figure("step_error", ".0%")),
     ("step [m]", _figure("step_length", ".3f")),
     ("width [m]", _figure("step_width", ".3f")),
     ("time [s]", _figure("step_time", ".3f")),
     ("in the air [s]", _figure("swing_time", ".3f")),
     ("clearance [m]", _figure("step_clearance", ".3f")),
-    ("yaw momentum [N·m·s]", _figure("yaw_momentum", ".2f")),
+    ("slide [mm]", lambda level: _millimetres(level.get("foot_slide"))),
+)
+COSTS: Columns = (
     ("cost of transport", _figure("cost_of_transport", ".2f")),
     ("of positive work", _figure("positive_cost_of_transport", ".2f")),
     ("stance knee [N·m/kg]", _figure("knee_mean", ".2f")),
     ("at most", _figure("knee_peak", ".2f")),
-    ("slide [mm]", lambda level: _millimetres(level.get("foot_slide"))),
+    ("yaw momentum [N·m·s]", _figure("yaw_momentum", ".2f")),
 )
 
 
