@@ -11,6 +11,7 @@ from tests.performance import (
     stepping,
     steps,
     vector,
+    walking,
 )
 
 for benchmark in (
@@ -18,6 +19,7 @@ for benchmark in (
     stepping,
     steps,
     vector,
+    walking,
     momentum_qp,
     solvers,
     qp_set,
