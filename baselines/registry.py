@@ -87,10 +87,11 @@ def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
     return config
 
 
-def walking_controllers() -> list[str]:
-    """The packaged controllers that walk."""
+def walking_controllers(*, planners: bool = False) -> list[str]:
+    """The packaged controllers that walk, or those of them that plan their steps."""
     found = {name: controller_config(name) for name in packaged("controllers")}
-    return [name for name, config in found.items() if isinstance(config, WalkConfig)]
+    kinds = (WalkConfig,) if planners else (WalkConfig, SimbiconConfig)
+    return [name for name, config in found.items() if isinstance(config, kinds)]
 
 
 def load_controller(

@@ -94,7 +94,8 @@ class ResidualWalkEnv(ResidualStepEnv):
         """
         walker = as_base_controller(controller, self.robot).unwrapped
         if not isinstance(walker, WalkingController):
-            raise ConfigError("does not walk", field="controller", choices=walking_controllers())
+            choices = walking_controllers(planners=True)
+            raise ConfigError("does not walk", field="controller", choices=choices)
         ResidualStepEnv.controller.fset(self, controller)
         self.walker = walker  #: the controller that walks, of which `controller` may be a wrapper
 

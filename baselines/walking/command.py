@@ -81,5 +81,7 @@ def command_of(array: np.ndarray) -> GaitCommand:
                        arm_swing=arm_swing, step_length=step_length)  # fmt: skip
 
 
+#: of a command, besides its velocity and turn
+STEP_PARAMETERS = ("step_time", "width", "clearance", "arm_swing", "step_length")
 ENTRIES = 8  #: of the array of a command
 STEP_TIME, WIDTH, CLEARANCE, ARM_SWING, STEP_LENGTH = range(3, ENTRIES)  #: of its entries

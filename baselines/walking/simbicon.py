@@ -3,17 +3,22 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-import mujoco
 import numpy as np
 
 from poise.baselines.controller import BaseController, Targets
 from poise.baselines.in_place.pd import PDGains, joint_gains, motor_torques
+from poise.baselines.stepping.capture_step import allocate_step_memory
 from poise.baselines.stepping.cop_region import CopRegion, foot_signs
 from poise.configs.errors import ConfigError
 from poise.envs.maths.vectors import rotation_between, turn
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
+
+from .command import STEP_PARAMETERS, GaitCommand, command_of
+from .config import GaitConfig
+from .models.leg_joints import leg_joints
+from .walk import allocate_gait
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,20 @@ class Gain:
 
 
 @dataclass(frozen=True)
+class SpeedGains:
+    """How it follows a command: no faster than `acceleration` [g] and `turn_acceleration` [ω²].
+
+    What each stride's velocity is off is summed up, times `correction`, up to `correction_limit`
+    [h ω].
+    """
+
+    acceleration: float = field(default=0.05, metadata={"above": 0.0})
+    turn_acceleration: float = field(default=0.02, metadata={"above": 0.0})
+    correction: float = field(default=0.2, metadata={"min": 0.0})
+    correction_limit: float = field(default=0.14, metadata={"min": 0.0})
+
+
+@dataclass(frozen=True)
 class SimbiconConfig:
     """Poses of the two states of a step, for `lift_time` [1/ω] and until touchdown.
 
@@ -65,23 +84,28 @@ class SimbiconConfig:
     swing_ankle: Gain = field(default_factory=lambda: Gain(0.03, 0.2))
     stance_ankle: Gain = field(default_factory=lambda: Gain(0.3, 0.2))
     joints: PDGains = field(default_factory=PDGains)  # of waist and arms
+    speed: SpeedGains = field(default_factory=SpeedGains, metadata={"omit": "default"})
 
 
 class Simbicon(BaseController):
-    """Marks time: left and right foot in turn, each lifted for a time, then lowered to the ground.
+    """Left and right foot in turn, each lifted for a time, then lowered to the ground: it marks
+    time, or walks at a commanded velocity.
 
     Four states, two for each foot [Yin07; Notes, lecture 11]. In each
 
-        swing thigh   N_s = K (θ_d − θ) − D ω,  θ_d = θ_d0 + c_d d + c_v v      (world axes)
+        swing thigh   N_s = K (θ_d − θ) − D ω,  θ_d = θ_d0 + c_d d + c_v (v − v_d)  (world axes)
         trunk         N_t = K (θ_ref − θ) − D ω                                 (world axes)
         stance hip    Σ a_j τ_j = −N_t − Σ a_k τ_k,  τ_k = a_k · N_s
         other joints  τ = K (q_d − q) − D q̇;  the swing sole is kept level
 
     a_j, a_k are the hips' axes; d and v the CoM's place from the stance ankle and its velocity,
-    in the sagittal and in the frontal plane. As feed-forward, the pendulum's force
+    in the sagittal and in the frontal plane. v_d is the velocity that is commanded and the sum of
+    the strides' errors; a turn turns these planes. As feed-forward, the pendulum's force
     f = m g (c − p)/z_c through the stance ankle p: τ = h − Jᵀ f. Raises ConfigError for a robot
     without two feet or without knees.
     """
+
+    walking = True  #: it always steps
 
     def __init__(self, robot: Robot, config: SimbiconConfig | None = None):
         if len(robot.soles) != 2:
@@ -94,12 +118,35 @@ class Simbicon(BaseController):
         self.rate, self.moment = robot.omega, robot.units.moment
         self.ankles = CopRegion(robot).middle
         self.foot_sign = foot_signs(robot)
-        self.legs = [_leg(robot, i) for i in range(2)]
+        self.legs = [leg_joints(robot, i) for i in range(2)]
         self.stiffness, self.damping = joint_gains(self.arrays, self.config.joints)
+        steps = GaitConfig(step_time=self.config.lift_time)
+        self.gait = allocate_gait(steps, robot.units, steps.limits)
+        self.memory = allocate_step_memory(CopRegion(robot).arrays)
         self.reset()
 
+    @property
+    def command(self) -> GaitCommand:
+        """The velocity and turn that are asked for; may be set at any time."""
+        return command_of(self.gait.command)
+
+    @command.setter
+    def command(self, command: GaitCommand) -> None:
+        self.gait.command[:] = command.array()
+
+    def check_command(self, command: GaitCommand) -> None:
+        """Raise ConfigError for a step parameter: it follows velocity and turn alone."""
+        told = [name for name in STEP_PARAMETERS if getattr(command, name)]
+        if told:
+            raise ConfigError("is not followed by simbicon, which follows ahead, left and turn",
+                              field=f"command.{told[0]}")  # fmt: skip
+
     def reset(self, state: RobotState | None = None) -> None:
-        """Forget the last trial."""
+        """Forget the last trial, its command too."""
+        g = self.gait
+        for member in (g.command, g.velocity, g.error, g.planned, g.step_clock):
+            member[:] = 0.0
+        g.walking[0], g.step_clock[0] = 1, -1.0
         self.stage = 0  #: 0 and 1: the left foot lifts and is lowered; 2 and 3: the right one
         self.steps = 0  #: begun since the reset
         self._clock = (1.0 - self.config.first) * self.config.lift_time / self.rate
@@ -115,6 +162,7 @@ class Simbicon(BaseController):
         if self._yaw is None:
             self._yaw = state.heading_yaw
         self._clock += self.period
+        self._follow_command()
         self._advance(state)
         c = self.config
         pose = c.lower if self.stage % 2 else c.lift
@@ -145,18 +193,45 @@ class Simbicon(BaseController):
             self.steps += self.stage % 2 == 0
             self.stage = (self.stage + 1) % 4
             self._clock = 0.0
+            if self.stage == 0:
+                self._end_stride(state)
+        m = self.memory
+        m.steps[0], m.foot[0], m.swinging[0] = self.steps, self.foot, self.stage % 2 == 0
+
+    def _follow_command(self) -> None:
+        """Let velocity and heading follow the command, no faster than they may."""
+        g, c, units, dt = self.gait, self.config.speed, self.robot.units, self.period
+        most = dt * np.array([c.acceleration * units.gravity] * 2
+                             + [c.turn_acceleration * self.rate**2])  # fmt: skip
+        g.velocity[:] += np.clip(g.command[:3] - g.velocity, -most, most)
+        g.planned[:] = g.velocity[:2] + g.error
+        self._yaw = (self._yaw or 0.0) + dt * float(g.velocity[2])
+        if g.step_clock[0] >= 0.0:
+            g.step_clock[0] += dt
+
+    def _end_stride(self, state: RobotState) -> None:
+        """Sum up how far the velocity of the last stride was off, where one is asked for."""
+        g, c = self.gait, self.config.speed
+        if not g.velocity[:2].any():
+            g.error[:] = 0.0
+        elif g.step_clock[0] > 0.0:
+            way = (state.com[:2] - g.middle) @ turn(self._yaw or 0.0)
+            most = c.correction_limit * self.robot.height_com * self.rate
+            error = g.error + c.correction * (g.velocity[:2] - way / g.step_clock[0])
+            g.error[:] = np.clip(error, -most, most)
+        g.middle[:], g.step_clock[0] = state.com[:2], 0.0
 
     def _pd(self, gain: Gain, error: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """K error − D speed [N·m]."""
         return self.moment * gain.stiffness * (error - gain.damping / self.rate * speed)
 
     def placement(self, state: RobotState, pose: Pose) -> np.ndarray:
-        """(2,) θ_d of the swing thigh, forward and to the left [rad]."""
+        """(2,) θ_d of the swing thigh, forward and to the left [rad]; d in h, v in h ω."""
         c, stance = self.config, 1 - self.foot
         h = self.robot.height_com
         R = turn(self._yaw or 0.0)
         d = (state.com[:2] - self._ankle(state, stance)[:2]) @ R / h
-        v = state.com_vel[:2] @ R / (h * self.rate)
+        v = (state.com_vel[:2] @ R - self.gait.planned) / (h * self.rate)
         forward = pose.swing_hip + c.sagittal.c_d * d[0] + c.sagittal.c_v * v[0]
         left = self.foot_sign[self.foot] * c.width + c.frontal.c_d * d[1] + c.frontal.c_v * v[1]
         return np.array([forward, left])
@@ -192,46 +267,3 @@ class Simbicon(BaseController):
         w[6 * sole : 6 * sole + 3] = force
         w[6 * sole + 3 : 6 * sole + 6] = np.cross(p - state.sole_points[sole], force)
         return w
-
-
-@dataclass(frozen=True)
-class _Leg:
-    """Joints of a leg, by index: on the way to the thigh, the hip's own, the knee, the ankle."""
-
-    upper: np.ndarray
-    hip: np.ndarray
-    knee: np.ndarray
-    ankle: np.ndarray
-    bend: np.ndarray  # what a bend of 1 adds to the knee
-
-
-def _leg(robot: Robot, sole: int) -> _Leg:
-    """Joints of a leg by how far down they are: in the upper quarter, in the lower one, between."""
-    model = robot.model
-    data = mujoco.MjData(model)
-    data.qpos[:] = robot.standing_qpos
-    mujoco.mj_kinematics(model, data)
-
-    def chain(body: int) -> list[int]:
-        joints: list[int] = []
-        while body != robot.root_body_id:
-            first = model.body_jntadr[body]
-            joints = [first + k for k in range(model.body_jntnum[body])] + joints
-            body = model.body_parentid[body]
-        return joints
-
-    mine, other = (chain(robot.soles[i].body_id) for i in (sole, 1 - sole))
-    own = np.array([j for j in mine if j not in other])
-    top, foot = data.xanchor[own[0]], data.xanchor[own[-1]]
-    depth = (data.xanchor[own] - top) @ (foot - top) / ((foot - top) @ (foot - top))
-    knee = own[(depth > 0.25) & (depth < 0.75)]
-    if len(knee) != 1:
-        raise ConfigError(f"needs legs with a knee, unlike {robot.name!r}", field="controller")
-    shortens = np.cross(data.xaxis[knee], foot - data.xanchor[knee]) @ (top - foot)
-    return _Leg(
-        upper=np.array([j for j in mine if j < knee[0]]) - 1,  # the first joint is the root's
-        hip=own[depth <= 0.25] - 1,
-        knee=knee - 1,
-        ankle=own[depth >= 0.75] - 1,
-        bend=np.sign(shortens),
-    )

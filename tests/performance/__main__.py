@@ -12,6 +12,7 @@ from tests.performance import (
     stepping,
     steps,
     vector,
+    walking,
 )
 
 for benchmark in (
@@ -20,6 +21,7 @@ for benchmark in (
     steps,
     vector,
     motion_tick,
+    walking,
     momentum_qp,
     solvers,
     qp_set,

@@ -21,6 +21,7 @@ def gait(
     seed: int = 21,
     human: str = "knee-moment",
     push: Switch = False,
+    push_suite: str = "walk-push",
     workers: int | None = None,
     allow: Allow = (),
 ) -> None:
@@ -35,7 +36,8 @@ def gait(
         robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the starts.
         human: a packaged band of the human knee's moment or a .yaml file of one.
-        push: find J50 at 0.5 m/s, too; that is the suite walk-push, an hour and more.
+        push: find J50, too; by the suite walk-push at 0.5 m/s, an hour and more.
+        push_suite: another suite with a part walk_push, or a .yaml file of one.
         workers: processes of that suite; all cores if not given.
     """
     from poise.training.gaits.compare import compare_gaits
@@ -43,7 +45,7 @@ def gait(
 
     figures = compare_gaits(
         compare, out=out, speeds=speeds, starts=starts, duration=duration, robot=robot, seed=seed,
-        human=human, pushed=push, workers=workers, say=_say, allow=allow,
+        human=human, pushed=push, push_suite=push_suite, workers=workers, say=_say, allow=allow,
     )  # fmt: skip
     print_gaits(figures, terminal())
     for name in ("gaits.json", "stance_knee.png"):

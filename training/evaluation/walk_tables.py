@@ -73,13 +73,13 @@ FOLLOWS: Columns = (
     ("edges touched", _edges),
 )
 STEPS: Columns = (
+    ("as told", _figure("steps_as_told_rate", ".0%")),
+    ("off by", _figure("step_error", ".0%")),
     ("step [m]", _figure("step_length", ".3f")),
     ("width [m]", _figure("step_width", ".3f")),
     ("time [s]", _figure("step_time", ".3f")),
     ("in the air [s]", _figure("swing_time", ".3f")),
     ("clearance [m]", _figure("step_clearance", ".3f")),
-    ("as told", _figure("steps_as_told_rate", ".0%")),
-    ("off by", _figure("step_error", ".0%")),
     ("slide [mm]", lambda level: _millimetres(level.get("foot_slide"))),
 )
 COSTS: Columns = (

@@ -20,6 +20,7 @@ from poise.envs.robots.robot import Robot, load_robot
 from poise.training.evaluation.evaluate import evaluate
 from poise.training.evaluation.tick_times import Clocked
 from poise.training.running.folder_lock import FolderLock
+from poise.training.suites.suite import load_suite
 from poise.training.trials.agents import Agent, check_walks, load_agent
 from poise.training.trials.play import run_trial
 from poise.training.trials.trial import Outcome, Trial
@@ -90,6 +91,7 @@ def compare_gaits(
     seed: int = 21,
     human: str | Path = "knee-moment",
     pushed: bool = False,
+    push_suite: str | Path = "walk-push",
     workers: int | None = None,
     say: Say = print,
     allow: str | Iterable[str] = (),
@@ -104,7 +106,8 @@ def compare_gaits(
         starts: of each speed, a little disturbed.
         duration: of a walk [s].
         human: a packaged band of the human knee's moment, or a YAML file of one.
-        pushed: find J50 at 0.5 m/s, too: the suite `walk-push`, which is long.
+        pushed: find J50, too: by the suite `walk-push` at 0.5 m/s, which is long.
+        push_suite: another suite, packaged or a file, with a part `walk_push`.
         workers: processes of that suite; None for all cores.
         say: what prints lines of progress.
 
@@ -117,6 +120,8 @@ def compare_gaits(
 
     _check(models, speeds, starts, duration, seed)
     check_out_folder(out)
+    if pushed and load_suite(push_suite).walk_push is None:
+        raise ConfigError("needs a part walk_push", source=push_suite, field="push_suite")
     band, body = load_knee_moment(human), load_robot(robot)
     StanceRecord(body)  # raises where a leg has no knee
     names = [controller_of(model) for model in models]
@@ -131,7 +136,7 @@ def compare_gaits(
                 figures.append(walk_at(agent, speed, starts, seed, band, tick))
                 say(_line(figures[-1]))
         if pushed:
-            figures = _with_j50(figures, names, out, robot, seed, workers, allow)
+            figures = _with_j50(figures, names, push_suite, out, robot, seed, workers, allow)
         write_figures(Path(out), figures, band, body, duration, seed)
         stance_plot(Path(out) / "stance_knee.png", figures, band)
     return figures
@@ -227,13 +232,13 @@ def tick_time(agent: Agent, seed: int) -> float | None:
 
 
 def _with_j50(
-    figures: list[GaitFigures], names: Sequence[str], out: str | Path, robot: str, seed: int,
-    workers: int | None, allow: str | Iterable[str],
+    figures: list[GaitFigures], names: Sequence[str], suite: str | Path, out: str | Path,
+    robot: str, seed: int, workers: int | None, allow: str | Iterable[str],
 ) -> list[GaitFigures]:  # fmt: skip
-    """The same with J50 of the suite `walk-push`."""
+    """The same with J50 of a suite."""
     from poise.training.running.terminal import terminal
 
-    summary = evaluate(names, "walk-push", out=Path(out) / "walk-push", robot=robot, seed=seed,
+    summary = evaluate(names, suite, out=Path(out) / "walk-push", robot=robot, seed=seed,
                        workers=workers, console=terminal(), allow=allow)  # fmt: skip
     found = {name: entry.get("j50_mean") for name, entry in summary["controllers"].items()}
     return [replace(each, j50=found.get(each.controller)) for each in figures]

@@ -88,7 +88,7 @@ def test_commands_need_a_controller_that_walks():
     """One line with the controllers that do; nothing else takes a command."""
     standing = ResidualBalanceEnv(robot(), pushes=None, duration=0.1)
     with pytest.raises(ConfigError, match=r"reset: command: the controller MomentumQP does not walk"
-                       r"; give one that does \(choices: walk"):  # fmt: skip
+                       r"; give one that does \(choices: simbicon, walk"):  # fmt: skip
         standing.reset(options={"command": FAST})
     with pytest.raises(ConfigError, match="environment: command: the controller MomentumQP does n"):
         standing.command = GaitCommand(0.1)

@@ -122,6 +122,40 @@ def test_it_marks_time():
     assert np.linalg.norm(state.com[:2] - start) < 0.3
 
 
+def played(command, seconds, seed=1):
+    """The environment after a walk by a command, and the CoM (n, 2) at its policy steps."""
+    env = ResidualBalanceEnv(robot(), controller="simbicon", pushes=None, duration=seconds)
+    env.reset(seed=seed, options={"command": command})
+    places = []
+    for _ in range(env.max_steps):
+        env.step_without_info(np.zeros(4))
+        places.append(env.simulation.state.com[:2].copy())
+    return env, np.array(places)
+
+
+@pytest.mark.parametrize("ahead", [0.2, 0.5, -0.15])
+def test_it_walks_at_a_commanded_velocity(ahead):
+    """Reached within 0.05 m/s after 6 s, straight ahead; the law has v − v_d in the place of v."""
+    env, places = played({"ahead": ahead}, 9.0)
+    assert not env.fallen and env.controller.command.ahead == ahead
+    velocity = (places[-1] - places[-151]) / 3.0
+    assert velocity[0] == pytest.approx(ahead, abs=0.05) and abs(velocity[1]) < 0.05
+
+
+def test_it_turns():
+    """The planes of its law turn with the command."""
+    env, _ = played({"ahead": 0.2, "turn": 0.2}, 6.0)
+    assert not env.fallen
+    assert env.simulation.state.heading_yaw == pytest.approx(0.2 * 6.0, abs=0.25)
+
+
+def test_what_it_does_not_follow_is_refused():
+    """Step parameters are those of `walk`; the error says what it follows."""
+    env = ResidualBalanceEnv(robot(), controller="simbicon", pushes=None, duration=1.0)
+    with pytest.raises(ConfigError, match="command.width: is not followed by simbicon, which fol"):
+        env.reset(seed=0, options={"command": {"ahead": 0.2, "width": 0.2}})
+
+
 def test_nothing_is_left_after_a_reset():
     """The state machine starts anew, heading included."""
     controller, state, first = first_tick()

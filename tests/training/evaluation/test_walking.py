@@ -78,7 +78,7 @@ def test_who_only_stands_is_told_so_before_anything_is_played(
 ) -> None:
     """One line with the controllers that walk; no folder is left."""
     with pytest.raises(
-        ConfigError, match=r"the controller 'momentum-qp' does not walk \(choices: w"
+        ConfigError, match=r"the controller 'momentum-qp' does not walk \(choices: simbicon, w"
     ):
         evaluate(["walk", "momentum-qp"], "walk", out=tmp_path / "out")
     assert in_process.played == 0 and not (tmp_path / "out").exists()

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from poise.training.cli.entry import main
+from poise.training.evaluation import run as evaluation
 from poise.training.gaits.compare import controller_of, figures_of
 from poise.training.gaits.human import KneeMoment
 from poise.training.gaits.stance import Stances
 from poise.training.trials.trial import Outcome
+from tests.support.evaluations import InProcess, write_suite
 
 BAND = KneeMoment("x", (0.0, 100.0), (0.2, 0.2), (0.1, 0.1))
 
@@ -59,3 +61,27 @@ def test_the_command_writes_a_table_a_file_and_a_picture(tmp_path, capsys):
     assert double["knee_mean"] < lip["knee_mean"]
     assert "Winter" in written["human"]["source"]
     assert (tmp_path / "g" / "stance_knee.png").stat().st_size > 10_000
+
+
+def test_pushes_while_walking_give_j50(tmp_path, capsys, monkeypatch):
+    """By a small suite: of each controller, in the table and in the file; the suite's folder."""
+    monkeypatch.setattr(evaluation, "Executor", InProcess)
+    InProcess.played, InProcess.stop_after = 0, None
+    pushed = {"command": {"ahead": 0.5}, "directions": 2, "impulses": [0.05, 1.5],
+              "first_trials": 3, "trials": 1, "window": 1.0}  # fmt: skip
+    suite = write_suite(tmp_path, {"duration": 10.5, "walk_push": pushed})
+    args = f"gait --compare lip --out {tmp_path}/g --speeds 0.5 --starts 1 --duration 8 --push"
+    assert main([*args.split(), "--push-suite", str(suite)]) == 0
+    (gait,) = json.loads((tmp_path / "g" / "gaits.json").read_text())["gaits"]
+    folder = tmp_path / "g" / "walk-push"
+    summary = json.loads((folder / "summary.json").read_text())["controllers"]["walk-lip"]
+    assert gait["j50"] == pytest.approx(summary["j50_mean"]) and 1.0 < gait["j50"] < 62.0
+    assert InProcess.played == 2 * 4 and "J50" in capsys.readouterr().out
+
+
+def test_a_suite_without_pushes_of_a_walk_gives_no_j50(tmp_path, capsys):
+    """One line, before anything is played."""
+    args = f"gait --compare lip --out {tmp_path}/g --push --push-suite walk"
+    assert main(args.split()) == 2
+    assert "push_suite: needs a part walk_push" in capsys.readouterr().err
+    assert not (tmp_path / "g").exists()
