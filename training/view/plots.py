@@ -16,6 +16,9 @@ WIDTH = 6.0  # [s] shown
 HEIGHT = 150  # of a plot [pixels]
 GREY = "#8A8A8A"  # of axes: seen on white and on black
 FAINT = "rgba(138, 138, 138, 0.25)"
+PADDING = (12, 8, 0, 0)  # above, right, below, left [pixels]: the highest number is seen whole
+#: what a plot reaches up to at least: of a robot at rest it would show the noise alone
+REACH = {"speed": 0.1, "margin": 0.1, "torque": 1.0, "push": 100.0}
 
 
 class Plots:
@@ -29,7 +32,7 @@ class Plots:
         plots = {
             name: gui.add_uplot(
                 empty, series, title=title, height=HEIGHT, axes=(axis, axis),
-                scales={"x": uplot.Scale(time=False)},
+                scales={"x": uplot.Scale(time=False), "y": _scale(REACH[name])}, padding=PADDING,
                 legend={"show": len(names) > 1 and k == 0, "live": False},
             )
             for k, (name, title) in enumerate(VALUES.items())
@@ -57,6 +60,15 @@ class Plots:
         """Take them away."""
         for plot in self.handles:
             plot.remove()
+
+
+def _scale(reach: float) -> uplot.Scale:
+    """From 0 to `reach`, and as far beyond them as the lines go."""
+    ends = {
+        "min": {"soft": 0.0, "mode": 1, "pad": 0.1},
+        "max": {"soft": reach, "mode": 1, "pad": 0.1},
+    }
+    return uplot.Scale(range=ends)
 
 
 def _series(index: int, name: str) -> uplot.Series:

@@ -57,7 +57,8 @@ class Stage:
         self._server, self.robot, self._grabbed = server, robot, grabbed
         size, count = robot.height_com, len(names)
         middle = 0.5 * (count - 1)
-        self._offsets = np.array([[0.0, LANE * size * (middle - k), 0.0] for k in range(count)])
+        # the first stands to the left, as in a video: the camera looks at them from in front
+        self._offsets = np.array([[0.0, LANE * size * (k - middle), 0.0] for k in range(count)])
         scene = server.scene
         self._root = scene.add_frame(ROOT, show_axes=False)
         self.robots = Robots(scene, ROOT, robot, count, opacity)

@@ -225,7 +225,7 @@ def test_other_controllers_are_loaded(view: BrowserView) -> None:
         shown = np.array([handle.batched_positions[side] for handle in handles])
         offset = shown - frame.positions[bodies]
         assert np.allclose(offset, offset[0], atol=1e-5)
-        assert (offset[0][1] > 0.3) == (side == 0)
+        assert (offset[0][1] < -0.3) == (side == 0)
     assert all(len(plot.data) == 3 for plot in view.plots.handles)
 
 
