@@ -129,6 +129,16 @@ def test_what_cannot_be_reached_is_come_near_to(robot: Robot) -> None:
     assert results[0].residual <= min(result.residual for result in results) + 1e-3
 
 
+def test_the_best_of_all_starts_counts(robot: Robot) -> None:
+    """Restarts of a single step, which get less far than the start was, change nothing."""
+    goal = IkGoal(HAND, [2.0, -0.2, 1.2], point=POINT)
+    first = solve_ik(robot, [goal])
+    for method in ("bounded", "jacobian-transpose"):
+        again = solve_ik(robot, [goal], start=first.qpos, method=method, restarts=3,
+                         options=IkOptions(iterations=1))  # fmt: skip
+        assert again.starts == 4 and again.residual <= first.residual + 1e-9
+
+
 def test_the_same_call_gives_the_same_bits(robot: Robot) -> None:
     """Solvers, and copies of them, remember nothing of the goals before."""
     solver = InverseKinematics(robot, [HAND])
