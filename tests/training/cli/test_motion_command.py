@@ -67,7 +67,10 @@ def test_check_and_physical_join(tmp_path: Path, capsys: pytest.CaptureFixture[s
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["jump"], "no such command: motion jump (choices: info, convert, import, follow, join, check,"),
+        (
+            ["jump"],
+            "no such command: motion jump (choices: info, convert, import, follow, join, check,",
+        ),
         (["info", "nothing"], "clip: no such name: 'nothing'; give a path to a .bvh file or a"),
         (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),
         (["import", "cmu02_walk", "--out", "x.npz"], "feet: its feet move by"),
