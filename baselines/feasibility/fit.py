@@ -22,6 +22,7 @@ TEMPOS = (0.9, 0.8, 0.7, 0.6, 0.5)
 ROUNDS = 6  # times that the CoM is moved
 INWARD = 0.01  # [m] that the ZMP is taken further inside than is needed
 UNREACHED = 1e-5  # [m, rad] of the soles
+TOGETHER, LOADS = 10, 5  # samples, and parts of the weight, that have one region
 OVER = 1e-3  # [rad] over a joint's range that is cut
 
 
@@ -99,7 +100,10 @@ def moved_com(
             total = float(np.linalg.norm(offset, axis=1).max())
         if judged.feasible:
             break
-        offset = offset + zmp_offset(path, _wanted(planted, path, judged), robot.units.gravity)
+        wanted = _wanted(planted, path, judged)
+        if wanted is None or judged.lacking > least:
+            break
+        offset = offset + zmp_offset(path, wanted, robot.units.gravity)
         moved = _with_offset(clip, first, legs, times, offset)
         if moved is None:
             break
@@ -121,14 +125,18 @@ def zmp_offset(path: Trajectory, wanted: np.ndarray, gravity: float) -> np.ndarr
     return np.asarray(solve_banded((1, 1), bands, right))
 
 
-def _wanted(planted: PlantedRobot, path: Trajectory, judged: Feasibility) -> np.ndarray:
-    """(n, 2) by which the ZMP is to move [m]."""
+def _wanted(planted: PlantedRobot, path: Trajectory, judged: Feasibility) -> np.ndarray | None:
+    """(n, 2) by which the ZMP is to move [m]; None where the motors do not hold the posture."""
     limits, wanted = judged.limits, np.zeros_like(judged.zmp)
     lacks = (judged.zmp_margin < limits.zmp_margin) | (judged.torque.max(axis=1) > limits.torque)
+    known: dict[tuple[int, int], np.ndarray | None] = {}
     for k in np.flatnonzero(lacks):
-        region = bearable_region(planted, path.qpos[k, 7:], float(judged.load[k]))
+        key = int(k) // TOGETHER, int(np.ceil(LOADS * judged.load[k]))
+        if key not in known:
+            known[key] = bearable_region(planted, path.qpos[k, 7:], key[1] / LOADS, limits.torque)
+        region = known[key]
         if region is None:
-            region = judged.support
+            return None
         goal = nearest_inside(_inner(region, INWARD), judged.zmp[k])
         wanted[k] = nearest_inside(_inner(judged.support, limits.zmp_margin + INWARD), goal)
         wanted[k] -= judged.zmp[k]

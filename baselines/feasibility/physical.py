@@ -16,8 +16,9 @@ from poise.envs.robots.robot import Robot
 
 from .check import Feasibility, FeasibilityLimits
 from .curve import Curve
+from .ends import Attempt, End
 from .planted import PlantedLegs
-from .shape import Attempt, End, Shaper
+from .shape import Shaper
 from .trajectory import PlantedRobot
 
 LEAST, MOST, LENGTHS = 0.2, 2.5, 16  # [s] durations that are tried, evenly in their logarithm
@@ -38,12 +39,14 @@ class JoinPart:
         duration: D [s].
         coefficient: K, the energy of its bending [m²/s³].
         bent: whether knots had to leave the curve of the fifth order.
+        calm: whether it begins and ends without the clips' accelerations.
         feasibility: of its samples, whose times count from its begin.
     """
 
     duration: float
     coefficient: float
     bent: bool
+    calm: bool
     feasibility: Feasibility
 
 
@@ -92,8 +95,9 @@ def physical_join(
     CoM, root and the joints that are no legs follow the curve of the fifth order between both
     states, of duration D and with up to three knots moved; the legs follow from soles that stay
     planted. Chosen is the least K + λ D, D from 0.2 to 2.5 s, that keeps `FeasibilityLimits`;
-    within 0.1 s of a cut it may be as bad as the clip is there. A motion is a C² spline through
-    its frames, so the join is C².
+    within 0.1 s of a cut it may be as bad as the clip is there. If none does with the clips'
+    accelerations at the cuts, the curve begins and ends without any. A motion is a C² spline
+    through its frames, so the join is C² in any case.
 
     Args:
         robot: whose motions they are.
@@ -184,6 +188,9 @@ def _direct_or_through(
 ) -> tuple[Attempt, ...] | str:
     """One way, or two by standing; or why there is none."""
     direct = cheapest(shaper, a, b, time_price)
+    if direct.qpos is None:  # a clip may be about to do what leads to nothing
+        calm = cheapest(shaper, a.calm, b.calm, time_price)
+        direct = calm if calm.qpos is not None else direct
     if direct.qpos is not None or not through:
         return (direct,) if direct.qpos is not None else direct.reason
     robot = shaper.planted.robot
@@ -211,9 +218,9 @@ def _prices(shaper: Shaper, a: End, b: End, time_price: float) -> list[tuple[flo
 
 def _part(shaper: Shaper, way: Attempt) -> JoinPart:
     assert way.feasibility is not None  # of a way that is possible
-    bent = bool(np.any(way.curve.bends))
+    bent, calm = bool(np.any(way.curve.bends)), not np.any(way.curve.coefficients[2])
     coefficient = way.curve.energy(shaper.masses)
-    return JoinPart(way.curve.duration, coefficient, bent, way.feasibility)
+    return JoinPart(way.curve.duration, coefficient, bent, calm, way.feasibility)
 
 
 def _frame(clip: RobotClip, time: float, field: str) -> int:

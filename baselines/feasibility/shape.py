@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
@@ -16,6 +15,7 @@ from .bearable import bearable_region
 from .check import Feasibility, FeasibilityLimits, check_joints, judge
 from .curve import Boundary, Curve, bend_shapes, jerk_matrix
 from .edges import EDGE, between_clips
+from .ends import Attempt, End
 from .planted import PlantedLegs
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 
@@ -28,37 +28,6 @@ SLACK = 1e5  # price of what remains violated [1/m, 1/rad], beside the jerk
 HOPELESS = 0.15  # [m, rad] of violation for which no further round is tried
 UNREACHED = 1e-5  # [m, rad] of the soles
 MOVED = 6  # coordinates of the curve that are no joints: CoM and φ
-
-
-class End(NamedTuple):
-    """One side of a join: joints of its frames (m, nj) and the state next to the join."""
-
-    frames: np.ndarray
-    q: np.ndarray
-    boundary: Boundary
-    region: np.ndarray  # (k, 2) where the motors can bear the weight
-    own: Feasibility  # of the motion about the join, whether it is played or not
-
-
-class Attempt(NamedTuple):
-    """What came of one duration.
-
-    Attributes:
-        qpos: (n − 1, nq) of the frames between both ends; None if it is not possible.
-        curve: that they follow.
-        feasibility: of the way from end to end; None if legs cannot reach the ground at all.
-        reason: why it is not possible.
-    """
-
-    qpos: np.ndarray | None
-    curve: Curve
-    feasibility: Feasibility | None
-    reason: str
-
-    @property
-    def lacking(self) -> float:
-        """How far it is from possible, see `Feasibility`."""
-        return np.inf if self.feasibility is None else self.feasibility.lacking
 
 
 @dataclass(frozen=True)
@@ -86,9 +55,9 @@ class Shaper:
             np.concatenate([s.com_vel, s.root_vel, s.v_ref[others]]),
             np.concatenate([s.com_acc, s.root_acc, s.a_ref[others]]),
         )
-        region = bearable_region(self.planted, s.q_ref)
+        region = bearable_region(self.planted, s.q_ref, share=self.limits.torque)
         region = np.zeros((0, 2)) if region is None else region
-        times = time + np.arange(-0.5 * EDGE, 0.5 * EDGE + 1e-9, FINE)
+        times = time + np.arange(-EDGE, EDGE + 1e-9, FINE)
         times = times[(times >= 0.0) & (times <= motion.duration)]
         own = check_joints(self.planted, joints_of(motion), times, self.limits)
         return End(frames, s.q_ref, state, region, own)

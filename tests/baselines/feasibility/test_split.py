@@ -47,5 +47,11 @@ def test_a_load_on_one_side_is_borne_by_that_sole() -> None:
     edge = path.support[:, 1].max() - 0.005
     moment = (edge - path.com[0, 1]) * robot.units.force
     pushed = path._replace(wrench=path.wrench + [[0.0, 0.0, 0.0, moment, 0.0, 0.0]])
-    loads = split_wrench(robot, pushed)[0, [2, 8]]
+    wrenches = split_wrench(robot, pushed)[0].reshape(2, 6)
+    loads = wrenches[:, 2]
+    cops = np.column_stack([-wrenches[:, 4], wrenches[:, 3]])  # times the loads
+    for cop, load, sole in zip(cops, loads, robot.soles, strict=True):
+        assert load > 0.0 and np.all(
+            np.abs(cop) <= load * 0.5 * np.ptp(sole.polygon, axis=0) + 0.01
+        )
     assert loads.min() < 0.08 * robot.units.force and loads.max() > 0.9 * robot.units.force

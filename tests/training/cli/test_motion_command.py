@@ -50,7 +50,7 @@ def test_check_and_physical_join(tmp_path: Path, capsys: pytest.CaptureFixture[s
     squat, hasty, fitted, both = (tmp_path / f"{name}.npz" for name in ("a", "b", "c", "d"))
     clip = packaged_clip(robot, "squat")
     write_robot_clip(clip, squat)
-    write_robot_clip(replace(clip, dt=clip.dt / 3.0), hasty)
+    write_robot_clip(replace(clip, dt=clip.dt / 7.0), hasty)
     assert main(["motion", "check", str(squat)]) == 0
     assert main(["motion", "check", str(hasty), "--qp"]) == 1
     printed = capsys.readouterr().out
