@@ -77,7 +77,7 @@ def test_rates_of_the_reference_are_those_of_its_clock() -> None:
 @pytest.mark.parametrize("after", ["resume", "catch-up", "restart"])
 def test_after_the_wait(after: str) -> None:
     """A second of waiting: on with the delay, or on time again, or from the begin."""
-    tempo = Tempo(waits=True, after=after)  # type: ignore[arg-type]
+    tempo = Tempo(waits=True, after=after)
     pace, times = course(tempo, [0.0] * 250 + [0.1] * 250 + [0.0] * 2000)
     held, end = times[500] - times[250], 2500 * TICK
     assert 0.1 <= held < 0.3
