@@ -70,7 +70,7 @@ def print_summary(summary: Summary, console: Console) -> None:
     ]
     table = Table(title=title, title_justify="left")
     table.add_column("#", justify="right")
-    table.add_column("controller", overflow="fold", min_width=_room(summary["ranking"], 16))
+    table.add_column("controller", overflow="fold", width=_room(summary["ranking"], 16))
     for heading, _ in columns:
         table.add_column(heading, justify="right", overflow="fold")
     rank = places(summary["controllers"])
@@ -146,11 +146,11 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
 def _pairs(summary: Summary) -> Table:
     table = Table()
     titles = [f"{pair['b']} against {pair['a']}" for pair in summary["pairs"]]
-    table.add_column("b against a", overflow="fold", min_width=_room(titles, 34))
+    table.add_column("b against a", overflow="fold", width=_room(titles, 34))
     gain = any("j50_gain" in pair for pair in summary["pairs"])
     names = ["both", "only a (lost)", "only b (won)", "neither", "McNemar p"]
     for name in names + (["J50 gain [95 %]"] if gain else []):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", overflow="fold")
     for title, pair in zip(titles, summary["pairs"], strict=True):
         cells = [str(pair.get(key, NONE)) for key in ("both", "only_a", "only_b", "neither")]
         cells.append(_number(pair.get("p_mcnemar"), ".2g"))

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import io
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
-from poise.training.evaluation.tables import places, ranked
+from poise.training.evaluation.tables import places, print_summary, ranked
 from poise.training.running.summary import Entry
+
+RESULTS = sorted((Path(__file__).parents[3] / "docs/results").rglob("*.json"))
+EDGES = "│┃┓┐┩┘┛"
 
 
 def entries(measure: str, values: dict[str, tuple[float, float]]) -> dict[str, Entry]:
@@ -43,3 +50,14 @@ def test_without_a_j50_the_rate_decides() -> None:
     del some["a"]["j50_mean"]
     some["a"]["recovered_rate"], some["b"]["recovered_rate"] = 0.25, 0.75
     assert ranked(some) == ["b", "a"] and places(some) == {"a": 2, "b": 1}
+
+
+@pytest.mark.parametrize("width", [80, 100, 120])
+@pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)
+def test_tables_fold_and_are_not_cut(path: Path, width: int) -> None:
+    """A console that is too narrow for them shows every cell, and the right edge."""
+    text = io.StringIO()
+    print_summary(json.loads(path.read_text()), Console(file=text, width=width))
+    rows = [line for line in text.getvalue().splitlines() if line[0] in "│┃┏┡└"]
+    assert rows and all(line[-1] in EDGES for line in rows)
+    assert "…" not in text.getvalue()
