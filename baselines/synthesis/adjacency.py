@@ -116,7 +116,7 @@ def transitions_between(
     ranked = [(len(before.times) - 1, 0), *whole, *sorted(minima, key=lambda pair: prices[pair])]
     pairs = dict.fromkeys(pair for pair in ranked if np.isfinite(prices[pair]))
     found: list[Transition] = []
-    reasons = []
+    reasons: list[tuple[float, str]] = []
     for pair in pairs:
         if len(found) == thresholds.each or len(reasons) == MOST_REFUSED:
             break

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -126,7 +127,7 @@ class MotionGraph:
             raise ValueError(f"clips: {shown(twice)} occurs twice")
         if len(names) > MOST_CLIPS or len(self.transitions) > MOST_TRANSITIONS:
             raise ValueError(f"more than {MOST_CLIPS} clips or {MOST_TRANSITIONS} transitions")
-        pairs = [*self.transitions, *self.weights]
+        pairs: list[Transition | Weight] = [*self.transitions, *self.weights]
         known, lengths = set(names), {clip.name: clip.duration + 1e-6 for clip in self.clips}
         for name in (*(p.before for p in pairs), *(p.after for p in pairs),
                      *(place.clip for place in self.states.values())):  # fmt: skip
@@ -199,9 +200,9 @@ def write_graph(graph: MotionGraph, path: str | Path) -> None:
     head = replace(graph, transitions=(), refused=())
     lines = [HEADER, *(line for line in to_yaml(head).splitlines(keepends=True)
                        if line not in ("transitions: []\n", "refused: []\n"))]  # fmt: skip
-    edges = [[t.before, t.after, t.leave, t.enter, t.duration, t.coefficient]
+    edges = [(t.before, t.after, t.leave, t.enter, t.duration, t.coefficient)
              for t in graph.transitions]  # fmt: skip
-    for name, rows in (("transitions", edges), ("refused", [list(row) for row in graph.refused])):
+    for name, rows in (("transitions", edges), ("refused", graph.refused)):
         lines += [f"{name}:{'' if rows else ' []'}\n", *(f"- {_flow(row)}" for row in rows)]
     write_atomic(path, "".join(lines))
 
@@ -221,6 +222,6 @@ def read_graph(path: str | Path) -> MotionGraph:
         raise ConfigError(str(error), source=path) from None
 
 
-def _flow(row: list[object]) -> str:
+def _flow(row: Sequence[object]) -> str:
     rounded = [round(value, 6) if isinstance(value, float) else value for value in row]
     return yaml.safe_dump(rounded, default_flow_style=True, allow_unicode=True, width=10_000)

@@ -84,7 +84,15 @@ def _circle(axes: Axes, graph: MotionGraph, table: np.ndarray) -> None:
                 shrinkB=16, arrowstyle="-|>", mutation_scale=9, color=BLUE,
                 alpha=float(1.0 - 0.85 * value / most) if most > 0.0 else 1.0))  # fmt: skip
     for place, name in zip(places, graph.names, strict=True):
-        axes.text(*(1.04 * place), _short(name), ha="center", va="center", fontsize=9, color=INK)
+        axes.text(
+            1.04 * place[0],
+            1.04 * place[1],
+            _short(name),
+            ha="center",
+            va="center",
+            fontsize=9,
+            color=INK,
+        )
     axes.set(xlim=(-1.4, 1.4), ylim=(-1.3, 1.3), aspect="equal")
     axes.axis("off")
     axes.set_title("Who may follow whom")
