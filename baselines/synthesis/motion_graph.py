@@ -200,9 +200,9 @@ def write_graph(graph: MotionGraph, path: str | Path) -> None:
     head = replace(graph, transitions=(), refused=())
     lines = [HEADER, *(line for line in to_yaml(head).splitlines(keepends=True)
                        if line not in ("transitions: []\n", "refused: []\n"))]  # fmt: skip
-    edges = [[t.before, t.after, t.leave, t.enter, t.duration, t.coefficient]
+    edges = [(t.before, t.after, t.leave, t.enter, t.duration, t.coefficient)
              for t in graph.transitions]  # fmt: skip
-    for name, rows in (("transitions", edges), ("refused", [list(row) for row in graph.refused])):
+    for name, rows in (("transitions", edges), ("refused", graph.refused)):
         lines += [f"{name}:{'' if rows else ' []'}\n", *(f"- {_flow(row)}" for row in rows)]
     write_atomic(path, "".join(lines))
 
