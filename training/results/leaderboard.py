@@ -64,7 +64,8 @@ def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
     entries, origin = dict(summary["controllers"]), dict.fromkeys(summary["controllers"], first)
     pairs = {pair["b"]: pair for pair in summary["pairs"] if pair["a"] == reference}
     for source, other in later:
-        for key, own, theirs in zip(SAME, _same(summary), _same(other), strict=True):
+        both = _sampled(summary) & _sampled(other)
+        for key, own, theirs in zip(SAME, _same(summary, both), _same(other, both), strict=True):
             if own != theirs:
                 raise ConfigError(f"is not that of {first}", source=source, field=key)
         for name in other["controllers"]:
@@ -84,8 +85,16 @@ def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:
     return whole, origin
 
 
-def _same(summary: Summary) -> tuple[object, ...]:
-    return tuple(summary[key] for key in SAME)
+def _sampled(summary: Summary) -> set[float]:
+    """Directions in which the ankle limit is told [deg]; later results have its corners, too."""
+    return {direction for direction, _ in summary["robot"]["ankle_limit"]}
+
+
+def _same(summary: Summary, directions: set[float]) -> tuple[object, ...]:
+    """What results of one page have in common; of the ankle limit that in these directions."""
+    limit = [row for row in summary["robot"]["ankle_limit"] if row[0] in directions]
+    alike = {**summary, "robot": {**summary["robot"], "ankle_limit": limit}}
+    return tuple(alike[key] for key in SAME)
 
 
 def _shape(entry: Entry) -> tuple[int, list[int]]:

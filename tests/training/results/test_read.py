@@ -121,7 +121,7 @@ def test_intervals_may_be_open() -> None:
     assert both_ends((None, 2.5)) is None and both_ends(None) is None
 
 
-@pytest.mark.parametrize("name", ["leaderboard", "leaderboard-feedback-step"])
+@pytest.mark.parametrize("name", ["leaderboard", "leaderboard-residual-torque"])
 def test_the_committed_results_are_read(name: str) -> None:
     """Those of the leaderboard have the form of today."""
     path = Path(__file__).parents[3] / f"docs/results/{name}.json"
