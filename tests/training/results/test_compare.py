@@ -221,6 +221,24 @@ def test_later_results_take_their_rows(tmp_path: Path) -> None:
     assert error.value.field == "seed" and page.read_text() == text
 
 
+def test_the_ankle_limit_may_be_told_in_more_directions(tmp_path: Path) -> None:
+    """Later results have its corners, too; where both tell it, it is the same."""
+    a = write_result(tmp_path / "a", {"pd": YES, "abe07": NO})
+    b = write_result(tmp_path / "b", {"pd": NO, "abe07": YES}, abe07=8.0)
+    page, file = tmp_path / "page.md", b / "summary.json"
+    data = json.loads(file.read_text())
+    limit = data["robot"]["ankle_limit"]
+    limit.insert(1, [limit[0][0] + 0.5, 20.0])
+    file.write_text(json.dumps(data))
+    write_leaderboard([a, b], page)
+    assert "`abe07` | 8.0 [" in page.read_text()
+    limit[0][1] += 1.0
+    file.write_text(json.dumps(data))
+    with pytest.raises(ConfigError, match="is not that of") as error:
+        write_leaderboard([a, b], page)
+    assert error.value.field == "robot"
+
+
 def every(plan: Plan, edge: float = 1e9) -> list[Trial]:
     """All trials of a controller that recovers pushes below an impulse in the first stage."""
     return plan.trials(won_below(plan, edge))[plan.names[0]]
