@@ -10,10 +10,9 @@ from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Names, RobotName, Switch
 from .export import export
-from .gait import gait
 from .results import compare, leaderboard, replay, report
 from .view import view
-from .walk import walk
+from .walk import gait, walk
 
 if TYPE_CHECKING:
     from poise.training.running.summary import Summary
