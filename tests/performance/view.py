@@ -1,8 +1,9 @@
 """`poise view` against the wall clock: `python -m tests.performance.view [--seconds 20]`.
 
-The share of real time with one controller and with three side by side, and the time from the
-moment at which a push is asked for to the moment at which its first picture has been sent. No
-page is open: a browser on the same machine takes processor time of its own.
+The share of real time with one controller, with one that performs a motion beside the ghost of it,
+and with three side by side, and the time from the moment at which a push is asked for to the moment
+at which its first picture has been sent. No page is open: a browser on the same machine takes
+processor time of its own.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import time
 
 import numpy as np
 
+from poise.baselines.motions.motion import load_motion
 from poise.envs.robots.robot import load_robot
 from poise.training.sessions.live import Live
 from poise.training.sessions.session import load_session
@@ -23,9 +25,13 @@ NAMES = ("feedback-step", "momentum-qp", "capture-step")
 PUSH = {"impulse": 6.0, "direction": 90.0, "duration": 0.1, "body": "torso"}
 
 
-def measure(names: tuple[str, ...], seconds: float) -> tuple[float, list[float]]:
+def measure(
+    names: tuple[str, ...], seconds: float, motion: str | None = None
+) -> tuple[float, list[float]]:
     """Share of real time, and the delays [s] of a push a second."""
-    live = Live(load_session(names, load_robot("humanoid")))
+    robot = load_robot("humanoid")
+    reference = None if motion is None else load_motion(motion, robot)
+    live = Live(load_session(names, robot, motion=reference))
     delays: list[float] = []
     with serving("127.0.0.1", 0) as server:
         view = BrowserView(server, live, lambda spec: live)
@@ -55,10 +61,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     seconds = parser.parse_args().seconds
-    for names in (NAMES[:1], NAMES):
-        share, delays = measure(names, seconds)
+    for names, motion in ((NAMES[:1], None), (NAMES[:1], "squat"), (NAMES, None)):
+        share, delays = measure(names, seconds, motion)
         middle, most = 1e3 * np.median(delays), 1e3 * np.max(delays)
-        print(f"{len(names)} controllers: {share:.3f} × real time; a push is sent as a picture")
+        print(
+            f"{len(names)} controllers, motion {motion or 'standing'}: {share:.3f} × real time; a push is sent as a picture"
+        )
         print(f"  after {middle:.0f} ms (median of {len(delays)}), at most {most:.0f} ms")
 
 
