@@ -64,10 +64,9 @@ def main() -> None:
     for names, motion in ((NAMES[:1], None), (NAMES[:1], "squat"), (NAMES, None)):
         share, delays = measure(names, seconds, motion)
         middle, most = 1e3 * np.median(delays), 1e3 * np.max(delays)
-        print(
-            f"{len(names)} controllers, motion {motion or 'standing'}: {share:.3f} × real time; a push is sent as a picture"
-        )
-        print(f"  after {middle:.0f} ms (median of {len(delays)}), at most {most:.0f} ms")
+        print(f"{len(names)} controllers, motion {motion or 'standing'}: {share:.3f} × real time")
+        print(f"  a push is sent as a picture after {middle:.0f} ms (median of {len(delays)}), "
+              f"at most {most:.0f} ms")  # fmt: skip
 
 
 if __name__ == "__main__":
