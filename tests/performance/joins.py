@@ -34,9 +34,10 @@ from poise.baselines.motions.robot_clip import RobotClip, reference_from
 from poise.baselines.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.following.follow import ANYWHERE, Footing, lies, performer
-from poise.training.following.reference import ReferenceBodies
+from poise.training.following.follow import performer
 from poise.training.statistics.rates import wilson_interval
+from poise.training.tracking.record import ANYWHERE, Footing, lies
+from poise.training.tracking.reference import ReferenceBodies
 
 CLIPS = ("cmu02_stand", "cmu02_squat", "cmu02_reach_down", "cmu02_reach_up", "cmu02_punch",
          "fair1_wave_hello")  # fmt: skip
@@ -90,7 +91,7 @@ def perform(robot: Robot, clip: RobotClip, start: float, end: float, seed: int) 
         _, terminated, truncated = env.step_without_info(agent.act(observation))
         footing.update(env.simulation.state)
         now = env.simulation.time
-        if env.fallen or terminated or lies(env, bodies):
+        if env.fallen or terminated or lies(env):
             return Performed(True, np.nan)
         done = truncated
         if start <= now <= end + WATCHED:
