@@ -178,8 +178,12 @@ def pause(shaper: Shaper, ways: Sequence[np.ndarray]) -> list[np.ndarray]:
 def assembled(
     shaper: Shaper, like: RobotClip, name: str, frames: Sequence[np.ndarray]
 ) -> RobotClip:
-    """A clip of joints (n, nj), one after the other, on the soles as they stand."""
-    qpos = np.array([shaper.planted.placed(q) for q in np.vstack(frames)])
+    """A clip of joints (n, nj), one after the other, on the soles as they stand.
+
+    What the check lets a joint be beyond its range between frames, no frame of a clip may be.
+    """
+    joints = np.clip(np.vstack(frames), *shaper.planted.robot.joint_range.T)
+    qpos = np.array([shaper.planted.placed(q) for q in joints])
     return RobotClip(replace(like.about, name=name), like.dt, qpos)
 
 
