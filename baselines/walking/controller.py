@@ -6,7 +6,7 @@ from poise.baselines.stepping.blocks import StepMemory
 from poise.envs.terrain.terrain import Terrain
 
 from .blocks import Gait
-from .command import GaitCommand
+from .command import GaitCommand, command_of
 
 
 @runtime_checkable
@@ -24,6 +24,21 @@ class WalkingController(Protocol):
     @property
     def walking(self) -> bool:
         """True from the first shift of weight until the walk has stopped."""
+
+
+class Commanded:
+    """The command of a controller whose `gait` holds it as an array."""
+
+    gait: Gait
+
+    @property
+    def command(self) -> GaitCommand:
+        """The velocity and turn that are asked for; may be set at any time."""
+        return command_of(self.gait.command)
+
+    @command.setter
+    def command(self, command: GaitCommand) -> None:
+        self.gait.command[:] = command.array()
 
 
 @runtime_checkable

@@ -15,8 +15,9 @@ from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .command import STEP_PARAMETERS, GaitCommand, command_of
+from .command import STEP_PARAMETERS, GaitCommand
 from .config import GaitConfig
+from .controller import Commanded
 from .models.leg_joints import leg_joints
 from .walk import allocate_gait
 
@@ -87,7 +88,7 @@ class SimbiconConfig:
     speed: SpeedGains = field(default_factory=SpeedGains, metadata={"omit": "default"})
 
 
-class Simbicon(BaseController):
+class Simbicon(Commanded, BaseController):
     """Left and right foot in turn, each lifted for a time, then lowered to the ground: it marks
     time, or walks at a commanded velocity.
 
@@ -124,15 +125,6 @@ class Simbicon(BaseController):
         self.gait = allocate_gait(steps, robot.units, steps.limits)
         self.memory = allocate_step_memory(CopRegion(robot).arrays)
         self.reset()
-
-    @property
-    def command(self) -> GaitCommand:
-        """The velocity and turn that are asked for; may be set at any time."""
-        return command_of(self.gait.command)
-
-    @command.setter
-    def command(self, command: GaitCommand) -> None:
-        self.gait.command[:] = command.array()
 
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError for a step parameter: it follows velocity and turn alone."""

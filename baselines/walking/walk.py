@@ -26,8 +26,9 @@ from poise.envs.terrain.terrain import Surface, Terrain
 
 from .arms import allocate_arms
 from .blocks import Gait, WalkTick
-from .command import ENTRIES, GaitCommand, command_of
+from .command import ENTRIES, GaitCommand
 from .config import GaitConfig, WalkConfig
+from .controller import Commanded
 from .given import allocate_treads, given_footholds
 from .models.leg_rows import leg_task
 from .models.legs import leg_arrays, no_legs
@@ -93,7 +94,7 @@ def over_treads(config: GaitConfig) -> GaitConfig:
     )
 
 
-class Walk(CaptureStep):
+class Walk(Commanded, CaptureStep):
     """Walks at a commanded velocity by footholds that lead the capture point [Englsberger11].
 
     Without a command it is `capture-step` with the same gains, bit for bit. With one it shifts its
@@ -126,15 +127,6 @@ class Walk(CaptureStep):
     def walking(self) -> bool:
         """True from the first shift of weight until the walk has stopped."""
         return bool(self.gait.walking[0])
-
-    @property
-    def command(self) -> GaitCommand:
-        """The velocity and turn that are asked for; may be set at any time."""
-        return command_of(self.gait.command)
-
-    @command.setter
-    def command(self, command: GaitCommand) -> None:
-        self.gait.command[:] = command.array()
 
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError with the limits of this robot for a command out of its reach."""

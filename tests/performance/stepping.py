@@ -7,13 +7,12 @@ does, over pushes of 8 to 30 N·s in eight directions; `momentum-qp`, which runs
 from __future__ import annotations
 
 import time
-from collections import defaultdict
 
 import numpy as np
 
-from poise.baselines.controller import WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
+from tests.performance.clocked import ClockedByKind
 
 PUSHES = [
     {
@@ -27,21 +26,10 @@ PUSHES = [
 SECONDS = 2.0
 
 
-class Clocked(WrappedController):
-    """A stepping controller whose ticks are timed by what they do."""
-
-    def __init__(self, controller, robot):
-        super().__init__(controller, robot)
-        self.seconds: dict[str, list[float]] = defaultdict(list)
-
-    def torques(self, state, targets):
-        begun = time.thread_time()
-        tau = self.inner.torques(state, targets)
-        spent = time.thread_time() - begun
-        step = self.inner.stepping()
-        kind = "in a swing" if step.foot >= 0 else "after a step" if step.steps else "feet in place"
-        self.seconds[kind].append(spent)
-        return tau
+def kind_of(controller) -> str:
+    """What a tick of a stepping controller was for."""
+    step = controller.stepping()
+    return "in a swing" if step.foot >= 0 else "after a step" if step.steps else "feet in place"
 
 
 def play(env, push) -> list[float]:
@@ -68,7 +56,7 @@ def main() -> None:
         for name, env in envs.items():
             steps[name] += play(env, push)
     stepping = envs["ResidualStep-v0, capture-step"]
-    clocked = stepping.controller = Clocked(stepping.controller, stepping.robot)
+    clocked = stepping.controller = ClockedByKind(stepping.controller, stepping.robot, kind_of)
     for push in PUSHES:
         play(stepping, push)
     print("| path | median | mean | steps per second |")
