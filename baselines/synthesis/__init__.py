@@ -1,1 +1,1 @@
-"""A motion from a line of script: its language, graphs of clips, the search, and the result."""
+"""A motion from a line of script, by the cheapest way through a graph of clips."""

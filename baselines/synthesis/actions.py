@@ -6,12 +6,21 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from poise.baselines.clips.clip import Clip
+from poise.baselines.scripts.printer import overlay_text
+from poise.baselines.scripts.tokens import wrong
+from poise.baselines.scripts.tree import (
+    Arrow,
+    ClipName,
+    Modifier,
+    Overlay,
+    Script,
+    Sequence,
+    StateName,
+    Term,
+)
 from poise.configs.errors import ConfigError, shown
 
-from .printer import overlay_text
 from .stage import Stage, changed, layer_of, overlaid
-from .tokens import wrong
-from .tree import Arrow, ClipName, Modifier, Overlay, Script, Sequence, StateName, Term
 
 MOST_ACTIONS = 1000
 OVER = ("on", "weight")

@@ -9,12 +9,11 @@ import numpy as np
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.groups import GROUPS
 from poise.baselines.joining.overlay import Layer, overlay
+from poise.baselines.motion_graphs.adjacency import Frames, end_to_begin, frames_of, with_clip
+from poise.baselines.motion_graphs.motion_graph import GraphClip, MotionGraph, Transition
+from poise.baselines.scripts.tokens import wrong
+from poise.baselines.scripts.tree import Modifier, Script
 from poise.configs.errors import ConfigError, shown
-
-from .adjacency import Frames, end_to_begin, frames_of, with_clip
-from .motion_graph import GraphClip, MotionGraph, Transition
-from .tokens import wrong
-from .tree import Modifier, Script
 
 LONGEST = 600.0  # [s] of a clip and of a whole motion
 

@@ -11,16 +11,17 @@ import numpy as np
 
 from poise.baselines.clips.clip import Clip
 from poise.baselines.joining.joins import JOINS
+from poise.baselines.motion_graphs.motion_graph import MotionGraph, StatePlace, Transition
+from poise.baselines.motion_graphs.nearest import nearest_places
+from poise.baselines.motion_graphs.paths import Path, Place, Step, Task
+from poise.baselines.motion_graphs.search import best_paths
+from poise.baselines.scripts.printer import text_of
+from poise.baselines.scripts.tokens import wrong
+from poise.baselines.scripts.tree import Script, StateName
 from poise.configs.errors import ConfigError, shown
 
 from .actions import Actions, Reader
-from .motion_graph import MotionGraph, StatePlace, Transition
-from .nearest import nearest_places
-from .printer import text_of
-from .search import Path, Place, Step, Task, best_paths
 from .stage import LONGEST, Stage
-from .tokens import wrong
-from .tree import Script, StateName
 
 Join = Callable[[Clip, Clip, float], Clip]
 Check = Callable[[Transition], str]

@@ -22,12 +22,12 @@ MOST = 14  # files in a room
 # is not in a room is one by itself.
 FLOORS = """
  1 configs, training/statistics
- 2 envs/compiled, baselines/allowance
+ 2 envs/compiled, baselines/allowance, baselines/scripts
  3 envs/maths, envs/terrain, baselines/clips, baselines/solvers, baselines/warmup
  3 training/running
  4 envs/robots, baselines/joining
- 5 envs/pushes, baselines/inverse_kinematics, baselines/matching, baselines/synthesis
- 6 envs/physics
+ 5 envs/pushes, baselines/inverse_kinematics, baselines/matching, baselines/motion_graphs
+ 6 envs/physics, baselines/synthesis
  7 envs/sensors, envs/viewing, baselines/controller
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body

@@ -10,7 +10,8 @@ import time
 
 import numpy as np
 
-from poise.baselines.synthesis.search import Task, best_paths
+from poise.baselines.motion_graphs.paths import Task
+from poise.baselines.motion_graphs.search import best_paths
 from poise.configs.errors import ConfigError
 from tests.support.motion_graphs import check_search, random_graph
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from poise.baselines.synthesis.motion_graph import (
+from poise.baselines.motion_graphs.layers import SHORT
+from poise.baselines.motion_graphs.motion_graph import (
     GraphClip,
     MotionGraph,
     Thresholds,
@@ -14,7 +15,8 @@ from poise.baselines.synthesis.motion_graph import (
     earliest_part,
     latest_part,
 )
-from poise.baselines.synthesis.search import SHORT, Task, best_paths
+from poise.baselines.motion_graphs.paths import Task
+from poise.baselines.motion_graphs.search import best_paths
 from poise.configs.errors import ConfigError
 
 Node = tuple[int, str, float]  # layer, clip, time

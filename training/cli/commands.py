@@ -296,7 +296,7 @@ def motion() -> None:
 def list_names() -> None:
     """List what can be named: robots, environments, controllers, policies, suites and the like."""
     from poise.baselines.clips.library import packaged_clips
-    from poise.baselines.synthesis.library import packaged_scripts
+    from poise.baselines.scripts.library import packaged_scripts
     from poise.configs.files import packaged
 
     kinds = (

@@ -11,10 +11,8 @@ import tyro
 from poise.baselines.clips.bvh import write_bvh
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import packaged_clips
-from poise.baselines.retargeting.performed import load_clip, robot_clip_of
-from poise.baselines.synthesis.adjacency import make_graph
-from poise.baselines.synthesis.library import between, find_script
-from poise.baselines.synthesis.motion_graph import (
+from poise.baselines.motion_graphs.adjacency import make_graph
+from poise.baselines.motion_graphs.motion_graph import (
     GraphClip,
     StatePlace,
     Thresholds,
@@ -22,9 +20,11 @@ from poise.baselines.synthesis.motion_graph import (
     read_graph,
     write_graph,
 )
-from poise.baselines.synthesis.printer import sequence_text
+from poise.baselines.retargeting.performed import load_clip, robot_clip_of
+from poise.baselines.scripts.library import between, find_script
+from poise.baselines.scripts.printer import sequence_text
+from poise.baselines.scripts.table import to_csv
 from poise.baselines.synthesis.synthesis import Synthesis
-from poise.baselines.synthesis.table import to_csv
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_file, read_yaml

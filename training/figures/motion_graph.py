@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
-from poise.baselines.synthesis.motion_graph import MotionGraph
+from poise.baselines.motion_graphs.motion_graph import MotionGraph
 
 from .style import BLUE, GREY, INK, PALE, saved_figure
 

@@ -6,8 +6,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from poise.baselines.synthesis.components import strong_clips
-from poise.baselines.synthesis.motion_graph import MotionGraph
+from poise.baselines.motion_graphs.components import strong_clips
+from poise.baselines.motion_graphs.motion_graph import MotionGraph
 from poise.baselines.synthesis.synthesis import Plan
 
 MOST_ROWS = 60

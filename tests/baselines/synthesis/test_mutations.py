@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from poise.baselines.synthesis.parser import parse
+from poise.baselines.scripts.parser import parse
 from poise.baselines.synthesis.synthesis import Synthesis
 from tests.performance.motion_mutations import (
     SCRIPTS,

@@ -16,12 +16,12 @@ from poise.baselines.clips.groups import GROUPS
 from poise.baselines.clips.library import find_bvh
 from poise.baselines.clips.rotations import angle_between
 from poise.baselines.joining.joins import JOINS
-from poise.baselines.synthesis.adjacency import frames_of, make_graph
-from poise.baselines.synthesis.components import strong_clips, strong_part
-from poise.baselines.synthesis.library import between, find_script, packaged_scripts
-from poise.baselines.synthesis.motion_graph import GraphClip, MotionGraph, StatePlace
-from poise.baselines.synthesis.nearest import nearest_places
-from poise.baselines.synthesis.parser import parse
+from poise.baselines.motion_graphs.adjacency import frames_of, make_graph
+from poise.baselines.motion_graphs.components import strong_clips, strong_part
+from poise.baselines.motion_graphs.motion_graph import GraphClip, MotionGraph, StatePlace
+from poise.baselines.motion_graphs.nearest import nearest_places
+from poise.baselines.scripts.library import between, find_script, packaged_scripts
+from poise.baselines.scripts.parser import parse
 from poise.baselines.synthesis.synthesis import Synthesis
 from poise.configs.errors import ConfigError
 

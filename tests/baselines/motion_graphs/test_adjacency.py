@@ -14,7 +14,7 @@ from poise.baselines.clips.library import find_bvh
 from poise.baselines.joining.coefficient import best_duration, coefficient, moved_shares
 from poise.baselines.joining.joins import ends
 from poise.baselines.joining.states import state_at
-from poise.baselines.synthesis.adjacency import (
+from poise.baselines.motion_graphs.adjacency import (
     all_rates,
     end_to_begin,
     frames_of,
@@ -22,7 +22,7 @@ from poise.baselines.synthesis.adjacency import (
     transitions_between,
     with_clip,
 )
-from poise.baselines.synthesis.motion_graph import (
+from poise.baselines.motion_graphs.motion_graph import (
     GraphClip,
     MotionGraph,
     StatePlace,

@@ -10,7 +10,7 @@ from poise.baselines.joining.states import minus
 from poise.configs.errors import ConfigError
 
 from .adjacency import Frames
-from .search import Place
+from .paths import Place
 
 NEAR = 8.0  # [deg] that a frame may be away from a posture
 

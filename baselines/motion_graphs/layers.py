@@ -1,180 +1,33 @@
-"""The cheapest way through a motion graph that plays wanted clips in order: layers and Dijkstra.
+"""The graph in which a way that plays wanted clips in order is a shortest way.
 
-A node is a moment of a clip at which something may begin or end, in one of the layers: layer 2k has
-the wanted clips up to number k behind it and plays any clip on the way; layer 2k + 1 plays wanted
-clip number k, which is entered in its first quarter and left in its last one. So a way is a way of
-moments; of two moments of one clip the later one is reached by playing on.
+A node is a moment of a clip in one of the layers: layer 2k has the wanted clips up to number k
+behind it and plays any clip on the way; layer 2k + 1 plays wanted clip number k, which is entered
+in its first quarter and left in its last one. So a way is a way of moments; of two moments of one
+clip the later one is reached by playing on.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra, yen
 
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError
 
+from .moments import Moments
 from .motion_graph import MotionGraph, Transition, earliest_part, latest_part
+from .paths import Path, Step, Task
 
 UNSEEN = -1  # predecessor of what has none
 SHORT = 1e-6  # of the price of time: of two ways that cost the same the shorter one is taken
 OFFSET = 1.0  # of the edges out of the start, as a sparse graph has no edges of 0
-CHECKS = 200  # of the best path, before the search gives up
-
-Place = tuple[str, float]  # a clip and a time in it [s]
 
 
-@dataclass(frozen=True)
-class Task:
-    """What a path must do.
-
-    Attributes:
-        actions: names of the clips to be played, in this order.
-        arrows: number of an action → the transition by hand that follows it.
-        start: places where the path may begin, each with a cost; none for the first action's begin.
-        goal: likewise where it may end; none for the last action's end.
-    """
-
-    actions: tuple[str, ...]
-    arrows: Mapping[int, Transition] = field(default_factory=dict)
-    start: Mapping[Place, float] = field(default_factory=dict)
-    goal: Mapping[Place, float] = field(default_factory=dict)
-
-
-class Step(NamedTuple):
-    """A clip from one time to another [s]; `after` is the transition that follows, if any."""
-
-    clip: str
-    enter: float
-    leave: float
-    wanted: bool
-    after: Transition | None
-
-
-class Path(NamedTuple):
-    """Steps in order and their cost."""
-
-    steps: tuple[Step, ...]
-    cost: float
-
-
-class Moments:
-    """The moments of all clips of a graph, and the edges between them, as arrays.
-
-    Attributes:
-        place: (n,) clip and time of each moment, of a clip in order of time.
-        plays: (p, 2) moments that follow each other in a clip; `lasts` (p,) [s].
-        joins: (t, 2) moments of each of `transitions`; `costs` (t,).
-        way_plays, way_joins: which of them a way uses: of two between the same moments the cheaper.
-    """
-
-    def __init__(self, graph: MotionGraph, extra: Iterable[Place] = ()):
-        self.names, self.lengths = graph.names, {c.name: c.duration for c in graph.clips}
-        order = {name: i for i, name in enumerate(self.names)}
-        cheapest: dict[tuple[Place, Place], Transition] = {}
-        for t in sorted(graph.transitions, key=graph.cost, reverse=True):
-            cheapest[(t.before, t.leave), (t.after, t.enter)] = t
-        places = {place for pair in cheapest for place in pair} | set(extra)
-        places |= {(name, time) for name, end in self.lengths.items() for time in (0.0, end)}
-        self.place: list[Place] = sorted(places, key=lambda place: (order[place[0]], place[1]))
-        self.index = {place: i for i, place in enumerate(self.place)}
-        self.clip = np.array([order[name] for name, _ in self.place])
-        self.time = np.array([time for _, time in self.place])
-        follow = np.flatnonzero(np.diff(self.clip) == 0)
-        self.plays = np.stack([follow, follow + 1], axis=1)
-        self.lasts = self.time[follow + 1] - self.time[follow]
-        self.transitions = list(cheapest.values())
-        self.joins = np.array(
-            [(self.index[a], self.index[b]) for a, b in cheapest], int).reshape(-1, 2)  # fmt: skip
-        self.costs = np.array([graph.cost(t) for t in self.transitions])
-        self.way_plays = np.ones(len(self.plays), bool)
-        self.way_joins = np.ones(len(self.joins), bool)
-        self._part(graph.thresholds.time_price)
-        self.joined = {(int(a), int(b)): t for (a, b), t in zip(
-            self.joins, self.transitions, strict=True)}  # fmt: skip
-        self.way_joined = {pair for pair, kept in zip(self.joined, self.way_joins, strict=True)
-                           if kept}  # fmt: skip
-
-    def _part(self, price: float) -> None:
-        """Leave out the dearer of playing on and jumping between the same two moments."""
-        play_at = {int(start): i for i, start in enumerate(self.plays[:, 0])}
-        for i in np.flatnonzero(self.joins[:, 1] == self.joins[:, 0] + 1):
-            play = play_at.get(int(self.joins[i, 0]))
-            if play is not None:
-                jump = self.costs[i] < price * self.lasts[play]
-                self.way_plays[play], self.way_joins[i] = not jump, jump
-
-    def __len__(self) -> int:
-        return len(self.place)
-
-    def number(self, name: str) -> int:
-        """The number of a clip."""
-        return self.names.index(name)
-
-
-def best_paths(
-    graph: MotionGraph,
-    task: Task,
-    k: int = 1,
-    check: Callable[[Transition], str] | None = None,
-) -> list[Path]:
-    """The k cheapest paths, the best first; fewer if there are no more.
-
-    A transition costs w K + λ D, a clip on the way λ a second, and of a wanted clip what is left
-    out costs λ a second.
-
-    Args:
-        graph: the clips and transitions.
-        task: what must be done.
-        k: at least 1.
-        check: says why a transition cannot be made after all, or nothing. It is asked about the
-            transitions of the best paths alone; one with a reason is left out and the search begins
-            again.
-
-    Raises:
-        ConfigError: no way; the text has what can be reached, and what comes nearest.
-    """
-    _check(graph, task, k)
-    known: dict[Transition, str] = {}
-    for _ in range(CHECKS):
-        left = graph.without({t for t, reason in known.items() if reason})
-        layers = _Layers(left, task)
-        paths = layers.best(k)
-        if not paths:
-            raise layers.no_way(known)
-        used = {s.after for path in paths for s in path.steps if s.after is not None}
-        new = sorted(used - set(known) - set(task.arrows.values()), key=_order)
-        if check is None or not new:
-            return paths
-        known |= {transition: check(transition) for transition in new}
-        if not any(known[transition] for transition in new):
-            return paths
-    raise ConfigError(f"no way was found after {CHECKS} searches: transitions are refused one by "
-                      "one", source="graph")  # fmt: skip
-
-
-def _check(graph: MotionGraph, task: Task, k: int) -> None:
-    if k < 1:
-        raise ConfigError(f"must be at least 1, not {k}", field="k")
-    if not task.actions:
-        raise ConfigError("a path needs an action", field="actions", choices=graph.names)
-    for name in (*task.actions, *(name for name, _ in (*task.start, *task.goal))):
-        if name not in graph.names:
-            raise ConfigError(f"no clip is called {shown(name)}", field="actions",
-                              choices=graph.names)  # fmt: skip
-
-
-def _order(transition: Transition) -> tuple[str, str, float, float]:
-    return transition.before, transition.after, transition.leave, transition.enter
-
-
-class _Layers:
+class Layers:
     """The layered graph of a task; node = layer · moments + moment, then start and end."""
 
     def __init__(self, graph: MotionGraph, task: Task):

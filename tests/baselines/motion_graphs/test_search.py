@@ -7,8 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from poise.baselines.synthesis.motion_graph import GraphClip, MotionGraph, Thresholds, Transition
-from poise.baselines.synthesis.search import SHORT, Task, best_paths
+from poise.baselines.motion_graphs.layers import SHORT
+from poise.baselines.motion_graphs.motion_graph import (
+    GraphClip,
+    MotionGraph,
+    Thresholds,
+    Transition,
+)
+from poise.baselines.motion_graphs.paths import Task
+from poise.baselines.motion_graphs.search import best_paths
 from poise.configs.errors import ConfigError
 from tests.support.motion_graphs import check_search
 

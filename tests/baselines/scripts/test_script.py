@@ -8,10 +8,10 @@ import numpy as np
 import pyparsing as pp
 import pytest
 
-from poise.baselines.synthesis.parser import parse, read_script
-from poise.baselines.synthesis.printer import text_of
-from poise.baselines.synthesis.table import from_csv, plain, script_of, table_of, to_csv
-from poise.baselines.synthesis.tree import Arrow, ClipName, Define, Modifier, Script, Term
+from poise.baselines.scripts.parser import parse, read_script
+from poise.baselines.scripts.printer import text_of
+from poise.baselines.scripts.table import from_csv, plain, script_of, table_of, to_csv
+from poise.baselines.scripts.tree import Arrow, ClipName, Define, Modifier, Script, Term
 from poise.configs.errors import ConfigError
 from tests.support.scripts import SEED, damaged, random_script
 

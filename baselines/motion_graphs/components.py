@@ -8,8 +8,9 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from .moments import Moments
 from .motion_graph import MotionGraph, Transition
-from .search import Moments, Place
+from .paths import Place
 
 
 def strong_part(graph: MotionGraph) -> MotionGraph:
