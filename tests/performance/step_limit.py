@@ -1,4 +1,4 @@
-"""How much a pendulum with a flywheel can take in steps that the legs can do: what is left above us.
+"""How much a pendulum with a flywheel can take in steps that the legs can do.
 
     python -m tests.performance.step_limit [--robot humanoid] [--body torso] [--lean 15]
 
@@ -17,9 +17,9 @@ programming, for the better of both feet and for the best of some times T_1, T_2
 a is the largest horizontal acceleration that the leg's motors give the lifted foot in the standing
 posture, the root at rest: half of it to speed the foot up, half to stop it. The first foot leaves
 `--begin` s after the push begins, the next ones as soon as the one before has landed, four in all.
-The control knows the push in advance, and feet land exactly where they are wanted: what a controller
-can reach is less. A changing height and what a swinging leg does to the body are outside this model,
-so it is an estimate, not a proof.
+The control knows the push in advance, and feet land exactly where they are wanted: what a
+controller can reach is less. A changing height and what a swinging leg does to the body are outside
+this model, so it is an estimate, not a proof.
 """
 
 import argparse
@@ -68,8 +68,8 @@ class Body:
 def swing_accelerations(robot, sole):
     """(16,) the largest acceleration [m/s²] of the foot along each direction of `COMPASS`.
 
-    a = J M⁻¹ τ with the leg's motors within their limits; the foot neither sideways to the direction
-    nor up, and level. M and J of the leg alone, in the standing posture.
+    a = J M⁻¹ τ with the leg's motors within their limits; the foot neither sideways to the
+    direction nor up, and level. M and J of the leg alone, in the standing posture.
     """
     model, data = robot.model, mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing_qpos
@@ -102,8 +102,8 @@ def measure(robot, given):
     reach = []
     for foot in range(2):
         side = np.sign(feet[foot, 1] - feet[:, 1].mean())
-        out, ahead, back = (hip * np.sin(np.radians(angle + given.lean))
-                            for angle in (given.abduction, given.flexion, given.extension))  # fmt: skip
+        ranges = np.radians([given.abduction, given.flexion, given.extension])
+        out, ahead, back = hip * np.sin(ranges + np.radians(given.lean))
         offset = feet[foot, 1] - feet[:, 1].mean()
         N = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, side]])
         reach.append((N, np.array([ahead, back, out + side * offset])))
