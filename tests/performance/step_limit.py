@@ -8,7 +8,8 @@ programming, for the better of both feet and for the best of some times T_1, T_2
     m c̈ = m ω² (c − p) − e(L̇_g)/z + F      pendulum at constant height z, ω² = g/z
     L̇ = L̇_g + (r × F)                      the push F itself turns the body: lever r above c
     p where the sole on the ground puts it with its ankle, at first both (`CopRegion`)
-    |L̇_g| within the hips' torque, |∫ L dt| ≤ Λ, as in `flywheel_limit`
+    |L̇_g| within the hips' torque, |∫ L dt| ≤ Λ, as in `flywheel_limit`; on one foot about x within
+      what one hip's abductor has, for it alone holds the pelvis level
     |f_k − f_{k−2}| ≤ ¼ a T²               a foot from rest to rest in a swing of time T
     f_k − c(t_k) within the hips' ranges, the trunk leaning by at most `--lean` degrees more
     feet do not cross: they stay a sole's width apart, in their standing order
@@ -123,8 +124,11 @@ def measure(robot, given):
     )
 
 
-def limit(body, direction, duration, lever, hips, begin, first, times):
-    """The largest J [N·s] along `direction` [deg], the foot `first` leaving first; 0: none."""
+def limit(body, direction, duration, lever, torque, begin, first, times):
+    """The largest J [N·s] along `direction` [deg], the foot `first` leaving first; 0: none.
+
+    `torque` are the hips' about both axes, and one hip's about x [N·m].
+    """
     n, m = STEPS, body.mass
     unknowns = 4 * n + 2 * FEET + 1  # p (n, 2), L̇_g (n, 2), f (FEET, 2), J
     eye = np.eye(unknowns)
@@ -146,6 +150,8 @@ def limit(body, direction, duration, lever, hips, begin, first, times):
         p = eye[2 * k : 2 * k + 2]
         rate = eye[2 * n + 2 * k : 2 * n + 2 * k + 2]
         landed = int(np.sum(landing <= k))
+        if k * STEP >= begin - 1e-9 and k < landing[-1]:
+            hold([rate[0], -rate[0]], torque[1])
         if k * STEP < begin - 1e-9:
             hold(body.both[0] @ p, body.both[1])
         elif landed == 0:
@@ -180,7 +186,7 @@ def limit(body, direction, duration, lever, hips, begin, first, times):
     result = linprog(
         -eye[-1], A_ub=csr_array(np.array(rows)), b_ub=np.array(bounds),
         A_eq=np.vstack([v, L]), b_eq=np.concatenate([-rest_v, np.zeros(2)]),
-        bounds=[(None, None)] * (2 * n) + [(-hips, hips)] * (2 * n)
+        bounds=[(None, None)] * (2 * n) + [(-torque[0], torque[0])] * (2 * n)
         + [(None, None)] * (2 * FEET) + [(0.0, None)],
     )  # fmt: skip
     return float(result.x[-1]) if result.success else 0.0
@@ -193,6 +199,7 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=0.1)
     parser.add_argument("--begin", type=float, default=0.05, help="the first foot leaves [s]")
     parser.add_argument("--hips", type=float, default=240.0, help="largest L̇ of the ground [N·m]")
+    parser.add_argument("--abductor", type=float, default=40.0, help="of one hip [N·m]")
     parser.add_argument("--lean", type=float, default=15.0, help="of the trunk [degree]")
     parser.add_argument("--abduction", type=float, default=25.0, help="of a hip [degree]")
     parser.add_argument("--flexion", type=float, default=50.0, help="of a hip [degree]")
@@ -208,10 +215,10 @@ def main() -> None:
     ahead, side = body.swing[0][0], body.swing[0][4]
     print(f"a foot is accelerated by {ahead:.0f} m/s² ahead, {side:.0f} to the side")
     print("direction   limit per mass   first foot, T_1, T_2 [s]")
-    found = []
+    found, torque = [], (given.hips, given.abductor)
     for direction in np.arange(given.directions) * 360.0 / given.directions:
         best = max(
-            (limit(body, direction, given.duration, lever, given.hips, given.begin, foot, times),
+            (limit(body, direction, given.duration, lever, torque, given.begin, foot, times),
              foot, times)
             for foot, times in product((0, 1), product(TIMES, TIMES))
         )  # fmt: skip
