@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from poise.baselines.stepping.config import StepLimits, SwingTask
 from poise.baselines.stepping.cop_region import foot_signs
@@ -121,7 +122,7 @@ def shared_reach(reaches: Sequence[Reach | None]) -> Reach | None:
     if not known or len(known) < len(reaches):
         return None
     pairs: dict[str, list[Pair]] = {name: [getattr(each, name) for each in known] for name in TOLD}
-    shared = {
+    shared: dict[str, Any] = {
         name: (max(low for low, _ in each), min(high for _, high in each))
         for name, each in pairs.items()
     }

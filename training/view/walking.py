@@ -40,7 +40,8 @@ class WalkSliders:
     """
 
     def __init__(self, gui: viser.GuiApi, moved: Callable[[dict[str, float]], None]):
-        self._moved, self._shown = moved, None
+        self._moved = moved
+        self._shown: GaitCommand | None = None
         self._reach: Reach | None = None
         self._commanded: set[str] = set()  # of STEPS
         self._folder: Any = gui.add_folder("Walk", visible=False)
