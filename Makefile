@@ -6,7 +6,8 @@
 # make clean   remove what was built (not .venv)
 # make release   the wheel and the sdist, checked, and tried alone on each of PYTHONS; notes, and
 #                the leaderboard's data for an archive such as Zenodo (.zenodo.json)
-# make weekly  the examples that need TorchRL, RLlib, RL Zoo or MoviePy, each in a fresh environment
+# make weekly  the examples that need TorchRL, RLlib, RL Zoo or MoviePy, each in a fresh environment;
+#              EXTRAS="zoo video" some of them alone
 # make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
@@ -18,6 +19,7 @@
 PYTHON311 ?= $(shell command -v python3.11 || command -v python3)
 PIP_ARGS ?=
 PYTHONS ?= python3.11 python3.12 python3.13
+EXTRAS ?= torchrl rllib zoo video
 LOCKED ?=
 PYTEST_ARGS ?=
 PYTEST_WORKERS ?= -n auto --maxprocesses 4
@@ -43,13 +45,17 @@ $(STAMP): pyproject.toml setup.py constraints.txt
 test: setup
 	$(PYTHON) -m pytest -q $(PYTEST_WORKERS) $(PYTEST_ARGS)
 
-# Not in .venv: RLlib and the Zoo ask for other versions of Gymnasium than constraints.txt has.
+# Not in .venv: RLlib and the Zoo ask for other versions of Gymnasium than constraints.txt has. Of
+# that file torch alone is held, so that no other build of it is pulled.
 weekly:
-	set -e; for extra in torchrl rllib zoo video; do \
-		rm -rf build/weekly; $(PYTHON311) -m venv build/weekly; \
-		build/weekly/bin/python -m pip install -q $(PIP_ARGS) -e ".[$$extra]" pytest; \
-		build/weekly/bin/python -m pytest -q -rs tests/integration/test_examples.py -k "test_$$extra"; \
-	done
+	mkdir -p build && grep '^torch==' constraints.txt > build/torch.txt
+	failed=; for extra in $(EXTRAS); do \
+		echo "$$extra:"; rm -rf build/weekly; $(PYTHON311) -m venv build/weekly && \
+		build/weekly/bin/python -m pip install -q $(PIP_ARGS) -c build/torch.txt -e ".[$$extra]" pytest && \
+		RAY_raylet_start_wait_time_s=600 \
+		build/weekly/bin/python -m pytest -q -rs tests/integration/test_examples.py -k "test_$$extra" || \
+		failed="$$failed $$extra"; \
+	done; test -z "$$failed" || { echo "failed:$$failed"; exit 1; }
 
 test-processors: setup
 	$(PYTHON) -m tests.processors --repeat 3 $(PYTEST_ARGS)
@@ -117,7 +123,7 @@ build/twine:
 release: build build/twine
 	build/twine/bin/twine check --strict dist/*
 	set -e; for python in $(PYTHONS); do \
-		if ! $$python --version; then echo "$$python: not here, left out"; continue; fi; \
+		if ! $$python --version 2>/dev/null; then echo "$$python: not here, left out"; continue; fi; \
 		rm -rf build/alone; $$python -m venv build/alone; \
 		build/alone/bin/python -m pip install -q $(PIP_ARGS) -c constraints.txt dist/poise-*.whl; \
 		(cd build/alone && bin/python -P ../../tests/smoke.py && bin/poise --version && \

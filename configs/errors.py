@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 import reprlib
 from collections.abc import Iterable, Iterator
@@ -28,6 +29,12 @@ def one_line(text: str, limit: int = LONGEST_TEXT) -> str:
 def shown(value: object) -> str:
     """The value for an error, as `repr` but short, and quick for whatever anybody may give."""
     return one_line(_short.repr(value), LONGEST_VALUE)
+
+
+def meant(name: object, names: Iterable[str]) -> str:
+    """What an error about `name` adds: the one of the valid `names` that it looks like, if any."""
+    near = difflib.get_close_matches(str(name)[:LONGEST_VALUE], list(names), n=1)
+    return f", did you mean {one_line(near[0], LONGEST_VALUE)}?" if near else ""
 
 
 class _Short(reprlib.Repr):

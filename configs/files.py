@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 
-from .errors import ConfigError, PoiseError, shown
+from .errors import ConfigError, PoiseError, meant, shown
 from .outputs import check_out_folder
 from .reading import is_file, is_folder
 
@@ -49,8 +49,9 @@ def resolve(kind: str, name: str | Path) -> Path:
     if path.suffix in (".yaml", ".yml") and is_file(path):
         return path
     problem = "no such file" if path.suffix or len(path.parts) > 1 else "no such name"
+    hint = meant(name, names) or ";"
     raise ConfigError(
-        f"{problem}: {shown(str(name))}; give a path to a .yaml file or a packaged name",
+        f"{problem}: {shown(str(name))}{hint} give a path to a .yaml file or a packaged name",
         field=kind,
         choices=names,
     )

@@ -20,7 +20,7 @@ from typing import (
 import numpy as np
 import yaml
 
-from .errors import ConfigError, shown
+from .errors import ConfigError, meant, shown
 from .files import packaged, resolve
 from .kinds import OfKind, kind_of
 from .reading import read_yaml
@@ -215,7 +215,10 @@ def _build_dataclass(cls: Any, data: Any, source: str, path: str) -> Any:
             )
         if key not in fields:
             raise ConfigError(
-                "unknown field", source=source, field=f"{prefix}{key}", choices=fields
+                f"unknown field{meant(key, fields)}",
+                source=source,
+                field=f"{prefix}{key}",
+                choices=fields,
             )
     hints = get_type_hints(cls)
     values = {}

@@ -6,7 +6,13 @@ from typing import Any
 from poise.baselines.controller import BaseController
 from poise.baselines.registry import walking_controllers
 from poise.baselines.walking.command import GaitCommand
-from poise.baselines.walking.controller import LimitedWalker, TerrainWalker, WalkingController
+from poise.baselines.walking.controller import (
+    LimitedWalker,
+    ReachingWalker,
+    TerrainWalker,
+    WalkingController,
+)
+from poise.baselines.walking.reach import Reach
 from poise.baselines.walking.schedule import (
     Follower,
     TimedCommand,
@@ -45,10 +51,19 @@ class CommandedEnv(BalanceEnv):
     def command(self, command: GaitCommand | Mapping[str, float]) -> None:
         if not isinstance(command, GaitCommand):
             command = build(GaitCommand, to_dict(command), "command")
-        walker = self._expect_walker("environment")
-        _check(walker, command)
+        self.check_command(command)
         self._timetable.clear()
-        walker.command = command
+        self._expect_walker("environment").command = command
+
+    def check_command(self, command: GaitCommand) -> None:
+        """Raise ConfigError with the robot's limits for a command that is out of its reach, and
+        for a controller that does not walk."""
+        check_reach(self._expect_walker("environment"), command)
+
+    @property
+    def reach(self) -> Reach | None:
+        """What the robot can be told; None where the controller does not walk, or does not say."""
+        return self._walker.reach if isinstance(self._walker, ReachingWalker) else None
 
     @property
     def transfer_time(self) -> float | None:
@@ -83,7 +98,7 @@ class CommandedEnv(BalanceEnv):
         if "command" in options:
             walker = self._expect_walker("reset")
             for command in commands:
-                _check(walker, command)
+                check_reach(walker, command)
         self._timetable.fill(commands)
         if self._walker is not None:
             follow_timetable(self._follower(self._walker))
@@ -94,7 +109,7 @@ class CommandedEnv(BalanceEnv):
         return Follower(self._timetable, clock, self.arrays.timestep, walker.gait.command)
 
 
-def _check(walker: WalkingController, command: GaitCommand) -> None:
+def check_reach(walker: WalkingController, command: GaitCommand) -> None:
     """Raise ConfigError for a command out of the reach of a controller that knows its limits."""
     if isinstance(walker, LimitedWalker):
         walker.check_command(command)

@@ -20,6 +20,7 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.vector_env import make_vector_env
 
+from .commanded import check_reach
 from .step_terms import StepView
 from .stepping import ResidualStepEnv
 from .walk_terms import (
@@ -64,7 +65,8 @@ class ResidualWalkEnv(ResidualStepEnv):
     Arguments: as of `ResidualStepEnv`, with a `controller` that walks, and `command`: a
     `GaitCommand`, a mapping of `ahead`, `left` [m/s] and `turn` [rad/s] or of ranges [lo, hi] of
     these, which are drawn from at the reset and, with `interval` [s], every so often; see
-    `CommandSampler`. The option "command" of `reset` takes its place in that episode.
+    `CommandSampler`. What is out of the robot's reach is refused at once. The option "command" of
+    `reset` takes its place in that episode.
     `config` is `configs/envs/walking.yaml` by default.
 
     Version history: v0, first release.
@@ -90,12 +92,15 @@ class ResidualWalkEnv(ResidualStepEnv):
     def controller(self, controller: Controller) -> None:
         """The controller whose targets and steps the action moves.
 
-        Raises ConfigError as `ResidualStepEnv` does, and for one that does not walk.
+        Raises ConfigError as `ResidualStepEnv` does, for one that does not walk, and for one that
+        cannot follow all that `command` may draw: with the limits of the robot.
         """
         walker = as_base_controller(controller, self.robot).unwrapped
         if not isinstance(walker, WalkingController):
             choices = walking_controllers(planners=True)
             raise ConfigError("does not walk", field="controller", choices=choices)
+        for command in self.command_sampler.extremes():
+            check_reach(walker, command)
         ResidualStepEnv.controller.fset(self, controller)
         self.walker = walker  #: the controller that walks, of which `controller` may be a wrapper
 

@@ -7,6 +7,7 @@ from poise.envs.terrain.terrain import Terrain
 
 from .blocks import Gait
 from .command import GaitCommand, command_of
+from .reach import Reach
 
 
 @runtime_checkable
@@ -47,6 +48,15 @@ class LimitedWalker(Protocol):
 
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError with these limits for a command out of reach."""
+
+
+@runtime_checkable
+class ReachingWalker(Protocol):
+    """What a controller that walks and follows every part of a command has."""
+
+    @property
+    def reach(self) -> Reach:
+        """What its robot can be told, on the terrain that it believes to walk on."""
 
 
 @runtime_checkable

@@ -1,5 +1,9 @@
 """Which commands are within the reach of a robot."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
 from poise.baselines.stepping.config import StepLimits, SwingTask
 from poise.baselines.stepping.cop_region import foot_signs
 from poise.baselines.stepping.swing_speed import highest_lift, swing_time
@@ -11,6 +15,56 @@ from .blocks import Gait
 from .command import GaitCommand
 
 APART = 0.01  # [m] between soles side by side
+ROUNDING = 1e-9  # [m] of a width that a user reads and gives back
+FINE = 1e-3  # [m] to which the highest clearance is found
+
+Pair = tuple[float, float]  # least and most
+TOLD = ("ahead", "left", "width", "clearance", "step_length", "arm_swing")  # pairs of a `Reach`
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What a robot can be told with a gait, each for itself: pairs of the least and the most.
+
+    Attributes:
+        ahead, left: in steps of the gait's own time and width [m/s].
+        width, step_length: see `GaitCommand` [m].
+        clearance: in the longest swing that the planner takes [m].
+        arm_swing: [rad]; 0 at most for a robot that does not say which joints swing its arms.
+        own_width, own_clearance: where none is commanded [m].
+        step_time, period: from lift-off to touchdown, and from one touchdown to the next, where no
+            time or length is commanded [s].
+    """
+
+    ahead: Pair
+    left: Pair
+    width: Pair
+    clearance: Pair
+    step_length: Pair
+    arm_swing: Pair
+    own_width: float
+    own_clearance: float
+    step_time: float
+    period: float
+
+
+def reach_of(robot: Robot, gait: Gait, limits: StepLimits, swing: SwingTask) -> Reach:
+    """The reach of a robot with a gait; arguments as of `check_command`."""
+    time, period = steps_of(GaitCommand(), gait)
+    back, far = (_longest_step(sign, time, robot, limits) for sign in (-1.0, 1.0))
+    aside = _widest_step(gait.width, time, robot, limits) / period
+    return Reach(
+        ahead=(-back / period, far / period),
+        left=(-aside, aside),
+        width=_width_range(robot, limits),
+        clearance=(0.0, _highest_clearance(robot, swing, limits.time_max / robot.omega)),
+        step_length=(0.0, limits.ahead * robot.height_com),
+        arm_swing=(0.0, largest_swing(robot) if has_arms(robot) else 0.0),
+        own_width=gait.width,
+        own_clearance=swing.clearance * robot.height_com,
+        step_time=time,
+        period=period,
+    )
 
 
 def least_width(robot: Robot) -> float:
@@ -43,24 +97,77 @@ def steps_of(command: GaitCommand, gait: Gait) -> tuple[float, float]:
 
 def _check_steps(command: GaitCommand, robot: Robot, gait: Gait, limits: StepLimits) -> None:
     """Steps are no longer than the planner lets them be, and no quicker than a foot may be."""
-    h, (swing, period) = robot.height_com, steps_of(command, gait)
-    far = (limits.ahead if command.ahead >= 0.0 else limits.behind) * h
-    most = min(far, 0.5 * limits.speed * h * robot.omega * swing)
+    swing, period = steps_of(command, gait)
+    most = _longest_step(command.ahead, swing, robot, limits)
     if abs(command.ahead) * period > most:
         raise _out_of_reach("ahead", f"{command.ahead:g} m/s is steps of "
                             f"{abs(command.ahead) * period:.3g} m in {period:.3g} s", robot,
                             f"at most {most:.3g} m in it, {most / period:.3g} m/s")  # fmt: skip
+    aside = _widest_step(command.width or gait.width, swing, robot, limits)
+    if abs(command.left) * period > aside:
+        raise _out_of_reach("left", f"{command.left:g} m/s is {abs(command.left) * period:.3g} m "
+                            f"to the side in a step of {period:.3g} s", robot,
+                            f"at most {aside:.3g} m in it, {aside / period:.3g} m/s")  # fmt: skip
     if command.step_length is not None:
         least = command.speed * (gait.time_min + gait.transfer_time)
-        if command.step_length < least - 1e-9:
+        if command.step_length < least - ROUNDING:
             raise _out_of_reach("step_length", f"{command.step_length:g} m at {command.speed:g} "
                                 "m/s", robot, f"at least {least:.3g} m there: its legs "
                                 f"need {gait.time_min:.3g} s for a step")  # fmt: skip
 
 
+def shared_reach(reaches: Sequence[Reach | None]) -> Reach | None:
+    """What all of them reach, with the steps of the first; None where one is None or none is."""
+    known = [each for each in reaches if each is not None]
+    if not known or len(known) < len(reaches):
+        return None
+    pairs: dict[str, list[Pair]] = {name: [getattr(each, name) for each in known] for name in TOLD}
+    shared: dict[str, Any] = {
+        name: (max(low for low, _ in each), min(high for _, high in each))
+        for name, each in pairs.items()
+    }
+    return replace(known[0], **shared)
+
+
+def _longest_step(ahead: float, swing: float, robot: Robot, limits: StepLimits) -> float:
+    """The longest step [m] with the sign of `ahead` and a swing of so many seconds."""
+    h = robot.height_com
+    far = (limits.ahead if ahead >= 0.0 else limits.behind) * h
+    return min(far, 0.5 * limits.speed * h * robot.omega * swing)
+
+
+def _widest_step(width: float, swing: float, robot: Robot, limits: StepLimits) -> float:
+    """The longest way of the CoM to the side in a step with a swing of so many seconds [m].
+
+    For soles that are W apart in the mean, a way s to the side is W + s between them after one step
+    and W − s after the next, so that a foot swings by 2 s.
+    """
+    h = robot.height_com
+    far = limits.width_max * h - width
+    return max(min(far, 0.5 * limits.side_speed * h * robot.omega * swing), 0.0)
+
+
+def _width_range(robot: Robot, limits: StepLimits) -> Pair:
+    return least_width(robot), limits.width_max * robot.height_com
+
+
+def _highest_clearance(robot: Robot, swing: SwingTask, time: float) -> float:
+    """The highest clearance of a swing of `time` [s], to 1 mm and not above what it can [m]."""
+    low, high = 0.0, highest_lift(robot)
+    if swing_time(robot, swing, high) <= time:
+        return high
+    while high - low > FINE:
+        middle = 0.5 * (low + high)
+        if swing_time(robot, swing, middle) <= time:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
 def _check_width(command: GaitCommand, robot: Robot, limits: StepLimits) -> None:
-    low, high = least_width(robot), limits.width_max * robot.height_com
-    if command.width is not None and not low <= command.width <= high:
+    low, high = _width_range(robot, limits)
+    if command.width is not None and not low - ROUNDING <= command.width <= high + ROUNDING:
         raise _out_of_reach("width", f"{command.width:g} m", robot,
                             f"{low:.3g} to {high:.3g} m, where soles do not overlap and legs "
                             "reach")  # fmt: skip

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -54,6 +54,11 @@ class CommandSampler:
                 break
             drawn.append(self._draw(rng, start))
         return tuple(drawn)
+
+    def extremes(self) -> list[GaitCommand]:
+        """The commands at the ends of all ranges; a robot that can these can all that is drawn."""
+        corners = product(set(self.ahead), set(self.left), set(self.turn))
+        return [GaitCommand(*corner) for corner in sorted(corners)]
 
     def _draw(self, rng: np.random.Generator, start: float) -> TimedCommand:
         ahead, left, turn = (float(rng.uniform(*r)) for r in (self.ahead, self.left, self.turn))

@@ -33,7 +33,7 @@ from .given import allocate_treads, given_footholds
 from .models.leg_rows import leg_task
 from .models.legs import leg_arrays, no_legs
 from .models.reference import allocate_reference
-from .reach import check_command
+from .reach import Reach, check_command, reach_of
 from .tick import walk_tick
 
 
@@ -131,6 +131,11 @@ class Walk(Commanded, CaptureStep):
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError with the limits of this robot for a command out of its reach."""
         check_command(command, self.robot, self.gait, self.gait_limits, self._gait_config.swing)
+
+    @property
+    def reach(self) -> Reach:
+        """What its robot can be told, on the terrain that it believes to walk on."""
+        return reach_of(self.robot, self.gait, self.gait_limits, self._gait_config.swing)
 
     @property
     def terrain(self) -> Terrain:

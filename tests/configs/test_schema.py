@@ -122,8 +122,14 @@ def test_an_int_is_taken_for_a_float_and_stays_exact() -> None:
 @pytest.mark.parametrize(
     ("data", "text"),
     [
-        ({"wieghts": {}}, "file.yaml: wieghts: unknown field (choices: name, weights, steps"),
-        ({"weights": {"cm": 1}}, "file.yaml: weights.cm: unknown field (choices: com, posture)"),
+        (
+            {"wieghts": {}},
+            "file.yaml: wieghts: unknown field, did you mean weights? (choices: name, weig",
+        ),
+        (
+            {"weights": {"cm": 1}},
+            "file.yaml: weights.cm: unknown field, did you mean com? (choices: com, posture)",
+        ),
         ({"weights": 3}, "weights: must be a mapping of fields, not 3 (choices: com, posture)"),
         ({"weights": {"com": -1}}, "weights.com: must be at least 0.0, not -1"),
         ({"weights": {"posture": 0}}, "weights.posture: must be above 0.0, not 0"),

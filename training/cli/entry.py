@@ -1,7 +1,6 @@
 """The process of the command `poise`: exit codes, stops, and what nobody reads any more."""
 
 import atexit
-import difflib
 import errno
 import os
 import select
@@ -12,7 +11,7 @@ from typing import TextIO
 import tyro
 
 import poise
-from poise.configs.errors import ConfigError, PoiseError, shown
+from poise.configs.errors import ConfigError, PoiseError, meant, shown
 from poise.training.running.stopping import (
     exit_at_once,
     ignore_stops,
@@ -92,9 +91,7 @@ def _unread(stream: TextIO | None) -> bool:
 
 def _unknown(name: str) -> ConfigError:
     """The error of a sub-command that does not exist, with the one that it looks like."""
-    near = difflib.get_close_matches(name, COMMANDS, n=1)
-    hint = f", did you mean {near[0]}?" if near else ""
-    return ConfigError(f"no such command: {shown(name)}{hint}", choices=COMMANDS)
+    return ConfigError(f"no such command: {shown(name)}{meant(name, COMMANDS)}", choices=COMMANDS)
 
 
 def _shell(given: list[str]) -> str:

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.reach import Reach
 from poise.baselines.walking.schedule import TimedCommand
 from poise.configs.errors import PoiseError
 from poise.envs.pushes.push import Push
@@ -47,6 +48,10 @@ class Play(Protocol):
     @property
     def gait(self) -> GaitCommand | None:
         """What those that walk are told now; None where nothing walks."""
+
+    @property
+    def reach(self) -> Reach | None:
+        """What all those that walk can be told; None where one of them does not say."""
 
     @property
     def ended(self) -> bool:
@@ -108,6 +113,11 @@ class Live:
         return self.session.command if self.session.walks else None
 
     @property
+    def reach(self) -> Reach | None:
+        """What all those that walk can be told."""
+        return self.session.reach
+
+    @property
     def yaw(self) -> float:
         """Of the heading at the reset [rad]."""
         return self.session.sides[0].env.simulation.start_yaw
@@ -159,7 +169,7 @@ class Live:
 class Recorded:
     """Frames that were recorded before; see `recorded_trial`."""
 
-    live, yaw, gait = False, 0.0, None
+    live, yaw, gait, reach = False, 0.0, None, None
 
     def __init__(
         self, spec: TrialSpec, robot: Robot, history: Sequence[Frames], period: float,

@@ -11,6 +11,7 @@ from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.registry import walking_controllers
 from poise.baselines.walking.command import GaitCommand, command_of
+from poise.baselines.walking.reach import Reach, shared_reach
 from poise.baselines.walking.schedule import MOST_COMMANDS, TimedCommand, parse_commands
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.pushes.options import parse_pushes
@@ -136,6 +137,11 @@ class Session:
         return any(side.walker is not None for side in self.sides)
 
     @property
+    def reach(self) -> Reach | None:
+        """What all that walk can be told; None where one of them does not say, or none walks."""
+        return shared_reach([each.walker.reach for each in self.sides if each.walker is not None])
+
+    @property
     def command(self) -> GaitCommand:
         """The command that holds now."""
         so_far = [each for each in self.commands if each.start <= self.time + SOON]
@@ -146,18 +152,23 @@ class Session:
 
         `fields` are those of `GaitCommand`. Commands that were known for later do not come.
 
+        What is refused leaves the command that holds.
+
         Raises:
-            ConfigError: a field that is not valid; no controller walks.
+            ConfigError: a field that is not valid; a command out of a robot's reach, with its
+                limits; no controller walks.
             PoiseError: there have been as many commands as an episode may have.
         """
         (command,) = parse_commands({**fields, "start": self.time}, "command")
-        walkers = self._expect_walkers()
+        walkers, told = self._expect_walkers(), command_of(command.array())
+        for walker in walkers:  # before one of them is told
+            walker.check_command(told)
         before = tuple(each for each in self.commands if each.start < self.time - SOON)
         if len(before) == MOST_COMMANDS:
             raise PoiseError(f"at most {MOST_COMMANDS} commands: begin anew by Reset")
         self.commands = (*before, command)
         for walker in walkers:
-            walker.command = command_of(command.array())
+            walker.command = told
         return command
 
     def _expect_walkers(self) -> list[CommandedEnv]:

@@ -17,7 +17,7 @@ from poise.baselines.plugins import find_plugin, make_plugin, plugin_config
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.reading import RIVALS, is_policy
 from poise.baselines.registry import ControllerConfig, controller_config, walking_controllers
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.files import packaged
 from poise.configs.reading import is_file, is_folder
 from poise.configs.schema import to_dict, to_yaml
@@ -84,9 +84,9 @@ def check_name(name: str) -> None:
     of_file = is_file(name) and Path(name).suffix in (".yaml", ".yml")
     if not (name in names or of_file or is_folder(name) or is_policy(name) or is_plugin(name)):
         raise ConfigError(
-            f"no such controller: {shown(name)}; give a name, a .yaml file of a controller, "
-            "a folder written by poise train, an ONNX file or a folder with a deploy.yaml, or "
-            "module:Class",
+            f"no such controller: {shown(name)}{meant(name, names) or ';'} give a name, a .yaml "
+            "file of a controller, a folder written by poise train, an ONNX file or a folder with "
+            "a deploy.yaml, or module:Class",
             field="controller",
             choices=names,
         )

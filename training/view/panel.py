@@ -104,7 +104,7 @@ class Panel:
         self.body.options = bodies
         self.body.value = "torso" if "torso" in bodies else bodies[0]
         self.impulse.value = round(WEIGHT * play.robot.mass, 1)
-        self.walk.set_visible(play.gait is not None)
+        self.walk.set_up(play.gait, play.reach)
         if isinstance(spec, TrialSpec):
             self.trial.value = spec.trial
             return

@@ -155,6 +155,21 @@ def test_the_error_of_a_stride_is_that_of_the_walk(env):
     assert env.recovered == (np.hypot(*found[:2]) < 0.036 * s.omega * s.height)
 
 
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ({"ahead": [0.2, 9.0]}, r"command\.ahead: 9 m/s .* 'humanoid' can at most .* 1\.85 m/s"),
+        ({"ahead": [-3.0, 0.5]}, r"command\.ahead: -3 m/s .* at most"),
+        ({"ahead": 0.0, "left": [-0.1, 4.0]}, r"command\.left: 4 m/s .* at most"),
+    ],
+)
+def test_what_may_be_drawn_is_within_reach_when_the_environment_is_made(command, said):
+    """One line with the robot's limits; nothing waits for the draw that goes wrong."""
+    with pytest.raises(ConfigError, match=said) as caught:
+        ResidualWalkEnv(robot(), command=command, **SHORT)
+    assert "\n" not in str(caught.value)
+
+
 def test_commands_are_drawn_by_the_environments_own_generator():
     """A vector environment draws another schedule in each, the same for the same seed."""
     ranges = {"ahead": [0.2, 0.6], "turn": [-0.2, 0.2], "interval": [0.1, 0.2]}

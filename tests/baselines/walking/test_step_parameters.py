@@ -11,7 +11,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import load_controller
 from poise.baselines.walking.arms import arm_scales, largest_swing
 from poise.baselines.walking.command import GaitCommand, command_of
-from poise.baselines.walking.reach import least_width
+from poise.baselines.walking.reach import TOLD, least_width, shared_reach
 from poise.configs.errors import ConfigError
 from tests.support.shared import robot
 
@@ -121,6 +121,7 @@ def test_a_width_is_commanded(width):
     ("command", "said"),
     [
         ({"ahead": 9.0}, r"command\.ahead: 9 m/s is steps of .* 'humanoid' can at most .* m/s"),
+        ({"left": -2.0}, r"left: -2 m/s is .* to the side .* 'humanoid' can at most .* m/s"),
         ({"ahead": 0.5, "clearance": 0.9}, r"clearance: 0\.9 m is out of reach.* joints end"),
         ({"ahead": 0.5, "width": 0.05}, r"width: 0\.05 m is out of reach.* soles do not overlap"),
         ({"ahead": 0.5, "width": 1.0}, r"width: 1 m is out of reach"),
@@ -137,6 +138,46 @@ def test_a_command_out_of_reach_is_refused_with_the_limits_of_the_robot(command,
     with pytest.raises(ConfigError, match=said):
         env.command = command
     assert env.command == GaitCommand(0.4)
+
+
+@pytest.mark.parametrize("name", ["humanoid", "toddler"])
+def test_the_reach_of_a_robot_is_what_it_is_not_refused(name):
+    """Each end by itself is taken, and what is beyond it is not."""
+    walker = load_controller("walk", robot(name))
+    reach, said = walker.reach, {}
+    for told in TOLD:
+        for end, sign in zip(getattr(reach, told), (-1.0, 1.0), strict=True):
+            if end == 0.0:  # to have none is no command
+                continue
+            for outside in (False, True):
+                value = end + sign * 3e-3 * outside  # [m], [m/s] or [rad]
+                said[told, sign, outside] = _refused(walker, told, value)
+    assert len(said) == 2 * 9 and {key: key[2] for key in said} == said
+    assert reach.own_width == pytest.approx(0.288 * robot(name).height_com)
+
+
+def _refused(walker, told, value):
+    """Whether a walk, slow enough for it, is refused such a step."""
+    command = {told: value}
+    if told == "clearance":  # the longest swing that the planner takes
+        command["step_time"] = walker.gait_limits.time_max / walker.robot.omega
+    if told == "step_length":
+        command["ahead"] = 0.2
+    try:
+        walker.check_command(GaitCommand(**command))
+    except ConfigError as error:
+        assert error.field == f"command.{'ahead' if told == 'step_length' else told}"
+        return True
+    return False
+
+
+def test_robots_side_by_side_reach_what_both_do():
+    """A walk that does not say what it reaches leaves nothing to offer."""
+    large, small = (load_controller("walk", robot(name)).reach for name in ("humanoid", "toddler"))
+    both = shared_reach([large, small])
+    assert both.width == (large.width[0], small.width[1]) and both.period == large.period
+    assert both.ahead[1] == small.ahead[1] > 0.0 and both.left[0] == small.left[0] < 0.0
+    assert shared_reach([large, None]) is None and shared_reach([]) is None
 
 
 def test_a_robot_without_named_arms_swings_none():

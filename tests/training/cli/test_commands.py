@@ -134,7 +134,11 @@ def test_a_broken_pipe_of_another_kind_is_raised(
     [
         (["evaluate", "pid"], "no such controller: 'pid'"),
         (["evaluate"], "controller: give at least one"),
-        (["evaluate", "zero", "--suite", "rndom"], "no such name: 'rndom'"),
+        (
+            ["evaluate", "momentum-pq"],
+            "'momentum-pq', did you mean momentum-qp? give a",
+        ),
+        (["evaluate", "zero", "--suite", "rndom"], "no such name: 'rndom', did you mean random? g"),
         (["evaluate", "zero", "--robot", "robby"], "no such name: 'robby'"),
         (["evaluate", "zero", "--workers", "0"], "workers: must be at least 1"),
         (

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.motions.motion import load_motion
+from poise.baselines.walking.command import GaitCommand
 from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
@@ -253,6 +254,20 @@ def test_a_command_takes_the_place_of_what_was_planned(walk: Session) -> None:
     assert session.sides[0].walker.command.ahead == 0.6
     session.reset()
     assert session.commands == planned and session.sides[0].walker.command.ahead == 0.2
+
+
+def test_a_command_out_of_reach_leaves_the_one_that_holds(walk: Session) -> None:
+    """In the session and its trial, too, so that what it saves is what was played."""
+    walk.reset()
+    walk.walk(ahead=0.3, width=0.25)
+    walk.step()
+    held, trial = walk.command, walk.trial
+    for wrong in ({"width": 2.0}, {"ahead": 0.3, "clearance": 0.5}, {"ahead": 9.0}):
+        with pytest.raises(ConfigError, match="is out of reach: 'humanoid' can"):
+            walk.walk(**wrong)
+    assert walk.command == held and walk.trial == trial
+    walker = walk.sides[0].walker
+    assert walker is not None and walker.command == GaitCommand(0.3, width=0.25)
 
 
 def test_what_does_not_walk_takes_no_command(session: Session, walk: Session) -> None:

@@ -21,6 +21,7 @@ pytest.importorskip("mjviser", reason="not installed: pip install 'poise[view]'"
 
 import viser
 
+from poise.baselines.walking.schedule import TimedCommand
 from poise.configs.errors import ConfigError
 from poise.envs.viewing.quantities import COM, REFERENCE
 from poise.training.sessions.live import Live, Play
@@ -321,17 +322,47 @@ def test_sliders_command_a_walk(view: BrowserView) -> None:
     sliders = view.panel.walk.sliders
     run_until(view, lambda: view.play.at > 2)
     assert view.panel.walk._folder.visible
-    assert [round(s.value, 3) for s in sliders.values()] == [0.5, 0.0, 6.0]  # 0.1 rad/s is 5.7°/s
+    shown = [round(s.value, 3) for s in sliders.values()]  # 0.1 rad/s is 5.7°/s
+    assert shown == [0.5, 0.0, 6.0, 0.225, 0.055, 0.16, 0.0]  # then what the gait does by itself
     sliders["ahead"].value, sliders["turn"].value = 0.3, -10.0
     for _ in range(50):
-        view.panel.walk._updated(SimpleNamespace(client_id=1))  # as when a user drags
+        dragged(view, "turn")
         view.run(0.02)
     commands = view.play.session.commands
     assert 2 <= len(commands) < 10
-    assert (commands[-1].ahead, commands[-1].turn) == (0.3, -0.1745)
+    assert view.play.session.command == TimedCommand(0.3, 0.0, -0.1745, start=commands[-1].start)
+    refuse_and_keep(view)
     view.reset()
     assert view.play.session.command.ahead == 0.5
     run_until(view, lambda: sliders["ahead"].value == 0.5)
+
+
+def dragged(view: BrowserView, name: str) -> None:
+    """As when a user moves a slider."""
+    view.panel.walk._updated(name, SimpleNamespace(client_id=1))
+
+
+def refuse_and_keep(view: BrowserView) -> None:
+    """Steps are commanded within the robot's reach, refused beyond it, and given back."""
+    sliders, session = view.panel.walk.sliders, view.play.session
+    width, reach = sliders["width"], session.reach
+    assert reach is not None and -1e-9 < width.min - reach.width[0] < 0.005
+    assert -1e-9 < reach.width[1] - width.max < 0.005
+    width.value, sliders["arm_swing"].value = 0.3, 20.0
+    dragged(view, "width")
+    dragged(view, "arm_swing")
+    run_until(view, lambda: session.command.width == 0.3)
+    held = session.command
+    assert (held.arm_swing, held.clearance, held.step_length) == (0.3491, None, None)
+    sliders["clearance"].value = sliders["clearance"].max  # not in a step as quick as these
+    dragged(view, "clearance")
+    run_until(view, lambda: sliders["clearance"].value < 0.06)
+    assert session.command == held and width.value == 0.3
+    assert "command.clearance" in view._pages._last[1] and "'humanoid' can" in view._pages._last[1]
+    view.panel.walk._give_back(SimpleNamespace(client_id=1))
+    run_until(view, lambda: session.command.width is None)
+    run_until(view, lambda: width.value < 0.23 and sliders["arm_swing"].value == 0.0)
+    assert session.command.ahead == 0.3
 
 
 def test_a_dragged_slider_gives_few_commands() -> None:
