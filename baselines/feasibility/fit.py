@@ -15,7 +15,7 @@ from poise.envs.robots.robot import Robot
 
 from .bearable import bearable_region
 from .check import RATE, Feasibility, FeasibilityLimits, check_motion, judge
-from .planted import PlantedLegs
+from poise.baselines.motions.legs import PlantedLegs
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 
 TEMPOS = (0.9, 0.8, 0.7, 0.6, 0.5)

@@ -17,7 +17,7 @@ from poise.envs.robots.robot import Robot
 from .check import Feasibility, FeasibilityLimits
 from .curve import Curve
 from .ends import Attempt, End
-from .planted import PlantedLegs
+from poise.baselines.motions.legs import PlantedLegs
 from .shape import Shaper
 from .trajectory import PlantedRobot
 

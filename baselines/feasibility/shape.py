@@ -16,7 +16,7 @@ from .check import Feasibility, FeasibilityLimits, check_joints, judge
 from .curve import Boundary, Curve, bend_shapes, jerk_matrix
 from .edges import EDGE, between_clips
 from .ends import Attempt, End
-from .planted import PlantedLegs
+from poise.baselines.motions.legs import PlantedLegs
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 
 NEIGHBOURS = 10  # frames of the clips beside a join that are looked at with it

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from poise.baselines.feasibility.planted import PlantedLegs
+from poise.baselines.motions.legs import PlantedLegs
 from poise.baselines.feasibility.trajectory import PlantedRobot
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.robot_clip import About, RobotClip

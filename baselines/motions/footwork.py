@@ -1,0 +1,205 @@
+"""A motion whose feet leave the ground, with a centre of mass that the soles on it can bear."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from scipy.linalg import solve_banded
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
+from scipy.spatial.transform import Rotation
+
+from poise.configs.errors import ConfigError
+from poise.envs.robots.robot import Robot
+
+from .feet import bearing_polygon, nominal_feet
+from .legs import PlantedLegs
+from .splines import rest_spline
+
+SHIFT = 0.8  # [s] that the ZMP takes from one foot to the other at most
+ROUNDS = 5  # times that the CoM is moved for what the limbs' momentum does to the ZMP, and the root
+# is turned where a leg's joint is at its limit
+MARGIN = 0.02  # [rad] that joints of legs keep from their limits
+SOFT = 0.1  # [s] over which turns of the root are smoothed
+UNREACHED = 2e-3  # [m, rad] that a sole or the CoM may be off
+
+
+class FootPlan(NamedTuple):
+    """What a motion asks of a robot in F frames, but for its legs and where its CoM goes.
+
+    Attributes:
+        dt: time between frames [s].
+        joints: (F, nj) of which those of the legs are a first guess [rad].
+        root: (F, 3) rotation vector φ of the root from standing [rad].
+        height: (F,) of the CoM over the ground [m].
+        places: (F, 2, 3) of the soles' points, over the ground [m]; turns: (F, 2, 3) of the soles
+            from where they are in standing [rad].
+        planted: (F, 2) bool.
+    """
+
+    dt: float
+    joints: np.ndarray
+    root: np.ndarray
+    height: np.ndarray
+    places: np.ndarray
+    turns: np.ndarray
+    planted: np.ndarray
+
+
+def com_over(zmp: np.ndarray, share: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """(n, m) c of c − s Δ²c = p: a pendulum over its ZMP p (n, m), at `begin` and `end` (m,).
+
+    `share` (n,) is s = h/((g + c̈_z) Δt²); a tridiagonal system, which has no unstable direction
+    since both ends are given.
+    """
+    bands = np.zeros((3, len(share)))
+    bands[1] = 1.0 + 2.0 * share
+    bands[0, 2:], bands[2, :-2] = -share[1:-1], -share[1:-1]
+    bands[1, [0, -1]] = 1.0
+    right = zmp.copy()
+    right[0], right[-1] = begin, end
+    return np.asarray(solve_banded((1, 1), bands, right))
+
+
+def plan_zmp(robot: Robot, plan: FootPlan, rest: np.ndarray) -> np.ndarray:
+    """(F, 2) the ZMP: in the middle of what one sole bears, between on both, at `rest` in the end.
+
+    `rest` (2,) is the CoM of standing from the middle of the soles [m]. On both soles it goes from
+    one to the next by α(u) = 10u³ − 15u⁴ + 6u⁵, in the last 0.8 s before a foot lifts off and the
+    first 0.8 s after it is down.
+    """
+    middles = [bearing_polygon(robot, i, 1.0, 0.95).mean(axis=0) for i in range(2)]
+    frames, out = len(plan.planted), np.empty((len(plan.planted), 2))
+
+    def over(foot: int, k: int) -> np.ndarray:
+        turn = Rotation.from_rotvec(plan.turns[k, foot]).as_matrix()[:2, :2]
+        return np.asarray(plan.places[k, foot, :2] + turn @ middles[foot])
+
+    both = plan.planted.all(axis=1)
+    for k in np.flatnonzero(~both):
+        out[k] = over(int(np.argmax(plan.planted[k])), k)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], both.astype(int), [0]])))
+    for a, b in edges.reshape(-1, 2):
+        middle = plan.places[a, :, :2].mean(axis=0) + rest
+        before = middle if a == 0 else out[a - 1]
+        after = middle if b == frames else over(int(np.argmax(plan.planted[b])), b)
+        length = int(round(SHIFT / plan.dt))
+        if b - a <= 2 * length and a > 0 and b < frames:
+            out[a:b] = before + _ease(b - a) * (after - before)
+            continue
+        out[a:b] = middle
+        count = min(length, b - a)
+        if a > 0:
+            out[a : a + count] = before + _ease(count) * (middle - before)
+        if b < frames:
+            out[b - count : b] = middle + _ease(count) * (after - middle)
+    return out
+
+
+def _ease(count: int) -> np.ndarray:
+    u = (np.arange(count)[:, None] + 1.0) / (count + 1.0)
+    return np.asarray(u**3 * (10.0 - 15.0 * u + 6.0 * u**2))
+
+
+def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
+    """(F, nq) postures of a plan: the CoM over its ZMP, and legs that reach their soles.
+
+    The CoM c solves c − h/(g + c̈_z) c̈ = p. What the limbs' angular momentum moves the ZMP by is
+    then taken off p, and the root turned where a leg's joint is at its limit, a few times.
+
+    Raises:
+        ConfigError: a place that the legs cannot reach, or a joint out of its range.
+    """
+    legs, ground = PlantedLegs(robot), float(nominal_feet(robot)[:, 2].mean())
+    standing = robot.standing_qpos
+    times = np.arange(len(plan.height)) * plan.dt
+    middle = nominal_feet(robot).mean(axis=0)
+    rest = _com(robot, standing)[:2] - middle[:2]
+    zmp = plan_zmp(robot, plan, rest)
+    vertical = rest_spline(times, plan.height[:, None])(times, 2)[:, 0]
+    share = plan.height / (robot.units.gravity + vertical) / plan.dt**2
+    wanted, qpos = zmp.copy(), np.empty((0, robot.model.nq))
+    for k in range(ROUNDS):
+        com = com_over(wanted, share, zmp[0], zmp[-1])
+        whole = np.column_stack([com, plan.height + ground])
+        qpos, turns = _reached(robot, legs, plan, whole, ground, source)
+        if k + 1 < ROUNDS:
+            wanted = wanted + zmp - real_zmp(robot, qpos, plan.dt, ground)
+            plan = plan._replace(root=plan.root + _smoothed(turns, SOFT / plan.dt))
+    low, high = robot.joint_range.T
+    over = np.maximum(low - qpos[:, 7:], qpos[:, 7:] - high)
+    frame, joint = np.unravel_index(int(np.argmax(over)), over.shape)
+    if over[frame, joint] > 0.0:
+        raise ConfigError(
+            f"joint {robot.joint_names[joint]!r} would be {np.degrees(over[frame, joint]):.2g}° "
+            f"beyond its range at {times[frame]:.2f} s", source=source, field="feet",
+        )  # fmt: skip
+    return qpos
+
+
+def real_zmp(robot: Robot, qpos: np.ndarray, dt: float, ground: float) -> np.ndarray:
+    """(F, 2) the ZMP of a motion by its momentum: m c̈ and L̇ of the whole body [m]."""
+    times = np.arange(len(qpos)) * dt
+    com, spin = np.empty((len(qpos), 3)), np.empty((len(qpos), 3))
+    data, model, velocity = mujoco.MjData(robot.model), robot.model, np.empty(robot.model.nv)
+    for k in range(len(qpos)):
+        a, b = max(k - 1, 0), min(k + 1, len(qpos) - 1)
+        mujoco.mj_differentiatePos(model, velocity, (b - a) * dt, qpos[a], qpos[b])
+        data.qpos[:], data.qvel[:] = qpos[k], velocity
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        com[k] = data.subtree_com[robot.root_body_id]
+        spin[k] = data.subtree_angmom[robot.root_body_id]
+    force = rest_spline(times, com)(times, 2) + [0.0, 0.0, robot.units.gravity]
+    moment = rest_spline(times, spin)(times, 1) / robot.mass
+    h = com[:, 2] - ground
+    lever = np.column_stack([h * force[:, 0] + moment[:, 1], h * force[:, 1] - moment[:, 0]])
+    return np.asarray(com[:, :2] - lever / force[:, 2:])
+
+
+def _reached(
+    robot: Robot, legs: PlantedLegs, plan: FootPlan, com: np.ndarray, ground: float, source: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Postures (F, nq), and turns (F, 3) of the root that bring the legs into their range."""
+    qpos, guess = np.empty((len(com), robot.model.nq)), robot.standing_qpos[7:]
+    turned = np.zeros((len(com), 3))
+    low, high = (robot.joint_range[legs.legs] + [MARGIN, -MARGIN]).T
+    axes = Rotation.from_rotvec(plan.turns.reshape(-1, 3)).as_matrix().reshape(-1, 2, 3, 3)
+    for k, place in enumerate(com):
+        soles = [(plan.places[k, i] + [0.0, 0.0, ground], axes[k, i] @ legs.standing_soles[i][1])
+                 for i in range(2)]  # fmt: skip
+        others = plan.joints[k, legs.others]
+        qpos[k], miss = legs.reach_soles(place, plan.root[k], others, guess, soles)
+        if miss > UNREACHED:
+            raise ConfigError(
+                f"the legs cannot reach at {k * plan.dt:.2f} s: {100 * miss:.1f} cm lack",
+                source=source, field="feet",
+            )  # fmt: skip
+        guess = qpos[k, 7:]
+        q = guess[legs.legs]
+        excess = np.maximum(q - high, 0.0) - np.maximum(low - q, 0.0)
+        if (out := excess != 0.0).any():
+            rows = legs.sensitivity(plan.root[k])[out, 3:]
+            turned[k] = np.linalg.lstsq(rows, -excess[out], rcond=0.05)[0]
+    return qpos, turned
+
+
+def _smoothed(turns: np.ndarray, width: float) -> np.ndarray:
+    """Turns (F, 3) as large as they were at their peaks, without their corners."""
+    size = 2 * int(width) + 1
+    wide = np.where(
+        np.abs(low := minimum_filter1d(turns, size, axis=0))
+        > np.abs(high := maximum_filter1d(turns, size, axis=0)), low, high,
+    )  # fmt: skip
+    return np.asarray(gaussian_filter1d(wide, width, axis=0))
+
+
+def _com(robot: Robot, qpos: np.ndarray) -> np.ndarray:
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(robot.model, data)
+    mujoco.mj_comPos(robot.model, data)
+    return np.array(data.subtree_com[robot.root_body_id])
