@@ -147,7 +147,7 @@ def make_footing(
     check_planted(planted, source)
     times = np.arange(len(qpos)) * dt
     com, places, turns = sole_poses(robot, qpos)
-    root = _root_turns(robot, qpos)
+    root = root_turns(robot, qpos)
     curves = [rest_spline(times, com), rest_spline(times, root)]
     for foot in range(2):
         down = planted[:, foot]
@@ -162,7 +162,7 @@ def make_footing(
     return Footing(knots, coeffs, moments, rows)
 
 
-def _root_turns(robot: Robot, qpos: np.ndarray) -> np.ndarray:
+def root_turns(robot: Robot, qpos: np.ndarray) -> np.ndarray:
     """(F, 3) rotation vectors of the root from where it is in standing, without jumps [rad]."""
     both = Rotation.from_quat(np.roll(qpos[:, 3:7], -1, axis=1))
     standing = Rotation.from_quat(np.roll(robot.standing_qpos[3:7], -1))

@@ -21,6 +21,7 @@ SHIFT = 0.8  # [s] that the ZMP takes from one foot to the other at most
 ROUNDS = 5  # times that the CoM is moved for what the limbs' momentum does to the ZMP, and the root
 # is turned where a leg's joint is at its limit
 MARGIN = 0.02  # [rad] that joints of legs keep from their limits
+LEAD = 0.5  # [s] in which the CoM is led to rest at both ends
 SOFT = 0.1  # [s] over which turns of the root are smoothed
 UNREACHED = 2e-3  # [m, rad] that a sole or the CoM may be off
 
@@ -121,7 +122,7 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     share = plan.height / (robot.units.gravity + vertical) / plan.dt**2
     wanted, qpos = zmp.copy(), np.empty((0, robot.model.nq))
     for k in range(ROUNDS):
-        com = com_over(wanted, share, zmp[0], zmp[-1])
+        com = _led(com_over(wanted, share, zmp[0], zmp[-1]), int(LEAD / plan.dt))
         whole = np.column_stack([com, plan.height + ground])
         qpos, turns = _reached(robot, legs, plan, whole, ground, source)
         if k + 1 < ROUNDS:
@@ -195,6 +196,16 @@ def _smoothed(turns: np.ndarray, width: float) -> np.ndarray:
         > np.abs(high := maximum_filter1d(turns, size, axis=0)), low, high,
     )  # fmt: skip
     return np.asarray(gaussian_filter1d(wide, width, axis=0))
+
+
+def _led(com: np.ndarray, frames: int) -> np.ndarray:
+    """The CoM (F, 2) at rest at both ends, to which it is led over so many frames."""
+    u = np.linspace(0.0, 1.0, frames + 1)
+    fade = (u**3 * (10.0 - 15.0 * u + 6.0 * u**2))[:, None]
+    out = com.copy()
+    out[: frames + 1] = com[0] + fade * (com[: frames + 1] - com[0])
+    out[-frames - 1 :] = com[-1] + fade[::-1] * (com[-frames - 1 :] - com[-1])
+    return out
 
 
 def _com(robot: Robot, qpos: np.ndarray) -> np.ndarray:

@@ -30,6 +30,7 @@ class Performance(Block):
     samples: np.ndarray  # (3, 18) of the tick: position, velocity and acceleration, in the world
     gain: float
     margin: float  # [m]
+    margin_both: float  # [m]
     rest_time: float  # [s]
     stance_error: float  # [m]
     load_time: float  # [s]
@@ -59,6 +60,7 @@ def allocate_performance(
         samples=guarded_zeros((3, COLUMNS)),
         gain=float(c.gain),
         margin=c.margin * h,
+        margin_both=c.margin_both * h,
         rest_time=c.rest_time / omega,
         stance_error=c.stance_error * h,
         load_time=c.load_time / omega,

@@ -17,8 +17,9 @@ class PerformConfig:
     """
 
     gain: float = field(default=1.0, metadata=NOT_NEGATIVE)  # k of p = p_ref + (1 + k)(ξ − ξ_ref)
-    # the planner of steps takes over when p_ref + ξ − ξ_ref is so far outside what soles reach
-    margin: float = field(default=0.025, metadata=NOT_NEGATIVE)
+    # the planner of steps takes over when p_ref + ξ − ξ_ref is so far outside what one sole reaches
+    margin: float = field(default=0.03, metadata=NOT_NEGATIVE)
+    margin_both: float = field(default=0.06, metadata=NOT_NEGATIVE)  # the same of both
     rest_time: float = field(default=1.0, metadata=POSITIVE)  # on both feet before it goes on
     stance_error: float = field(default=0.04, metadata=POSITIVE)  # of the feet, to go on
     load_time: float = field(default=0.25, metadata=POSITIVE)  # in which a foot takes up its load

@@ -316,7 +316,7 @@ def perform(t: PerformTick, time: float) -> bool:
     if not m.swinging[0] and foot >= 0 and p.begun[0] != phase:
         lift_off(t, foot, phase)
     corners = reached_region(t)
-    if beyond_reach(t, corners) > p.margin:
+    if beyond_reach(t, corners) > (p.margin if m.swinging[0] else p.margin_both):
         leave(t)
         return False
     ask_for(t, corners)
