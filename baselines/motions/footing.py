@@ -18,8 +18,8 @@ from poise.envs.robots.robot import Robot
 
 from .splines import evaluate, piecewise, rest_spline
 
-#: columns of `Footing.coeffs`: c, φ, then place and turn of either sole
-COM, ROOT, PLACE, TURN, COLUMNS = 0, 3, (6, 12), (9, 15), 18
+#: columns of `Footing.coeffs`: c, φ, place and turn of either sole, then δ
+COM, ROOT, PLACE, TURN, SPIN, COLUMNS = 0, 3, (6, 12), (9, 15), 18, 20
 CREEP = 0.01  # [m] by which a planted sole may be elsewhere than in the middle of its stance
 FLAT = 0.05  # [rad] by which it may be turned from there
 BRIEF = 3  # frames that a sole is in the air at least, and on the ground
@@ -46,7 +46,8 @@ class Footing(Copyable):
     rest.
 
     Attributes:
-        knots: (k+1,) [s]; coeffs: (k, 4, 18), see `splines.piecewise` and COM to TURN.
+        knots: (k+1,) [s]; coeffs: (k, 4, 20), see `splines.piecewise` and COM to SPIN. δ is how far
+            c − c̈/ω² is from the ZMP: L̇, turned by a right angle, over m (g + c̈_z) [m].
         switches: (n,) rising times [s] at which the planted soles change.
         planted: (n+1, 2) int: 1 where a sole is, before the first of these times, between them,
             and after the last.
@@ -153,6 +154,7 @@ def make_footing(
         down = planted[:, foot]
         _check_rest(times, places[:, foot], turns[:, foot], down, source)
         curves += [_stepped(times, values[:, foot], down) for values in (places, turns)]
+    curves.append(rest_spline(times, momentum_offset(robot, qpos, dt)))
     knots, coeffs = piecewise(curves)
     changes = np.flatnonzero(np.any(np.diff(planted.astype(int), axis=0), axis=1)) + 1
     # a sole lifts off at its last planted frame, and is down at its first one
@@ -160,6 +162,26 @@ def make_footing(
     moments = times[np.where(falls, changes - 1, changes)]
     rows = np.concatenate([planted[:1], planted[changes]]).astype(np.int64)
     return Footing(knots, coeffs, moments, rows)
+
+
+def momentum_offset(robot: Robot, qpos: np.ndarray, dt: float) -> np.ndarray:
+    """(F, 2) by how much c − (h/(g + c̈_z)) c̈ is further than the ZMP, for L̇ of the body [m]."""
+    times = np.arange(len(qpos)) * dt
+    com, spin = np.empty((len(qpos), 3)), np.empty((len(qpos), 3))
+    data, model, velocity = mujoco.MjData(robot.model), robot.model, np.empty(robot.model.nv)
+    for k in range(len(qpos)):
+        a, b = max(k - 1, 0), min(k + 1, len(qpos) - 1)
+        mujoco.mj_differentiatePos(model, velocity, (b - a) * dt, qpos[a], qpos[b])
+        data.qpos[:], data.qvel[:] = qpos[k], velocity
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        com[k] = data.subtree_com[robot.root_body_id]
+        spin[k] = data.subtree_angmom[robot.root_body_id]
+    lift = rest_spline(times, com[:, 2:])(times, 2)[:, 0] + robot.units.gravity
+    moment = rest_spline(times, spin)(times, 1) / robot.mass
+    return np.asarray(np.column_stack([moment[:, 1], -moment[:, 0]]) / lift[:, None])
 
 
 def root_turns(robot: Robot, qpos: np.ndarray) -> np.ndarray:

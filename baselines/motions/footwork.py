@@ -14,6 +14,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .feet import bearing_polygon, nominal_feet
+from .footing import momentum_offset
 from .legs import PlantedLegs
 from .splines import rest_spline
 
@@ -126,7 +127,7 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
         whole = np.column_stack([com, plan.height + ground])
         qpos, turns = _reached(robot, legs, plan, whole, ground, source)
         if k + 1 < ROUNDS:
-            wanted = wanted + zmp - real_zmp(robot, qpos, plan.dt, ground)
+            wanted = wanted + zmp - real_zmp(robot, qpos, whole - [0.0, 0.0, ground], plan.dt)
             plan = plan._replace(root=plan.root + _smoothed(turns, SOFT / plan.dt))
     low, high = robot.joint_range.T
     over = np.maximum(low - qpos[:, 7:], qpos[:, 7:] - high)
@@ -139,26 +140,12 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     return qpos
 
 
-def real_zmp(robot: Robot, qpos: np.ndarray, dt: float, ground: float) -> np.ndarray:
-    """(F, 2) the ZMP of a motion by its momentum: m c̈ and L̇ of the whole body [m]."""
+def real_zmp(robot: Robot, qpos: np.ndarray, com: np.ndarray, dt: float) -> np.ndarray:
+    """(F, 2) the ZMP of postures with this CoM (F, 3) over the ground, by m c̈ and L̇ [m]."""
     times = np.arange(len(qpos)) * dt
-    com, spin = np.empty((len(qpos), 3)), np.empty((len(qpos), 3))
-    data, model, velocity = mujoco.MjData(robot.model), robot.model, np.empty(robot.model.nv)
-    for k in range(len(qpos)):
-        a, b = max(k - 1, 0), min(k + 1, len(qpos) - 1)
-        mujoco.mj_differentiatePos(model, velocity, (b - a) * dt, qpos[a], qpos[b])
-        data.qpos[:], data.qvel[:] = qpos[k], velocity
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_comVel(model, data)
-        mujoco.mj_subtreeVel(model, data)
-        com[k] = data.subtree_com[robot.root_body_id]
-        spin[k] = data.subtree_angmom[robot.root_body_id]
     force = rest_spline(times, com)(times, 2) + [0.0, 0.0, robot.units.gravity]
-    moment = rest_spline(times, spin)(times, 1) / robot.mass
-    h = com[:, 2] - ground
-    lever = np.column_stack([h * force[:, 0] + moment[:, 1], h * force[:, 1] - moment[:, 0]])
-    return np.asarray(com[:, :2] - lever / force[:, 2:])
+    cmp = com[:, :2] - com[:, 2:] * force[:, :2] / force[:, 2:]
+    return np.asarray(cmp - momentum_offset(robot, qpos, dt))
 
 
 def _reached(

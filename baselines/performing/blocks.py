@@ -27,7 +27,7 @@ class Performance(Block):
     switches: np.ndarray
     planted: np.ndarray
     pace: Pace  # of the motion's time, where it waits
-    samples: np.ndarray  # (3, 18) of the tick: position, velocity and acceleration, in the world
+    samples: np.ndarray  # (3, 20) of the tick: position, velocity and acceleration, in the world
     gain: float
     margin: float  # [m]
     margin_both: float  # [m]

@@ -1,14 +1,14 @@
 """A tick of `MotionStep` in a motion with steps; `perform_tick` is where to begin.
 
 While it performs, the soles in contact are those of the schedule, the foot in the air follows the
-motion's, and the CoM c̈ = ω² (c − p) with p = p_ref + (1 + k) (ξ − ξ_ref), kept within what the
-soles reach [Englsberger11]. When p_ref + ξ − ξ_ref is beyond that, no CoP brings ξ back, and the
+motion's, and the CoM c̈ = ω² (c − p − δ) with p = p_ref + (1 + k) (ξ − ξ_ref), kept within what the
+soles reach [Englsberger11]; δ is what the motion's angular momentum does. When p_ref + ξ − ξ_ref is beyond that, no CoP brings ξ back, and the
 planner of steps takes over. Once it has come to rest the motion goes on from the new stance.
 """
 
 import numpy as np
 
-from poise.baselines.motions.footing import COM, PLACE, ROOT, TURN
+from poise.baselines.motions.footing import COM, PLACE, ROOT, SPIN, TURN
 from poise.baselines.motions.splines import evaluate
 from poise.baselines.motions.targets import root_reference
 from poise.baselines.motions.tempo import TIME
@@ -104,14 +104,15 @@ def put_frame(t: PerformTick) -> None:
 def to_world(t: PerformTick) -> None:
     """Turn CoM and places of `samples` to the world."""
     p = t.performance
-    for column in (COM, PLACE[0], PLACE[1]):
+    for column in (COM, PLACE[0], PLACE[1], SPIN):
         for r in range(3):
             x, y = p.samples[r, column], p.samples[r, column + 1]
             x, y = turned(p.frame[COS], p.frame[SIN], x, y)
             p.samples[r, column], p.samples[r, column + 1] = x, y
-        p.samples[0, column] += p.frame[X]
-        p.samples[0, column + 1] += p.frame[Y]
-        p.samples[0, column + 2] += p.frame[GROUND]
+        if column != SPIN:
+            p.samples[0, column] += p.frame[X]
+            p.samples[0, column + 1] += p.frame[Y]
+            p.samples[0, column + 2] += p.frame[GROUND]
 
 
 @compiled
@@ -137,14 +138,15 @@ def pendulum_rate(t: PerformTick) -> float:
 
 @compiled
 def wanted_cop(t: PerformTick, gain: float, out: np.ndarray) -> None:
-    """p_ref + (1 + gain) (ξ − ξ_ref) into `out` (≥ 2,) [m]."""
+    """p_ref + (1 + gain) (ξ − ξ_ref) into `out` (≥ 2,) [m]; p_ref = c − c̈/ω² − δ is the ZMP."""
     s, samples = t.own.state, t.performance.samples
     rate = pendulum_rate(t)
     omega = np.sqrt(rate)
     for a in range(2):
         j = COM + a
         error = s.com[a] - samples[0, j] + (s.com_vel[a] - samples[1, j]) / omega
-        out[a] = samples[0, j] - samples[2, j] / rate + (1.0 + gain) * error
+        zmp = samples[0, j] - samples[2, j] / rate - samples[0, SPIN + a]
+        out[a] = zmp + (1.0 + gain) * error
 
 
 @compiled
@@ -179,7 +181,7 @@ def ask_for(t: PerformTick, corners: int) -> None:
     for a in range(2):
         own.cop[a] = c.pair[a]
         own.com[a], own.com_vel[a] = s.com[a], s.com_vel[a]
-        own.com_acc[a] = rate * (s.com[a] - own.cop[a])
+        own.com_acc[a] = rate * (s.com[a] - own.cop[a] - p.samples[0, SPIN + a])
     own.com[2] = p.samples[0, COM + 2]
     own.com_vel[2], own.com_acc[2] = p.samples[1, COM + 2], p.samples[2, COM + 2]
     copy_into(given.q_ref, own.q_ref)
