@@ -3,7 +3,6 @@
 import numpy as np
 
 from poise.baselines.controller import Targets
-from poise.baselines.motions.motion import load_motion
 from poise.baselines.performing.motion_step import MotionStep
 from poise.baselines.performing.tick import perform_tick
 from poise.baselines.stepping.blocks import CaptureTick

@@ -46,11 +46,12 @@ class Retargeted(NamedTuple):
 def retarget(
     clip: Clip, robot: Robot, *, smooth: float = SMOOTH, lead: float = LEAD, planted: bool = False
 ) -> Retargeted:
-    """The postures in which a robot does what a clip shows, with both soles where it stands.
+    """The postures in which a robot does what a clip shows, its soles planted where the clip's are.
 
     Per frame: directions of pelvis, trunk, shoulders and arms as in the clip; the hips' height in
     proportion to the legs; the CoM over its place; the soles fixed; the joints within their limits;
-    links off the floor and off each other.
+    links off the floor and off each other. Where the clip's feet move by 12 cm, trunk and arms are
+    those, the feet step as in `paces.py`, and the CoM goes where they can bear it.
 
     Args:
         clip: whose hips, knees, ankles, shoulders, elbows and wrists are known by name.
@@ -60,8 +61,9 @@ def retarget(
         planted: take the feet as planted though they move in the clip.
 
     Raises:
-        ConfigError: feet that move (without `planted`), unknown joints, fewer than 8 frames,
-            a `smooth` or `lead` that is not above 0, mink is missing.
+        ConfigError: feet that jump or turn, or steps that the legs cannot do (without `planted`);
+            unknown joints, fewer than 8 frames, a `smooth` or `lead` that is not above 0, mink is
+            missing.
         PoiseError: no posture keeps the soles and the limits.
     """
     for name, value in (("smooth", smooth), ("lead", lead)):

@@ -1,7 +1,7 @@
 """Which commands are within the reach of a robot."""
 
-from poise.baselines.stepping.config import StepLimits, SwingTask
 from poise.baselines.motions.feet import foot_signs
+from poise.baselines.stepping.config import StepLimits, SwingTask
 from poise.baselines.stepping.swing_speed import highest_lift, swing_time
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
