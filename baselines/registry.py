@@ -35,7 +35,8 @@ from .plugins import PluginConfig, PluginController, plugin_config
 ControllerConfig = (
     MomentumQPConfig | PDConfig | StablePDConfig | JacobianTransposeConfig | Kudoh02Config
     | Macchietto09Config | CapturePointConfig | LQRLIPConfig | LIPMPCConfig | PluginConfig
-    | CaptureStepConfig | IPMStepConfig | MotionStepConfig | WalkConfig | SimbiconConfig | PolicyFileConfig
+    | CaptureStepConfig | IPMStepConfig | MotionStepConfig | WalkConfig | SimbiconConfig
+    | PolicyFileConfig
 )  # fmt: skip
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration).

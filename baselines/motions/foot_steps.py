@@ -23,7 +23,7 @@ FOOT = ("left", "right")
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A place of a foot at a time, from where it is in standing; lengths in h, angles in degrees."""
+    """A place of a foot at a time, from where it is in standing; lengths in h, angles in °."""
 
     time: float = field(metadata={"min": 0.0})  # [s]
     ahead: float = 0.0

@@ -86,7 +86,7 @@ def plan_zmp(robot: Robot, plan: FootPlan, rest: np.ndarray) -> np.ndarray:
         middle = plan.places[a, :, :2].mean(axis=0) + rest
         before = middle if a == 0 else out[a - 1]
         after = middle if b == frames else over(int(np.argmax(plan.planted[b])), b)
-        length = int(round(SHIFT / plan.dt))
+        length = round(SHIFT / plan.dt)
         if b - a <= 2 * length and a > 0 and b < frames:
             out[a:b] = before + _ease(b - a) * (after - before)
             continue

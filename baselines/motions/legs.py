@@ -63,7 +63,7 @@ class PlantedLegs:
         guess: np.ndarray,
         soles: Sequence[tuple[np.ndarray, np.ndarray]],
     ) -> tuple[np.ndarray, float]:
-        """The same for a CoM in the world, `com` (3,) [m], and `soles`: points (3,), axes (3, 3)."""
+        """The same for a CoM `com` (3,) in the world [m], and `soles`: points (3,), axes (3, 3)."""
         data = self._data
         angle, turn = float(np.linalg.norm(root)), np.zeros(4)
         mujoco.mju_axisAngle2Quat(turn, root / max(angle, 1e-12), angle)

@@ -2,8 +2,9 @@
 
 While it performs, the soles in contact are those of the schedule, the foot in the air follows the
 motion's, and the CoM c̈ = ω² (c − p − δ) with p = p_ref + (1 + k) (ξ − ξ_ref), kept within what the
-soles reach [Englsberger11]; δ is what the motion's angular momentum does. When p_ref + ξ − ξ_ref is beyond that, no CoP brings ξ back, and the
-planner of steps takes over. Once it has come to rest the motion goes on from the new stance.
+soles reach [Englsberger11]; δ is what the motion's angular momentum does. When p_ref + ξ − ξ_ref is
+beyond that, no CoP brings ξ back, and the planner of steps takes over. Once it has come to rest the
+motion goes on from the new stance.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from poise.baselines.motions.footing import COM, PLACE, ROOT, SPIN, TURN
 from poise.baselines.motions.splines import evaluate
 from poise.baselines.motions.targets import root_reference
-from poise.baselines.motions.tempo import TIME
+from poise.baselines.motions.tempo import CHANGE, RATE, TIME
 from poise.baselines.stepping.cop_region import double_support_region, single_support_region
 from poise.baselines.stepping.guidance import limit_posture
 from poise.baselines.stepping.recentring import set_level_frame, stop_recentring
@@ -79,7 +80,7 @@ def sample_footing(t: PerformTick, time: float) -> None:
     p = t.performance
     evaluate(p.knots, p.coeffs, False, time, p.samples[0], p.samples[1], p.samples[2])
     if p.pace.waits:
-        rate, change = p.pace.memory[1], p.pace.memory[2]
+        rate, change = p.pace.memory[RATE], p.pace.memory[CHANGE]
         for j in range(p.samples.shape[1]):
             p.samples[2, j] = rate * rate * p.samples[2, j] + change * p.samples[1, j]
             p.samples[1, j] *= rate

@@ -110,7 +110,7 @@ def _in_turn(found: list[Pace]) -> list[Pace]:
 
 
 def _feet(clip: Clip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middles (F, 2, 2) of the feet [m], headings (F, 2) [rad], heights (F, 2) of the ankles [m]."""
+    """Middles (F, 2, 2) of the feet [m], headings (F, 2) [rad], heights (F, 2) of ankles [m]."""
     roles, all_places = clip.skeleton.roles, clip.places()
     middles, headings, heights = [], [], []
     for side in SIDES:

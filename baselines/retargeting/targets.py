@@ -50,9 +50,10 @@ def clip_targets(
 ) -> BodyTargets:
     """Targets of a clip at 30 frames a second, low-passed at `smooth` [Hz] both ways in time.
 
-    The `heading` [rad], or the feet's mean direction at the start, becomes x. Heights are relative to the highest of the
-    clip, or to 0.9 of the legs' length where nobody stands upright in it: so they are scaled by
-    the lengths of the legs. Directions are of points, so T and A as rest poses make no difference.
+    The `heading` [rad], or the feet's mean direction at the start, becomes x. Heights are relative
+    to the highest of the clip, or to 0.9 of the legs' length where nobody stands upright in it: so
+    they are scaled by the lengths of the legs. Directions are of points, so T and A as rest poses
+    make no difference.
 
     Raises:
         ConfigError: joints that are not known by name; fewer than 8 frames.

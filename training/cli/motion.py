@@ -115,8 +115,8 @@ def bring(
 ) -> None:
     """Retarget a BVH file to a robot, its soles planted where the clip's are; see docs/motions.md.
 
-    The .npz file is taken wherever a motion is named. A clip whose feet move by 12 cm becomes a motion
-    with steps, which motion-step performs. Needs pip install 'poise[motion]'.
+    The .npz file is taken wherever a motion is named. A clip whose feet move by 12 cm becomes a
+    motion with steps, which motion-step performs. Needs pip install 'poise[motion]'.
 
     Args:
         file: a .bvh file, or the name of a packaged clip.

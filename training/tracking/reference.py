@@ -66,8 +66,8 @@ class ReferenceBodies:
 
         Trunk, arms, the root's orientation and the CoM are the motion's, in the heading frame of
         the soles. The legs are those that reach the soles where these are: a foot that has come
-        down elsewhere than in the standing posture is no error of the bodies above it. Of a motion with
-        steps the legs are the motion's, too, from the soles that are planted.
+        down elsewhere than in the standing posture is no error of the bodies above it. Of a motion
+        with steps the legs are the motion's, too, from the soles that are planted.
         """
         if self.motion.footing is not None:
             return self._on_planted_soles(self.motion.footing, time, stance)

@@ -45,13 +45,14 @@ class StepErrors:
         self._placed: list[float] = []
         self._slide = 0.0
         self._resting: list[np.ndarray | None] = [None, None]
+        self._swung = [False, False]
 
     def update(self) -> None:
         """Call it after every policy step."""
         controller = self._env.controller
         performance = controller.performance if isinstance(controller, MotionStep) else None
         if performance is None or not performance.performing[0]:
-            self._resting = [None, None]
+            self._resting, self._swung = [None, None], [False, False]
             return
         x, y, ground, cos, sin = performance.frame
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
@@ -62,7 +63,7 @@ class StepErrors:
             gap = state.sole_points[foot] - places[foot]
             if not sample.planted[foot]:
                 self._swing.append(float(gap @ gap))
-                self._resting[foot] = None
+                self._resting[foot], self._swung[foot] = None, True
             elif state.contacts[foot] > 0.5 and begun:
                 self._rest(foot, state.sole_points[foot], float(np.hypot(*gap[:2])))
 
@@ -71,7 +72,7 @@ class StepErrors:
         rest = self._resting[foot]
         if rest is None:
             self._resting[foot] = point.copy()
-            if self._swing:
+            if self._swung[foot]:
                 self._placed.append(gap)
         else:
             self._slide = max(self._slide, float(np.linalg.norm((point - rest)[:2])))
