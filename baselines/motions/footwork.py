@@ -20,10 +20,11 @@ from .splines import rest_spline
 
 SHIFT = 0.8  # [s] that the ZMP takes from one foot to the other at most
 ROUNDS = 5  # times that the CoM is moved for what the limbs' momentum does to the ZMP, and the root
-# is turned where a leg's joint is at its limit
+# rolls where a leg's joint is at its limit
 MARGIN = 0.02  # [rad] that joints of legs keep from their limits
 LEAD = 0.5  # [s] in which the CoM is led to rest at both ends
 SOFT = 0.1  # [s] over which turns of the root are smoothed
+ROLLED, MOST_ROLL = 0.4, 0.1  # least rate of a joint that the root's roll helps; the roll [rad]
 UNREACHED = 2e-3  # [m, rad] that a sole or the CoM may be off
 
 
@@ -108,7 +109,7 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     """(F, nq) postures of a plan: the CoM over its ZMP, and legs that reach their soles.
 
     The CoM c solves c − h/(g + c̈_z) c̈ = p. What the limbs' angular momentum moves the ZMP by is
-    then taken off p, and the root turned where a leg's joint is at its limit, a few times.
+    then taken off p, and the root rolled where a leg's joint is at its limit, a few times.
 
     Raises:
         ConfigError: a place that the legs cannot reach, or a joint out of its range.
@@ -151,7 +152,7 @@ def real_zmp(robot: Robot, qpos: np.ndarray, com: np.ndarray, dt: float) -> np.n
 def _reached(
     robot: Robot, legs: PlantedLegs, plan: FootPlan, com: np.ndarray, ground: float, source: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Postures (F, nq), and turns (F, 3) of the root that bring the legs into their range."""
+    """Postures (F, nq), and rolls (F, 3) of the root that bring the legs into their range."""
     qpos, guess = np.empty((len(com), robot.model.nq)), robot.standing_qpos[7:]
     turned = np.zeros((len(com), 3))
     low, high = (robot.joint_range[legs.legs] + [MARGIN, -MARGIN]).T
@@ -169,9 +170,10 @@ def _reached(
         guess = qpos[k, 7:]
         q = guess[legs.legs]
         excess = np.maximum(q - high, 0.0) - np.maximum(low - q, 0.0)
-        if (out := excess != 0.0).any():
-            rows = legs.sensitivity(plan.root[k])[out, 3:]
-            turned[k] = np.linalg.lstsq(rows, -excess[out], rcond=0.05)[0]
+        if (excess != 0.0).any():
+            rolls = legs.sensitivity(plan.root[k])[:, 3]
+            needed = np.where(np.abs(rolls) > ROLLED, -excess / rolls, 0.0)
+            turned[k, 0] = np.clip(needed[np.argmax(np.abs(needed))], -MOST_ROLL, MOST_ROLL)
     return qpos, turned
 
 

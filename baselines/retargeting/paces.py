@@ -23,6 +23,7 @@ SWING = 0.4  # [s] of a step whose begin or end the clip does not show
 FLIGHT = 0.25  # [s] with both feet off the ground: longer is a jump
 LONGEST = 0.5  # [h] of a step
 LOWEST, HIGHEST = 0.05, 0.15  # [h] of the way of a foot over the ground at its highest
+DIP, MOST_DIP = 0.5, 0.35  # of its height that a foot's toes dip in the air; the turn [rad]
 WALKING = 0.98  # [h] height of the CoM between first and last step
 BEFORE, AFTER = 1.3, 1.6  # [s] of standing before the first and after the last step, at least
 FAR = 0.3  # [m] a clip whose hips move further faces that way
@@ -162,6 +163,8 @@ def plan_paces(
         way = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
         places[a : b + 1, foot] += way * (goal - places[a, foot])
         places[a : b + 1, foot, 2] += apex * _hump(u[:, 0])
+        tip = min(DIP * apex / (0.5 * float(np.ptp(robot.soles[foot].polygon[:, 0]))), MOST_DIP)
+        turns[a : b + 1, foot, 1] = tip * _hump(u[:, 0])
         turns[a : b + 1, foot, 2] += way[:, 0] * (yaw - turns[a, foot, 2])
         places[b:, foot], turns[b:, foot, 2] = goal, yaw
         planted[a + 1 : b, foot] = False
