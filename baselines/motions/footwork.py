@@ -19,12 +19,14 @@ from .legs import PlantedLegs
 from .splines import rest_spline
 
 SHIFT = 0.8  # [s] that the ZMP takes from one foot to the other at most
-ROUNDS = 5  # times that the CoM is moved for what the limbs' momentum does to the ZMP, and the root
-# rolls where a leg's joint is at its limit
+# how often the CoM is moved for what the limbs do to the ZMP; and of these how often the
+# root rolls where a leg's joint is at its limit
+ROUNDS, ROLLING = 6, 4
 MARGIN = 0.02  # [rad] that joints of legs keep from their limits
 LEAD = 0.5  # [s] in which the CoM is led to rest at both ends
 SOFT = 0.1  # [s] over which turns of the root are smoothed
 ROLLED, MOST_ROLL = 0.4, 0.1  # least rate of a joint that the root's roll helps; the roll [rad]
+AWAY = 0.04  # [m] that the ZMP may be from where it is planned
 UNREACHED = 2e-3  # [m, rad] that a sole or the CoM may be off
 
 
@@ -112,7 +114,8 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     then taken off p, and the root rolled where a leg's joint is at its limit, a few times.
 
     Raises:
-        ConfigError: a place that the legs cannot reach, or a joint out of its range.
+        ConfigError: a place that the legs cannot reach, a joint out of its range, or limbs whose
+            angular momentum takes the ZMP 4 cm from where it is planned.
     """
     legs, ground = PlantedLegs(robot), float(nominal_feet(robot)[:, 2].mean())
     standing = robot.standing_qpos
@@ -122,14 +125,21 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     zmp = plan_zmp(robot, plan, rest)
     vertical = rest_spline(times, plan.height[:, None])(times, 2)[:, 0]
     share = plan.height / (robot.units.gravity + vertical) / plan.dt**2
-    wanted, qpos = zmp.copy(), np.empty((0, robot.model.nq))
+    wanted, whole, qpos = zmp.copy(), np.empty((0, 3)), np.empty((0, robot.model.nq))
     for k in range(ROUNDS):
         com = _led(com_over(wanted, share, zmp[0], zmp[-1]), int(LEAD / plan.dt))
         whole = np.column_stack([com, plan.height + ground])
         qpos, turns = _reached(robot, legs, plan, whole, ground, source)
         if k + 1 < ROUNDS:
-            wanted = wanted + zmp - real_zmp(robot, qpos, whole - [0.0, 0.0, ground], plan.dt)
-            plan = plan._replace(root=plan.root + _smoothed(turns, SOFT / plan.dt))
+            wanted = zmp + momentum_offset(robot, qpos, plan.dt)
+            if k < ROLLING:
+                plan = plan._replace(root=plan.root + _smoothed(turns, SOFT / plan.dt))
+    away = np.linalg.norm(real_zmp(robot, qpos, whole - [0.0, 0.0, ground], plan.dt) - zmp, axis=1)
+    if away.max() > AWAY:
+        raise ConfigError(
+            f"the limbs swing too fast: the ZMP is {100 * away.max():.1f} cm from where the soles "
+            f"bear it at {times[int(np.argmax(away))]:.2f} s", source=source, field="feet",
+        )  # fmt: skip
     low, high = robot.joint_range.T
     over = np.maximum(low - qpos[:, 7:], qpos[:, 7:] - high)
     frame, joint = np.unravel_index(int(np.argmax(over)), over.shape)

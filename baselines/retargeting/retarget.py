@@ -19,7 +19,7 @@ from .targets import RATE, between_standing, clip_targets, standing_targets
 
 SMOOTH = 3.0  # [Hz] of the low-pass on what the clip asks for, and on the joints
 LEAD = 1.0  # [s] from standing into the clip, and back
-SHORTER, SHORTEST = 0.9, 0.3  # by which steps are shortened until legs reach, and the end of that
+SHORTER, SHORTEST = 0.94, 0.3  # by which steps are shortened until legs reach, and the end of that
 
 
 class Retargeted(NamedTuple):
