@@ -18,6 +18,7 @@ from .splines import rest_spline
 
 RATE = 1.0 / 30.0  # [s] between the postures of a motion with steps
 LEAST = 0.1  # [s] from lift-off to touchdown, and on both feet
+STANDING = 1.3  # [s] of standing that it takes to shift the weight to one foot, and back
 FOOT = ("left", "right")
 
 
@@ -51,10 +52,12 @@ class FootStep:
 
 def check_steps(steps: Sequence[FootStep], duration: float) -> None:
     """Raise ValueError unless one foot at a time is in the air, and both stand in the end."""
-    times = [0.0, *(t for step in steps for t in (step.lift, step.land)), duration]
+    times = [t for step in steps for t in (step.lift, step.land)]
     if any(b - a < LEAST for a, b in pairwise(times)):
-        raise ValueError(f"steps: one after the other, with {LEAST} s on both feet before, between "
-                         f"and after, not {times}")  # fmt: skip
+        raise ValueError(f"steps: one after the other, with {LEAST} s between, not {times}")
+    if min(times[0], duration - times[-1]) < STANDING - 1e-9:
+        raise ValueError(f"steps: {STANDING} s of standing are needed before the first and after "
+                         f"the last, not {times[0]:g} and {duration - times[-1]:g}")  # fmt: skip
 
 
 def plan_steps(

@@ -11,6 +11,7 @@ from poise.baselines.clips.contacts import measure_contacts
 from poise.baselines.clips.rotations import heading_angle
 from poise.baselines.clips.skeleton import SIDES
 from poise.baselines.motions.feet import foot_signs, nominal_feet
+from poise.baselines.motions.foot_steps import STANDING
 from poise.baselines.motions.footing import root_turns
 from poise.baselines.motions.footwork import FootPlan
 from poise.configs.errors import ConfigError
@@ -21,11 +22,11 @@ from .targets import RATE
 BOTH = 0.1  # [s] on both feet between two steps, at least
 SWING = 0.4  # [s] of a step whose begin or end the clip does not show
 FLIGHT = 0.25  # [s] with both feet off the ground: longer is a jump
-LONGEST = 0.5  # [h] of a step
+LONGEST = 0.45  # [h] of a step
 LOWEST, HIGHEST = 0.05, 0.15  # [h] of the way of a foot over the ground at its highest
 DIP, MOST_DIP = 0.5, 0.35  # of its height that a foot's toes dip in the air; the turn [rad]
 WALKING = 0.98  # [h] height of the CoM between first and last step
-BEFORE, AFTER = 1.3, 1.6  # [s] of standing before the first and after the last step, at least
+BEFORE, AFTER = STANDING, 1.6  # [s] of standing before the first and after the last step, at least
 FAR = 0.3  # [m] a clip whose hips move further faces that way
 TURN = 45.0  # [°] that a clip may turn
 
