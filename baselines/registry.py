@@ -10,6 +10,8 @@ from poise.baselines.in_place.lip_mpc import LIPMPC, LIPMPCConfig
 from poise.baselines.in_place.lqr_lip import LQRLIP, LQRLIPConfig
 from poise.baselines.in_place.macchietto09 import Macchietto09, Macchietto09Config
 from poise.baselines.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
+from poise.baselines.performing.config import MotionStepConfig
+from poise.baselines.performing.motion_step import MotionStep
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.policy_files.reading import is_policy, policy_config, policy_file_config
@@ -33,7 +35,8 @@ from .plugins import PluginConfig, PluginController, plugin_config
 ControllerConfig = (
     MomentumQPConfig | PDConfig | StablePDConfig | JacobianTransposeConfig | Kudoh02Config
     | Macchietto09Config | CapturePointConfig | LQRLIPConfig | LIPMPCConfig | PluginConfig
-    | CaptureStepConfig | IPMStepConfig | WalkConfig | SimbiconConfig | PolicyFileConfig
+    | CaptureStepConfig | IPMStepConfig | MotionStepConfig | WalkConfig | SimbiconConfig
+    | PolicyFileConfig
 )  # fmt: skip
 
 #: `kind` → its configuration and its controller, which takes (robot, configuration).
@@ -50,6 +53,7 @@ KINDS: dict[str, tuple[type, type]] = {
     "outside": (PluginConfig, PluginController),
     "capture-step": (CaptureStepConfig, CaptureStep),
     "ipm-step": (IPMStepConfig, IPMStep),
+    "motion-step": (MotionStepConfig, MotionStep),
     "walk": (WalkConfig, Walk),
     "simbicon": (SimbiconConfig, Simbicon),
     "policy-file": (PolicyFileConfig, PolicyFile),
@@ -92,6 +96,12 @@ def walking_controllers(*, planners: bool = False) -> list[str]:
     found = {name: controller_config(name) for name in packaged("controllers")}
     kinds = (WalkConfig,) if planners else (WalkConfig, SimbiconConfig)
     return [name for name, config in found.items() if isinstance(config, kinds)]
+
+
+def performing_controllers() -> list[str]:
+    """The packaged controllers that perform motions whose feet leave the ground."""
+    found = {name: controller_config(name) for name in packaged("controllers")}
+    return [name for name, config in found.items() if isinstance(config, MotionStepConfig)]
 
 
 def load_controller(

@@ -3,6 +3,8 @@
 import numpy as np
 
 from poise.baselines.controller import Targets
+from poise.baselines.performing.motion_step import MotionStep
+from poise.baselines.performing.tick import perform_tick
 from poise.baselines.stepping.blocks import CaptureTick
 from poise.baselines.stepping.ipm_step import energy_foothold
 from poise.baselines.stepping.swing import time_left
@@ -138,4 +140,16 @@ def walking() -> None:
     assert isinstance(walk, Walk)
     tick = walk.around(walk.blocks(env.simulation.state, env.targets))
     address_of(walk_tick, tick)
+    env.bind(tick, NO_KERNEL)
+
+
+def performing() -> None:
+    """The performance of a motion whose feet leave the ground."""
+    env = ResidualBalanceEnv(controller="motion-step", motion="kick", duration=0.1)
+    env.reset(seed=0)
+    controller = env.controller
+    assert isinstance(controller, MotionStep)
+    state, targets = env.simulation.state, env.targets
+    tick = controller.around(controller.blocks(state, controller.resting(state)), targets)
+    address_of(perform_tick, tick)
     env.bind(tick, NO_KERNEL)

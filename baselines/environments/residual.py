@@ -13,7 +13,12 @@ from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.motions.targets import motion_arrays
 from poise.baselines.motions.tempo import TIME, Tempo
-from poise.baselines.registry import ControllerConfig, load_controller
+from poise.baselines.performing.controller import Performer
+from poise.baselines.registry import (
+    ControllerConfig,
+    load_controller,
+    performing_controllers,
+)
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
@@ -118,7 +123,8 @@ class ResidualBalanceEnv(ControlledEnv):
     def motion(self) -> ReferenceMotion:
         """The reference; may be replaced between episodes.
 
-        Raises ConfigError for one of another robot.
+        Raises ConfigError for one of another robot, and for one whose feet leave the ground where
+        the controller keeps them planted.
         """
         return self._reference
 
@@ -127,7 +133,20 @@ class ResidualBalanceEnv(ControlledEnv):
         self._reference = load_motion(motion, self.robot)
         tempo = self.tempo if self._reference.moves else Tempo()
         self._motion = motion_arrays(self._reference, tempo, self.robot.height_com)
+        self._hand_over_motion()
         self._unbind()
+
+    def _hand_over_motion(self) -> None:
+        """Tell a controller that performs motions with steps which one it is to be."""
+        decides = self._base.unwrapped
+        if isinstance(decides, Performer):
+            decides.perform(self._reference, self._motion.pace)
+        elif self._reference.footing is not None:
+            raise ConfigError(
+                f"the feet of {self._reference.name!r} leave the ground, which "
+                f"{type(decides).__name__} cannot perform", source="environment", field="motion",
+                choices=performing_controllers(),
+            )  # fmt: skip
 
     @property
     def motion_time(self) -> float:

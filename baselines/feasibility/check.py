@@ -14,6 +14,7 @@ from poise.envs.robots.ground import contact_friction
 from poise.envs.robots.robot import Robot
 
 from .split import motor_torques
+from .stepped import margins, sample_stepped
 from .trajectory import Joints, PlantedRobot, Trajectory, joints_of, sample_trajectory
 
 RATE = 100.0  # [Hz] of the samples
@@ -167,7 +168,8 @@ def check_motion(
     """What a robot needs to do a motion, 100 times a second, against what it has.
 
     Checked is what controllers are asked for: the C² motion of the joints, at rest at both ends,
-    with the soles where they stand. M v̇ + h in the root's rows is the wrench of the ground.
+    with the soles where they stand. Of a motion with steps only the soles that its schedule has
+    planted bear anything. M v̇ + h in the root's rows is the wrench of the ground.
 
     Raises:
         ConfigError: a clip that is no motion of this robot, see `reference_from`.
@@ -175,7 +177,10 @@ def check_motion(
     if isinstance(motion, RobotClip):
         motion = reference_from(motion, robot, motion.about.name)
     times = np.arange(0.0, min(motion.duration, LONGEST) + 1e-9, 1.0 / RATE)
-    return check_joints(PlantedRobot(robot), joints_of(motion), times, limits)
+    planted = PlantedRobot(robot)
+    if motion.footing is not None:
+        return judge(robot, sample_stepped(planted, motion, times), limits)
+    return check_joints(planted, joints_of(motion), times, limits)
 
 
 def check_joints(
@@ -193,23 +198,27 @@ def judge(
 ) -> Feasibility:
     """A sampled trajectory against limits."""
     force, support = trajectory.wrench[:, :3], trajectory.support
-    normals, offsets = half_planes(support)
+    if trajectory.planted is None:
+        normals, offsets = half_planes(support)
+        margin = (offsets - trajectory.zmp @ normals.T).min(axis=1)
+        drift = np.linalg.norm(trajectory.corners - trajectory.corners[0], axis=2).max(axis=1)
+    else:
+        margin, drift = margins(robot, trajectory)
     joints = trajectory.qpos[:, 7:]
     excess = np.maximum(robot.joint_range[:, 0] - joints, joints - robot.joint_range[:, 1])
-    moved = np.linalg.norm(trajectory.corners - trajectory.corners[0], axis=2)
     torque = motor_torques(robot, trajectory) / np.asarray(robot.torque_limit)
     return Feasibility(
         limits=limits or FeasibilityLimits(),
         times=trajectory.times,
         zmp=trajectory.zmp,
         support=support,
-        zmp_margin=(offsets - trajectory.zmp @ normals.T).min(axis=1),
+        zmp_margin=margin,
         friction=np.hypot(force[:, 0], force[:, 1]) / (ground_friction(robot) * force[:, 2]),
         load=force[:, 2] / robot.units.force,
         torque=np.abs(torque),
         speed=np.abs(trajectory.qvel[:, 6:]),
         excess=excess,
-        drift=moved.max(axis=1),
+        drift=drift,
         gap=None,
         motors=robot.motor_names,
         joints=robot.joint_names,

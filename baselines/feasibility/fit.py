@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_banded
 
+from poise.baselines.motions.footwork import com_over
+from poise.baselines.motions.legs import PlantedLegs
 from poise.baselines.motions.reference_motion import ReferenceMotion
-from poise.baselines.motions.robot_clip import RobotClip, reference_from
+from poise.baselines.motions.robot_clip import RobotClip, check_both_planted, reference_from
 from poise.configs.errors import PoiseError
 from poise.envs.maths.polygons import half_planes, nearest_inside
 from poise.envs.robots.robot import Robot
 
 from .bearable import bearable_region
 from .check import RATE, Feasibility, FeasibilityLimits, check_motion, judge
-from .planted import PlantedLegs
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 
 TEMPOS = (0.9, 0.8, 0.7, 0.6, 0.5)
@@ -57,6 +57,7 @@ def fit_motion(clip: RobotClip, robot: Robot, limits: FeasibilityLimits | None =
         NotFitted: nothing helps; the worst sample is named.
         ConfigError: the clip is no motion of this robot.
     """
+    check_both_planted(clip, clip.about.name, "a fit")
     slowed = [(1.0, clip), *((tempo, replace(clip, dt=clip.dt / tempo)) for tempo in TEMPOS)]
     for tempo, slow in slowed:
         judged = check_motion(slow, robot, limits)
@@ -116,13 +117,8 @@ def zmp_offset(path: Trajectory, wanted: np.ndarray, gravity: float) -> np.ndarr
     step = path.times[1] - path.times[0]
     height = path.com[:, 2] - path.height
     share = height / (gravity + path.com_acc[:, 2]) / step**2
-    bands = np.zeros((3, len(share)))
-    bands[1] = 1.0 + 2.0 * share
-    bands[0, 2:], bands[2, :-2] = -share[1:-1], -share[1:-1]
-    bands[1, [0, -1]] = 1.0
-    right = wanted.copy()
-    right[[0, -1]] = 0.0
-    return np.asarray(solve_banded((1, 1), bands, right))
+    still = np.zeros(2)
+    return com_over(wanted, share, still, still)
 
 
 def _wanted(planted: PlantedRobot, path: Trajectory, judged: Feasibility) -> np.ndarray | None:

@@ -10,6 +10,7 @@ from poise.baselines.controller import Targets
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.motions.targets import motion_arrays, update_targets
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .check import Feasibility
@@ -30,8 +31,11 @@ def with_gap(
     CoP. The gap is ‖[ΔP; ΔL/h]‖/(m g) of Δ = A v̇_qp − A v̇_ref, h the CoM's standing height: what
     of the motion's own acceleration the QP has to give up for its cones, torques and limits, and
     for what its tasks weigh. The CoM is asked for where the motion has it, without the offset of a
-    controller's gains.
+    controller's gains. Raises ConfigError for a motion with steps.
     """
+    if motion.footing is not None:
+        raise ConfigError("is not for motions with steps: this QP keeps both soles planted",
+                          source=motion.name, field="qp")  # fmt: skip
     planted, qp = PlantedRobot(robot), MomentumQP(robot, config)
     block, none = motion_arrays(motion), np.zeros(RESIDUALS)
     gaps = np.empty(len(judged.times))

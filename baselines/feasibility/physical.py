@@ -8,16 +8,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from poise.baselines.motions.legs import PlantedLegs
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
-from poise.baselines.motions.robot_clip import RobotClip, reference_from
+from poise.baselines.motions.robot_clip import RobotClip, check_both_planted, reference_from
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.robots.robot import Robot
 
 from .check import Feasibility, FeasibilityLimits
 from .curve import Curve
 from .ends import Attempt, End
-from .planted import PlantedLegs
 from .shape import Shaper
 from .trajectory import PlantedRobot
 
@@ -109,9 +109,11 @@ def physical_join(
         limits: what the join has to keep.
 
     Raises:
-        ConfigError: a time outside of its clip, or a motion of another robot.
+        ConfigError: a time outside of its clip, a motion of another robot, or one with steps.
         JoinRefused: no duration is possible, nor the way by standing.
     """
+    for clip in (before, after):
+        check_both_planted(clip, clip.about.name, "a physical join")
     motions = [reference_from(clip, robot, clip.about.name) for clip in (before, after)]
     last = _frame(before, before.duration if leave is None else leave, "leave")
     _frame(after, enter, "enter")

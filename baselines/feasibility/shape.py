@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+from poise.baselines.motions.legs import PlantedLegs
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.solvers import QP, make_solver
 from poise.envs.maths.polygons import half_planes
@@ -16,7 +17,6 @@ from .check import Feasibility, FeasibilityLimits, check_joints, judge
 from .curve import Boundary, Curve, bend_shapes, jerk_matrix
 from .edges import EDGE, between_clips
 from .ends import Attempt, End
-from .planted import PlantedLegs
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 
 NEIGHBOURS = 10  # frames of the clips beside a join that are looked at with it

@@ -26,6 +26,9 @@ def split_wrench(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     unit, limit = robot.units.force, np.asarray(robot.torque_limit)
     G = wrench_sums(trajectory)
     B = unit * (trajectory.jacobians[:, :, robot.motor_dofs] / limit).transpose(0, 2, 1)
+    if trajectory.planted is not None:  # a sole in the air bears nothing
+        bears = np.repeat(trajectory.planted, 6, axis=1)[:, None]
+        G, B = G * bears, B * bears
     b, wanted = trajectory.motors / limit, trajectory.wrench / unit
     size = np.concatenate([np.append(np.ones(3), _lever(sole.polygon)) for sole in robot.soles])
     H = B.transpose(0, 2, 1) @ B + SUM * G.transpose(0, 2, 1) @ G + np.diag(LEAST / size**2)
@@ -34,7 +37,8 @@ def split_wrench(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     below = np.full(cones.shape[1], -np.inf), np.zeros(cones.shape[1])
     solver = make_solver("active-set")
     solved = [solver.solve(QP(H[k], g[k], cones[k], *below)).x for k in range(len(H))]
-    return unit * np.array(solved).reshape(len(H), -1)
+    out = unit * np.array(solved).reshape(len(H), -1)
+    return out if trajectory.planted is None else out * np.repeat(trajectory.planted, 6, axis=1)
 
 
 def motor_torques(robot: Robot, trajectory: Trajectory) -> np.ndarray:

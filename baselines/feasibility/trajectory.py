@@ -32,6 +32,7 @@ class Trajectory(NamedTuple):
         jacobians: (n, 6 nc, nv) of the soles, linear then angular, at their points.
         sole_points: (n, nc, 3) [m]; sole_axes: (n, nc, 3, 3); corners: (n, k, 3) of all [m].
         height: of the plane of the soles [m].
+        planted: (n, nc) bool, which soles the ground bears; None: all, always.
     """
 
     times: np.ndarray
@@ -47,6 +48,7 @@ class Trajectory(NamedTuple):
     sole_axes: np.ndarray
     corners: np.ndarray
     height: float
+    planted: np.ndarray | None = None
 
     @property
     def zmp(self) -> np.ndarray:
@@ -89,6 +91,11 @@ class PlantedRobot:
         self._origin = self._middle(robot.standing_qpos)
 
     @property
+    def ground(self) -> float:
+        """Height of the plane of the soles [m]."""
+        return float(self._origin[2])
+
+    @property
     def state(self) -> RobotState:
         """Every quantity of the last `at`; overwritten by the next."""
         return RobotState(self.arrays, self._state)
@@ -102,13 +109,21 @@ class PlantedRobot:
         rows = self._rows()
         data.qvel[6:] = rate
         data.qvel[:6] = _least(rows[:, :6], -rows[:, 6:] @ rate)
-        data.ctrl[:] = 0.0
-        mujoco.mj_step1(self.robot.model, data)
-        update_state(self.arrays, self._views, self._state)
+        self._update()
         J, vdot = self._state.J, np.empty(nv)
         vdot[6:] = acceleration
         vdot[:6] = _least(J[:, :6], -J[:, 6:] @ acceleration - self._state.Jdot_v)
         return vdot
+
+    def put(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Let `state` be that of a posture (nq,) and velocities (nv,)."""
+        self.data.qpos[:], self.data.qvel[:] = qpos, qvel
+        self._update()
+
+    def _update(self) -> None:
+        self.data.ctrl[:] = 0.0
+        mujoco.mj_step1(self.robot.model, self.data)
+        update_state(self.arrays, self._views, self._state)
 
     def placed(self, q: np.ndarray) -> np.ndarray:
         """(nq,) with the root where the soles have it."""
@@ -141,6 +156,13 @@ class PlantedRobot:
 
 def sample_trajectory(planted: PlantedRobot, joints: Joints, times: np.ndarray) -> Trajectory:
     """The whole robot at `times` (n,) [s] of a motion of its joints."""
+    return record(planted, times, lambda time: planted.at(*joints(time)))
+
+
+def record(
+    planted: PlantedRobot, times: np.ndarray, put: Callable[[float], np.ndarray]
+) -> Trajectory:
+    """The whole robot at `times` (n,) [s]: `put` puts it there, and returns its v̇ (nv,)."""
     robot, n = planted.robot, len(times)
     nv, nc = robot.model.nv, len(robot.soles)
     motor = robot.motor_dofs
@@ -153,7 +175,7 @@ def sample_trajectory(planted: PlantedRobot, joints: Joints, times: np.ndarray) 
         float(planted._origin[2]),
     )  # fmt: skip
     for k, time in enumerate(made.times):
-        vdot = planted.at(*joints(time))
+        vdot = put(time)
         s = planted._state
         made.qpos[k], made.qvel[k], made.qacc[k] = s.qpos, s.qvel, vdot
         made.com[k] = s.com

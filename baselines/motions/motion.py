@@ -19,9 +19,11 @@ from poise.configs.schema import build, read_yaml
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 
+from .foot_steps import RATE, FootStep, check_steps, plan_steps
+from .footwork import perform_plan
 from .postures import LevelKinematics
 from .reference_motion import ReferenceMotion
-from .robot_clip import read_robot_clip, reference_from
+from .robot_clip import read_robot_clip, reference_from, stepped_reference
 from .splines import piecewise, rest_spline
 
 SAMPLING = 0.02  # [s] between the postures whose height and root orientation are computed
@@ -55,6 +57,9 @@ class MotionDescription:
     both ends, the others are in `clips.interpolation`. With `loop` the motion repeats for ever,
     which needs a last keyframe equal to the first; without, the last keyframe is held.
     `com_unit` fraction: of the half size of the box around the soles, forward and left.
+
+    With `steps` feet leave the ground. Then the CoM is where the soles on it can bear it, the legs
+    are those that reach, and what keyframes say of legs is a first guess.
     """
 
     keyframes: tuple[Keyframe, ...]
@@ -62,6 +67,7 @@ class MotionDescription:
     com_unit: Literal["fraction", "m"] = "fraction"
     balance: Balance = field(default_factory=Balance)
     interpolation: Interpolation = "rest"
+    steps: tuple[FootStep, ...] = ()
 
     def __post_init__(self):
         times = [key.time for key in self.keyframes]
@@ -78,6 +84,12 @@ class MotionDescription:
             raise ValueError("keyframes: the first and the last are held and have no rates")
         if self.interpolation == "polynomial" and len(times) > MOST_OF_POLYNOMIAL:
             raise ValueError(f"keyframes: a polynomial goes through at most {MOST_OF_POLYNOMIAL}")
+        if self.steps:
+            check_steps(self.steps, times[-1])
+            moved = any(any(key.com) for key in self.keyframes)
+            if self.loop or moved or self.balance != Balance():
+                raise ValueError("steps: not with loop, balance, or a com of keyframes: the centre "
+                                 "of mass goes where the soles can bear it")  # fmt: skip
 
 
 def load_motion(motion: str | Path | ReferenceMotion, robot: Robot) -> ReferenceMotion:
@@ -118,6 +130,12 @@ def make_motion(
     keys = description.keyframes
     rates = [_posture(key.rates, robot, source, "rates") - standing for key in keys]
     joints, com_xy = _curves(description.interpolation, times, postures, com, np.array(rates))
+
+    if description.steps:
+        frames = joints(np.arange(0.0, times[-1] + 0.5 * RATE, RATE))
+        plan = plan_steps(description.steps, frames, np.zeros((len(frames), 3)), robot, source)
+        qpos = perform_plan(robot, plan, source)
+        return stepped_reference(name, robot, qpos, RATE, plan.planted, source)
 
     # height and root orientation follow from the joints
     dense = np.linspace(times[0], times[-1], 1 + int(np.ceil(times[-1] / SAMPLING)))

@@ -7,6 +7,7 @@ import numpy as np
 
 from poise.envs.compiled.copies import Copyable
 
+from .footing import Footing
 from .splines import evaluate
 
 STILL = 1e-6  # [rad, m] by which a posture that is held may change
@@ -43,6 +44,7 @@ class ReferenceMotion(Copyable):
     knots: np.ndarray  # (k+1,) [s]
     coeffs: np.ndarray  # (k, 4, nj+6)
     loop: bool
+    footing: Footing | None = None  # None: both soles stay planted
 
     @property
     def duration(self) -> float:

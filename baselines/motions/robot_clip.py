@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from poise.configs.reading import parse_json, parsing
 from poise.configs.schema import build
 from poise.envs.robots.robot import Robot
 
+from .footing import check_planted, make_footing, sole_poses
 from .postures import LevelKinematics
 from .reference_motion import ReferenceMotion
 from .splines import piecewise, rest_spline
@@ -24,7 +25,7 @@ from .splines import piecewise, rest_spline
 FEWEST = 4  # frames that a spline at rest at both ends takes
 MOST = 20_000
 LEVEL = 0.02  # [m] by which a sole may leave the plane of both
-ABOUT = "about.json"
+ABOUT, PLANTED = "about.json", "planted"
 
 
 @dataclass(frozen=True)
@@ -40,17 +41,19 @@ class About:
 
 @dataclass(frozen=True, eq=False)
 class RobotClip:
-    """Postures of one robot at one rate, both soles on the ground.
+    """Postures of one robot at one rate.
 
     Attributes:
         about: which robot's, and where they come from.
         dt: time between frames [s].
         qpos: (F, nq) as MuJoCo has them.
+        planted: (F, 2) bool, which soles are on the ground; None: both, always.
     """
 
     about: About
     dt: float
     qpos: np.ndarray
+    planted: np.ndarray | None = None
 
     @property
     def duration(self) -> float:
@@ -69,7 +72,10 @@ def write_robot_clip(clip: RobotClip, path: str | Path) -> None:
         raise ConfigError("must be the name of a .npz file", source=path, choices=("*.npz",))
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, array in (("qpos", clip.qpos), ("dt", np.array([clip.dt]))):
+        arrays = {"qpos": clip.qpos, "dt": np.array([clip.dt])}
+        if clip.planted is not None:
+            arrays[PLANTED] = clip.planted.astype(float)
+        for name, array in arrays.items():
             member = io.BytesIO()
             np.lib.format.write_array(member, np.ascontiguousarray(array), version=(1, 0))
             archive.writestr(zipfile.ZipInfo(f"{name}.npy"), member.getvalue())
@@ -99,7 +105,26 @@ def read_robot_clip(path: str | Path) -> RobotClip:
         raise ConfigError("must be one time from 0.001 to 1 s", source=path, field="dt")
     if not np.isfinite(clip.qpos).all():
         raise ConfigError("must be finite", source=path, field="qpos")
+    if f"{PLANTED}.npy" in archive.names:
+        return replace(clip, planted=_read_planted(path, len(clip.qpos)))
     return clip
+
+
+def _read_planted(path: str | Path, frames: int) -> np.ndarray:
+    """(F, 2) bool, see `check_planted`."""
+    planted = read_arrays(path, (PLANTED,))[PLANTED]
+    if planted.shape != (frames, 2) or not np.isin(planted, (0.0, 1.0)).all():
+        raise ConfigError(f"must be {frames} rows of two numbers, 1 where a sole is planted, else "
+                          "0", source=path, field=PLANTED)  # fmt: skip
+    check_planted(planted > 0.0, str(path))
+    return np.asarray(planted > 0.0)
+
+
+def check_both_planted(clip: RobotClip, source: str | Path, what: str) -> None:
+    """Raise ConfigError for a motion with steps, for `what` keeps both soles planted."""
+    if clip.planted is not None:
+        raise ConfigError(f"its feet leave the ground: {what} keeps both planted", source=source,
+                          field="planted")  # fmt: skip
 
 
 def reference_from(clip: RobotClip, robot: Robot, source: str) -> ReferenceMotion:
@@ -110,12 +135,16 @@ def reference_from(clip: RobotClip, robot: Robot, source: str) -> ReferenceMotio
 
     Raises:
         ConfigError: postures of another robot, a joint out of its range, or soles that leave
-            their plane by 2 cm: a foot that is lifted cannot be followed yet.
+            their plane by 2 cm though they are planted.
     """
     if clip.about.fingerprint != robot.fingerprint:
         raise ConfigError(
             f"is a motion of the robot {clip.about.robot!r}, not of {robot.name!r} as it is here",
             source=source, field="motion",
+        )  # fmt: skip
+    if clip.planted is not None:
+        return stepped_reference(
+            clip.about.name, robot, clip.qpos, clip.dt, clip.planted, source
         )  # fmt: skip
     kinematics, times = LevelKinematics(robot), np.arange(len(clip.qpos)) * clip.dt
     joints = clip.qpos[:, 7:]
@@ -129,6 +158,27 @@ def reference_from(clip: RobotClip, robot: Robot, source: str) -> ReferenceMotio
     splines = [rest_spline(times, values) for values in (joints, com, root)]
     knots, coeffs = piecewise(splines)
     return ReferenceMotion(clip.about.name, knots, coeffs, loop=False)
+
+
+def stepped_reference(
+    name: str, robot: Robot, qpos: np.ndarray, dt: float, planted: np.ndarray, source: str
+) -> ReferenceMotion:
+    """The reference motion of postures (F, nq) of which some stand on one sole, `planted` (F, 2).
+
+    Joints are cubic splines through the frames. CoM and root are in the motion's own frame, in
+    `footing`, and in the table of the motion relative to the middle of the soles, as ever.
+
+    Raises:
+        ConfigError: a joint out of its range; planted soles that move, see `make_footing`.
+    """
+    _check_range(qpos[:, 7:], robot, source)
+    footing, times = make_footing(robot, qpos, dt, planted, source), np.arange(len(qpos)) * dt
+    com, places, _ = sole_poses(robot, qpos)
+    standing = LevelKinematics(robot).standing.com * [1.0, 1.0, 0.0]
+    turns = np.array([footing.sample(t).root[0] for t in times])
+    tables = (qpos[:, 7:], com - places.mean(axis=1) - standing, turns)
+    knots, coeffs = piecewise([rest_spline(times, values) for values in tables])
+    return ReferenceMotion(name, knots, coeffs, False, footing)
 
 
 def _check_range(joints: np.ndarray, robot: Robot, source: str) -> None:

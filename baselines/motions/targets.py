@@ -77,7 +77,7 @@ def update_targets(
     cos, sin = s.heading[0], s.heading[1]
     samples[0, nj + 3] += residual[LEAN_X]
     samples[0, nj + 4] += residual[LEAN_Y]
-    _root_reference(robot, cos, sin, samples[:, nj + 3 : nj + 6], t)
+    root_reference(robot, cos, sin, samples[:, nj + 3 : nj + 6], t)
     middle_x, middle_y = samples[0, nj] + com_offset, samples[0, nj + 1]
     x, y = middle_x + residual[COM_X], middle_y + residual[COM_Y]
     t.com[0] = s.origin[0] + cos * x - sin * y
@@ -97,7 +97,7 @@ def update_targets(
 
 
 @compiled
-def _root_reference(
+def root_reference(
     robot: RobotArrays, cos: float, sin: float, samples: np.ndarray, t: TargetArrays
 ) -> None:
     """Root axes, and angular velocity and acceleration in body axes, from φ, φ̇, φ̈."""

@@ -17,6 +17,7 @@ from poise.baselines.joining.joins import ends, insert
 from poise.baselines.motions.robot_clip import (
     About,
     RobotClip,
+    check_both_planted,
     read_robot_clip,
     reference_from,
 )
@@ -39,7 +40,7 @@ def load_clip(file: str | Path, robot: Robot | None = None) -> tuple[Clip, str]:
     With a robot the clip is of the robot's skeleton: a .bvh file is retargeted first.
 
     Raises:
-        ConfigError: no such file; a .npz without its robot; as `read_bvh` and `retarget`.
+        ConfigError: no such file; a .npz without its robot; steps; as `read_bvh` and `retarget`.
     """
     path = Path(file) if Path(file).suffix == ".npz" else find_bvh(file)
     digest = f"sha256:{hashlib.sha256(read_bytes(path, MOST_BYTES)).hexdigest()[:16]}"
@@ -49,6 +50,7 @@ def load_clip(file: str | Path, robot: Robot | None = None) -> tuple[Clip, str]:
     if robot is None:
         return clip, digest
     made = retarget(clip, robot).clip
+    check_both_planted(made, path.stem, "what is put together of clips")
     whole = clip_of_robot(robot, made.qpos, made.dt, path.stem)
     return replace(whole, licence=clip.licence), digest
 
@@ -77,6 +79,7 @@ def _of_robot(path: Path, robot: Robot | None) -> Clip:
     if stored.about.fingerprint != robot.fingerprint:
         raise ConfigError(f"is a motion of the robot {stored.about.robot!r}, not of "
                           f"{robot.name!r}", source=path, field="robot")  # fmt: skip
+    check_both_planted(stored, path, "what is put together of clips")
     clip = clip_of_robot(robot, stored.qpos, stored.dt, path.stem)
     return replace(clip, licence=stored.about.licence)
 

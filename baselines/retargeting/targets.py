@@ -45,12 +45,15 @@ class BodyTargets(NamedTuple):
         return len(self.height)
 
 
-def clip_targets(clip: Clip, arms: bool, smooth: float) -> BodyTargets:
+def clip_targets(
+    clip: Clip, arms: bool, smooth: float, heading: float | None = None
+) -> BodyTargets:
     """Targets of a clip at 30 frames a second, low-passed at `smooth` [Hz] both ways in time.
 
-    The feet's mean direction at the start becomes x. Heights are relative to the highest of the
-    clip, or to 0.9 of the legs' length where nobody stands upright in it: so they are scaled by
-    the lengths of the legs. Directions are of points, so T and A as rest poses make no difference.
+    The `heading` [rad], or the feet's mean direction at the start, becomes x. Heights are relative
+    to the highest of the clip, or to 0.9 of the legs' length where nobody stands upright in it: so
+    they are scaled by the lengths of the legs. Directions are of points, so T and A as rest poses
+    make no difference.
 
     Raises:
         ConfigError: joints that are not known by name; fewer than 8 frames.
@@ -59,7 +62,8 @@ def clip_targets(clip: Clip, arms: bool, smooth: float) -> BodyTargets:
         raise ConfigError(f"lasts {clip.duration:.2f} s, at least {least:.2f} s are needed",
                           source=clip.name)  # fmt: skip
     clip = clip.resampled(RATE)
-    points = _points(clip, clip.turned(-_feet_heading(clip)).places())
+    heading = _feet_heading(clip) if heading is None else heading
+    points = _points(clip, clip.turned(-heading).places())
     height = (points["pelvis"] - points["feet"])[:, 2]
     upright = max(float(height.max()), UPRIGHT * clip.skeleton.leg_length)
     names = [name for name in LINES if arms or name not in ARMS]

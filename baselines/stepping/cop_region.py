@@ -1,12 +1,12 @@
 """The region of centres of pressure that soles reach with their ankles' torques [Koolen12]."""
 
-import mujoco
 import numpy as np
 
+from poise.baselines.motions.feet import bearing_polygon, nominal_feet
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.polygons import clipped, convex_hull, stacked
+from poise.envs.maths.polygons import convex_hull, stacked
 from poise.envs.maths.vectors import placed, turn, turned
 from poise.envs.robots.robot import Robot
 
@@ -17,51 +17,6 @@ DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 # fractions of the load on the first sole, for which the region of two soles is computed
 LOAD_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 LINE = 1e-12  # [m] a corner that is nearer to the line of its neighbours is none
-
-
-def nominal_feet(robot: Robot) -> np.ndarray:
-    """(2, 3) middles of the soles in the standing posture, which faces along x [m]."""
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing_qpos
-    mujoco.mj_kinematics(robot.model, data)
-    feet = [data.xpos[s.body_id] + data.xmat[s.body_id].reshape(3, 3) @ s.position
-            for s in robot.soles]  # fmt: skip
-    return np.array(feet)
-
-
-def foot_signs(robot: Robot) -> np.ndarray:
-    """(2,) 1 for the left foot, −1 for the right one, in the standing posture."""
-    feet = nominal_feet(robot)
-    sign = 1.0 if feet[0, 1] > feet[1, 1] else -1.0
-    return np.array([sign, -sign])
-
-
-def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """N (k, 2), o (k,), b (k,): |N p − o| ≤ b/λ for a CoP p [m, sole frame] under a load of λ m g.
-
-    One row for each motor joint of the foot itself: the moment of a vertical force about its axis
-    in the standing posture, over its torque limit.
-    """
-    model, foot = robot.model, robot.soles[sole]
-    data = mujoco.MjData(model)
-    data.qpos[:] = robot.standing_qpos
-    mujoco.mj_kinematics(model, data)
-    body = foot.body_id
-    R = data.xmat[body].reshape(3, 3) @ foot.rotation
-    point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot.position
-    weight = robot.units.force
-    normals, offsets, bounds = [], [], []
-    for joint in range(model.njnt):
-        dof = model.jnt_dofadr[joint]
-        motor = np.flatnonzero(np.asarray(robot.motor_dofs) == dof)
-        if model.jnt_bodyid[joint] != body or len(motor) == 0:
-            continue
-        axis, anchor = data.xaxis[joint], data.xanchor[joint]
-        # (axis × (point + R p − anchor))_z, affine in p
-        offsets.append(-np.cross(axis, point - anchor)[2])
-        normals.append([np.cross(axis, R[:, a])[2] for a in range(2)])
-        bounds.append(robot.torque_limit[motor[0]] / weight)
-    return np.reshape(normals, (-1, 2)), np.array(offsets), np.array(bounds)
 
 
 @compiled
@@ -148,15 +103,13 @@ def double_support_region(
 class CopRegion(Copyable):
     """The region in which soles can put the centre of pressure p with their ankles' torques.
 
-    A sole under a load of λ m g reaches the p of its polygon with |N p − o| ≤ b/λ (`ankle_limits`).
+    A sole under a load of λ m g reaches the p of its polygon with |N p − o| ≤ b/λ, see `feet.py`.
     Two soles reach p = λ p_0 + (1 − λ) p_1, with p_i what sole i reaches under its load: the less a
     foot carries, the further its ankle can move the pressure. Only `fraction` of each polygon and
     of each torque limit counts.
     """
 
     def __init__(self, robot: Robot, fraction: float = 0.95):
-        self.polygons = [fraction * sole.polygon for sole in robot.soles]
-        self.limits = [ankle_limits(robot, i) for i in range(len(robot.soles))]
         self.robot, self._fraction = robot, fraction
         self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
         self.middle = [polygon.mean(axis=0) for polygon in self.alone]
@@ -173,12 +126,7 @@ class CopRegion(Copyable):
             )
 
     def _under(self, sole: int, load: float) -> np.ndarray:
-        polygon = self.polygons[sole]
-        for normal, offset, bound in zip(*self.limits[sole], strict=True):
-            room = self._fraction * bound / max(load, 1e-3)
-            polygon = clipped(polygon, normal, offset + room)
-            polygon = clipped(polygon, -normal, room - offset)
-        return polygon
+        return bearing_polygon(self.robot, sole, load, self._fraction)
 
     def _sum(self, load: float) -> np.ndarray:
         first, second = load * self._under(0, load), (1.0 - load) * self._under(1, 1.0 - load)

@@ -6,6 +6,7 @@ from typing import NamedTuple, TypedDict
 
 import numpy as np
 
+from poise.baselines.motions.feet import foot_signs
 from poise.envs.compiled.calls import NO_KERNEL, address_of
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import guarded_zeros
@@ -16,7 +17,7 @@ from poise.envs.robots.robot import Robot
 from .blocks import Search
 from .config import FallFeedback, FootholdChoice, PivotConfig, StepFeedback, StepLimits
 from .controller import StepOffsets
-from .cop_region import CopRegion, foot_signs
+from .cop_region import CopRegion
 from .feedback import feedback_arrays
 from .search import capture_foothold, plan_step, replan_step, set_foot
 from .swing import Swing

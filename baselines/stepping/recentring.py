@@ -8,6 +8,7 @@ near to its nominal place as it can with ξ between the feet at touchdown. Kerne
 
 import numpy as np
 
+from poise.baselines.motions.feet import nominal_feet
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
@@ -26,7 +27,6 @@ from .blocks import (
     SwingArrays,
 )
 from .config import RecentringConfig
-from .cop_region import nominal_feet
 from .feedback import PHASE
 from .search import (
     distance_outside,

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from poise.baselines.motions.feet import foot_signs
 from poise.baselines.stepping.config import StepLimits, SwingTask
-from poise.baselines.stepping.cop_region import foot_signs
 from poise.baselines.stepping.swing_speed import highest_lift, swing_time
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot

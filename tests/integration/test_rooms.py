@@ -34,7 +34,7 @@ FLOORS = """
  9 envs/vector, baselines/feasibility, baselines/in_place, baselines/policy_files
  9 baselines/retargeting
  9 baselines/stepping, baselines/walking/models
-10 baselines/walking
+10 baselines/performing, baselines/walking
 11 baselines/registry
 12 baselines/environments
 13 training/learning, training/tracking

@@ -24,8 +24,9 @@ import mujoco
 import numpy as np
 from scipy.optimize import linprog
 
+from poise.baselines.motions.feet import nominal_feet
 from poise.baselines.registry import controller_config
-from poise.baselines.stepping.cop_region import CopRegion, nominal_feet
+from poise.baselines.stepping.cop_region import CopRegion
 from poise.baselines.whole_body.momentum_qp import com_offset
 from poise.envs.maths.polygons import half_planes
 from poise.envs.physics.simulation import Simulation

@@ -32,8 +32,9 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 
+from poise.baselines.motions.feet import nominal_feet
 from poise.baselines.registry import controller_config
-from poise.baselines.stepping.cop_region import CopRegion, nominal_feet
+from poise.baselines.stepping.cop_region import CopRegion
 from poise.baselines.whole_body.momentum_qp import com_offset
 from poise.envs.maths.polygons import half_planes
 from poise.envs.physics.arrays import dof_chain

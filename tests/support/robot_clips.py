@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from poise.baselines.feasibility.planted import PlantedLegs
 from poise.baselines.feasibility.trajectory import PlantedRobot
+from poise.baselines.motions.legs import PlantedLegs
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.robot_clip import About, RobotClip
 from poise.envs.robots.robot import Robot

@@ -113,9 +113,10 @@ def bring(
     lead: float = 1.0,
     planted: Switch = False,
 ) -> None:
-    """Retarget a BVH file to a robot whose soles stay where it stands; see docs/motions.md.
+    """Retarget a BVH file to a robot, its soles planted where the clip's are; see docs/motions.md.
 
-    The .npz file is taken wherever a motion is named. Needs pip install 'poise[motion]'.
+    The .npz file is taken wherever a motion is named. A clip whose feet move by 12 cm becomes a
+    motion with steps, which motion-step performs. Needs pip install 'poise[motion]'.
 
     Args:
         file: a .bvh file, or the name of a packaged clip.

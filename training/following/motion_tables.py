@@ -13,6 +13,7 @@ from poise.training.running.summary import InMotion, MotionLevel, Number, Summar
 NONE = "–"
 BOUNDS = {None: "", "lower": "≥ ", "upper": "≤ "}
 ALL = "all"
+STEPPED, OF_STEPS = "swing_error", ("swing_error", "placement_error", "support_slide")
 #: heading → key of a level, factor, format
 FIGURES: dict[str, tuple[str, float, str]] = {
     "joints \\[°]": ("joint_rms", float(np.degrees(1.0)), ".1f"),
@@ -22,6 +23,9 @@ FIGURES: dict[str, tuple[str, float, str]] = {
     "CoM \\[mm]": ("com_error", 1e3, ".1f"),
     "slide \\[mm]": ("sole_slide", 1e3, ".1f"),
     "late \\[s]": ("motion_delay", 1.0, ".2f"),
+    "swing \\[mm]": ("swing_error", 1e3, ".1f"),
+    "placed \\[mm]": ("placement_error", 1e3, ".1f"),
+    "support \\[mm]": ("support_slide", 1e3, ".1f"),
     "steps": ("steps_mean", 1.0, ".1f"),
     "power \\[W]": ("mean_power", 1.0, ".0f"),
 }
@@ -42,18 +46,25 @@ def _levels(name: str, levels: list[MotionLevel]) -> Table:
     table = Table(title=escape(name), title_justify="left")
     table.add_column("of J50", justify="right")
     table.add_column("motion", no_wrap=True)
-    for heading in ("fell \\[95 %]", *FIGURES):
+    for heading in ("fell \\[95 %]", *_headings(levels)):
         table.add_column(heading, justify="right", overflow="fold")
+    shown = {heading: FIGURES[heading] for heading in _headings(levels)}
     for level in levels:
         low, high = (NONE if end is None else f"{end:.1%}" for end in level["fallen_ci95"])
         table.add_row(
             f"{level['share']:g}",
             escape(level["motion"] or ALL),
             f"{level['fallen']} of {level['trials']} \\[{low}, {high}]",
-            *(_text(level.get(key), factor, form) for key, factor, form in FIGURES.values()),
+            *(_text(level.get(key), factor, form) for key, factor, form in shown.values()),
             end_section=level["motion"] is None,
         )
     return table
+
+
+def _headings(levels: list[MotionLevel]) -> list[str]:
+    """The columns; those of steps only where a motion has them."""
+    stepped = any(level.get(STEPPED) is not None for level in levels)
+    return [name for name, (key, _, _) in FIGURES.items() if stepped or key not in OF_STEPS]
 
 
 def _in_motion(found: dict[str, list[InMotion]]) -> Table:

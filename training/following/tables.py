@@ -17,6 +17,14 @@ from poise.baselines.retargeting.retarget import Retargeted
 
 from .follow import Followed
 
+#: what is shown of a motion with steps: name, field, factor, unit
+STEPS = (
+    ("a sole in the air, RMS", "swing_error", 1e3, "mm"),
+    ("a sole as it lands, at most", "placement_error", 1e3, "mm"),
+    ("a planted sole slid by", "support_slide", 1e3, "mm"),
+    ("left to catch a fall", "interruptions", 1.0, "times"),
+)
+
 
 def print_followed(trials: Sequence[Followed], title: str, console: Console) -> None:
     """Falls, and errors over the trials that did not fall."""
@@ -25,15 +33,17 @@ def print_followed(trials: Sequence[Followed], title: str, console: Console) -> 
     table.add_row("trials, falls", f"{len(trials)}, {falls}")
     table.add_row("solver failures", str(sum(trial.solver_failures for trial in trials)))
     stood = [trial for trial in trials if not trial.fallen]
+    stepped = any(np.isfinite(trial.swing_error) for trial in trials)
     for name, field, factor, unit in (
         ("joints, RMS", "joint_rms", np.degrees(1.0), "°"),
         ("bodies, mean distance", "body_error", 1e3, "mm"),
         ("the same, from the root", "body_error_root", 1e3, "mm"),
         ("bodies in the last second", "body_error_last", 1e3, "mm"),
         ("centre of mass", "com_error", 1e3, "mm"),
-        ("a sole slid or stepped by", "sole_slide", 1e3, "mm"),
+        *(STEPS if stepped else (("a sole slid or stepped by", "sole_slide", 1e3, "mm"),)),
     ):
         values = [factor * getattr(trial, field) for trial in stood]
+        values = [value for value in values if np.isfinite(value)]
         text = f"{np.mean(values):.1f} {unit}, largest {max(values):.1f}" if values else "-"
         table.add_row(name, text)
     console.print(table)
@@ -71,7 +81,7 @@ def print_retargeted(made: Retargeted, console: Console) -> None:
             f"{len(made.clip.qpos)} at {1 / made.clip.dt:.3g} Hz, {made.clip.duration:.2f} s",
         ),
         ("legs over the clip's", f"{made.scale:.3f}"),
-        ("soles off their places", f"{1000 * made.sole_error:.2g} mm at most"),
+        ("soles", _soles(made)),
         ("over joint limits", f"{np.degrees(made.limit_excess):.2g}°"),
         ("in the floor or in itself", f"{1000 * made.penetration:.2g} mm at most"),
         ("directions, RMS", directions),
@@ -79,6 +89,14 @@ def print_retargeted(made: Retargeted, console: Console) -> None:
     ):
         table.add_row(name, value)
     console.print(table)
+
+
+def _soles(made: Retargeted) -> str:
+    planted = made.clip.planted
+    if planted is None:
+        return f"{1000 * made.sole_error:.2g} mm off their places at most"
+    steps = int(np.sum(np.diff(planted.astype(int), axis=0) > 0))
+    return f"{steps} steps, {made.stride:.0%} of the length that the legs' scale gives"
 
 
 def print_feasibility(judged: Feasibility, title: str, console: Console) -> None:

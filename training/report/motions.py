@@ -18,6 +18,10 @@ FIGURES = {
     "com_error": ("CoM [m]", "mean distance from where the motion has it", ".4f"),
     "sole_slide": ("Slide [m]", "how far a sole moved since it landed", ".4f"),
     "motion_delay": ("Late [s]", "the motion at the end, where it waits", ".2f"),
+    "swing_error": ("Swing [m]", "root mean square of a sole's way in the air, with steps", ".4f"),
+    "placement_error": ("Placement [m]", "largest, of a sole that lands", ".4f"),
+    "support_slide": ("Support [m]", "largest way of a planted sole", ".4f"),
+    "interruptions": ("Caught", "how often steps of the planner took over", ".2f"),
     "steps_mean": ("Steps", "mean of the touchdowns", ".1f"),
     "mean_power": ("Power [W]", "∫ Σ |τ q̇| dt over the time", ".0f"),
 }

@@ -220,6 +220,10 @@ class MotionMeans(TypedDict, total=False):
     com_error: Number
     sole_slide: Number
     motion_delay: Number
+    swing_error: Number
+    placement_error: Number
+    support_slide: Number
+    interruptions: Number
     mean_power: Number
 
 

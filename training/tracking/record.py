@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,6 +13,7 @@ from poise.envs.balance.termination import FallLimits
 from poise.envs.physics.state import RobotState
 
 from .reference import ReferenceBodies, Stance
+from .steps import NONE, StepErrors, StepFigures
 
 LAST = 1.0  # [s] of a trial whose error is told apart
 COUNTED = 0.5  # [s] after the motion's end until which errors count
@@ -23,7 +24,7 @@ ANYWHERE = {"height": 1e-3, "tilt": 180.0}  # `FallLimits` that never end an epi
 
 
 @dataclass(frozen=True)
-class TrackingFigures:
+class TrackingFigures(StepFigures):
     """How near a trial stayed to the motion; NaN where it fell at once.
 
     Attributes:
@@ -64,6 +65,8 @@ class Tracking:
         self._end = max([0.0, *(start + SETTLING for start in pushes)])
         self._errors: list[tuple[float, float, float, float]] = []
         self._counted = 0  # of them
+        footing = env.motion.footing
+        self._steps = None if footing is None else StepErrors(env, footing)
 
     @property
     def ended(self) -> bool:
@@ -78,7 +81,11 @@ class Tracking:
         self._footing.update(env.simulation.state)
         self.fallen = bool(env.fallen) or lies(env)
         if not self.fallen:
-            self._errors.append(_errors(env, self._reference, self._footing.stance))
+            stance = self._footing.stance
+            if self._steps is not None:
+                stance = Stance.of(env.simulation.state)
+                self._steps.update()
+            self._errors.append(_errors(env, self._reference, stance))
             self._counted += env.motion_time < env.motion.duration + COUNTED
 
     def figures(self) -> TrackingFigures:
@@ -90,7 +97,9 @@ class Tracking:
         if not len(table):
             table = last = np.full((1, 4), np.nan)
         joints, bodies, root, com = (float(value) for value in table.mean(axis=0))
+        steps = NONE if self._steps is None else self._steps.figures()
         return TrackingFigures(
+            **asdict(steps),
             joint_rms=float(np.sqrt(joints)),
             body_error=bodies,
             body_error_root=root,

@@ -6,7 +6,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from poise.baselines.motions.footing import Footing
 from poise.baselines.motions.postures import LevelKinematics
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.envs.physics.state import RobotState
@@ -64,8 +66,11 @@ class ReferenceBodies:
 
         Trunk, arms, the root's orientation and the CoM are the motion's, in the heading frame of
         the soles. The legs are those that reach the soles where these are: a foot that has come
-        down elsewhere than in the standing posture is no error of the bodies above it.
+        down elsewhere than in the standing posture is no error of the bodies above it. Of a motion
+        with steps the legs are the motion's, too, from the soles that are planted.
         """
+        if self.motion.footing is not None:
+            return self._on_planted_soles(self.motion.footing, time, stance)
         sample, data = self.motion.sample(time), self._data
         posture = self._kinematics.posture(sample.q_ref)
         turn, free = stance.turn, np.array([0, 1, 2, *self._legs])
@@ -83,6 +88,29 @@ class ReferenceBodies:
             data.qpos[self._legs + 1] += step[3:]
         self._correction = data.qpos[self._legs + 1] - sample.q_ref[self._legs - 6]
         return sample.q_ref, data.xpos[self.bodies].copy()
+
+    def _on_planted_soles(
+        self, footing: Footing, time: float, stance: Stance
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The same of a motion with steps, whose own frame is put on the soles that are planted."""
+        data, sample, joints = self._data, footing.sample(time), self.motion.sample(time).q_ref
+        down = sample.planted
+        ahead = stance.axes[down][:, :2, 0].sum(axis=0)
+        wanted = sample.turns[down][:, 0, 2].mean()
+        yaw = float(np.arctan2(ahead[1], ahead[0]) - wanted)
+        turn = Rotation.from_rotvec([0.0, 0.0, yaw])
+        standing = self._kinematics.standing.root_axes
+        axes = (turn * Rotation.from_rotvec(sample.root[0])).as_matrix() @ standing
+        mujoco.mju_mat2Quat(data.qpos[3:7], np.ascontiguousarray(axes).ravel())
+        places = turn.apply(sample.places[down][:, 0])
+        origin = (stance.points[down] - places).mean(axis=0)
+        self.com = origin + turn.apply(sample.com[0])
+        data.qpos[:3], data.qpos[7:] = self.com, joints
+        for _ in range(2):  # the second time the bodies are there
+            mujoco.mj_kinematics(self.robot.model, data)
+            mujoco.mj_comPos(self.robot.model, data)
+            data.qpos[:3] += self.com - data.subtree_com[self.robot.root_body_id]
+        return joints, data.xpos[self.bodies].copy()
 
     def poses(self, time: float, stance: Stance) -> tuple[np.ndarray, np.ndarray]:
         """Where all bodies are at a time [s], about soles that stand as in `stance`.

@@ -10,7 +10,7 @@ import numpy as np
 
 from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.stepping.cop_region import foot_signs
+from poise.baselines.motions.feet import foot_signs
 from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
 from poise.training.tracking.record import Tracking

@@ -141,7 +141,8 @@ class Outcome:
         edge_contacts: times that a foot came to touch an edge of the terrain.
         surfaces_passed: of a terrain, of which the CoM has passed the beginning; stairs climbed.
         joint_rms, body_error, body_error_root, body_error_last, com_error, sole_slide,
-            motion_delay: of a motion that is performed, see `TrackingFigures`.
+            motion_delay, swing_error, placement_error, support_slide, interruptions: of a motion
+            that is performed, see `TrackingFigures`.
         error: what the controller raised, on one line; the trial then counts as not recovered.
     """
 
@@ -198,6 +199,10 @@ class Outcome:
     com_error: float | None = None
     sole_slide: float | None = None
     motion_delay: float | None = None
+    swing_error: float | None = None
+    placement_error: float | None = None
+    support_slide: float | None = None
+    interruptions: float | None = None
     error: str | None = None
 
 

@@ -138,9 +138,6 @@ def test_jacobians_are_the_derivatives_of_the_errors(kind: str, squat: Clip) -> 
 
 def test_what_cannot_be_followed_is_said(squat: Clip) -> None:
     robot = robot_named("compact")
-    walk = read_bvh(find_bvh("cmu02_walk")).clip
-    with pytest.raises(ConfigError, match="cmu02_walk: feet: its feet move by .* cm"):
-        retarget(walk, robot)
     with pytest.raises(ConfigError, match="smooth: must be above 0"):
         retarget(squat, robot, smooth=0.0)
     with pytest.raises(ConfigError, match="at least 0.23 s are needed"):

@@ -73,7 +73,8 @@ def test_check_and_physical_join(tmp_path: Path, capsys: pytest.CaptureFixture[s
         ),
         (["info", "nothing"], "clip: no such name: 'nothing'; give a path to a .bvh file or a"),
         (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),
-        (["import", "cmu02_walk", "--out", "x.npz"], "feet: its feet move by"),
+        (["follow", "kick"], "motion: the feet of 'kick' leave the ground"),
+        (["check", "kick", "--qp"], "kick: qp: is not for motions with steps"),
         (["convert", "cmu02_stand", "x.txt"], "x.txt: must be the name of a .bvh file"),
         (["join", "cmu02_punch", "fair1_wave_hello", "x.bvh"], "has another skeleton than"),
         (

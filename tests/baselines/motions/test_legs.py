@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.baselines.feasibility.planted import PlantedLegs
+from poise.baselines.motions.legs import PlantedLegs
 from poise.baselines.motions.motion import load_motion
 from poise.envs.robots.robot import Robot
 from tests.support.physics import robot_named

@@ -1,13 +1,16 @@
-"""Postures with a given centre of mass, trunk and arms whose legs reach the planted soles."""
+"""Postures with a given centre of mass, trunk and arms whose legs reach the soles."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from poise.baselines.motions.postures import LevelKinematics
 from poise.envs.robots.robot import Robot
+
+from .postures import LevelKinematics
 
 MOST, CLOSE = 15, 1e-7  # iterations, and the error [m, rad] that ends them
 FURTHEST = 0.3  # [m, rad] of a step
@@ -16,7 +19,7 @@ SMALL = 1e-6  # [rad] by which φ is turned for its derivative
 
 
 class PlantedLegs:
-    """Inverse kinematics of the legs of one robot, both soles where it stands.
+    """Inverse kinematics of the legs of one robot, whose soles are where it stands, or elsewhere.
 
     Attributes:
         legs: (k,) entries of q that move one sole and not the other.
@@ -32,9 +35,13 @@ class PlantedLegs:
         dofs = _leg_dofs(robot, self._data)
         self.legs = dofs - 6
         self.others = np.setdiff1d(np.arange(len(robot.joint_names)), self.legs)
-        self._soles = [self._sole(i) for i in range(len(robot.soles))]
-        self._middle = np.mean([point for point, _ in self._soles], axis=0)
+        self.standing_soles = [self._sole(i) for i in range(len(robot.soles))]  #: points and axes
+        self._middle = np.mean([point for point, _ in self.standing_soles], axis=0)
         self._free = np.array([0, 1, 2, *dofs])
+        self._away, self._upright = np.zeros(3), np.zeros(4)  # of the root from the CoM, of late
+        mujoco.mju_mat2Quat(
+            self._upright, np.ascontiguousarray(self._standing.root_axes).ravel()
+        )  # fmt: skip
 
     def reach(
         self, com: np.ndarray, root: np.ndarray, others: np.ndarray, guess: np.ndarray
@@ -45,26 +52,39 @@ class PlantedLegs:
         ground, to that of the standing posture; `root` (3,) its φ; `others` the joints that are no
         legs; `guess` (nj,) what the search begins with.
         """
-        data = self._data
         com = self._middle + com + self._standing.com * [1.0, 1.0, 0.0]
-        axes = Rotation.from_rotvec(root).as_matrix() @ self._standing.root_axes
-        mujoco.mju_mat2Quat(data.qpos[3:7], np.ascontiguousarray(axes).ravel())
+        return self.reach_soles(com, root, others, guess, self.standing_soles)
+
+    def reach_soles(
+        self,
+        com: np.ndarray,
+        root: np.ndarray,
+        others: np.ndarray,
+        guess: np.ndarray,
+        soles: Sequence[tuple[np.ndarray, np.ndarray]],
+    ) -> tuple[np.ndarray, float]:
+        """The same for a CoM `com` (3,) in the world [m], and `soles`: points (3,), axes (3, 3)."""
+        data = self._data
+        angle, turn = float(np.linalg.norm(root)), np.zeros(4)
+        mujoco.mju_axisAngle2Quat(turn, root / max(angle, 1e-12), angle)
+        mujoco.mju_mulQuat(data.qpos[3:7], turn, self._upright)
         data.qpos[7:] = guess
         data.qpos[7 + self.others] = others
-        data.qpos[:3] = com
+        data.qpos[:3] = com + self._away
         for i in range(MOST + 1):
-            error, jacobian = self._miss(com)
+            error, jacobian = self._miss(com, soles)
             if np.abs(error).max() < CLOSE or i == MOST:
                 break
             step = np.linalg.lstsq(jacobian[:, self._free], -error, rcond=RANK)[0]
             step *= min(1.0, FURTHEST / float(np.abs(step).max()))
             data.qpos[:3] += step[:3]
             data.qpos[7 + self.legs] += step[3:]
+        self._away = data.qpos[:3] - com
         return data.qpos.copy(), float(np.abs(error).max())
 
     def sensitivity(self, root: np.ndarray) -> np.ndarray:
         """(k, 6) how the legs of the last `reach` change with the CoM and with φ, `root`."""
-        _, jacobian = self._miss(np.zeros(3))
+        _, jacobian = self._miss(np.zeros(3), self.standing_soles)
         now = Rotation.from_rotvec(root)
         turns = [(now.inv() * Rotation.from_rotvec(root + SMALL * axis)).as_rotvec() / SMALL
                  for axis in np.eye(3)]  # fmt: skip
@@ -74,20 +94,23 @@ class PlantedLegs:
         wanted[:, 3:] = -jacobian[:, 3:6] @ body
         return np.asarray(np.linalg.lstsq(jacobian[:, self._free], wanted, rcond=RANK)[0][3:])
 
-    def _miss(self, com: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _miss(
+        self, com: np.ndarray, soles: Sequence[tuple[np.ndarray, np.ndarray]]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Misses of CoM and soles [m, rad], and their Jacobian."""
         robot, data, model = self.robot, self._data, self.robot.model
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         count = 3 + 6 * len(robot.soles)
-        error, jacobian = np.zeros(count), np.zeros((count, model.nv))
+        error, jacobian, quaternion = np.zeros(count), np.zeros((count, model.nv)), np.zeros(4)
         error[:3] = data.subtree_com[robot.root_body_id] - com
         mujoco.mj_jacSubtreeCom(model, data, jacobian[:3], robot.root_body_id)
-        for i, (wanted, wanted_axes) in enumerate(self._soles):
+        for i, (wanted, wanted_axes) in enumerate(soles):
             point, axes = self._sole(i)
             at = 3 + 6 * i
             error[at : at + 3] = point - wanted
-            error[at + 3 : at + 6] = Rotation.from_matrix(axes @ wanted_axes.T).as_rotvec()
+            mujoco.mju_mat2Quat(quaternion, (axes @ wanted_axes.T).ravel())
+            mujoco.mju_quat2Vel(error[at + 3 : at + 6], quaternion, 1.0)
             mujoco.mj_jac(model, data, jacobian[at : at + 3], jacobian[at + 3 : at + 6], point,
                           robot.soles[i].body_id)  # fmt: skip
         return error, jacobian

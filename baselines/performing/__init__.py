@@ -1,0 +1,1 @@
+"""Motions whose feet leave the ground, performed on a schedule of contacts."""
