@@ -85,13 +85,11 @@ def sole_error(
     return np.concatenate(errors), np.concatenate(rows)
 
 
-def planted(scene: Scene, stance: Stance, frames: np.ndarray) -> None:
-    """Lead the soles of some frames to their places, by the shortest displacements."""
+def plant(scene: Scene, stance: Stance, frames: np.ndarray) -> None:
+    """Lead the planted soles of some frames (k,) to their places, by the shortest displacements."""
     for frame in frames.tolist():
         for _ in range(NEWTON):
             given = motions(scene, stance, frame).given
             if np.abs(given).max() < CLOSE:
                 break
-            qpos = scene.qpos.copy()
-            mujoco.mj_integratePos(scene.model, qpos[frame], given, 1.0)
-            scene.move(qpos)
+            scene.displace(frame, given)

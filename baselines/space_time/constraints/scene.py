@@ -113,6 +113,11 @@ class Scene:
         """Take other postures (F, nq)."""
         self.qpos, self._at = qpos, -1
 
+    def displace(self, frame: int, delta: np.ndarray) -> None:
+        """Move the posture of one frame by δ (nv,), the root's turn in its own axes."""
+        mujoco.mj_integratePos(self.model, self.qpos[frame], np.ascontiguousarray(delta), 1.0)
+        self._at = -1
+
     def point(self, name: str, field: str) -> Placed:
         """What has this name: a limb's role, ``com``, or a body; ConfigError names the choices."""
         if name == COM:
