@@ -12,8 +12,8 @@ from poise.baselines.motions.robot_clip import About, RobotClip
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .limbs import find_limbs
-from .targets import RATE, between_standing, clip_targets, standing_targets
+from .limbs import Limbs, find_limbs
+from .targets import RATE, BodyTargets, between_standing, clip_targets, standing_targets
 
 SMOOTH = 3.0  # [Hz] of the low-pass on what the clip asks for, and on the joints
 LEAD = 1.0  # [s] from standing into the clip, and back
@@ -59,14 +59,7 @@ def retarget(
             a `smooth` or `lead` that is not above 0, mink is missing.
         PoiseError: no posture keeps the soles and the limits.
     """
-    for name, value in (("smooth", smooth), ("lead", lead)):
-        if not 0.0 < value <= 100.0:
-            raise ConfigError(f"must be above 0 and at most 100, not {value:g}", field=name)
-    if not planted:
-        _check_feet(clip)
-    limbs = find_limbs(robot)
-    targets = clip_targets(clip, limbs.has_arms, smooth)
-    whole = between_standing(targets, standing_targets(robot, limbs), lead)
+    limbs, whole = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
     solved = _solver()(robot, limbs, whole, smooth)
     about = About(robot.name, robot.fingerprint, clip.name, clip.name, clip.licence)
     joints = solved.qpos[:, 7:]
@@ -80,6 +73,20 @@ def retarget(
         solved.time_per_frame,
         float(max(excess.max(), 0.0)),
     )
+
+
+def targets_on(
+    clip: Clip, robot: Robot, *, smooth: float, lead: float, planted: bool
+) -> tuple[Limbs, BodyTargets]:
+    """The robot's limbs, and what a clip asks of it from standing to standing; see `retarget`."""
+    for name, value in (("smooth", smooth), ("lead", lead)):
+        if not 0.0 < value <= 100.0:
+            raise ConfigError(f"must be above 0 and at most 100, not {value:g}", field=name)
+    if not planted:
+        _check_feet(clip)
+    limbs = find_limbs(robot)
+    targets = clip_targets(clip, limbs.has_arms, smooth)
+    return limbs, between_standing(targets, standing_targets(robot, limbs), lead)
 
 
 def _check_feet(clip: Clip) -> None:

@@ -16,8 +16,8 @@ from .program import Penalised, Quadratic, solve_program
 from .stance import Motions, Stance, motions
 from .trajectory import coordinate_derivative, coordinates, third_difference
 
-PENALTY = 300.0  # of what a user's constraint lacks [1/m, 1/rad], times its weight
-HARD = 3000.0  # the same of clearance, of soles in the floor and of joint limits
+PENALTY = 100.0  # of what a user's constraint lacks [1/m, 1/rad], times its weight
+HARD = 300.0  # the same of clearance, of soles in the floor and of joint limits
 DAMPING = 1e-4  # of displacements: what nothing asks for stays
 MARGIN = 0.005  # [rad] kept from the joint limits, for splines between the frames
 
@@ -69,7 +69,9 @@ class Problem:
         errors = [self.asked.errors(scene, frame) for frame in range(len(scene))]
         rough = self.third @ coordinates(scene.qpos, scene.robot.standing_qpos).ravel()
         joints = scene.qpos[1:-1, 7:]
-        lacking = HARD * float(np.maximum(np.maximum(self.low - joints, joints - self.high), 0).sum())
+        lacking = HARD * float(
+            np.maximum(np.maximum(self.low - joints, joints - self.high), 0).sum()
+        )
         for frame in self.inner.tolist():
             lacking += HARD * self.asked.too_near(scene, frame)
             lacking += HARD * sum(float(r.excess.sum())

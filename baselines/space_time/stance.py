@@ -46,7 +46,9 @@ def standing_stance(scene: Scene) -> Stance:
     data, frames = scene.see(scene.robot.standing_qpos), len(scene)
     bodies = [sole.body_id for sole in scene.robot.soles]
     places = np.tile(data.xpos[bodies], (frames, 1, 1))
-    return Stance(np.ones((frames, 2), dtype=bool), places, np.tile(data.xquat[bodies], (frames, 1, 1)))
+    return Stance(
+        np.ones((frames, 2), dtype=bool), places, np.tile(data.xquat[bodies], (frames, 1, 1))
+    )
 
 
 def motions(scene: Scene, stance: Stance, frame: int) -> Motions:

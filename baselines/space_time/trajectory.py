@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 from scipy import sparse
 
 from poise.baselines.clips.rotations import to_scipy
-from poise.envs.robots.robot import Robot
 
 THIRD = (-1.0, 3.0, -3.0, 1.0)
 SMALL = 1e-6  # [rad] below which the series is used
@@ -39,7 +37,7 @@ def rotation_derivative(phi: np.ndarray) -> np.ndarray:
 
 
 def coordinate_derivative(qpos: np.ndarray, standing: np.ndarray) -> sparse.csr_matrix:
-    """(F nv, F nv) ∂x/∂δ, δ the displacements that `moved` takes; blocks on the diagonal."""
+    """(F nv, F nv) ∂x/∂δ, δ the displacements of `Scene.displace`; blocks on the diagonal."""
     phi, count = coordinates(qpos, standing)[:, 3:6], qpos.shape[1] - 1
     blocks = np.tile(np.eye(count), (len(qpos), 1, 1))
     blocks[:, 3:6, 3:6] = rotation_derivative(phi)
@@ -56,14 +54,6 @@ def third_difference(frames: int, dt: float) -> sparse.csr_matrix:
     values = np.tile(np.array(THIRD) / dt**3, rows)
     entries = (values, (np.repeat(np.arange(rows), 4), columns.ravel()))
     return sparse.coo_matrix(entries, shape=(rows, frames)).tocsr()
-
-
-def moved(robot: Robot, qpos: np.ndarray, delta: np.ndarray) -> np.ndarray:
-    """(F, nq) postures displaced by δ (F, nv): the root's turn in its own axes."""
-    out = qpos.copy()
-    for posture, step in zip(out, delta, strict=True):
-        mujoco.mj_integratePos(robot.model, posture, np.ascontiguousarray(step), 1.0)
-    return out
 
 
 def jerk(qpos: np.ndarray, dt: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 
@@ -140,6 +141,15 @@ class Scene:
         corners = np.pad(sole.polygon, ((0, 0), (0, 1))) @ sole.rotation.T + sole.position
         axes = self.data.xmat[sole.body_id].reshape(3, 3)
         return self.data.xpos[sole.body_id] + corners @ axes.T
+
+    def part(self, frames: np.ndarray) -> Scene:
+        """A scene of some of the frames (k,), whose `dt` is their mean distance."""
+        part = copy.copy(self)
+        part.data = mujoco.MjData(self.model)
+        part.qpos, part.times = self.qpos[frames].copy(), self.times[frames]
+        part.planted, part._at = self.planted[frames], -1
+        part.dt = float(part.times[-1] - part.times[0]) / (len(frames) - 1)
+        return part
 
     def __len__(self) -> int:
         return len(self.qpos)
