@@ -77,8 +77,8 @@ class ClearanceLimit(mink.Limit):
         return [self.pairs[i] for i in np.flatnonzero(near | endless)]
 
     def distance(self, data: mujoco.MjData, pair: Pair, ends: np.ndarray) -> float:
-        """Between the geometries of a pair [m], at most 3 cm more than what is kept; `ends` (6,) become
-        the nearest points."""
+        """Between the geometries of a pair [m], at most 3 cm more than what is kept; `ends` (6,)
+        become the nearest points."""
         reach = pair.kept + NEAR
         return float(mujoco.mj_geomDistance(self.model, data, *pair[:2], reach, ends))
 

@@ -42,9 +42,9 @@ def by_trial(
     Every keyframe by itself: each constraint that holds then has an operation with a parameter s,
     which moves the posture by a share s of what is missing, on planted soles. Its values
     0, ¼, … 1 are tried in all combinations, from the most preferred on, which is 0: the motion
-    as it is. A state is corrected to the joint limits. Kept is what satisfies most of the constraints,
-    soles and clearance; of these, what has the least Σ e, e = x/(x + 5 cm) for an excess x; of these,
-    what is most preferred. Between keyframes displacements are monotone cubics.
+    as it is. A state is corrected to the joint limits. Kept is what satisfies most of the
+    constraints, soles and clearance; of these, what has the least Σ e, e = x/(x + 5 cm) for an
+    excess x; of these, what is most preferred. Between keyframes displacements are monotone cubics.
 
     Raises ConfigError for more constraints at one time than 2ᵏ trials allow.
     """
@@ -152,8 +152,11 @@ def _score(
         satisfied += excess * each.scale(part) <= max(each.tolerance, 1e-2 * FAR)
         coefficients += excess / (excess + FAR)
     data = part.at(key)
-    corners = [np.linalg.norm(part.corners(i) - part.standing_corners[i], axis=1).max()
-               for i in range(len(part.robot.soles)) if stance.planted[key, i]]  # fmt: skip
+    corners = [
+        np.linalg.norm(own - part.planted_corners[key, i, : len(own)], axis=1).max()
+        for i in np.flatnonzero(stance.planted[key])
+        for own in [part.corners(int(i))]
+    ]
     satisfied += max(corners, default=0.0) <= SOLE
     satisfied += asked.limit.depth(data) <= NEAR
     joints, (low, high) = part.qpos[key, 7:], part.robot.joint_range.T

@@ -1,4 +1,4 @@
-"""The whole clip's problem about its postures now: what they cost, and the next quadratic program."""
+"""The whole clip's problem about its postures now: their cost, and the next quadratic program."""
 
 from __future__ import annotations
 

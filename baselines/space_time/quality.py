@@ -41,17 +41,15 @@ class Quality(NamedTuple):
     violations: tuple[Violation, ...]
 
 
-def measure(
-    scene: Scene, asked: Asked, corners: np.ndarray, constraints: tuple[Constraint, ...] = ()
-) -> Quality:
+def measure(scene: Scene, asked: Asked, constraints: tuple[Constraint, ...] = ()) -> Quality:
     """The quality of a scene's postures.
 
     Args:
         scene: with the postures.
         asked: what the clip asks for.
-        corners: (F, 2, k, 3) where the corners of planted soles are to be [m].
         constraints: the user's.
     """
+    corners = scene.planted_corners
     places, errors, angles = np.empty_like(corners), [], []
     hands: dict[str, list[float]] = {side: [] for side in SIDES if scene.limbs.has_arms}
     depth = 0.0

@@ -112,16 +112,9 @@ def retarget_clip(
         by_trial(scene, asked, stance, wanted)
     if chosen != "frame":
         spent = (time.thread_time() - begun) / len(scene)
-    corners = np.tile(_padded(scene.standing_corners), (len(scene), 1, 1, 1))
     done = replace(made.clip, qpos=scene.qpos)
-    return RetargetedClip(done, measure(scene, asked, corners, wanted), chosen, made.scale, spent)
+    return RetargetedClip(done, measure(scene, asked, wanted), chosen, made.scale, spent)
 
 
 def _scene(robot: Robot, limbs: Any, qpos: np.ndarray, lead: float) -> Scene:
     return Scene(robot, limbs, qpos, 1.0 / 30.0, lead, np.ones((len(qpos), 2), dtype=bool))
-
-
-def _padded(corners: Sequence[np.ndarray]) -> np.ndarray:
-    """Corners of both soles as one array: the last one of each again where it has fewer."""
-    most = max(len(each) for each in corners)
-    return np.array([each[np.minimum(np.arange(most), len(each) - 1)] for each in corners])

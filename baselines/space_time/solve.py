@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-
 from poise.configs.errors import PoiseError
 
 from .problem import Cost, Problem

@@ -148,8 +148,16 @@ def bring(
     clip = clip.at_speed(speed) if speed != 1.0 else clip
     clip = clip.mirrored() if mirror else clip
     body = load_robot(robot)
-    made = retarget_clip(clip, body, solver=solver, constraints=constraints or (), smooth=smooth,
-                         lead=lead, planted=planted, progress=partial(print, flush=True))  # fmt: skip
+    made = retarget_clip(
+        clip,
+        body,
+        solver=solver,
+        constraints=constraints or (),
+        smooth=smooth,
+        lead=lead,
+        planted=planted,
+        progress=partial(print, flush=True),
+    )
     reference_from(made.clip, body, str(file))  # nothing is written that cannot be followed
     write_robot_clip(made.clip, out)
     print_retargeted(made, terminal())

@@ -15,7 +15,7 @@ from .scene import Rows, Scene
 
 @dataclass(frozen=True, kw_only=True)
 class OverSupport(Constraint):
-    """nᵢ · p ≤ dᵢ − margin for all sides i of the hull of the planted soles, seen from above.
+    """nᵢ · p ≤ dᵢ − margin for all sides i of the hull of the planted soles, from above.
 
     Attributes:
         point: com, a limb's role or a body.
@@ -31,10 +31,10 @@ class OverSupport(Constraint):
         point = scene.point(self.point, "point")
         for frame in frames:
             data = scene.at(frame)
-            soles = [scene.corners(i)[:, :2] for i in np.flatnonzero(scene.planted[frame])]
-            if not soles:
+            soles = scene.planted_corners[frame, scene.planted[frame], :, :2].reshape(-1, 2)
+            if not len(soles):
                 continue
-            sides = ConvexHull(np.concatenate(soles)).equations  # n · x + b ≤ 0 inside
+            sides = ConvexHull(soles).equations  # n · x + b ≤ 0 inside
             value = sides[:, :2] @ point.place(data)[:2] + sides[:, 2]
             derivative = sides[:, :2] @ point.jacobian(scene.model, data)[:2]
             bound = np.full(len(sides), -self.margin)

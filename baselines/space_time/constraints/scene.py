@@ -76,6 +76,8 @@ class Scene:
         times: (F,) [s].
         duration: of the clip [s].
         planted: (F, 2) by the order of the robot's soles.
+        planted_corners: (F, 2, k, 3) where their corners are to be while planted [m]: where the
+            robot stands, unless others are set. A sole of fewer corners has its last one again.
         sides: the index of the left and the right sole.
     """
 
@@ -93,7 +95,10 @@ class Scene:
         self.see(robot.standing_qpos)
         order = np.argsort([-self.data.xpos[sole.body_id][1] for sole in robot.soles])
         self.sides = dict(zip(SIDES, order.tolist(), strict=True))
-        self.standing_corners = [self.corners(i) for i in range(len(robot.soles))]
+        corners = [self.corners(i) for i in range(len(robot.soles))]
+        most = max(len(each) for each in corners)
+        padded = [each[np.minimum(np.arange(most), len(each) - 1)] for each in corners]
+        self.planted_corners = np.tile(np.array(padded), (len(qpos), 1, 1, 1))
 
     def see(self, qpos: np.ndarray) -> mujoco.MjData:
         """Kinematics of a posture (nq,)."""
@@ -148,6 +153,7 @@ class Scene:
         part.data = mujoco.MjData(self.model)
         part.qpos, part.times = self.qpos[frames].copy(), self.times[frames]
         part.planted, part._at = self.planted[frames], -1
+        part.planted_corners = self.planted_corners[frames]
         part.dt = float(part.times[-1] - part.times[0]) / (len(frames) - 1)
         return part
 
