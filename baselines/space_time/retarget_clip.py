@@ -10,7 +10,9 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from poise.baselines.clips.bvh import read_bvh
 from poise.baselines.clips.clip import Clip
+from poise.baselines.clips.library import find_bvh
 from poise.baselines.motions.robot_clip import RobotClip
 from poise.baselines.retargeting.retarget import LEAD, SMOOTH, retarget, targets_on
 from poise.baselines.space_time.constraints.constraint import Constraint
@@ -45,7 +47,7 @@ class RetargetedClip(NamedTuple):
 
 
 def retarget_clip(
-    clip: Clip,
+    clip: Clip | str | Path,
     robot: Robot,
     *,
     solver: Solver | None = None,
@@ -68,7 +70,8 @@ def retarget_clip(
     keyframe, as `by_trial` says.
 
     Args:
-        clip: whose feet stay where they are, as for `retarget`.
+        clip: whose feet stay where they are, as for `retarget`; or a packaged one's name, or a path
+            to a .bvh file.
         robot: with two feet.
         solver: without one, spacetime if there are constraints, else frame.
         constraints: the user's, or the name of a packaged file or a path to one.
@@ -87,6 +90,7 @@ def retarget_clip(
         raise ConfigError(f"no such solver: {solver!r}", field="solver", choices=get_args(Solver))
     if not 0.1 <= crossover <= 100.0:
         raise ConfigError(f"must be from 0.1 to 100, not {crossover:g}", field="crossover")
+    clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
     source = constraints if isinstance(constraints, (str, Path)) else None
     wanted = read_constraints(source) if source is not None else tuple(constraints)
     chosen: Solver = solver or ("spacetime" if wanted else "frame")

@@ -14,7 +14,7 @@ from .stance import plant
 MOST, TRUST = 25, 0.3  # programs, and the largest move of a joint in the first [rad]
 LEAST_TRUST = 2e-3  # [rad] that ends it
 SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step that are tried
-ENOUGH = 1e-4  # relative decrease of the cost that ends it
+ENOUGH, MET = 1e-3, 0.02  # decreases that end it: of the cost, relative; of the penalties
 
 
 class Optimum(NamedTuple):
@@ -64,11 +64,12 @@ def optimise(problem: Problem, progress: Callable[[int, Cost], None] | None = No
         if share == 0.0:
             trust *= 0.25
             continue
-        gain = (cost.whole - found.whole) / max(cost.whole, 1e-12)
+        enough = cost.whole - found.whole < ENOUGH * cost.whole
+        enough &= cost.lacking - found.lacking < MET
         cost = found
         if progress is not None:
             progress(solved, cost)
-        if gain < ENOUGH:
+        if enough:
             break
         trust = min(2.0 * trust, TRUST) if share == 1.0 else 0.5 * trust
     return Optimum(first, cost, solved, time.thread_time() - begun)

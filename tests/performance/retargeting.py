@@ -1,14 +1,14 @@
-"""Retargeting of clips whose feet stay to robots, by each solver: what is missed, and how long it takes.
+"""Retargeting of clips whose feet stay, by each solver: what is missed, and how long it takes.
 
-    python -m tests.performance.retargeting                    # 6 clips × 4 robots × frame, spacetime
+    python -m tests.performance.retargeting                    # 6 clips, 4 robots, 2 solvers
     python -m tests.performance.retargeting --robots humanoid --clips cmu02_punch
     python -m tests.performance.retargeting --clips cmu02_punch --robots humanoid \
         --solvers frame spacetime grid --constraints low_punch
 
-Bars: planted soles ≤ 1 mm off, skating ≤ 0.5 cm/s mean and 1 cm/s largest, no joint over its
-limit, penetration ≤ 1 mm, hands ≤ 3 cm in the mean over the frames in which they can be where they are to
-be; a frame takes ≤ 20 ms by `frame`; `spacetime` has a third derivative at least 30 % lower, at most 1.1 times
-the task error, and takes 30 s of the processor at most for 10 s of a clip.
+Bars: planted soles ≤ 1 mm off, skating ≤ 0.5 cm/s mean and 1 cm/s largest, no joint over its limit,
+penetration ≤ 1 mm, hands ≤ 3 cm in the mean over the frames in which they can be where they are to
+be; a frame takes ≤ 20 ms by `frame`; `spacetime` has a third derivative at least 30 % lower, at
+most 1.1 times the task error, and takes 30 s of the processor at most for 10 s of a clip.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from poise.baselines.clips.library import find_bvh
 from poise.baselines.retargeting.limbs import Limbs, find_limbs
 from poise.baselines.retargeting.retarget import LEAD, SMOOTH, targets_on
 from poise.baselines.retargeting.targets import BodyTargets
-from poise.baselines.space_time.retarget_clip import RetargetedClip, retarget_clip
+from poise.baselines.space_time.retarget_clip import RetargetedClip, Solver, retarget_clip
 from poise.envs.robots.robot import Robot, load_robot
 
 ROBOTS = ("humanoid", "compact", "tall", "toddler")
@@ -36,7 +36,7 @@ EVERY = 5  # frames between those in which that is looked at
 
 
 class Hand:
-    """A hand relative to its shoulder, and how near its arm alone brings it to where it is to be."""
+    """A hand relative to its shoulder, and how near to its place its arm alone brings it."""
 
     def __init__(self, robot: Robot, limbs: Limbs, side: str):
         self.robot, self.points = robot, limbs.points
@@ -69,7 +69,7 @@ class Hand:
         return hand - shoulder - upper * arm - lower * forearm
 
     def least(self, qpos: np.ndarray, targets: BodyTargets, frame: int) -> float:
-        """The least error over the arm's joints within their limits, from here and from standing."""
+        """The least error over the arm's joints, from here and from standing [m]."""
         where, (low, high) = 7 + self.joints, self.robot.joint_range[self.joints].T
 
         def errors(angles: np.ndarray) -> np.ndarray:
@@ -98,16 +98,19 @@ def hands(robot: Robot, made: RetargetedClip, targets: BodyTargets) -> dict[str,
     return found
 
 
-def judge(robot: Robot, name: str, solvers: list[str], constraints: str | None) -> list[str]:
+def judge(robot: Robot, name: str, solvers: list[Solver], constraints: str | None) -> list[str]:
     """Print a row for every solver; return the bars that are missed."""
     clip, missed, frame = read_bvh(find_bvh(name)).clip, [], None
     _, targets = targets_on(clip, robot, smooth=SMOOTH, lead=LEAD, planted=False)
     for solver in solvers:
-        made = retarget_clip(clip, robot, solver=solver, constraints=constraints or ())  # type: ignore[arg-type]
+        made = retarget_clip(clip, robot, solver=solver, constraints=constraints or ())
         q, label = made.quality, f"{name} on {robot.name} by {solver}"
         reach = hands(robot, made, targets)
-        arms = ", ".join(f"{s} {100 * e:.1f} cm in {n:.0%}" + (f" (else {100 * o:.1f})" if n < 1 else "")
-                         for s, (e, n, o) in reach.items())  # fmt: skip
+        arms = ", ".join(
+            f"{side} {100 * error:.1f} cm in {share:.0%}"
+            + (f" (else {100 * other:.1f})" if share < 1.0 else "")
+            for side, (error, share, other) in reach.items()
+        )
         seconds = made.time_per_frame * len(made.clip.qpos)
         print(f"{label}: soles {1000 * q.sole_error:.2g} mm, skating {100 * q.skating:.2g} / "
               f"{100 * q.skating_largest:.2g} cm/s, limits {np.degrees(q.limit_excess):.2g}°, "

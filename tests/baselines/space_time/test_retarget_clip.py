@@ -1,4 +1,4 @@
-"""A whole clip at once: smoother, as near to the clip, planted; constraints met, or their lack said."""
+"""A whole clip at once: smoother, as near to it, planted; constraints met, or their lack said."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from poise.baselines.space_time.stance import standing_stance
 from poise.configs.errors import ConfigError
 from tests.support.physics import robot_named
 
-LEAD = 0.4
+LEAD = 0.3
 WANTED: tuple[Constraint, ...] = (
-    Reach(point="hand_right", place=(0.3, -0.3, 1.1), period=When(at=0.4)),
-    Keep(point="hand_left", period=(0.2, 0.6)),
+    Reach(point="hand_right", place=(0.3, 0.2, 1.3), period=When(at=0.3)),
+    Keep(point="hand_left", period=(0.1, 0.5)),
 )
 
 
 @cache
 def clip() -> Clip:
-    return read_bvh(find_bvh("cmu02_punch")).clip.cut(1.0, 1.9)
+    return read_bvh(find_bvh("cmu02_punch")).clip.cut(1.2, 1.8)
 
 
 @cache
@@ -58,7 +58,7 @@ def test_smoother_and_as_near() -> None:
 
 def test_constraints_are_met_where_single_frames_miss_them() -> None:
     missed, met = made("frame", True).quality, made("spacetime", True).quality
-    assert min(each.largest for each in missed.violations) > 0.04
+    assert min(each.largest for each in missed.violations) > 0.02
     assert all(each.holds for each in met.violations)
     assert met.sole_error < 1e-6 and met.limit_excess == 0.0
     reference_from(made("spacetime", True).clip, robot_named("humanoid"), "test")
@@ -76,12 +76,12 @@ def test_what_cannot_be_is_missed_by_little_and_said() -> None:
     """A hand that is to be 3 m up, or still in place below: the optimum ends, and lists it."""
     robot, high = (
         robot_named("humanoid"),
-        Height(point="hand_right", least=3.0, period=When(at=0.4)),
+        Height(point="hand_right", least=3.0, period=When(at=0.3)),
     )
     found = retarget_clip(clip(), robot, constraints=[high], lead=LEAD)
     assert found.solver == "spacetime"
     (only,) = found.quality.violations
-    assert not only.holds and 1.0 < only.largest < 2.3 and only.time == pytest.approx(0.4, abs=0.02)
+    assert not only.holds and 1.0 < only.largest < 2.3 and only.time == pytest.approx(0.3, abs=0.02)
     assert found.quality.sole_error < 1e-6 and found.quality.limit_excess == 0.0
 
 
@@ -92,16 +92,16 @@ def test_a_foot_that_is_not_planted_is_lifted() -> None:
     planted = np.ones((len(targets), 2), dtype=bool)
     scene = Scene(robot, limbs, made("frame", False).clip.qpos, 1 / 30, LEAD, planted)
     left = scene.sides["left"]
-    planted[16:29, left] = False
+    planted[11:26, left] = False
     stance = standing_stance(scene)._replace(planted=planted)
-    lift = (Height(point="ankle_left", least=0.2, period=(0.25, 0.35)),)
+    lift = (Height(point="ankle_left", least=0.15, period=(0.25, 0.3)),)
     assert violation(lift[0], scene).largest > 0.05
     optimise(Problem(scene, Asked(scene, targets, lift), stance, lift, 2.0))
     assert violation(lift[0], scene).largest < 5e-3
     corners = [scene.corners(left) for f in range(len(scene)) for _ in [scene.at(f)]]
     heights = np.array([each[:, 2].min() for each in corners])
-    assert heights.min() > -1e-3 and heights[20:25].max() > 0.05
-    assert np.abs(heights[~np.isin(np.arange(len(scene)), np.arange(16, 29))]).max() < 1e-6
+    assert heights.min() > -1e-3 and heights[16:20].max() > 0.02
+    assert np.abs(heights[~np.isin(np.arange(len(scene)), np.arange(11, 26))]).max() < 1e-6
     right = 1 - left
     for frame in range(len(scene)):
         scene.at(frame)

@@ -49,7 +49,7 @@ def test_third_differences() -> None:
     assert third @ np.full(12, 7.0) == pytest.approx(np.zeros(15), abs=1e-9)
     moving = third @ (times + 1.0)
     assert moving[3:-3] == pytest.approx(np.zeros(9), abs=1e-8)
-    assert np.abs(moving).max() == pytest.approx(2.0 / dt**2)  # the velocity of 1 from rest
+    assert np.abs(moving).max() == pytest.approx(1.0 / dt**2)  # the velocity of 1 from rest
 
 
 def test_jerk_is_that_of_the_joints() -> None:

@@ -44,7 +44,7 @@ def test_packaged_files_are_valid(name: str) -> None:
         (f"{HEAD}{REACH}, period: {{at: 1, phase: [0, 1]}}}}\n", "must have one of at, contact"),
         (f"{HEAD}{REACH}, period: {{contact: front}}}}\n", r"choices: left, right, both"),
         (f"{HEAD}{REACH}, weight: 0}}\n", r"s\[0\].weight: must be above 0"),
-        (f"{HEAD}{{kind: reach, point: a, place: [null, null, null]}}\n", "place must have a number"),
+        (f"{HEAD}{{kind: reach, point: a, place: [null, null, null]}}\n", "must have a number"),
         (f"{HEAD}{{kind: height, point: pelvis}}\n", "needs least or most"),
         (f"{HEAD}{{kind: speed, point: a, least: 2, most: 1}}\n", "least 2 is above most 1"),
         (f"{HEAD}{{kind: reach, point: [}}\n", "line 2"),
