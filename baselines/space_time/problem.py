@@ -46,7 +46,8 @@ class Problem:
 
     e are the errors of `FrameTasks`, x the coordinates of a posture, ρ = (2π f)⁻⁶. Hard are the
     soles where they are planted and the joint limits. By the L1 norm are penalised: constraints of
-    the user's, the clearance of links, and soles in the air that are below the floor.
+    the user's, the clearance of links, and soles in the air that are below the floor
+    [Witkin88; Gleicher98].
     """
 
     def __init__(
