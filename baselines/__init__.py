@@ -36,6 +36,7 @@ __all__ = [
     "WrappedController",
     "load_controller",
     "load_motion",
+    "retarget_clip",
     "solve_ik",
 ]
 
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from poise.baselines.motions.motion import load_motion
     from poise.baselines.motions.reference_motion import ReferenceMotion
     from poise.baselines.registry import load_controller
+    from poise.baselines.space_time.retarget_clip import retarget_clip
     from poise.baselines.stepping.capture_step import CaptureStep
     from poise.baselines.stepping.config import CaptureStepConfig
     from poise.baselines.stepping.controller import SteppingController
@@ -89,6 +91,7 @@ else:
             "motions.motion": ("load_motion",),
             "motions.reference_motion": ("ReferenceMotion",),
             "registry": ("load_controller",),
+            "space_time.retarget_clip": ("retarget_clip",),
             "stepping.capture_step": ("CaptureStep",),
             "stepping.config": ("CaptureStepConfig",),
             "stepping.controller": ("SteppingController",),

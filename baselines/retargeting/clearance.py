@@ -44,8 +44,8 @@ class ClearanceLimit(mink.Limit):
     ) -> mink.Constraint:
         """G Δq ≤ h, a row for each pair that is near."""
         rows, bounds = [], []
-        for pair in self._candidates(configuration.data):
-            distance, row = self._row(configuration.data, pair)
+        for pair in self.candidates(configuration.data):
+            distance, row = self.row(configuration.data, pair)
             if row is not None:
                 room = GAIN * (distance - pair.kept)
                 rows.append(-row)
@@ -56,16 +56,16 @@ class ClearanceLimit(mink.Limit):
 
     def lacking(self, data: mujoco.MjData) -> np.ndarray:
         """(k,) by how much pairs are nearer than they are to be [m]; empty if none is."""
-        pairs = self._candidates(data)
-        gaps = [pair.kept - self._distance(data, pair, np.empty(6)) for pair in pairs]
+        pairs = self.candidates(data)
+        gaps = [pair.kept - self.distance(data, pair, np.empty(6)) for pair in pairs]
         return np.array([gap for gap in gaps if gap > 0.0])
 
     def depth(self, data: mujoco.MjData) -> float:
         """Depth of the deepest penetration [m]; 0 without one."""
-        pairs = self._candidates(data)
-        return max(0.0, *(-self._distance(data, pair, np.empty(6)) for pair in pairs), 0.0)
+        pairs = self.candidates(data)
+        return max(0.0, *(-self.distance(data, pair, np.empty(6)) for pair in pairs), 0.0)
 
-    def _candidates(self, data: mujoco.MjData) -> list[Pair]:
+    def candidates(self, data: mujoco.MjData) -> list[Pair]:
         """The pairs whose bounding spheres are near; a plane is never left out."""
         if not self.pairs:
             return []
@@ -76,14 +76,16 @@ class ClearanceLimit(mink.Limit):
         near = between - radius[first] - radius[second] < kept + NEAR
         return [self.pairs[i] for i in np.flatnonzero(near | endless)]
 
-    def _distance(self, data: mujoco.MjData, pair: Pair, ends: np.ndarray) -> float:
+    def distance(self, data: mujoco.MjData, pair: Pair, ends: np.ndarray) -> float:
+        """Between the geometries of a pair [m], at most 3 cm more than what is kept; `ends` (6,)
+        become the nearest points."""
         reach = pair.kept + NEAR
         return float(mujoco.mj_geomDistance(self.model, data, *pair[:2], reach, ends))
 
-    def _row(self, data: mujoco.MjData, pair: Pair) -> tuple[float, np.ndarray | None]:
+    def row(self, data: mujoco.MjData, pair: Pair) -> tuple[float, np.ndarray | None]:
         """The distance, and its derivative (nv,); None where the pair is far or just touches."""
         ends = np.empty(6)
-        distance = self._distance(data, pair, ends)
+        distance = self.distance(data, pair, ends)
         normal = ends[3:] - ends[:3]
         length = float(np.linalg.norm(normal))
         if distance >= pair.kept + NEAR or length < 1e-9:

@@ -15,7 +15,7 @@ from poise.envs.robots.robot import Robot
 
 from .limbs import Limbs, find_limbs
 from .paces import LONGEST, clip_heading, longest_step, plan_paces
-from .targets import RATE, between_standing, clip_targets, standing_targets
+from .targets import RATE, BodyTargets, between_standing, clip_targets, standing_targets
 
 SMOOTH = 3.0  # [Hz] of the low-pass on what the clip asks for, and on the joints
 LEAD = 1.0  # [s] from standing into the clip, and back
@@ -66,14 +66,7 @@ def retarget(
             missing.
         PoiseError: no posture keeps the soles and the limits.
     """
-    for name, value in (("smooth", smooth), ("lead", lead)):
-        if not 0.0 < value <= 100.0:
-            raise ConfigError(f"must be above 0 and at most 100, not {value:g}", field=name)
-    steps = not planted and not measure_contacts(clip).in_place
-    limbs = find_limbs(robot)
-    heading = clip_heading(clip) if steps else None
-    targets = clip_targets(clip, limbs.has_arms, smooth, heading)
-    whole = between_standing(targets, standing_targets(robot, limbs), lead)
+    limbs, whole, heading = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
     solved = _solver()(robot, limbs, whole, smooth)
     about = About(robot.name, robot.fingerprint, clip.name, clip.name, clip.licence)
     qpos, stance, stride = solved.qpos, None, 1.0
@@ -92,6 +85,21 @@ def retarget(
         float(max(excess.max(), 0.0)),
         stride,
     )
+
+
+def targets_on(
+    clip: Clip, robot: Robot, *, smooth: float, lead: float, planted: bool
+) -> tuple[Limbs, BodyTargets, float | None]:
+    """The robot's limbs, what a clip asks of it from standing to standing, and the heading of a
+    clip with steps [rad]; None for feet that stay. See `retarget`."""
+    for name, value in (("smooth", smooth), ("lead", lead)):
+        if not 0.0 < value <= 100.0:
+            raise ConfigError(f"must be above 0 and at most 100, not {value:g}", field=name)
+    steps = not planted and not measure_contacts(clip).in_place
+    limbs = find_limbs(robot)
+    heading = clip_heading(clip) if steps else None
+    targets = clip_targets(clip, limbs.has_arms, smooth, heading)
+    return limbs, between_standing(targets, standing_targets(robot, limbs), lead), heading
 
 
 def _stepped(

@@ -14,13 +14,11 @@ from poise.configs.errors import PoiseError
 from poise.envs.robots.robot import Robot
 
 from .clearance import ClearanceLimit
+from .frame_tasks import FrameTasks
 from .limbs import Limbs
 from .targets import BodyTargets, low_pass
-from .tasks import HeightTask, SegmentTask, SolesTask
+from .tasks import SolesTask
 
-COM, HEIGHT = 10.0, 5.0  # costs beside those of the segments [1/m]
-POSTURE, TRUNK = 0.1, 1.0  # the same of joints out of standing [1/rad]: a deep squat is to be
-# shallower rather than made by the waist alone, once the hips are at their limit
 PLANTING = 3  # iterations from near postures to planted soles
 MARGIN = 0.005  # [rad] kept from the joint limits, for splines between the frames
 MOST, STEP = 10, 1e-3  # iterations, and the largest move [rad, m] that ends them
@@ -71,8 +69,8 @@ def solve_frames(robot: Robot, limbs: Limbs, targets: BodyTargets, smooth: float
         begin = time.thread_time()
         qpos[frame] = ik.planted_near(qpos[frame], wanted[frame])
         times[frame] += time.thread_time() - begin
-        ik.segments.aim(targets.directions, frame)
-        angles[frame] = ik.angles()
+        ik.frame.aim(targets, frame)
+        angles[frame] = ik.frame.angles()
         sole_error = max(sole_error, ik.sole_error())
         penetration = max(penetration, ik.clearance.depth(ik.configuration.data))
     rms = np.sqrt((angles**2).mean(axis=0))
@@ -123,29 +121,21 @@ class _FrameIk:
 
     def __init__(self, robot: Robot, limbs: Limbs, names: list[str]):
         self.robot, self.model = robot, robot.model
-        self.configuration = mink.Configuration(self.model, q=robot.standing_qpos)
+        self.frame = FrameTasks(robot, limbs, names)
+        self.configuration = self.frame.configuration
         self.planted = [_corners(robot, self.configuration.data, i) for i in range(2)]
-        self.segments, self.height = SegmentTask(limbs, names), HeightTask(limbs, HEIGHT)
-        data = self.configuration.data
-        self.standing = float((self.height.pelvis.place(data) - self.height.feet.place(data))[2])
-        com = mink.ComTask(np.array([COM, COM, 0.0]))
-        com.set_target_from_configuration(self.configuration)
-        posture = mink.PostureTask(self.model, _posture_costs(limbs, self.model, data))
-        posture.set_target_from_configuration(self.configuration)
         self.near = mink.PostureTask(self.model, 1.0)
-        self.tasks = [self.segments, self.height, com, posture]
         self.soles = SolesTask([sole.body for sole in robot.soles], self.configuration)
         self.damping = LEAST_DAMPING
-        self.clearance = ClearanceLimit(robot, data)
+        self.clearance = ClearanceLimit(robot, self.configuration.data)
         self.limits = [mink.ConfigurationLimit(self.model, 1.0, MARGIN), self.clearance]
 
     def solve(self, targets: BodyTargets, frame: int) -> np.ndarray:
         """(nq,) the posture of a frame."""
-        self.segments.aim(targets.directions, frame)
-        self.height.height = self.standing * float(targets.height[frame])
+        self.frame.aim(targets, frame)
         damping, merit = self.damping, self._merit()
         for _ in range(MOST):
-            before, step = self.configuration.q.copy(), self._step(self.tasks, damping)
+            before, step = self.configuration.q.copy(), self._step(self.frame.tasks, damping)
             self.configuration.integrate_inplace(step, 1.0)
             after = self._merit()
             if after <= merit * (1.0 + 1e-9) + 1e-12:
@@ -182,29 +172,16 @@ class _FrameIk:
     def _merit(self) -> float:
         """Σ‖W e‖² of the tasks and, heavily, of the soles and of what lacks in clearance: what a
         step must make smaller."""
-        errors = [task.cost * task.compute_error(self.configuration) for task in self.tasks]
+        errors = [self.frame.errors()]
         errors.append(SOLES * self.clearance.lacking(self.configuration.data))
         errors.append(SOLES * self.soles.whole_error(self.configuration))
         return float(sum(error @ error for error in errors))
-
-    def angles(self) -> np.ndarray:
-        """(S,) angles [rad] of the segments to their targets: ‖e‖ is a chord."""
-        chords = self.segments.compute_error(self.configuration).reshape(-1, 3)
-        return 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(chords, axis=1), 0.0, 1.0))
 
     def sole_error(self) -> float:
         """Largest distance of a corner of a sole from where it is planted [m]."""
         data = self.configuration.data
         gaps = [_corners(self.robot, data, i) - self.planted[i] for i in range(2)]
         return float(max(np.linalg.norm(gap, axis=1).max() for gap in gaps))
-
-
-def _posture_costs(limbs: Limbs, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """(nv,) costs of joints out of standing: the trunk's are those between pelvis and chest."""
-    pelvis, chest = (limbs.points[role].jacobian(model, data) for role in ("pelvis", "chest"))
-    trunk = np.abs(chest - pelvis).max(axis=0) > 1e-9
-    trunk[:6] = False
-    return np.where(trunk, TRUNK, POSTURE)
 
 
 def _corners(robot: Robot, data: mujoco.MjData, foot: int) -> np.ndarray:

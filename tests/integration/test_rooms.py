@@ -34,8 +34,8 @@ FLOORS = """
  9 envs/vector, baselines/feasibility, baselines/in_place, baselines/policy_files
  9 baselines/retargeting
  9 baselines/stepping, baselines/walking/models
-10 baselines/performing, baselines/walking
-11 baselines/registry
+10 baselines/performing, baselines/space_time/constraints, baselines/walking
+11 baselines/registry, baselines/space_time
 12 baselines/environments
 13 training/learning, training/tracking
 14 training/trials

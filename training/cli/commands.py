@@ -308,6 +308,7 @@ def list_names() -> None:
         "suites",
         "training",
         "motions",
+        "constraints",
         "tuning",
         "limits",
         "human",

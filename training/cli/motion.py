@@ -3,8 +3,9 @@
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -23,6 +24,7 @@ from .motion_check import check
 from .motion_join import join
 from .motion_script import graph, plan, synth
 
+Solver = Literal["frame", "spacetime", "grid"]
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
 
@@ -112,6 +114,8 @@ def bring(
     smooth: float = 3.0,
     lead: float = 1.0,
     planted: Switch = False,
+    solver: Solver | None = None,
+    constraints: str | None = None,
 ) -> None:
     """Retarget a BVH file to a robot, its soles planted where the clip's are; see docs/motions.md.
 
@@ -131,9 +135,12 @@ def bring(
         smooth: low-pass on what is asked of the robot [Hz].
         lead: from standing into the clip, and back [s].
         planted: take the feet as planted though they move in the clip.
+        solver: frame by frame, spacetime for the optimum of the whole clip, grid for constraints
+            by trial in steps; without one spacetime if there are constraints, else frame.
+        constraints: a packaged name (see poise list) or a .yaml file of what else is wanted.
     """
     from poise.baselines.motions.robot_clip import reference_from, write_robot_clip
-    from poise.baselines.retargeting.retarget import retarget
+    from poise.baselines.space_time.retarget_clip import retarget_clip
     from poise.training.following.tables import print_retargeted
 
     check_out_file(out)
@@ -142,7 +149,16 @@ def bring(
     clip = clip.at_speed(speed) if speed != 1.0 else clip
     clip = clip.mirrored() if mirror else clip
     body = load_robot(robot)
-    made = retarget(clip, body, smooth=smooth, lead=lead, planted=planted)
+    made = retarget_clip(
+        clip,
+        body,
+        solver=solver,
+        constraints=constraints or (),
+        smooth=smooth,
+        lead=lead,
+        planted=planted,
+        progress=partial(print, flush=True),
+    )
     reference_from(made.clip, body, str(file))  # nothing is written that cannot be followed
     write_robot_clip(made.clip, out)
     print_retargeted(made, terminal())

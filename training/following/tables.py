@@ -13,7 +13,8 @@ from poise.baselines.clips.axes import FileAxes
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.contacts import measure_contacts
 from poise.baselines.feasibility.check import Feasibility, shown
-from poise.baselines.retargeting.retarget import Retargeted
+from poise.baselines.space_time.constraints.constraint import Violation
+from poise.baselines.space_time.retarget_clip import RetargetedClip
 
 from .follow import Followed
 
@@ -70,33 +71,55 @@ def print_clip(clip: Clip, axes: FileAxes, console: Console) -> None:
     console.print(table)
 
 
-def print_retargeted(made: Retargeted, console: Console) -> None:
-    """What the robot's postures miss."""
-    table = _table(f"{made.clip.about.name} on {made.clip.about.robot}")
-    worst = sorted(made.direction_error.items(), key=lambda item: -item[1])
+def print_retargeted(made: RetargetedClip, console: Console) -> None:
+    """What the robot's postures miss, and which of the user's constraints are violated."""
+    table = _table(f"{made.clip.about.name} on {made.clip.about.robot}, by {made.solver}")
+    quality = made.quality
+    worst = sorted(quality.directions.items(), key=lambda item: -item[1])
     directions = ", ".join(f"{name} {np.degrees(error):.1f}°" for name, error in worst)
+    hands = ", ".join(f"{side} {100 * error:.1f} cm" for side, error in quality.hands.items())
     for name, value in (
         (
             "frames",
             f"{len(made.clip.qpos)} at {1 / made.clip.dt:.3g} Hz, {made.clip.duration:.2f} s",
         ),
         ("legs over the clip's", f"{made.scale:.3f}"),
-        ("soles", _soles(made)),
-        ("over joint limits", f"{np.degrees(made.limit_excess):.2g}°"),
-        ("in the floor or in itself", f"{1000 * made.penetration:.2g} mm at most"),
+        ("steps", _steps(made)),
+        ("soles off their places", f"{1000 * quality.sole_error:.2g} mm at most"),
+        ("skating, mean and largest", f"{100 * quality.skating:.2g}, "
+         f"{100 * quality.skating_largest:.2g} cm/s"),
+        ("over joint limits", f"{np.degrees(quality.limit_excess):.2g}°"),
+        ("in the floor or in itself", f"{1000 * quality.penetration:.2g} mm at most"),
+        ("hands off their places, mean", hands or "no arms"),
         ("directions, RMS", directions),
+        ("third derivative of joints, RMS", f"{quality.jerk:.1f} rad/s³"),
         ("time a frame", f"{1000 * made.time_per_frame:.1f} ms of the processor"),
-    ):
+    ):  # fmt: skip
         table.add_row(name, value)
+    console.print(table)
+    if quality.violations:
+        print_violations(quality.violations, console)
+
+
+def print_violations(violations: Sequence[Violation], console: Console) -> None:
+    """By how much each constraint of the user's is missed, where it is missed most."""
+    missed = sum(not each.holds for each in violations)
+    table = Table(title=f"constraints, {missed} of {len(violations)} violated",
+                  title_justify="left")  # fmt: skip
+    for name in ("constraint", "missed by", "at", ""):
+        table.add_column(name)
+    for each in violations:
+        table.add_row(escape(each.about), f"{each.largest:.3g} {each.unit}", f"{each.time:.2f} s",
+                      "" if each.holds else "violated")  # fmt: skip
     console.print(table)
 
 
-def _soles(made: Retargeted) -> str:
+def _steps(made: RetargetedClip) -> str:
     planted = made.clip.planted
     if planted is None:
-        return f"{1000 * made.sole_error:.2g} mm off their places at most"
+        return "none"
     steps = int(np.sum(np.diff(planted.astype(int), axis=0) > 0))
-    return f"{steps} steps, {made.stride:.0%} of the length that the legs' scale gives"
+    return f"{steps}, {made.stride:.0%} of the length that the legs' scale gives"
 
 
 def print_feasibility(judged: Feasibility, title: str, console: Console) -> None:

@@ -45,13 +45,13 @@ def test_a_row_is_the_rate_of_the_distance() -> None:
         limit, configuration = limit_at(angles, height, tilt=0.1)
         rng, h, checked = np.random.default_rng(0), 1e-4, 0
         for pair in limit.pairs:
-            distance, row = limit._row(configuration.data, pair)
+            distance, row = limit.row(configuration.data, pair)
             if row is None or abs(distance) < 2e-3:
                 continue
             way = rng.normal(size=limit.model.nv)
             ends = [configuration.integrate(way, sign * h) for sign in (-1.0, 1.0)]
             before, after = (
-                limit._distance(mink.Configuration(limit.model, q=q).data, pair, np.empty(6))
+                limit.distance(mink.Configuration(limit.model, q=q).data, pair, np.empty(6))
                 for q in ends
             )
             assert row @ way == pytest.approx((after - before) / (2 * h), abs=0.02)

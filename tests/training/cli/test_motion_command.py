@@ -30,6 +30,24 @@ def test_info_convert_and_import(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert np.abs(robot.root - robot_clip.qpos[:, :3]).max() < 1e-6
 
 
+def test_constraints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """They are met by the whole clip's solver, which is the default then; single frames only say
+    how much is missing."""
+    file, out = tmp_path / "pelvis.yaml", tmp_path / "out.npz"
+    file.write_text("constraints:\n- {kind: height, point: pelvis, most: 0.7, period: {at: 0.2}}\n")
+    words = ["motion", "import", "cmu02_punch", "--out", str(out), "--cut", "1.2", "1.7"]
+    words += ["--lead", "0.3", "--constraints", str(file)]
+    assert main([*words, "--solver", "frame"]) == 0
+    printed = capsys.readouterr().out
+    assert "by frame" in printed and "constraints, 1 of 1 violated" in printed
+    assert "skating, mean and largest" in printed and "hands off their places" in printed
+    assert main(words) == 0
+    printed = capsys.readouterr().out
+    assert "by spacetime" in printed and "constraints, 0 of 1 violated" in printed
+    assert "program 1: tasks " in printed
+    assert read_robot_clip(out).qpos[9 + 6, 2] < read_robot_clip(out).qpos[0, 2] - 0.03
+
+
 def test_join(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """T₁ + D + T₂; without a duration that of the least coefficient."""
     out, lengths = tmp_path / "both.bvh", []
@@ -75,6 +93,11 @@ def test_check_and_physical_join(tmp_path: Path, capsys: pytest.CaptureFixture[s
         (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),
         (["follow", "kick"], "motion: the feet of 'kick' leave the ground"),
         (["check", "kick", "--qp"], "kick: qp: is not for motions with steps"),
+        (
+            ["import", "cmu02_stand", "--out", "x.npz", "--constraints", "nothing"],
+            "constraints: no such name: 'nothing'; give a path to a .yaml file or a packaged name "
+            "(choices: hand_on_hip, low_punch)",
+        ),
         (["convert", "cmu02_stand", "x.txt"], "x.txt: must be the name of a .bvh file"),
         (["join", "cmu02_punch", "fair1_wave_hello", "x.bvh"], "has another skeleton than"),
         (

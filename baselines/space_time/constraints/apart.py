@@ -1,0 +1,43 @@
+"""Two points that keep a distance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from .constraint import Constraint
+from .scene import Rows, Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class Apart(Constraint):
+    """‖p − p'‖ ≥ distance.
+
+    Attributes:
+        point, to: limbs' roles such as hand_left, com, or bodies.
+        distance: [m].
+    """
+
+    point: str
+    to: str
+    distance: float = field(metadata={"above": 0.0})
+    kind: Literal["apart"] = "apart"
+
+    def rows(self, scene: Scene, frames: Sequence[int]) -> Iterator[Rows]:
+        """One row a frame."""
+        first, second = scene.point(self.point, "point"), scene.point(self.to, "to")
+        low, high = np.array([self.distance]), np.array([np.inf])
+        for frame in frames:
+            data = scene.at(frame)
+            between = first.place(data) - second.place(data)
+            length = float(np.linalg.norm(between))
+            way = between / length if length > 1e-9 else np.array([0.0, 1.0, 0.0])
+            moved = first.jacobian(scene.model, data) - second.jacobian(scene.model, data)
+            yield Rows({frame: way[None] @ moved}, np.array([length]), low, high)
+
+    def about(self) -> str:
+        """The constraint in a few words."""
+        return f"{self.point} and {self.to} apart by {self.distance:g} m"
