@@ -49,38 +49,60 @@ def measure(scene: Scene, asked: Asked, constraints: tuple[Constraint, ...] = ()
         asked: what the clip asks for.
         constraints: the user's.
     """
-    corners = scene.planted_corners
-    places, errors, angles = np.empty_like(corners), [], []
+    errors, angles, depth = [], [], 0.0
     hands: dict[str, list[float]] = {side: [] for side in SIDES if scene.limbs.has_arms}
-    depth = 0.0
     for frame in range(len(scene)):
         data = scene.at(frame)
-        for foot in range(len(scene.robot.soles)):
-            own = scene.corners(foot)
-            places[frame, foot] = own[np.minimum(np.arange(corners.shape[2]), len(own) - 1)]
         for side, found in hands.items():
             found.append(float(np.linalg.norm(hand_error(scene, asked, side, frame))))
         depth = max(depth, asked.limit.depth(data))
         errors.append(asked.errors(scene, frame))
         angles.append(asked.tasks.angles())
-    planted = scene.planted[:, :, None, None]
-    off = np.linalg.norm(np.where(planted, places - corners, 0.0), axis=-1)
-    both = (scene.planted[1:] & scene.planted[:-1])[:, :, None]
-    speeds = np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1) / scene.dt
-    skating = speeds[np.broadcast_to(both, speeds.shape)]
+    soles = measure_soles(scene)
     joints, (low, high) = scene.qpos[:, 7:], scene.robot.joint_range.T
     rms = np.sqrt(np.mean(np.square(angles), axis=0))
     return Quality(
-        float(off.max()),
-        float(skating.mean()) if skating.size else 0.0,
-        float(skating.max(initial=0.0)),
-        max(depth, float(-places[..., 2].min())),
+        soles.error,
+        soles.skating,
+        soles.skating_largest,
+        max(depth, soles.depth),
         float(np.maximum(np.maximum(low - joints, joints - high), 0.0).max()),
         {side: float(np.mean(found)) for side, found in hands.items()},
         jerk(scene.qpos, scene.dt),
         float(np.sqrt(np.mean([e @ e for e in errors]))),
         dict(zip(asked.targets.directions, rms.tolist(), strict=True)),
         tuple(violation(each, scene) for each in constraints),
+    )
+
+
+class SoleQuality(NamedTuple):
+    """Of the corners of planted soles: the largest distance from where they are to be [m], their
+    horizontal speed, its mean and the largest [m/s]; how deep in the floor any sole gets [m]."""
+
+    error: float
+    skating: float
+    skating_largest: float
+    depth: float
+
+
+def measure_soles(scene: Scene) -> SoleQuality:
+    """How soles stay where they are planted."""
+    corners = scene.planted_corners
+    places = np.empty_like(corners)
+    for frame in range(len(scene)):
+        scene.at(frame)
+        for foot in range(len(scene.robot.soles)):
+            places[frame, foot] = scene.padded_corners(foot)
+    planted = scene.planted[:, :, None, None]
+    off = np.linalg.norm(np.where(planted, places - corners, 0.0), axis=-1)
+    both = (scene.planted[1:] & scene.planted[:-1])[:, :, None]
+    speeds = np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1) / scene.dt
+    skating = speeds[np.broadcast_to(both, speeds.shape)]
+    return SoleQuality(
+        float(off.max()),
+        float(skating.mean()) if skating.size else 0.0,
+        float(skating.max(initial=0.0)),
+        float(-places[..., 2].min()),
     )
 
 

@@ -14,7 +14,13 @@ from poise.baselines.clips.bvh import read_bvh
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import find_bvh
 from poise.baselines.motions.robot_clip import RobotClip
-from poise.baselines.retargeting.retarget import LEAD, SMOOTH, retarget, targets_on
+from poise.baselines.retargeting.retarget import (
+    LEAD,
+    SMOOTH,
+    Retargeted,
+    retarget,
+    targets_on,
+)
 from poise.baselines.retargeting.targets import RATE
 from poise.baselines.space_time.constraints.constraint import Constraint
 from poise.baselines.space_time.constraints.reading import check_constraints, read_constraints
@@ -23,6 +29,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .stance import standing_stance
+from .trajectory import jerk
 
 Solver = Literal["frame", "spacetime", "grid"]
 CROSSOVER = 2.0  # [Hz] what is asked faster than this is smoothed
@@ -112,6 +119,8 @@ def retarget_clip(
     from .solve import optimise
 
     scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted)
+    if heading is not None:
+        return _stepped(made, scene)
     stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
     spent, begun = made.time_per_frame, time.thread_time()
     if chosen == "spacetime":
@@ -125,7 +134,19 @@ def retarget_clip(
         spent = (time.thread_time() - begun) / len(scene)
     done = replace(made.clip, qpos=scene.qpos)
     quality = measure(scene, asked, wanted)
-    return RetargetedClip(done, quality, chosen, made.scale, spent, made.stride)
+    return RetargetedClip(done, quality, chosen, made.scale, spent)
+
+
+def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
+    """A clip with steps, whose frames are not those of what was asked for: hands are left out."""
+    from .quality import Quality, measure_soles
+
+    soles = measure_soles(scene)
+    quality = Quality(
+        soles.error, soles.skating, soles.skating_largest, max(made.penetration, soles.depth),
+        made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
+    )  # fmt: skip
+    return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride)
 
 
 def _scene(
@@ -142,7 +163,5 @@ def _scene(
             if planted[frame, foot] and planted[frame - 1, foot]:
                 scene.planted_corners[frame, foot] = scene.planted_corners[frame - 1, foot]
             elif planted[frame, foot]:
-                own = scene.corners(foot)
-                most = scene.planted_corners.shape[2]
-                scene.planted_corners[frame, foot] = own[np.minimum(np.arange(most), len(own) - 1)]
+                scene.planted_corners[frame, foot] = scene.padded_corners(foot)
     return scene

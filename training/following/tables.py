@@ -90,7 +90,7 @@ def print_retargeted(made: RetargetedClip, console: Console) -> None:
          f"{100 * quality.skating_largest:.2g} cm/s"),
         ("over joint limits", f"{np.degrees(quality.limit_excess):.2g}°"),
         ("in the floor or in itself", f"{1000 * quality.penetration:.2g} mm at most"),
-        ("hands off their places, mean", hands or "no arms"),
+        ("hands off their places, mean", hands or "not measured"),
         ("directions, RMS", directions),
         ("third derivative of joints, RMS", f"{quality.jerk:.1f} rad/s³"),
         ("time a frame", f"{1000 * made.time_per_frame:.1f} ms of the processor"),

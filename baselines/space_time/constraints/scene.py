@@ -95,10 +95,8 @@ class Scene:
         self.see(robot.standing_qpos)
         order = np.argsort([-self.data.xpos[sole.body_id][1] for sole in robot.soles])
         self.sides = dict(zip(SIDES, order.tolist(), strict=True))
-        corners = [self.corners(i) for i in range(len(robot.soles))]
-        most = max(len(each) for each in corners)
-        padded = [each[np.minimum(np.arange(most), len(each) - 1)] for each in corners]
-        self.planted_corners = np.tile(np.array(padded), (len(qpos), 1, 1, 1))
+        padded = np.array([self.padded_corners(i) for i in range(len(robot.soles))])
+        self.planted_corners = np.tile(padded, (len(qpos), 1, 1, 1))
 
     def see(self, qpos: np.ndarray) -> mujoco.MjData:
         """Kinematics of a posture (nq,)."""
@@ -146,6 +144,12 @@ class Scene:
         corners = np.pad(sole.polygon, ((0, 0), (0, 1))) @ sole.rotation.T + sole.position
         axes = self.data.xmat[sole.body_id].reshape(3, 3)
         return self.data.xpos[sole.body_id] + corners @ axes.T
+
+    def padded_corners(self, foot: int) -> np.ndarray:
+        """(k, 3) the same, the last one again up to the number of corners of the other sole."""
+        most = max(len(sole.polygon) for sole in self.robot.soles)
+        corners = self.corners(foot)
+        return corners[np.minimum(np.arange(most), len(corners) - 1)]
 
     def part(self, frames: np.ndarray) -> Scene:
         """A scene of some of the frames (k,), whose `dt` is their mean distance."""
