@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from poise.baselines.clips.clip import Clip
+from poise.baselines.feasibility.check import FeasibilityLimits
 from poise.baselines.feasibility.ends import Attempt, End
 from poise.baselines.feasibility.physical import (
     TIME_PRICE,
@@ -71,10 +72,14 @@ class RobotJoins:
     """Ways between clips of one robot's skeleton, see `physical_join`.
 
     What has been looked for is remembered by the names of clips and the times in them.
+
+    Args:
+        robot: whose clips they are.
+        limits: what the ways keep.
     """
 
-    def __init__(self, robot: Robot):
-        self.robot = robot
+    def __init__(self, robot: Robot, limits: FeasibilityLimits | None = None):
+        self.robot, self.limits = robot, limits
         self._sides: dict[str, _Side | str] = {}
         self._ways: dict[tuple[Transition, bool], Way | str] = {}
 
@@ -150,7 +155,7 @@ class RobotJoins:
 
     @cached_property
     def _first_shaper(self) -> Shaper:
-        return make_shaper(self.robot, 1.0, [load_motion("standing", self.robot)])
+        return make_shaper(self.robot, 1.0, [load_motion("standing", self.robot)], self.limits)
 
     def _shaper(self, dt: float, sides: tuple[_Side, ...]) -> Shaper:
         span = height_span([side.motion for side in sides])

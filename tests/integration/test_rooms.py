@@ -44,7 +44,7 @@ FLOORS = """
 16 training/evaluation, training/qp_set, training/robot_check
 17 training/gaits, training/results
 18 training/export, training/report, training/sessions
-19 training/view
+19 training/motion_report, training/view
 20 training/cli
 21 envs, baselines, training
 """

@@ -25,6 +25,9 @@ from poise.configs.reading import read_yaml
 from poise.configs.schema import build
 from poise.envs.robots.robot import load_robot
 from poise.training.following.scripts import load_clips, open_synthesis, write_robot_motion
+from poise.training.motion_report.graph_chart import graph_pictures
+from poise.training.motion_report.page import check_page, write_page
+from poise.training.motion_report.performance import write_synthesis
 from poise.training.running.terminal import terminal
 
 from .arguments import Switch
@@ -50,6 +53,7 @@ def graph(
     weights: Path | None = None,
     state: tuple[str, ...] = (),
     plot: Path | None = None,
+    report: Path | None = None,
 ) -> None:
     """Find out which clips may follow which, and where: a motion graph as YAML.
 
@@ -67,9 +71,12 @@ def graph(
         weights: a .yaml file of an expert: weights, a list of before, after and weight.
         state: postures by name, as NAME=CLIP@SECONDS.
         plot: a .png file for the adjacency matrix and the graph.
+        report: a .html file for both, which follows light and dark.
     """
     from poise.training.following.script_tables import print_graph
 
+    if report is not None:
+        check_page(report)
     limits = build(Thresholds, {
         "coefficient": coefficient, "angle": angle, "contacts": not any_feet, "least": least,
         "most": most, "time_price": time_price, "each": each}, "graph")  # fmt: skip
@@ -84,6 +91,10 @@ def graph(
 
         plot_graph(plot, made)
         print(plot)
+    if report is not None:
+        lead = f"{len(made.clips)} clips, {len(made.transitions)} transitions."
+        write_page(report, out.stem, lead, graph_pictures(made))
+        print(report)
 
 
 def plan(
@@ -127,6 +138,7 @@ def synth(
     goal: Annotated[str | None, tyro.conf.arg(name="to")] = None,
     kind: Kind | None = None,
     least: float | None = None,
+    report: Path | None = None,
 ) -> None:
     """Make the motion of a script, and a file beside it with every choice (.plan.json).
 
@@ -140,10 +152,13 @@ def synth(
         kind: of transitions that the script leaves open. None: physical with a robot, which
             lasts as long and bends as much as it needs, and insert without.
         least: shortest transition of the packaged clips [s]; a graph has its own.
+        report: a .html file for the script's timeline and, for a robot, the ZMP of the motion.
     """
     if out.suffix not in ((".npz", ".bvh") if robot else (".bvh",)):
         raise ConfigError("must be the name of a .npz or .bvh file; a .npz needs --robot",
                           source=out, field="out")  # fmt: skip
+    if report is not None:
+        check_page(report)
     tree = between(find_script(script), start, goal)
     synthesis = open_synthesis(graph, robot, kind, least)
     begin = time.monotonic()
@@ -157,6 +172,9 @@ def synth(
     write_atomic(out.with_suffix(".plan.json"), text + "\n")
     print(f"{clip.duration:.1f} s, made in {record['seconds']:.1f} s")
     print(out)
+    if report is not None:
+        write_synthesis(report, record, out, robot)
+        print(report)
 
 
 def _weights(path: Path | None) -> tuple[Weight, ...]:

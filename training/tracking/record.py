@@ -78,7 +78,7 @@ class Tracking:
         self._footing.update(env.simulation.state)
         self.fallen = bool(env.fallen) or lies(env)
         if not self.fallen:
-            self._errors.append(_errors(env, self._reference, self._footing.stance))
+            self._errors.append(tracking_errors(env, self._reference, self._footing.stance))
             self._counted += env.motion_time < env.motion.duration + COUNTED
 
     def figures(self) -> TrackingFigures:
@@ -138,7 +138,7 @@ def lies(env: ResidualBalanceEnv) -> bool:
     return bool(low or leaning)
 
 
-def _errors(
+def tracking_errors(
     env: ResidualBalanceEnv, reference: ReferenceBodies, stance: Stance
 ) -> tuple[float, float, float, float]:
     """Mean square of the joints, mean distance of the bodies, the same relative to the root, and
