@@ -194,13 +194,13 @@ MOTION: dict[str, Callable[..., object]] = {
     "convert": convert,
     "import": bring,
     "follow": follow,
-    "play": play,
     "join": join,
-    "match": match,
     "check": check,
     "graph": graph,
     "plan": plan,
     "synth": synth,
+    "match": match,
+    "play": play,
 }
 
 

@@ -93,7 +93,7 @@ def graph(
         print(plot)
     if report is not None:
         lead = f"{len(made.clips)} clips, {len(made.transitions)} transitions."
-        write_page(report, out.stem, lead, graph_pictures(made))
+        write_page(report, f"{out.stem}, a motion graph", lead, graph_pictures(made))
         print(report)
 
 
