@@ -24,7 +24,7 @@ def test_commands_hold_from_their_time_on() -> None:
 def test_a_walk_that_is_asked_for_is_walked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It punches in place for two seconds and then goes forward at about the speed that is asked for."""
+    """It punches in place for two seconds and then goes forward about as fast as asked."""
     out = tmp_path / "walk.bvh"
     ask = ["--commands", "2:1.2", "--seconds", "5", "--out", str(out)]
     assert main(["motion", "match", *TWO, *ask]) == 0
