@@ -12,16 +12,18 @@ from .page import Picture
 from .trace import Trace
 
 WIDTH, LEFT, RIGHT, TOP = 560.0, 46.0, 552.0, 24.0
-PANEL, GAP = 110.0, 32.0
+PANEL, GAP = 110.0, 48.0
 OUTSIDE = 0.06  # [m] beyond the soles that is still shown
 
 
 def zmp_picture(judged: Feasibility, trace: Trace | None = None) -> Picture:
     """The ZMP of a reference beside the hull of its soles; with a trace the measured CoP, too."""
-    lacking = float((judged.zmp_margin < 0.0).mean())
-    caption = (f"The ZMP of the motion, forward and to the left, and the reach of the soles. It is "
-               f"at least {100.0 * judged.zmp_margin.min():.1f} cm inside; "
-               f"outside for {lacking:.1%} of the time.")  # fmt: skip
+    least, outside = 100.0 * float(judged.zmp_margin.min()), judged.zmp_margin < 0.0
+    caption = "The ZMP of the motion, forward and to the left, and the reach of the soles. It is "
+    if least >= 0.0:
+        caption += f"at least {least:.1f} cm inside."
+    else:
+        caption += f"outside for {outside.mean():.1%} of the time, by {-least:.1f} cm at most."
     key = {"zmp": "ZMP of the motion", "support": "soles"}
     if trace is not None:
         caption += " Measured is the centre of pressure under the soles as they stand."

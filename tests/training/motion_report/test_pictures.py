@@ -102,7 +102,7 @@ def test_a_performance_is_seen_with_its_push(tmp_path: Path) -> None:
     (trial,) = follow(motion, robot=robot, starts=1, impulse=12.0, watch=watched)
     trace = watched.tracers[0].trace()
     ((start, length),) = trace.pushes
-    before = (trace.time > 0.6) & (trace.time < start)
+    before = (trace.time > start - 0.3) & (trace.time < start)
     after = (trace.time > start + length) & (trace.time < start + 0.5)
     assert trace.bodies[after].max() > 2.0 * trace.bodies[before].max()
     assert trace.beta[after].min() < 0.9 < trace.beta[before].min()
