@@ -13,8 +13,8 @@ from .page import Picture
 
 NAME = 15  # characters of a clip's name
 CELL, LEFT, TOP = 30.0, 132.0, 108.0  # of the matrix
-SIDE, RADIUS = 470.0, 165.0  # of the circle
-FAINT = 0.18  # opacity of the dearest transition
+SIDE, RADIUS = 500.0, 148.0  # of the circle
+FAINT = 0.3  # opacity of the dearest transition
 #: first word of a reason → class, what it means
 REASONS = {
     "K": ("mark-k", "K is too large"),

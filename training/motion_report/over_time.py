@@ -11,7 +11,7 @@ from poise.training.report.svg import Chart, Svg, ticks
 from .page import Picture
 from .trace import Trace
 
-WIDTH, LEFT, RIGHT, TOP = 560.0, 46.0, 552.0, 24.0
+WIDTH, LEFT, RIGHT, TOP = 440.0, 46.0, 432.0, 24.0
 PANEL, GAP = 110.0, 48.0
 OUTSIDE = 0.06  # [m] beyond the soles that is still shown
 
