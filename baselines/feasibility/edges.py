@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from .check import Feasibility, FeasibilityLimits
 
 EDGE = 0.1  # [s] beside a cut in which a join may be as bad as the clip is there
+FADE = 0.1  # [s] after that in which it may be so in part
 #: arrays of `Feasibility` with a row for each sample
 SAMPLED = ("times", "zmp", "zmp_margin", "friction", "load", "torque", "speed", "excess",
            "drift", "gap")  # fmt: skip
@@ -30,9 +31,16 @@ def eased(own: Feasibility) -> FeasibilityLimits:
     )
 
 
-def part(judged: Feasibility, begin: float, end: float, limits: FeasibilityLimits) -> Feasibility:
-    """The samples from `begin` to `end` [s], against other limits."""
-    kept = (judged.times >= begin - 1e-9) & (judged.times <= end + 1e-9)
+def faded(own: Feasibility, share: float) -> FeasibilityLimits:
+    """Limits of which `share` are those of `eased`, and the rest the limits themselves."""
+    hard, soft = own.limits, eased(own)
+    values = {field.name: _between(getattr(hard, field.name), getattr(soft, field.name), share)
+              for field in fields(hard)}  # fmt: skip
+    return FeasibilityLimits(**values)
+
+
+def part(judged: Feasibility, kept: np.ndarray, limits: FeasibilityLimits) -> Feasibility:
+    """The samples of a mask (n,), against other limits."""
     samples = [name for name in SAMPLED if getattr(judged, name) is not None]
     cut: dict[str, Any] = {name: getattr(judged, name)[kept] for name in samples}
     return replace(judged, limits=limits, **cut)
@@ -41,20 +49,35 @@ def part(judged: Feasibility, begin: float, end: float, limits: FeasibilityLimit
 def between_clips(judged: Feasibility, before: Feasibility, after: Feasibility) -> str:
     """Why a join is not possible; empty if it is.
 
-    Its limits hold but for 0.1 s beside each cut, where it may be as bad as the clips `before` and
-    `after` it are there: what a clip asks for at its cut is not the join's doing.
+    Its limits hold but beside each cut. For 0.1 s it may be as bad there as the clips `before` and
+    `after` it are: what a clip asks for at its cut is not the join's doing. For 0.1 s more it may
+    be two thirds and then one third as bad, since a smooth curve does not end at once what the
+    clip has begun.
     """
-    last = float(judged.times[-1])
-    edge = min(EDGE, 0.5 * last)
-    for begin, end, limits in (
-        (edge, last - edge, judged.limits),
-        (0.0, edge, eased(before)),
-        (last - edge, last, eased(after)),
-    ):
-        one = part(judged, begin, end, limits)
-        if len(one.times) and not one.feasible:
-            return one.reason
+    times, last = judged.times, float(judged.times[-1])
+    shares = np.array([_shares(away) for away in (times, last - times)])
+    side, share = shares.argmax(axis=0), shares.max(axis=0)
+    side[(share > 0.0) & (times > 0.5 * last) & (shares[0] == shares[1])] = 1
+    for own, number in ((before, 0), (after, 1)):
+        for value in np.unique(share[side == number]):
+            limits = faded(own, float(value)) if value > 0.0 else judged.limits
+            one = part(judged, (side == number) & (share == value), limits)
+            if not one.feasible:
+                return one.reason
     return ""
+
+
+def _shares(away: np.ndarray) -> np.ndarray:
+    """(n,) how much of a clip's own ease holds at times `away` (n,) from its cut [s]."""
+    steps = np.ceil((away - EDGE - 1e-9) / (FADE / 2.0))  # 0 beside the cut, then 1, 2, …
+    return np.asarray(np.clip(1.0 - np.maximum(steps, 0.0) / 3.0, 0.0, 1.0))
+
+
+def _between(hard: Any, soft: Any, share: float) -> Any:
+    """A limit, or a pair of limits, some way from one to another."""
+    if isinstance(hard, tuple):
+        return tuple(_between(h, s, share) for h, s in zip(hard, soft, strict=True))
+    return hard + share * (soft - hard)
 
 
 def _lower(values: np.ndarray) -> float:

@@ -122,7 +122,7 @@ def physical_join(
     frames = np.array([motions[1].sample(time).q_ref for time in times])
     a = shaper.end(motions[0], last * before.dt, before.qpos[: last + 1, 7:])
     b = shaper.end(motions[1], enter, frames)
-    way = _direct_or_through(shaper, a, b, time_price, through)
+    way = way_between(shaper, a, b, time_price, through)
     if isinstance(way, str):
         raise JoinRefused(f"no way from {before.about.name!r} at {last * before.dt:.2f} s to "
                           f"{after.about.name!r} at {enter:.2f} s: {way}")  # fmt: skip
@@ -130,7 +130,7 @@ def physical_join(
     between = pause(shaper, made)
     name = f"{before.about.name}-{after.about.name}"
     clip = assembled(shaper, before, name, [a.frames, *between, b.frames])
-    parts = tuple(_part(shaper, attempt) for attempt in way)
+    parts = tuple(part_of(shaper, attempt) for attempt in way)
     start, length = last * before.dt, (sum(map(len, between)) + 1) * before.dt
     return PhysicalJoin(clip, start, enter, start, start + length, parts)
 
@@ -147,9 +147,13 @@ def make_shaper(
     planted.at(robot.standing_qpos[7:], still, still)
     inertia = np.diag(planted.state.M) / robot.mass
     masses = np.concatenate([np.ones(3), inertia[3:6], inertia[6:][legs.others]])
+    return Shaper(planted, legs, limits or FeasibilityLimits(), dt, height_span(motions), masses)
+
+
+def height_span(motions: Sequence[ReferenceMotion]) -> tuple[float, float]:
+    """Lowest and highest CoM that joins between motions may have [m]."""
     heights = [m.sample(t).com_offset[2] for m in motions for t in np.arange(0.0, m.duration, 0.1)]
-    span = min(heights) - LOWER, max(heights) + HIGHER
-    return Shaper(planted, legs, limits or FeasibilityLimits(), dt, span, masses)
+    return min(heights) - LOWER, max(heights) + HIGHER
 
 
 def cheapest(shaper: Shaper, a: End, b: End, time_price: float) -> Attempt:
@@ -189,26 +193,44 @@ def assembled(
     return RobotClip(replace(like.about, name=name), like.dt, qpos)
 
 
-def _direct_or_through(
+def way_between(
     shaper: Shaper, a: End, b: End, time_price: float, through: bool
 ) -> tuple[Attempt, ...] | str:
-    """One way, or two by standing; or why there is none."""
+    """One way, or two by standing if that is allowed; or why there is none."""
+    direct = direct_way(shaper, a, b, time_price)
+    if direct.qpos is not None or not through:
+        return (direct,) if direct.qpos is not None else direct.reason
+    ways = ways_by_standing(shaper, a, b, time_price)
+    return f"{direct.reason}; {ways}" if isinstance(ways, str) else ways
+
+
+def direct_way(shaper: Shaper, a: End, b: End, time_price: float) -> Attempt:
+    """The cheapest way from one end to the other, without the clips' accelerations if need be."""
     direct = cheapest(shaper, a, b, time_price)
     if direct.qpos is None:  # a clip may be about to do what leads to nothing
         calm = cheapest(shaper, a.calm, b.calm, time_price)
         direct = calm if calm.qpos is not None else direct
-    if direct.qpos is not None or not through:
-        return (direct,) if direct.qpos is not None else direct.reason
-    robot = shaper.planted.robot
-    frames = np.tile(robot.standing_qpos[7:], (STILL, 1))
-    standing = shaper.end(load_motion("standing", robot), 0.0, frames)
-    reason, ways = direct.reason, []
+    return direct
+
+
+def ways_by_standing(
+    shaper: Shaper, a: End, b: End, time_price: float
+) -> tuple[Attempt, ...] | str:
+    """Two ways with standing between them; or why there are none."""
+    standing, ways = standing_end(shaper), []
     for word, (start, goal) in zip(("to", "from"), pairwise((a, standing, b)), strict=True):
         way = cheapest(shaper, start, goal, time_price)
         if way.qpos is None:
-            return f"{reason}; {word} standing: {way.reason}"
+            return f"{word} standing: {way.reason}"
         ways.append(way)
     return tuple(ways)
+
+
+def standing_end(shaper: Shaper) -> End:
+    """The standing posture as one side of a join."""
+    robot = shaper.planted.robot
+    frames = np.tile(robot.standing_qpos[7:], (STILL, 1))
+    return shaper.end(load_motion("standing", robot), 0.0, frames)
 
 
 def _prices(shaper: Shaper, a: End, b: End, time_price: float) -> list[tuple[float, int]]:
@@ -222,7 +244,8 @@ def _prices(shaper: Shaper, a: End, b: End, time_price: float) -> list[tuple[flo
     return prices
 
 
-def _part(shaper: Shaper, way: Attempt) -> JoinPart:
+def part_of(shaper: Shaper, way: Attempt) -> JoinPart:
+    """What is told of a way that is possible."""
     assert way.feasibility is not None  # of a way that is possible
     bent, calm = bool(np.any(way.curve.bends)), not np.any(way.curve.coefficients[2])
     coefficient = way.curve.energy(shaper.masses)

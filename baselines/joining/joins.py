@@ -159,6 +159,15 @@ def faced_like(clip: Clip, other: Clip) -> Clip:
     return clip.turned(float(other.facing()[-1] - clip.facing()[0]))
 
 
+def laid_on(before: Clip, after: Clip) -> Clip:
+    """A and then B, turned and moved so that its first frame is A's last one: that frame once.
+
+    What is left of a difference between the two postures is a step between two frames.
+    """
+    after = _placed(faced_like(after, before), before.root[-1])
+    return _joined([(before.root, before.rotations), (after.root[1:], after.rotations[1:])], before)
+
+
 def ends(before: Clip, after: Clip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Δ, v_a and v_b (3 + 3J,) of A's end and B's begin, headings and places over the ground alike.
 

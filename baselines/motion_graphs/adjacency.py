@@ -210,10 +210,19 @@ def _prices(before: Frames, after: Frames, thresholds: Thresholds) -> np.ndarray
     gap = _square(xa)[:, None] + _square(xb) - 2.0 * xa @ xb.T
     along = 0.5 * (va @ xb.T + (xb * vb).sum(1) - (xa * va).sum(1)[:, None] - xa @ vb.T)
     mean = 0.25 * (_square(va)[:, None] + _square(vb) + 2.0 * va @ vb.T)
-    best = np.full(gap.shape, np.inf)
+    # K in powers of 1/D: 12 g/D³ − 24 a/D² + (12 m + c)/D, with no array made twice
+    gap *= 12.0
+    along *= -24.0
+    mean *= 12.0
+    mean += change
+    best, price = np.full(gap.shape, np.inf), np.empty(gap.shape)
     for d in np.geomspace(thresholds.least, thresholds.most, DURATIONS):
-        price = 12.0 / d**3 * (gap - 2.0 * d * along + d**2 * mean) + change / d
-        np.minimum(best, price + thresholds.time_price * d, out=best)
+        np.multiply(gap, 1.0 / d, out=price)
+        for part in (along, mean):
+            price += part
+            price *= 1.0 / d
+        price += thresholds.time_price * d
+        np.minimum(best, price, out=best)
     return best
 
 

@@ -43,4 +43,4 @@ def _inside(graph: MotionGraph) -> set[Place]:
     counts = np.bincount(labels)
     if counts.max() < 2:
         return set()
-    return {moments.place[i] for i in np.flatnonzero(labels == np.argmax(counts))}
+    return {moments.place(int(i)) for i in np.flatnonzero(labels == np.argmax(counts))}

@@ -14,15 +14,15 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra, yen
+from scipy.sparse.csgraph import dijkstra
 
 from poise.configs.errors import ConfigError
 
+from .k_best import k_best
 from .moments import Moments
 from .motion_graph import MotionGraph, Transition, earliest_part, latest_part
 from .paths import Path, Step, Task
 
-UNSEEN = -1  # predecessor of what has none
 SHORT = 1e-6  # of the price of time: of two ways that cost the same the shorter one is taken
 OFFSET = 1.0  # of the edges out of the start, as a sparse graph has no edges of 0
 
@@ -41,15 +41,14 @@ class Layers:
         self._link()
 
     def best(self, k: int) -> list[Path]:
+        """The k cheapest paths, the best first; fewer if there are no more."""
         rows, columns, costs = (np.concatenate(part) for part in zip(*self._edges, strict=True))
         matrix = csr_array((costs, (rows, columns)), shape=(self.end + 1, self.end + 1))
+        if k > 1 and (several := k_best(matrix, self.begin, self.end, k)):
+            return [self._path(nodes, cost) for cost, nodes in several]
         self._ahead, before = dijkstra(matrix, indices=self.begin, return_predecessors=True)
-        ahead = self._ahead
-        if not np.isfinite(ahead[self.end]):
-            return []
-        if k == 1:
-            return [self._path(before, float(ahead[self.end]))]
-        return self._several(matrix, ahead, k)
+        cost = float(self._ahead[self.end])
+        return [self._path(_back_to(self.begin, before, self.end), cost)] if cost < np.inf else []
 
     def no_way(self, known: Mapping[Transition, str]) -> ConfigError:
         """The error of a task without a path: how far it goes, and what would be nearest."""
@@ -68,34 +67,9 @@ class Layers:
         return ConfigError(f"no way from {before} to {after} (reachable: "
                            f"{', '.join(reached[:20]) or 'nothing'}{said})")  # fmt: skip
 
-    def _several(self, matrix: csr_array, ahead: np.ndarray, k: int) -> list[Path]:
-        """Yen's algorithm among the nodes that paths below a bound can meet.
-
-        A path through any other node costs more than the bound; so if k paths below it are found
-        they are the cheapest ones. If not, the bound is raised.
-        """
-        back = dijkstra(matrix.T.tocsr(), indices=self.end)
-        through, bound = ahead + back, float(ahead[self.end])
-        reachable = int(np.isfinite(through).sum())
-        extra = self.price
-        while True:
-            kept = np.flatnonzero(through <= bound + extra)
-            small = matrix[kept][:, kept]
-            small.indices, small.indptr = (part.astype(np.int32)  # which `yen` asks for
-                                           for part in (small.indices, small.indptr))  # fmt: skip
-            ends = [int(np.searchsorted(kept, node)) for node in (self.begin, self.end)]
-            costs, before = yen(small, *ends, k, return_predecessors=True)
-            whole = len(kept) == reachable
-            if whole or (len(costs) == k and costs[-1] <= bound + extra):
-                return [self._path(_expanded(row, kept, self.end + 1), float(cost))
-                        for row, cost in zip(before, costs, strict=True)]  # fmt: skip
-            extra *= 4.0
-
-    def _path(self, before: np.ndarray, cost: float) -> Path:
-        nodes = [self.end]
-        while nodes[-1] != self.begin:
-            nodes.append(int(before[nodes[-1]]))
-        return Path(self._steps(nodes[-2:0:-1]), cost - OFFSET)
+    def _path(self, nodes: list[int], cost: float) -> Path:
+        """The path of all nodes from the begin to the end."""
+        return Path(self._steps(nodes[1:-1]), cost - OFFSET)
 
     def _steps(self, nodes: list[int]) -> tuple[Step, ...]:
         """Nodes between which a clip is played on are one step."""
@@ -107,7 +81,7 @@ class Layers:
             else:
                 groups.append([node])
                 after.append(transition)
-        ends = [(self.moments.place[g[0] % self.size], self.moments.place[g[-1] % self.size])
+        ends = [(self.moments.place(g[0] % self.size), self.moments.place(g[-1] % self.size))
                 for g in groups]  # fmt: skip
         return tuple(
             Step(name, enter, leave, bool(g[0] // self.size % 2), t)
@@ -118,11 +92,12 @@ class Layers:
         """The transition of an edge, or None for playing on."""
         layer, pair = last // self.size, (last % self.size, node % self.size)
         if layer == node // self.size:
-            way = layer % 2 == 0 and pair in self.moments.way_joined
-            return self.moments.joined[pair] if way else None
+            number = self.moments.joined(*pair) if layer % 2 == 0 else None
+            way = number is not None and self.moments.way_joins[number]
+            return self.moments.transition(*pair) if way else None
         if layer % 2 and (arrow := self.task.arrows.get(layer // 2)) is not None:
             return arrow
-        return self.moments.joined[pair]
+        return self.moments.transition(*pair)
 
     def _link(self) -> None:
         moments, actions = self.moments, self.task.actions
@@ -143,7 +118,7 @@ class Layers:
         self._add_joins(into, layer - self.size, layer, self._skipped_before(k, into))
         out = self._leaves(k)
         if (arrow := self.task.arrows.get(k)) is not None:
-            ends = [moments.index[arrow.before, arrow.leave], moments.index[arrow.after, 0.0]]
+            ends = [moments.at(arrow.before, arrow.leave), moments.at(arrow.after, 0.0)]
             self._add(np.array([[layer + ends[0], layer + 2 * self.size + ends[1]]]),
                       np.array([self.graph.cost(arrow)]))  # fmt: skip
             return
@@ -178,14 +153,14 @@ class Layers:
         last = 2 * len(actions) - 1
         start = dict(self.task.start) or {(actions[0], 0.0): 0.0}
         for (name, time), cost in start.items():
-            node = moments.index[name, time]
+            node = moments.at(name, time)
             if actions and name == actions[0] and time <= earliest_part(lengths[name]):
                 self._add_one(self.begin, self.size + node, OFFSET + cost + self.price * time)
             if self.task.start:
                 self._add_one(self.begin, node, OFFSET + cost)
         goal = dict(self.task.goal) or {(actions[-1], lengths[actions[-1]]): 0.0}
         for (name, time), cost in goal.items():
-            node = moments.index[name, time]
+            node = moments.at(name, time)
             if actions and name == actions[-1] and time >= latest_part(lengths[name]):
                 self._add_one(last * self.size + node, self.end,
                               SHORT + cost + self.price * (lengths[name] - time))  # fmt: skip
@@ -203,12 +178,12 @@ class Layers:
         self._add(pairs, self.moments.costs[joins] + more)
 
 
-def _expanded(row: np.ndarray, kept: np.ndarray, size: int) -> np.ndarray:
-    """Predecessors of the kept nodes as those of all."""
-    whole = np.full(size, UNSEEN)
-    seen = row >= 0
-    whole[kept[seen]] = kept[row[seen]]
-    return whole
+def _back_to(begin: int, before: np.ndarray, end: int) -> list[int]:
+    """The nodes from a begin to an end, by the predecessor of each."""
+    nodes = [end]
+    while nodes[-1] != begin:
+        nodes.append(int(before[nodes[-1]]))
+    return nodes[::-1]
 
 
 def _size(reason: str) -> float:

@@ -14,51 +14,89 @@ class Moments:
     """The moments of all clips of a graph, and the edges between them, as arrays.
 
     Attributes:
-        place: (n,) clip and time of each moment, of a clip in order of time.
+        clip, time: (n,) number of the clip and time in it [s] of each moment, in this order.
         plays: (p, 2) moments that follow each other in a clip; `lasts` (p,) [s].
-        joins: (t, 2) moments of each of `transitions`; `costs` (t,).
+        joins: (t, 2) moments of each of `transitions`, in order; `costs` (t,). Of several between
+            two moments the cheapest is kept.
         way_plays, way_joins: which of them a way uses: of two between the same moments the cheaper.
     """
 
     def __init__(self, graph: MotionGraph, extra: Iterable[Place] = ()):
         self.names, self.lengths = graph.names, {c.name: c.duration for c in graph.clips}
-        order = {name: i for i, name in enumerate(self.names)}
-        cheapest: dict[tuple[Place, Place], Transition] = {}
-        for t in sorted(graph.transitions, key=graph.cost, reverse=True):
-            cheapest[(t.before, t.leave), (t.after, t.enter)] = t
-        places = {place for pair in cheapest for place in pair} | set(extra)
-        places |= {(name, time) for name, end in self.lengths.items() for time in (0.0, end)}
-        self.place: list[Place] = sorted(places, key=lambda place: (order[place[0]], place[1]))
-        self.index = {place: i for i, place in enumerate(self.place)}
-        self.clip = np.array([order[name] for name, _ in self.place])
-        self.time = np.array([time for _, time in self.place])
+        self._order = {name: i for i, name in enumerate(self.names)}
+        index = self._gather(graph, list(extra))
+        self._first = np.searchsorted(self.clip, np.arange(len(self.names) + 1))
         follow = np.flatnonzero(np.diff(self.clip) == 0)
         self.plays = np.stack([follow, follow + 1], axis=1)
         self.lasts = self.time[follow + 1] - self.time[follow]
-        self.transitions = list(cheapest.values())
-        self.joins = np.array(
-            [(self.index[a], self.index[b]) for a, b in cheapest], int).reshape(-1, 2)  # fmt: skip
-        self.costs = np.array([graph.cost(t) for t in self.transitions])
+        self._link(graph, index)
         self.way_plays = np.ones(len(self.plays), bool)
         self.way_joins = np.ones(len(self.joins), bool)
         self._part(graph.thresholds.time_price)
-        self.joined = {(int(a), int(b)): t for (a, b), t in zip(
-            self.joins, self.transitions, strict=True)}  # fmt: skip
-        self.way_joined = {pair for pair, kept in zip(self.joined, self.way_joins, strict=True)
-                           if kept}  # fmt: skip
+
+    def _gather(self, graph: MotionGraph, extra: list[Place]) -> np.ndarray:
+        """Find all moments; (2 t,) which ones transitions leave, and then enter."""
+        edges, order = graph.transitions, self._order
+        clips = [order[t.before] for t in edges] + [order[t.after] for t in edges]
+        times = [t.leave for t in edges] + [t.enter for t in edges]
+        for i, length in enumerate(self.lengths.values()):
+            clips += [i, i]
+            times += [0.0, length]
+        clip = np.array(clips + [order[name] for name, _ in extra])
+        time = np.array(times + [time for _, time in extra])
+        ranked = np.lexsort((time, clip))
+        clip, time = clip[ranked], time[ranked]
+        new = np.append(True, (np.diff(clip) != 0) | (np.diff(time) != 0.0))
+        self.clip, self.time = clip[new], time[new]
+        index = np.empty(len(ranked), int)
+        index[ranked] = np.cumsum(new) - 1
+        return index[: 2 * len(edges)]
+
+    def _link(self, graph: MotionGraph, index: np.ndarray) -> None:
+        """Keep the cheapest transition between each two moments; of equal ones the last."""
+        count, costs = len(graph.transitions), graph.costs
+        leave, enter = index[:count], index[count:]
+        ranked = np.lexsort((-np.arange(count), costs, enter, leave))
+        keys = (leave * len(self) + enter)[ranked]
+        kept = ranked[np.append(True, np.diff(keys) != 0)] if count else ranked
+        self.joins = np.stack([leave[kept], enter[kept]], axis=1)
+        self.costs = costs[kept]
+        self.transitions = [graph.transitions[i] for i in kept]
+        self._keys = leave[kept] * len(self) + enter[kept]
 
     def _part(self, price: float) -> None:
         """Leave out the dearer of playing on and jumping between the same two moments."""
-        play_at = {int(start): i for i, start in enumerate(self.plays[:, 0])}
-        for i in np.flatnonzero(self.joins[:, 1] == self.joins[:, 0] + 1):
-            play = play_at.get(int(self.joins[i, 0]))
-            if play is not None:
-                jump = self.costs[i] < price * self.lasts[play]
-                self.way_plays[play], self.way_joins[i] = not jump, jump
+        after = np.flatnonzero(self.joins[:, 1] == self.joins[:, 0] + 1)
+        start = self.joins[after, 0]
+        after = after[self.clip[start] == self.clip[start + 1]]
+        play = np.searchsorted(self.plays[:, 0], self.joins[after, 0])
+        jump = self.costs[after] < price * self.lasts[play]
+        self.way_plays[play], self.way_joins[after] = ~jump, jump
 
     def __len__(self) -> int:
-        return len(self.place)
+        return len(self.clip)
 
     def number(self, name: str) -> int:
         """The number of a clip."""
-        return self.names.index(name)
+        return self._order[name]
+
+    def place(self, moment: int) -> Place:
+        """The clip and the time of a moment."""
+        return self.names[self.clip[moment]], float(self.time[moment])
+
+    def at(self, name: str, time: float) -> int:
+        """The moment of a clip at a time that is one."""
+        first, last = self._first[self.number(name) : self.number(name) + 2]
+        return int(first + np.searchsorted(self.time[first:last], time))
+
+    def joined(self, before: int, after: int) -> int | None:
+        """The number of the transition from a moment to another one, if there is one."""
+        key = before * len(self) + after
+        i = int(np.searchsorted(self._keys, key))
+        return i if i < len(self._keys) and self._keys[i] == key else None
+
+    def transition(self, before: int, after: int) -> Transition:
+        """The transition from a moment to another one."""
+        number = self.joined(before, after)
+        assert number is not None  # the edge was taken
+        return self.transitions[number]

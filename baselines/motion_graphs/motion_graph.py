@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from poise.configs.errors import ConfigError, shown
@@ -159,11 +160,18 @@ class MotionGraph:
         return weight * transition.coefficient + self.thresholds.time_price * transition.duration
 
     @cached_property
+    def costs(self) -> np.ndarray:
+        """(t,) `cost` of all transitions."""
+        return np.array([self.cost(transition) for transition in self.transitions])
+
+    @cached_property
     def _factors(self) -> dict[tuple[str, str], float | None]:
         return {(w.before, w.after): w.weight for w in self.weights}
 
     def without(self, refused: set[Transition]) -> MotionGraph:
         """The graph less some transitions."""
+        if not refused:
+            return self
         return replace(self, transitions=tuple(t for t in self.transitions if t not in refused))
 
 

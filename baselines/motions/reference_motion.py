@@ -56,6 +56,12 @@ class ReferenceMotion(Copyable):
         """False for a posture that is held."""
         return bool(np.ptp(self.coeffs[:, 0], axis=0).max() >= STILL)
 
+    def at_speed(self, factor: float) -> "ReferenceMotion":
+        """The motion `factor` > 0 times as fast: q(factor t)."""
+        powers = float(factor) ** np.arange(self.coeffs.shape[1])
+        coeffs = self.coeffs * powers[:, None]
+        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop)
+
     def sample(self, t: float) -> MotionSample:
         """The reference at time t [s]."""
         out = np.zeros((3, self.coeffs.shape[2]))

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from poise.configs.archives import read_archive, read_arrays
 from poise.configs.errors import ConfigError
@@ -127,11 +128,14 @@ def check_both_planted(clip: RobotClip, source: str | Path, what: str) -> None:
                           field="planted")  # fmt: skip
 
 
-def reference_from(clip: RobotClip, robot: Robot, source: str) -> ReferenceMotion:
+def reference_from(
+    clip: RobotClip, robot: Robot, source: str, rest: bool = True
+) -> ReferenceMotion:
     """The reference motion of the postures: C², and at rest at both ends.
 
     Joints, CoM and root are cubic splines through the frames. The places of the soles are where
     they are: CoM and root are taken over the plane and the middle of both, see `LevelKinematics`.
+    Without `rest` it is a piece of a motion: at its ends it moves on as its frames do.
 
     Raises:
         ConfigError: postures of another robot, a joint out of its range, or soles that leave
@@ -155,7 +159,8 @@ def reference_from(clip: RobotClip, robot: Robot, source: str) -> ReferenceMotio
         _check_level(kinematics, times[i], source)
         com[i] = posture.com - kinematics.standing.com * [1.0, 1.0, 0.0]  # controllers add that
         root[i] = kinematics.root_rotation(posture)
-    splines = [rest_spline(times, values) for values in (joints, com, root)]
+    spline = rest_spline if rest else make_interp_spline  # the latter without a knot near ends
+    splines = [spline(times, values) for values in (joints, com, root)]
     knots, coeffs = piecewise(splines)
     return ReferenceMotion(clip.about.name, knots, coeffs, loop=False)
 

@@ -55,6 +55,15 @@ def load_clip(file: str | Path, robot: Robot | None = None) -> tuple[Clip, str]:
     return replace(whole, licence=clip.licence), digest
 
 
+def planted_qpos(clip: Clip, robot: Robot) -> np.ndarray:
+    """(F, nq) the postures of a clip of the robot's skeleton, on planted soles.
+
+    Raises ConfigError for a clip of another skeleton, PoiseError for a posture to which none with
+    planted soles is near.
+    """
+    return np.asarray(_plant()(robot, find_limbs(robot), robot_qpos(clip, robot)))
+
+
 def robot_clip_of(clip: Clip, robot: Robot, name: str, source: str = "") -> RobotClip:
     """A clip of the robot's skeleton as its motion: from standing to standing, on planted soles.
 
@@ -62,9 +71,8 @@ def robot_clip_of(clip: Clip, robot: Robot, name: str, source: str = "") -> Robo
         ConfigError: a clip of another skeleton, or a posture that the robot cannot follow.
         PoiseError: a posture to which none with planted soles is near.
     """
-    planted = _plant()
     whole = _led(clip, robot)
-    qpos = planted(robot, find_limbs(robot), robot_qpos(whole, robot))
+    qpos = planted_qpos(whole, robot)
     qpos[0], qpos[-1] = robot.standing_qpos, robot.standing_qpos
     about = About(robot.name, robot.fingerprint, name, source or clip.name, clip.licence)
     made = RobotClip(about, whole.dt, qpos)

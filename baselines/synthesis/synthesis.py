@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from poise.baselines.clips.clip import Clip
-from poise.baselines.joining.joins import JOINS
+from poise.baselines.joining.joins import JOINS, laid_on
 from poise.baselines.motion_graphs.motion_graph import MotionGraph, StatePlace, Transition
 from poise.baselines.motion_graphs.nearest import nearest_places
 from poise.baselines.motion_graphs.paths import Path, Place, Step, Task
@@ -21,46 +21,12 @@ from poise.baselines.scripts.tree import Script, StateName
 from poise.configs.errors import ConfigError, shown
 
 from .actions import Actions, Reader
+from .plan import PHYSICAL, Plan, Played, played_lead
+from .robot_joins import RobotJoins
 from .stage import LONGEST, Stage
 
 Join = Callable[[Clip, Clip, float], Clip]
 Check = Callable[[Transition], str]
-
-
-@dataclass(frozen=True)
-class Played:
-    """A clip, or a transition, as it is played.
-
-    Attributes:
-        what: name of the clip, or the kind of the transition.
-        begins, ends: in the whole [s].
-        enter, leave: times in the clip [s]; of a transition those of the clips about it.
-        wanted: whether the script asks for it.
-        coefficient: K of a transition; None for a clip.
-    """
-
-    what: str
-    begins: float
-    ends: float
-    enter: float
-    leave: float
-    wanted: bool
-    coefficient: float | None = None
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Paths of a script through a graph, the best one first.
-
-    Attributes:
-        actions: what is wanted.
-        paths: with their costs.
-        kinds: number of an action → the kind of the transition by hand after it.
-    """
-
-    actions: Actions
-    paths: tuple[Path, ...]
-    kinds: dict[int, str]
 
 
 class Synthesis:
@@ -72,6 +38,9 @@ class Synthesis:
         kind: of transitions that the script leaves open.
         joins: kind → how two clips are joined; those that need no robot by default.
         check: says why a transition cannot be made, or nothing; see `best_paths`.
+        robot_joins: of the robot whose clips they are, for transitions of the kind `physical`. Of
+            these the ones of the best path are made first; what the robot cannot do is gone round,
+            or by standing where there is no other way.
     """
 
     def __init__(
@@ -81,11 +50,14 @@ class Synthesis:
         kind: str = "insert",
         joins: Mapping[str, Join] = JOINS,
         check: Check | None = None,
+        robot_joins: RobotJoins | None = None,
     ):
-        if kind not in joins:
-            raise ConfigError(f"no transition {shown(kind)} here", field="kind", choices=joins)
+        self.kinds = (*joins, *([PHYSICAL] if robot_joins else []))
+        if kind not in self.kinds:
+            raise ConfigError(f"no transition {shown(kind)} here", field="kind", choices=self.kinds)
         self.stage = Stage(graph, dict(clips))
         self.kind, self.joins, self.check = kind, joins, check
+        self.robot_joins = robot_joins
 
     def plan(self, script: Script, k: int = 1) -> Plan:
         """The k best paths; what the script makes of clips becomes part of the stage.
@@ -100,6 +72,8 @@ class Synthesis:
         """The clip of the best path, and the record of what was chosen, as plain values."""
         plan = self.plan(script) if plan is None else plan
         clip, played = self._play(plan)
+        if self.kind == PHYSICAL:
+            clip, played = self._led(clip, played)
         return clip, {
             "script": text_of(script),
             "robot": self.stage.graph.robot,
@@ -120,19 +94,46 @@ class Synthesis:
         for i, arrow in enumerate(actions.arrows):
             if not arrow.kind:
                 continue
-            if arrow.kind not in self.joins:
-                raise wrong(f"no transition {shown(arrow.kind)} here", script.text, arrow.at,
-                            script.source, self.joins)  # fmt: skip
-            duration = dict(arrow.options).get("duration")
-            arrows[i] = self.stage.by_hand(actions.names[i], actions.names[i + 1], duration)
-            kinds[i] = arrow.kind
+            arrows[i], kinds[i] = self._by_hand(actions, i, script), arrow.kind
         ends = [self._places(state, script) for state in (actions.start, actions.goal)]
         task = Task(actions.names, arrows, *ends)
         try:
-            paths = best_paths(self.stage.graph, task, k, self.check)
+            paths = self._best_paths(task, k)
         except ConfigError as error:
             raise ConfigError(error.message, source=script.source, choices=error.choices) from None
         return Plan(actions, tuple(paths), kinds)
+
+    def _by_hand(self, actions: Actions, i: int, script: Script) -> Transition:
+        """The transition of the arrow after action `i`; an error says where the arrow stands."""
+        arrow = actions.arrows[i]
+        said = f"no transition {shown(arrow.kind)} here" if arrow.kind not in self.kinds else ""
+        duration = dict(arrow.options).get("duration")
+        made = self.stage.by_hand(actions.names[i], actions.names[i + 1], duration)
+        if arrow.kind == PHYSICAL and not said:
+            said = self._refusal(made, through=True)
+            if duration is not None:
+                said = "a physical transition lasts as long as the robot needs"
+        if said:
+            raise wrong(said, script.text, arrow.at, script.source,
+                        self.kinds if said.startswith("no transition") else None)  # fmt: skip
+        return made
+
+    def _best_paths(self, task: Task, k: int) -> list[Path]:
+        """Ways of which every transition can be made; by standing if there is no other one."""
+        graph = self.stage.graph
+        if self.kind != PHYSICAL:
+            return best_paths(graph, task, k, self.check)
+        try:
+            return best_paths(graph, task, k, lambda t: self._refusal(t, through=False))
+        except ConfigError:
+            return best_paths(graph, task, k, lambda t: self._refusal(t, through=True))
+
+    def _refusal(self, transition: Transition, through: bool) -> str:
+        """Why a physical transition cannot be made, or nothing."""
+        assert self.robot_joins is not None  # or there is no such kind
+        said = self.check(transition) if self.check is not None else ""
+        clips = (self.stage.clips[name] for name in (transition.before, transition.after))
+        return said or self.robot_joins.refusal(*clips, transition, through)
 
     def _places(self, state: StateName | None, script: Script) -> dict[Place, float]:
         if state is None:
@@ -165,7 +166,7 @@ class Synthesis:
             assert transition is not None
             kind = plan.kinds.get(number, self.kind) if before.wanted else self.kind
             number += step.wanted
-            both = self.joins[kind](last, part, transition.duration)
+            both, physics = self._joined(kind, last, part, transition)
             head, last = _split(both, len(both) - len(part))
             done.append(head)
             frames += len(head)
@@ -173,13 +174,40 @@ class Synthesis:
             ends = sorted((played[-1].ends, begins))
             played += [
                 Played(kind, ends[0], ends[1], transition.leave, transition.enter, False,
-                       transition.coefficient),
+                       transition.coefficient, physics),
                 Played(step.clip, begins, begins + part.duration, *step[1:4]),
             ]  # fmt: skip
         whole = _together([*done, last])
         if whole.duration > LONGEST:
             raise self._too_long()
         return replace(whole, name=plan.actions.names[0]), played
+
+    def _joined(
+        self, kind: str, last: Clip, part: Clip, transition: Transition
+    ) -> tuple[Clip, dict[str, Any] | None]:
+        """What has been made so far, a transition and the clip that follows."""
+        if kind != PHYSICAL:
+            return self.joins[kind](last, part, transition.duration), None
+        assert self.robot_joins is not None
+        clips = (self.stage.clips[name] for name in (transition.before, transition.after))
+        way = self.robot_joins.way(*clips, transition)
+        between, part = (clip if clip.dt == last.dt else clip.resampled(last.dt)
+                         for clip in (way.clip, part))  # fmt: skip
+        return laid_on(laid_on(last, between), part), way.record()
+
+    def _led(self, clip: Clip, played: list[Played]) -> tuple[Clip, list[Played]]:
+        """From standing to standing, by ways that the robot can do."""
+        assert self.robot_joins is not None
+        into, back = (self.robot_joins.lead(clip, first) for first in (True, False))
+        if into is not None:
+            clip = replace(laid_on(into.clip, clip), name=clip.name, licence=clip.licence)
+            late = into.clip.duration
+            played = [replace(p, begins=p.begins + late, ends=p.ends + late) for p in played]
+            played = [played_lead(into, 0.0), *played]
+        if back is not None:
+            played = [*played, played_lead(back, clip.duration)]
+            clip = laid_on(clip, back.clip)
+        return clip, played
 
     def _too_long(self) -> ConfigError:
         return ConfigError(f"lasts longer than {LONGEST:g} s", source="script")

@@ -27,14 +27,14 @@ FLOORS = """
  3 training/running
  4 envs/robots, baselines/joining
  5 envs/pushes, baselines/inverse_kinematics, baselines/matching, baselines/motion_graphs
- 6 envs/physics, baselines/synthesis
+ 6 envs/physics
  7 envs/sensors, envs/viewing, baselines/controller
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
  9 envs/vector, baselines/feasibility, baselines/in_place, baselines/policy_files
  9 baselines/retargeting
  9 baselines/stepping, baselines/walking/models
-10 baselines/performing, baselines/space_time/constraints, baselines/walking
+10 baselines/performing, baselines/space_time/constraints, baselines/synthesis, baselines/walking
 11 baselines/registry, baselines/space_time
 12 baselines/environments
 13 training/learning, training/tracking
@@ -44,7 +44,7 @@ FLOORS = """
 16 training/evaluation, training/qp_set, training/robot_check
 17 training/gaits, training/results
 18 training/export, training/report, training/sessions
-19 training/view
+19 training/motion_report, training/view
 20 training/cli
 21 envs, baselines, training
 """

@@ -1,27 +1,23 @@
 """`poise motion …`: files of motion capture, on a robot, and performed."""
 
-import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
-from poise.baselines.allowance import named
 from poise.baselines.clips.bvh import read_bvh, write_bvh
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import find_bvh
 from poise.configs.errors import ConfigError
-from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
 from poise.training.running.terminal import terminal
 
-from .arguments import Allow, Switch
-from .motion_check import check
-from .motion_join import join
+from .arguments import Switch
+from .motion_check import check, follow
+from .motion_join import join, match
 from .motion_script import graph, plan, synth
 
 Solver = Literal["frame", "spacetime", "grid"]
@@ -165,49 +161,49 @@ def bring(
     print(out)
 
 
-def follow(
-    motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")],
+def play(
+    file: File,
     /,
     *,
-    controller: str = "momentum-qp",
+    video: Path,
     robot: str = "humanoid",
-    starts: int = 20,
-    push: float = 0.0,
-    share: float = 0.0,
-    directions: int = 8,
-    seed: int = 0,
-    out: Path | None = None,
-    allow: Allow = (),
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    size: tuple[int, int] = (640, 480),
+    planted: Switch = False,
 ) -> None:
-    """Perform a motion, pushed or not, and say how near the robot stayed to it.
+    """Show a motion without physics: the robot, and beside it the skeleton of the BVH file.
 
     Args:
-        motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
-        controller: as in poise evaluate.
-        robot: a packaged robot (see poise list) or a .yaml description.
-        starts: number of trials, each from a start that is disturbed in another way.
-        push: impulse of a push at a random time of the motion [N s]; 0 for none.
-        share: the same as a share of the J50 of the push's direction, standing (configs/limits).
-        directions: of the pushes, spread evenly, one after the other.
-        seed: of starts and pushes.
-        out: a JSON file to write the trials to.
+        file: a .bvh file, the name of a packaged clip, or a robot's .npz, which has no skeleton.
+        video: the .mp4 or .webp file to write.
+        robot: who does it.
+        unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
+        up: the file's axis that is up, such as y or -z, or auto.
+        forward: the axis along which the rest pose faces, or auto.
+        size: width and height [pixels], even.
+        planted: take the feet as planted though they move in the clip.
     """
-    from poise.baselines.allowance import allowing
-    from poise.training.following.follow import follow
-    from poise.training.following.tables import print_followed
+    from poise.baselines.motions.robot_clip import read_robot_clip, reference_from
+    from poise.baselines.retargeting.retarget import LEAD, retarget
+    from poise.training.figures.playback import beside_of, check_video, write_playback
 
-    if out is not None:
-        check_out_file(out)
-    with allowing([*named(controller), *allow]):
-        trials = follow(motion, controller, robot=robot, starts=starts, impulse=push, share=share,
-                        directions=directions, seed=seed)  # fmt: skip
-    pushed = f"pushed by {push:g} N s" if push else "not pushed"
-    pushed = f"pushed by {share:g} of J50" if share else pushed
-    print_followed(trials, f"{Path(motion).stem} by {controller} on {robot}, {pushed}", terminal())
-    if out is not None:
-        rows = [asdict(trial) for trial in trials]
-        write_atomic(out, json.dumps(rows, indent=1) + "\n")
-        print(out)
+    check_video(video)
+    check_out_file(video)
+    if any(edge < 16 or edge > 4096 or edge % 2 for edge in size):
+        raise ConfigError(f"must be two even numbers from 16 to 4096, not {size}", field="size")
+    body, skeleton = load_robot(robot), None
+    if file.suffix == ".npz":
+        clip = read_robot_clip(file)
+        reference_from(clip, body, str(file))  # of this robot
+    else:
+        source = read_bvh(find_bvh(file), unit, up, forward).clip
+        made = retarget(source, body, planted=planted)
+        clip, skeleton = made.clip, beside_of(body, source, made.scale, LEAD)
+    frames = write_playback(video, body, clip.qpos, clip.dt, skeleton, size)
+    print(f"{frames} frames")
+    print(video)
 
 
 MOTION: dict[str, Callable[..., object]] = {
@@ -220,6 +216,8 @@ MOTION: dict[str, Callable[..., object]] = {
     "graph": graph,
     "plan": plan,
     "synth": synth,
+    "match": match,
+    "play": play,
 }
 
 

@@ -1,15 +1,20 @@
-"""`poise motion check`: whether a robot can do a motion, and what makes it possible."""
+"""`poise motion check` and `follow`: what a robot can do of a motion, and what it then does."""
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
+from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError
+from poise.configs.files import write_atomic
+from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
 from poise.training.running.terminal import terminal
 
-from .arguments import Switch
+from .arguments import Allow, Switch
 
 
 def check(
@@ -68,3 +73,76 @@ def check(
         write_robot_clip(fitted.clip, out)
         print(out)
     return 0 if judged.feasible else 1
+
+
+def follow(
+    motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")],
+    /,
+    *,
+    controller: str = "momentum-qp",
+    robot: str = "humanoid",
+    starts: int | None = None,
+    push: float = 0.0,
+    share: float = 0.0,
+    directions: int = 8,
+    tempo: float = 1.0,
+    waits: Switch = False,
+    fastest: Switch = False,
+    seed: int = 0,
+    out: Path | None = None,
+    report: Path | None = None,
+    allow: Allow = (),
+) -> None:
+    """Perform a motion, pushed or not, and say how near the robot stayed to it.
+
+    Args:
+        motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
+        controller: as in poise evaluate.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
+            at each tempo of --fastest.
+        push: impulse of a push at a random time of the motion [N s]; 0 for none.
+        share: the same as a share of the J50 of the push's direction, standing (configs/limits).
+        directions: of the pushes, spread evenly, one after the other.
+        tempo: how many times as fast the motion is played.
+        waits: let the motion wait while the robot catches itself.
+        fastest: find the largest tempo at which none of the trials falls.
+        seed: of starts and pushes.
+        out: a JSON file to write the trials to.
+        report: a .html file for pictures of the trial with the largest error: ZMP and centre of
+            pressure, errors, tempo, and the timeline of a script's motion.
+    """
+    from poise.baselines.allowance import allowing
+    from poise.baselines.motions.tempo import Tempo
+    from poise.training.following.fastest import STARTS, find_fastest
+    from poise.training.following.follow import follow as perform
+    from poise.training.following.tables import print_followed
+    from poise.training.motion_report.page import check_page
+    from poise.training.motion_report.performance import Watched, write_performance
+
+    if fastest and (push or share or tempo != 1.0 or waits or out or report):
+        raise ConfigError("goes with --controller, --robot, --starts and --seed alone",
+                          field="fastest")  # fmt: skip
+    if out is not None:
+        check_out_file(out)
+    if report is not None:
+        check_page(report)
+    with allowing([*named(controller), *allow]):
+        if fastest:
+            find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
+            return
+        watched = Watched() if report is not None else None
+        trials = perform(motion, controller, robot=robot, starts=20 if starts is None else starts,
+                         impulse=push, share=share, directions=directions, seed=seed, speed=tempo,
+                         tempo=Tempo(waits=True) if waits else None, watch=watched)  # fmt: skip
+    pushed = f"pushed by {push:g} N s" if push else "not pushed"
+    pushed = f"pushed by {share:g} of J50" if share else pushed
+    faster = f", {tempo:g} times as fast" if tempo != 1.0 else ""
+    title = f"{Path(motion).stem} by {controller} on {robot}{faster}, {pushed}"
+    print_followed(trials, title, terminal())
+    if out is not None:
+        write_atomic(out, json.dumps([asdict(trial) for trial in trials], indent=1) + "\n")
+        print(out)
+    if report is not None and watched is not None:
+        write_performance(report, title, motion, robot, tempo, trials, watched)
+        print(report)

@@ -1,4 +1,4 @@
-"""`poise motion join`: one clip after the other."""
+"""`poise motion join` and `match`: one clip after the other, and a motion that is asked for."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,8 +10,11 @@ from poise.baselines.clips.library import find_bvh
 from poise.baselines.joining.coefficient import best_duration, coefficient, moved_shares
 from poise.baselines.joining.joins import JOINS, ends
 from poise.configs.errors import ConfigError
+from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
+from poise.training.running.terminal import terminal
 
+Files = Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 Clips = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
 
@@ -56,6 +59,35 @@ def join(
     write_bvh(JOINS[kind](before, after, duration), out)
     price = float(coefficient(gap, rate, next_rate, shares, duration))
     print(f"{kind}, {duration:.2f} s, coefficient {price:.3g}")
+    print(out)
+
+
+def match(
+    files: Files = (),
+    /,
+    *,
+    commands: tuple[str, ...],
+    out: Path,
+    seconds: float = 10.0,
+    start: str = "",
+) -> None:
+    """Make a motion that does what is asked for, by motion matching; see docs/motions.md.
+
+    Args:
+        files: .bvh files or names of packaged clips, all of one skeleton. None: CMU's subject 02.
+        commands: what is asked for from a time on, as SECONDS:FORWARD,LEFT,TURN in m/s and rad/s.
+        out: the .bvh file to write.
+        seconds: how long the motion lasts.
+        start: CLIP@SECONDS where it begins. None: the first frame of the first clip.
+    """
+    from poise.training.following.matched import matched, print_matched
+
+    if out.suffix != ".bvh":
+        raise ConfigError("must be the name of a .bvh file", source=out, choices=("*.bvh",))
+    check_out_file(out)
+    made, database = matched(files, commands, seconds, start)
+    write_bvh(made.clip, out)
+    print_matched(made, database, terminal())
     print(out)
 
 

@@ -9,32 +9,31 @@ from typing import Annotated, Literal
 import tyro
 
 from poise.baselines.clips.bvh import write_bvh
-from poise.baselines.clips.clip import Clip
-from poise.baselines.clips.library import packaged_clips
 from poise.baselines.motion_graphs.adjacency import make_graph
 from poise.baselines.motion_graphs.motion_graph import (
-    GraphClip,
     StatePlace,
     Thresholds,
     Weight,
-    read_graph,
     write_graph,
 )
-from poise.baselines.retargeting.performed import load_clip, robot_clip_of
 from poise.baselines.scripts.library import between, find_script
 from poise.baselines.scripts.printer import sequence_text
 from poise.baselines.scripts.table import to_csv
-from poise.baselines.synthesis.synthesis import Synthesis
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import write_atomic
-from poise.configs.reading import is_file, read_yaml
+from poise.configs.reading import read_yaml
 from poise.configs.schema import build
-from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.robots.robot import load_robot
+from poise.training.following.scripts import load_clips, open_synthesis, write_robot_motion
+from poise.training.motion_report.graph_chart import graph_pictures
+from poise.training.motion_report.page import check_page, write_page
+from poise.training.motion_report.performance import write_synthesis
 from poise.training.running.terminal import terminal
 
 from .arguments import Switch
 
 ScriptFile = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCRIPT")]
+Kind = Literal["insert", "cross", "capture", "inertial", "physical"]
 Files = Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
 
@@ -54,6 +53,7 @@ def graph(
     weights: Path | None = None,
     state: tuple[str, ...] = (),
     plot: Path | None = None,
+    report: Path | None = None,
 ) -> None:
     """Find out which clips may follow which, and where: a motion graph as YAML.
 
@@ -71,13 +71,17 @@ def graph(
         weights: a .yaml file of an expert: weights, a list of before, after and weight.
         state: postures by name, as NAME=CLIP@SECONDS.
         plot: a .png file for the adjacency matrix and the graph.
+        report: a .html file for both, which follows light and dark.
     """
     from poise.training.following.script_tables import print_graph
 
+    if report is not None:
+        check_page(report)
     limits = build(Thresholds, {
         "coefficient": coefficient, "angle": angle, "contacts": not any_feet, "least": least,
         "most": most, "time_price": time_price, "each": each}, "graph")  # fmt: skip
-    loaded = _load([str(file) for file in files], robot)
+    body = None if robot is None else load_robot(robot)
+    loaded = load_clips([str(file) for file in files], body)
     made = make_graph(loaded, limits, _weights(weights), _states(state), robot or "")
     write_graph(made, out)
     print_graph(made, terminal())
@@ -87,6 +91,10 @@ def graph(
 
         plot_graph(plot, made)
         print(plot)
+    if report is not None:
+        lead = f"{len(made.clips)} clips, {len(made.transitions)} transitions."
+        write_page(report, f"{out.stem}, a motion graph", lead, graph_pictures(made))
+        print(report)
 
 
 def plan(
@@ -97,7 +105,7 @@ def plan(
     robot: str | None = None,
     k: int = 1,
     table: Switch = False,
-    kind: Literal["insert", "cross", "capture", "inertial"] = "insert",
+    kind: Kind | None = None,
 ) -> None:
     """The cheapest ways of a script through a motion graph, without making the motion.
 
@@ -107,12 +115,13 @@ def plan(
         robot: for whom the packaged clips are retargeted. None: their own skeleton.
         k: how many ways.
         table: print the script as a table, comma-separated, too.
-        kind: of transitions that the script leaves open.
+        kind: of transitions that the script leaves open. None: physical with a robot, which
+            lasts as long and bends as much as it needs, and insert without.
     """
     from poise.training.following.script_tables import print_plan
 
     tree = find_script(script)
-    synthesis = _synthesis(graph, robot, kind)
+    synthesis = open_synthesis(graph, robot, kind)
     print_plan(synthesis.plan(tree, k), sequence_text(tree.sequence), terminal())
     if table:
         print(to_csv(tree), end="")
@@ -127,8 +136,9 @@ def synth(
     graph: Path | None = None,
     start: Annotated[str | None, tyro.conf.arg(name="from")] = None,
     goal: Annotated[str | None, tyro.conf.arg(name="to")] = None,
-    kind: Literal["insert", "cross", "capture", "inertial"] = "insert",
+    kind: Kind | None = None,
     least: float | None = None,
+    report: Path | None = None,
 ) -> None:
     """Make the motion of a script, and a file beside it with every choice (.plan.json).
 
@@ -139,81 +149,32 @@ def synth(
         graph: a file of poise motion graph. None: the packaged clips.
         start: a posture from which the motion begins, as <NAME> in a script.
         goal: a posture in which it ends.
-        kind: of transitions that the script leaves open.
+        kind: of transitions that the script leaves open. None: physical with a robot, which
+            lasts as long and bends as much as it needs, and insert without.
         least: shortest transition of the packaged clips [s]; a graph has its own.
+        report: a .html file for the script's timeline and, for a robot, the ZMP of the motion.
     """
     if out.suffix not in ((".npz", ".bvh") if robot else (".bvh",)):
         raise ConfigError("must be the name of a .npz or .bvh file; a .npz needs --robot",
                           source=out, field="out")  # fmt: skip
+    if report is not None:
+        check_page(report)
     tree = between(find_script(script), start, goal)
-    synthesis = _synthesis(graph, robot, kind, least)
+    synthesis = open_synthesis(graph, robot, kind, least)
     begin = time.monotonic()
     clip, record = synthesis.make(tree)
     if robot is None:
         write_bvh(clip, out)
     else:
-        _write_robot(clip, load_robot(robot), out, tree.source)
+        write_robot_motion(clip, load_robot(robot), out, tree.source)
     record["seconds"] = round(time.monotonic() - begin, 3)
     text = json.dumps(record, indent=1, ensure_ascii=False)
     write_atomic(out.with_suffix(".plan.json"), text + "\n")
     print(f"{clip.duration:.1f} s, made in {record['seconds']:.1f} s")
     print(out)
-
-
-def _synthesis(
-    file: Path | None, robot: str | None, kind: str, least: float | None = None
-) -> Synthesis:
-    """The clips of a graph, or the packaged ones, ready for scripts."""
-    if file is not None:
-        made = read_graph(file)
-        if (robot or "") != made.robot:
-            raise ConfigError(f"is of {made.robot or 'no robot'}, not of {robot or 'none'}",
-                              source=file, field="robot")  # fmt: skip
-        loaded = _load([_beside(clip.file, file) for clip in made.clips], robot,
-                       [clip.name for clip in made.clips])  # fmt: skip
-        for told, (found, _) in zip(made.clips, loaded, strict=True):
-            if told.digest and told.digest != found.digest:
-                raise ConfigError(f"is not the file that it was: {told.file}; make the graph again",
-                                  source=file, field=f"clips.{told.name}")  # fmt: skip
-        return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind)
-    names = [name for name in packaged_clips() if _fits(name, robot)]
-    limits = Thresholds() if least is None else build(Thresholds, {"least": least}, "synth")
-    loaded = _load(names, robot)
-    return Synthesis(make_graph(loaded, limits, robot=robot or ""),
-                     {entry.name: clip for entry, clip in loaded}, kind)  # fmt: skip
-
-
-def _fits(name: str, robot: str | None) -> bool:
-    """Without a robot the clips of one skeleton; with one those whose feet stay."""
-    return name.startswith("cmu02") if robot is None else not name.endswith("walk")
-
-
-def _load(
-    files: Sequence[str], robot: str | None, names: Sequence[str] | None = None
-) -> list[tuple[GraphClip, Clip]]:
-    body = None if robot is None else load_robot(robot)
-    loaded = []
-    for file, name in zip(files, names or [Path(file).stem for file in files], strict=True):
-        clip, digest = load_clip(file, body)
-        loaded.append((GraphClip(name, file, clip.duration, digest), clip))
-    return loaded
-
-
-def _beside(file: str, graph_file: Path) -> str:
-    """A clip's file, looked for beside the graph's file too."""
-    beside = graph_file.parent / file
-    return str(beside) if Path(file).suffix and not is_file(file) and is_file(beside) else file
-
-
-def _write_robot(clip: Clip, robot: Robot, out: Path, source: str) -> None:
-    from poise.baselines.motions.robot_clip import write_robot_clip
-    from poise.baselines.retargeting.robot_bvh import clip_of_robot
-
-    made = robot_clip_of(clip, robot, out.stem, source)
-    if out.suffix == ".npz":
-        write_robot_clip(made, out)
-    else:
-        write_bvh(clip_of_robot(robot, made.qpos, made.dt, out.stem), out)
+    if report is not None:
+        write_synthesis(report, record, out, robot)
+        print(report)
 
 
 def _weights(path: Path | None) -> tuple[Weight, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
+from poise.baselines.motions.tempo import Tempo
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import whole_number
 from poise.envs.balance.termination import FallLimits
@@ -20,7 +21,7 @@ from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.tracking.record import ANYWHERE, TrackingFigures
 from poise.training.trials.agents import Agent, load_agent
-from poise.training.trials.play import run_trial
+from poise.training.trials.play import Watch, run_trial
 from poise.training.trials.push_limits import load_limits
 from poise.training.trials.trial import Outcome, Trial
 
@@ -55,6 +56,10 @@ def follow(
     share: float = 0.0,
     directions: int = 8,
     seed: int = 0,
+    speed: float = 1.0,
+    tempo: Tempo | None = None,
+    watch: Callable[[Trial], Watch | None] | None = None,
+    patient: bool = True,
 ) -> list[Followed]:
     """Let a controller perform a motion from `starts` disturbed starts.
 
@@ -66,11 +71,17 @@ def follow(
     `share` the impulse is that share of the J50 that the robot's file of limits has for the
     direction: what momentum-qp stands half of.
 
+    The motion is played `speed` times as fast, and waits as `tempo` says. `watch` gives, for a
+    trial, what is called with the environment after the reset and after every step. Without
+    `patient` the first fall is the last trial.
+
     Raises:
         ConfigError: no such motion, controller or robot, one that does not play motions, counts
             below 1, an impulse, a share or a seed below 0, an impulse and a share, a share without
-            measured limits.
+            measured limits, a speed that is not from 0.1 to 10.
     """
+    if not 0.1 <= speed <= 10.0:
+        raise ConfigError(f"must be from 0.1 to 10, not {speed:g}", field="tempo")
     for name, count in (("starts", starts), ("directions", directions)):
         whole_number(count, 1, name)
     whole_number(seed, 0, "seed")
@@ -82,7 +93,8 @@ def follow(
     body = robot if isinstance(robot, Robot) else load_robot(robot)
     half = load_limits(body).j50() if share else None
     reference = load_motion(motion, body)
-    agent = performer(controller, body, reference, LONGEST, ANYWHERE)
+    reference = reference if speed == 1.0 else reference.at_speed(speed)
+    agent = performer(controller, body, reference, LONGEST, ANYWHERE, tempo)
     rng = np.random.default_rng(seed)
     trials = []
     for k in range(starts):
@@ -92,7 +104,10 @@ def follow(
         push = Push(push_bodies(body)[0], start, PUSH_TIME, size, direction)
         pushes = (push,) if size else ()
         trial = Trial(k, seed + k, pushes, motion=reference.name)
-        trials.append(_followed(run_trial(agent, trial), trial))
+        watcher = None if watch is None else watch(trial)
+        trials.append(_followed(run_trial(agent, trial, watcher), trial))
+        if trials[-1].fallen and not patient:
+            break
     return trials
 
 
@@ -114,8 +129,9 @@ def performer(
     motion: ReferenceMotion,
     duration: float,
     fall: Mapping[str, float] | None = None,
+    tempo: Tempo | None = None,
 ) -> Agent:
-    """An agent that performs a motion for `duration` [s].
+    """An agent that performs a motion for `duration` [s], whose time runs as `tempo` says.
 
     `fall` are its `FallLimits`; by default lower than the motion ever is, or further from upright.
 
@@ -124,6 +140,7 @@ def performer(
     """
     fall = fall or fall_limits(motion, robot)
     given = {"motion": motion, "pushes": None, "duration": duration, "fall": fall}
+    given |= {} if tempo is None else {"tempo": tempo}
     try:
         return load_agent(controller, robot, **given)
     except TypeError:

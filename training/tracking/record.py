@@ -85,7 +85,7 @@ class Tracking:
             if self._steps is not None:
                 stance = Stance.of(env.simulation.state)
                 self._steps.update()
-            self._errors.append(_errors(env, self._reference, stance))
+            self._errors.append(tracking_errors(env, self._reference, stance))
             self._counted += env.motion_time < env.motion.duration + COUNTED
 
     def figures(self) -> TrackingFigures:
@@ -147,7 +147,7 @@ def lies(env: ResidualBalanceEnv) -> bool:
     return bool(low or leaning)
 
 
-def _errors(
+def tracking_errors(
     env: ResidualBalanceEnv, reference: ReferenceBodies, stance: Stance
 ) -> tuple[float, float, float, float]:
     """Mean square of the joints, mean distance of the bodies, the same relative to the root, and

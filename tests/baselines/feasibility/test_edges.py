@@ -22,7 +22,8 @@ def with_margin(one: Feasibility, begin: float, end: float, margin: float) -> Fe
 
 def test_a_part_has_its_samples_and_its_own_limits() -> None:
     whole = judged()
-    cut = part(whole, 0.5, 1.0, FeasibilityLimits(torque=0.1))
+    kept = (whole.times > 0.495) & (whole.times < 1.005)
+    cut = part(whole, kept, FeasibilityLimits(torque=0.1))
     assert len(cut.times) == len(cut.torque) == len(cut.zmp) == 51
     assert cut.times[0] == 0.5 and cut.limits.torque == 0.1 and not cut.feasible
     np.testing.assert_array_equal(cut.support, whole.support)
@@ -38,6 +39,11 @@ def test_a_join_may_be_as_bad_as_its_clips_beside_the_cuts_alone() -> None:
         (with_margin(good, last - 0.09, 99.0, -0.05), good, bad, True),
         (with_margin(good, -1.0, 0.09, -0.06), bad, good, False),  # worse than the clip
         (with_margin(good, 0.5, 0.6, -0.05), bad, bad, False),  # not beside a cut
+        (with_margin(good, 0.11, 0.14, -0.02), bad, good, True),  # two thirds as bad
+        (with_margin(good, 0.11, 0.14, -0.05), bad, good, False),
+        (with_margin(good, last - 0.19, last - 0.16, -0.01), good, bad, True),  # one third
+        (with_margin(good, last - 0.19, last - 0.16, -0.02), good, bad, False),
+        (with_margin(good, 0.11, 0.14, -0.02), good, bad, False),  # of the other clip
     )
     for join, before, after, possible in cases:
         reason = between_clips(join, before, after)

@@ -1,13 +1,17 @@
 """Motions are performed: errors are small where the robot stands, and falls are counted."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from poise.baselines.clips.bvh import read_bvh
 from poise.baselines.clips.library import find_bvh
+from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.robot_clip import reference_from
 from poise.baselines.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
+from poise.training.following.fastest import fastest
 from poise.training.following.follow import follow
 from poise.training.trials.push_limits import load_limits
 from tests.support.physics import robot_named
@@ -59,3 +63,31 @@ def test_a_share_of_j50_is_that_of_the_direction() -> None:
         [0.3 * table(0.0), 0.3 * table(180.0)]
     )
     assert not any(trial.fallen for trial in trials)
+
+
+def test_the_fastest_tempo_is_the_last_one_before_falls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bisection on steps of 0.05; between 1 and a tenth where the motion's own tempo falls."""
+    for limit, wanted in ((1.32, 1.3), (1.0, 1.0), (9.0, 4.0), (0.43, 0.4), (0.01, 0.0)):
+        asked = []
+
+        def fake(*_, speed: float, limit: float = limit, asked: list = asked, **__) -> list:
+            asked.append(speed)
+            return [SimpleNamespace(fallen=speed > limit)]
+
+        monkeypatch.setattr("poise.training.following.fastest.follow", fake)
+        assert fastest("squat") == pytest.approx(wanted)
+        assert len(asked) < 12
+
+
+def test_a_faster_motion_has_its_rates_and_the_impatient_stop_at_a_fall() -> None:
+    robot = robot_named("humanoid")
+    motion = load_motion("squat", robot)
+    fast = motion.at_speed(2.0)
+    assert fast.duration == pytest.approx(0.5 * motion.duration)
+    own, twice = motion.sample(1.0), fast.sample(0.5)
+    for name, factor in (("q_ref", 1), ("v_ref", 2), ("a_ref", 4), ("com_acc", 4), ("root_vel", 2)):
+        np.testing.assert_allclose(getattr(twice, name), factor * getattr(own, name), atol=1e-9)
+    trials = follow(motion, robot=robot, starts=2, impulse=200.0, speed=2.0, patient=False)
+    assert len(trials) == 1 and trials[0].fallen
+    with pytest.raises(ConfigError, match=r"tempo: must be from 0.1 to 10, not 0"):
+        follow(motion, robot=robot, speed=0.0)

@@ -1,0 +1,96 @@
+"""The clips that scripts are made of, ready to be put together, and what becomes of a script."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from poise.baselines.clips.bvh import write_bvh
+from poise.baselines.clips.clip import Clip
+from poise.baselines.clips.library import packaged_clips
+from poise.baselines.motion_graphs.adjacency import make_graph
+from poise.baselines.motion_graphs.motion_graph import GraphClip, Thresholds, read_graph
+from poise.baselines.motions.robot_clip import write_robot_clip
+from poise.baselines.retargeting.performed import load_clip, robot_clip_of
+from poise.baselines.retargeting.robot_bvh import clip_of_robot
+from poise.baselines.synthesis.plan import PHYSICAL
+from poise.baselines.synthesis.robot_joins import RobotJoins
+from poise.baselines.synthesis.synthesis import Synthesis
+from poise.configs.errors import ConfigError
+from poise.configs.reading import is_file
+from poise.configs.schema import build
+from poise.envs.robots.robot import Robot, load_robot
+
+
+def open_synthesis(
+    file: Path | None, robot: str | None, kind: str | None = None, least: float | None = None
+) -> Synthesis:
+    """The clips of a graph, or the packaged ones, ready for scripts.
+
+    Args:
+        file: of the graph; None for the packaged clips.
+        robot: whose motions the clips are to be; None for their own skeleton.
+        kind: of transitions that scripts leave open; None for `physical` with a robot, else
+            `insert`.
+        least: shortest transition of the packaged clips [s].
+
+    Raises:
+        ConfigError: a graph of another robot, a clip that changed, `physical` without a robot; as
+            `read_graph` and `load_clip`.
+    """
+    body = None if robot is None else load_robot(robot)
+    joins = None if body is None else RobotJoins(body)
+    kind = kind or (PHYSICAL if joins else "insert")
+    if file is not None:
+        made = read_graph(file)
+        if (robot or "") != made.robot:
+            raise ConfigError(f"is of {made.robot or 'no robot'}, not of {robot or 'none'}",
+                              source=file, field="robot")  # fmt: skip
+        loaded = load_clips([_beside(clip.file, file) for clip in made.clips], body,
+                       [clip.name for clip in made.clips])  # fmt: skip
+        for told, (found, _) in zip(made.clips, loaded, strict=True):
+            if told.digest and told.digest != found.digest:
+                raise ConfigError(f"is not the file that it was: {told.file}; make the graph again",
+                                  source=file, field=f"clips.{told.name}")  # fmt: skip
+        return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind,
+                         robot_joins=joins)  # fmt: skip
+    names = [name for name in packaged_clips() if _fits(name, robot)]
+    limits = Thresholds() if least is None else build(Thresholds, {"least": least}, "synth")
+    loaded = load_clips(names, body)
+    return Synthesis(make_graph(loaded, limits, robot=robot or ""),
+                     {entry.name: clip for entry, clip in loaded}, kind,
+                     robot_joins=joins)  # fmt: skip
+
+
+def _fits(name: str, robot: str | None) -> bool:
+    """Without a robot the clips of one skeleton; with one those whose feet stay."""
+    return name.startswith("cmu02") if robot is None else not name.endswith("walk")
+
+
+def load_clips(
+    files: Sequence[str], robot: Robot | None, names: Sequence[str] | None = None
+) -> list[tuple[GraphClip, Clip]]:
+    """The clips of files with what a graph keeps of them; see `load_clip`."""
+    loaded = []
+    for file, name in zip(files, names or [Path(file).stem for file in files], strict=True):
+        clip, digest = load_clip(file, robot)
+        loaded.append((GraphClip(name, file, clip.duration, digest), clip))
+    return loaded
+
+
+def _beside(file: str, graph_file: Path) -> str:
+    """A clip's file, looked for beside the graph's file too."""
+    beside = graph_file.parent / file
+    return str(beside) if Path(file).suffix and not is_file(file) and is_file(beside) else file
+
+
+def write_robot_motion(clip: Clip, robot: Robot, out: Path, source: str) -> None:
+    """Write a clip of the robot's skeleton as its motion (.npz), or as BVH.
+
+    Raises ConfigError and PoiseError as `robot_clip_of`.
+    """
+    made = robot_clip_of(clip, robot, out.stem, source)
+    if out.suffix == ".npz":
+        write_robot_clip(made, out)
+    else:
+        write_bvh(clip_of_robot(robot, made.qpos, made.dt, out.stem), out)
