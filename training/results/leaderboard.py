@@ -24,7 +24,7 @@ Suite `{suite}`, robot `{robot}`, seed {seed}; Poise {poise}, MuJoCo {mujoco}, c
 {processor}, {cores} cores. Intervals are 95 %; what the columns mean: [benchmark.md](benchmark.md).
 `lost, won` and McNemar's p are against `{reference}` on the mix. `root [N]` is the largest
 force that a controller took from nowhere: only those with 0 obey physics, the others have no rank.
-Equal results share a rank.
+Equal results share a rank. η is J50 over the robot's own ankle limit.
 
 """
 
@@ -137,8 +137,10 @@ Cells = list[list[str]]
 
 
 def _ranked(summary: Summary) -> tuple[list[str], Cells]:
+    entries = summary["controllers"]
     columns = [column for column in table_columns(summary) if column[0] in COLUMNS]
-    rank = places(summary["controllers"])
+    columns.insert(1, ("N·s/kg", lambda name: f"{entries[name]['j50_mean_per_mass']:.2f}"))
+    rank = places(entries)
     rows = [[str(rank[name] or "–"), f"`{name}`", *(text(name) for _, text in columns)]
             for name in summary["ranking"]]  # fmt: skip
     return ["", "controller", *(heading for heading, _ in columns)], rows
@@ -151,6 +153,9 @@ def _directions(summary: Summary) -> tuple[list[str], Cells]:
         [f"`{name}`", *(f"{d['eta']:.2f}" for d in entries[name]["directions"])]
         for name in summary["ranking"]
     ]
+    limit = {angle: impulse for angle, impulse in summary["robot"]["ankle_limit"]}
+    if all(angle in limit for angle in angles):
+        rows.insert(0, ["η = 1 at [N·s]", *(f"{limit[angle]:.1f}" for angle in angles)])
     return ["controller", *(f"{angle:g}°" for angle in angles)], rows
 
 
