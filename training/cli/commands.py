@@ -185,6 +185,7 @@ def tune(
     robot: str | None = None,
     policy: str | None = None,
     generations: int | None = None,
+    minutes: float | None = None,
     seed: int | None = None,
     workers: int = 2,
     resume: Switch = False,
@@ -199,6 +200,7 @@ def tune(
         robot: a packaged robot or a .yaml description.
         policy: a policy on top of the controller, which counts too.
         generations: of the search.
+        minutes: that the search may take; --resume goes on from where it ended.
         seed: of the search and its pushes.
         workers: number of processes.
         resume: go on with the search that the folder holds.
@@ -210,7 +212,7 @@ def tune(
              "generations": generations, "seed": seed}  # fmt: skip
     chosen = {name: value for name, value in given.items() if value is not None}
     permitted = [*named(controller), *allow]
-    tune(tune_config(config, **chosen), out, workers, resume, terminal(), permitted)
+    tune(tune_config(config, **chosen), out, workers, resume, terminal(), permitted, minutes)
 
 
 def qp_set(

@@ -16,19 +16,20 @@ from poise.training.running.summary import Entry, Summary
 
 from .summary import read_summary
 
-HEAD = """# Leaderboard
+HEAD = """# Leaderboard{of}
 
 <!-- Written by `poise leaderboard {source}`: change the result, not this page. -->
 
 Suite `{suite}`, robot `{robot}`, seed {seed}; Poise {poise}, MuJoCo {mujoco}, commit `{commit}`;
 {processor}, {cores} cores. Intervals are 95 %; what the columns mean: [benchmark.md](benchmark.md).
-`lost, won` and McNemar's p are against `{reference}` on the mix. `root [N]` is the largest
+`lost, won` and McNemar's p are against `{reference}` on the {paired}. `root [N]` is the largest
 force that a controller took from nowhere: only those with 0 obey physics, the others have no rank.
-Equal results share a rank.
+Equal results share a rank. η is J50 over the robot's own ankle limit.
 
 """
 
 
+HUMANOID: Final = "humanoid"  # whose page names no robot
 COLUMNS = ("mean J50 [N·s]", "η mean", "η worst", "recovered of the mix", "recovered", "lost, won",
            "McNemar p", "root [N]", "tick [µs]")  # fmt: skip
 SAME: Final = (
@@ -107,6 +108,8 @@ def leaderboard(summaries: Mapping[str, Summary]) -> str:
     summary, origin = merged(summaries)
     versions, machine = summary["versions"], summary["machine"]
     text = HEAD.format(
+        of="" if summary["robot"]["name"] == HUMANOID else f": `{summary['robot']['name']}`",
+        paired=summary["rated"] or "pushes that both met",
         source=" ".join(summaries),
         suite=summary["suite"],
         robot=summary["robot"]["name"],
@@ -137,8 +140,14 @@ Cells = list[list[str]]
 
 
 def _ranked(summary: Summary) -> tuple[list[str], Cells]:
-    columns = [column for column in table_columns(summary) if column[0] in COLUMNS]
-    rank = places(summary["controllers"])
+    entries = summary["controllers"]
+    columns = [
+        (heading, text)
+        for heading, text in table_columns(summary)
+        if heading in COLUMNS and (summary["rated"] or heading != "recovered")
+    ]  # else each of its own pushes
+    columns.insert(1, ("N·s/kg", lambda name: f"{entries[name]['j50_mean_per_mass']:.2f}"))
+    rank = places(entries)
     rows = [[str(rank[name] or "–"), f"`{name}`", *(text(name) for _, text in columns)]
             for name in summary["ranking"]]  # fmt: skip
     return ["", "controller", *(heading for heading, _ in columns)], rows
@@ -151,6 +160,9 @@ def _directions(summary: Summary) -> tuple[list[str], Cells]:
         [f"`{name}`", *(f"{d['eta']:.2f}" for d in entries[name]["directions"])]
         for name in summary["ranking"]
     ]
+    limit = {angle: impulse for angle, impulse in summary["robot"]["ankle_limit"]}
+    if all(angle in limit for angle in angles):
+        rows.insert(0, ["η = 1 at [N·s]", *(f"{limit[angle]:.1f}" for angle in angles)])
     return ["controller", *(f"{angle:g}°" for angle in angles)], rows
 
 

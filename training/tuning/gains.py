@@ -43,17 +43,21 @@ class Gain:
 class Gains:
     """The gains that are searched, within the configuration of a controller.
 
+    A range reaches to where the search starts, if the controller's own number is outside of it.
+
     Raises ConfigError naming a path that leads to no number, or a range that is not allowed.
     """
 
     def __init__(self, controller: str, ranges: Mapping[str, tuple[float, float]], robot: str):
         self.start = to_dict(controller_config(controller))
-        self.gains = [Gain(path, low, high) for path, (low, high) in ranges.items()]
-        body, numbers = load_robot(robot), sorted(_numbers(self.start))
-        for gain in self.gains:
-            if gain.path not in numbers:
-                raise ConfigError("the controller has no such number", field=f"gains.{gain.path}",
-                                  choices=numbers)  # fmt: skip
+        self.gains: list[Gain] = []
+        body, numbers = load_robot(robot), _numbers(self.start)
+        for path, (low, high) in ranges.items():
+            if path not in numbers:
+                raise ConfigError("the controller has no such number", field=f"gains.{path}",
+                                  choices=sorted(numbers))  # fmt: skip
+            gain = Gain(path, min(low, numbers[path]), max(high, numbers[path]))
+            self.gains.append(gain)
             for end in (gain.low, gain.high):
                 data = deepcopy(self.start)
                 _put(data, gain.path, end)

@@ -27,6 +27,7 @@ from poise.training.running.stopping import keeps
 
 from .candidates import Candidate, TuningPushes, follow, play
 from .gains import Gains
+from .pace import Pace
 
 CONFIG, GAINS, HISTORY = "config.yaml", "gains.yaml", "history.jsonl"
 AVERAGED = 16  # generations whose better halves the result is the mean of
@@ -99,17 +100,22 @@ def tune(
     resume: bool = False,
     console: Console | None = None,
     allow: str | Iterable[str] = (),
+    minutes: float | None = None,
 ) -> dict[str, object]:
     """Search; returns the controller's configuration at the mean of the last candidates.
 
     Writes `out/gains.yaml`, that controller, after each generation, and `out/history.jsonl` with
     all that was tried, from which `resume` goes on as if nothing had happened. A controller from
     outside (``module:Class``) that the configuration or the policy names must be among `allow`.
+    No generation begins that would end later than `minutes` after the first one of this call
+    began, if the ones before are a measure; one is always played.
 
-    Raises ConfigError for a configuration that is not valid or names what is not allowed, a folder
-    that holds another search, or where the library `cma` is missing; PoiseError when another
-    process searches there, or a file cannot be written.
+    Raises ConfigError for a configuration that is not valid or names what is not allowed, `minutes`
+    that are not above 0, a folder that holds another search, or where the library `cma` is
+    missing; PoiseError when another process searches there, or a file cannot be written.
     """
+    if minutes is not None and not minutes > 0.0:
+        raise ConfigError(f"must be above 0, not {minutes}", field="minutes")
     check_out_folder(out)
     _known(config, out, resume)  # what is refused makes no folder
     gains = Gains(config.controller, config.gains, config.robot)
@@ -125,11 +131,14 @@ def tune(
         for row in rows:
             search.again(row, out / HISTORY)
         write_atomic(out / CONFIG, to_yaml(config))
-        while search.generation < config.generations:
+        pace = Pace(minutes)
+        while search.generation < config.generations and pace.allows_another():
             rows.append(search.step(executor))
+            pace.count()
             write_atomic(out / GAINS, to_yaml(gains.at(search.mean)))
             write_atomic(out / HISTORY, "".join(json.dumps(row) + "\n" for row in rows))
-            console.print(search.words(rows[-1]), highlight=False)
+            left = config.generations - search.generation
+            console.print(search.words(rows[-1]) + pace.words(left), highlight=False)
     return gains.at(search.mean)
 
 

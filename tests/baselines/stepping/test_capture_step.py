@@ -80,6 +80,21 @@ def test_pushes_are_walked_off_on_the_g1(direction):
     assert env.recovered and env.controller.steps >= 2
 
 
+def test_the_h1_steps_back_only_where_it_must():
+    """With 0.35 N·s/kg its feet stay; 0.48, which feet in place lose, it walks off."""
+    pytest.importorskip(WHEEL, reason="its model is not installed: pip install 'poise[robots]'")
+    h1 = robot("unitree_h1")
+    env = ResidualBalanceEnv(h1, controller="walk-off-h1", pushes=None, duration=6.0)
+    for specific, steps in ((0.35, False), (0.48, True)):
+        push = {"specific_impulse": specific, "direction": 180.0, "start": 0.5, "duration": 0.1,
+                "body": "pelvis"}  # fmt: skip
+        env.reset(seed=0, options={"push": push})
+        over = fallen = False
+        while not (over or fallen):
+            _, fallen, over = env.step_without_info(np.zeros(4))
+        assert env.recovered and (env.controller.steps > 0) == steps
+
+
 def test_feet_do_not_cross():
     """At every touchdown each foot is on its own side of the other."""
     widths = []

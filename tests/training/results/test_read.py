@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from poise.configs.errors import ConfigError
+from poise.training.results.leaderboard import leaderboard
 from poise.training.results.read import load_results
 from poise.training.results.summary import read_summary
 from poise.training.running.summary import both_ends
@@ -121,13 +122,26 @@ def test_intervals_may_be_open() -> None:
     assert both_ends((None, 2.5)) is None and both_ends(None) is None
 
 
-@pytest.mark.parametrize("name", ["leaderboard", "leaderboard-residual-torque"])
-def test_the_committed_results_are_read(name: str) -> None:
-    """Those of the leaderboard have the form of today."""
+@pytest.mark.parametrize(
+    ("name", "rated", "page"),
+    [
+        ("leaderboard", "mix", None),
+        ("leaderboard-residual-torque", "mix", None),
+        *(
+            (robot, None, f"leaderboard-{robot}.md")
+            for robot in ("unitree_g1", "unitree_h1", "booster_t1")
+        ),
+    ],
+)
+def test_the_committed_results_are_read(name: str, rated: str | None, page: str | None) -> None:
+    """Those of the leaderboards have the form of today, and the pages of robots are theirs."""
     path = Path(__file__).parents[3] / f"docs/results/{name}.json"
     summary = read_summary(path)
     assert summary == json.loads(path.read_text(), object_hook=_as_read)
-    assert summary["rated"] == "mix" and summary["reference"] in summary["controllers"]
+    assert summary["rated"] == rated and summary["reference"] in summary["controllers"]
+    if page is not None:
+        source = f"docs/results/{name}.json"
+        assert (path.parents[1] / page).read_text() == leaderboard({source: summary})
 
 
 def _as_read(mapping: dict[str, Any]) -> dict[str, Any]:

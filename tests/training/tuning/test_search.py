@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config
@@ -174,3 +175,30 @@ def test_a_search_resumes_as_if_nothing_had_happened(tmp_path):
     assert read_yaml(twice / GAINS) == found  # nothing lost
     with pytest.raises(ConfigError, match="no search"):
         tune(small(), tmp_path / "none", resume=True)
+
+
+def test_a_range_reaches_to_where_the_search_starts(tmp_path):
+    """A start outside of a range is where the search starts, not the nearer end."""
+    path = tmp_path / "stiff.yaml"
+    path.write_text("base: momentum-qp\nkind: momentum-qp\ncom: {stiffness: 20.0}\n")
+    gains = Gains(str(path), {"com.stiffness": (0.2, 12.0)}, "humanoid")
+    assert gains.first() == pytest.approx([1.0])
+    assert gains.at(gains.first()) == to_dict(controller_config(path))
+    assert gains.at(np.zeros(1))["com"]["stiffness"] == pytest.approx(0.2)
+
+
+def test_a_search_ends_when_its_minutes_are_over(tmp_path, capsys):
+    """One generation is played, then none that would end late; the rest by `resume`."""
+    tune(small(), tmp_path / "short", workers=1, minutes=1e-6, console=Console())
+    said = capsys.readouterr().out
+    assert "generation 1 of 3" in said and "s each" in said and "left" not in said
+    assert len((tmp_path / "short" / HISTORY).read_text().splitlines()) == 1
+    tune(small(), tmp_path / "short", workers=1, resume=True, console=Console())
+    assert "min left" in capsys.readouterr().out
+    tune(small(), tmp_path / "long", workers=1)
+    for name in (GAINS, HISTORY):
+        assert (tmp_path / "short" / name).read_bytes() == (tmp_path / "long" / name).read_bytes()
+    for wrong in (0.0, -1.0, float("nan")):
+        with pytest.raises(ConfigError, match="above 0"):
+            tune(small(), tmp_path / "none", minutes=wrong)
+    assert not (tmp_path / "none").exists()
