@@ -139,6 +139,7 @@ class ResidualBalanceEnv(ControlledEnv):
     def _hand_over_motion(self) -> None:
         """Tell a controller that performs motions with steps which one it is to be."""
         decides = self._base.unwrapped
+        self._handed = decides, self._motion
         if isinstance(decides, Performer):
             decides.perform(self._reference, self._motion.pace)
         elif self._reference.footing is not None:
@@ -192,6 +193,9 @@ class ResidualBalanceEnv(ControlledEnv):
         return self._targets.q_ref, self._targets.v_ref
 
     def _begin(self, options: Mapping[str, Any]) -> None:
+        if self._handed[0] is not self._base.unwrapped or self._handed[1] is not self._motion:
+            self._hand_over_motion()
+            self._unbind()
         self.controller.reset(self.state_source.state)
         self._begin_walk(options)
         self._motion.pace.clear()

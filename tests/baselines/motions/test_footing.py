@@ -43,7 +43,7 @@ def test_a_sole_rests_while_it_is_planted_and_swings_between(kick: Footing) -> N
         assert sample.planted.tolist() == [True, not swings]
         assert sample.places[0, 1:] == pytest.approx(np.zeros((2, 3)))  # the left one never moves
         if not swings:
-            assert sample.places[:, 0] == pytest.approx(start[:, 0], abs=1e-9)
+            assert sample.places[:, 0] == pytest.approx(start[:, 0], abs=1e-6)  # 1e-7 of the IK
     assert kick.sample(2.5).places[1, 0, 0] == pytest.approx(0.315, abs=0.005)  # 0.4 h ahead
 
 

@@ -40,11 +40,14 @@ def test_the_zmp_goes_from_foot_to_foot() -> None:
     joints = np.tile(robot.standing_qpos[7:], (frames, 1))
     steps = [FootStep("left", 1.4, 2.4, (Waypoint(1.9, up=0.1),), ahead=0.1)]
     plan = plan_steps(steps, joints, np.zeros((frames, 3)), robot, "x")
-    zmp, feet = plan_zmp(robot, plan, np.zeros(2)), nominal_feet(robot)
+    feet = nominal_feet(robot)
+    rest = com_of(robot, robot.standing_qpos)[:2] - feet[:, :2].mean(axis=0)
+    zmp = plan_zmp(robot, plan, rest)
     a, b = round(1.4 / RATE), round(2.4 / RATE)
     assert zmp[a + 1 : b, 1] == pytest.approx(np.full(b - a - 1, feet[1, 1]))  # on the right sole
-    assert zmp[0] == pytest.approx(feet[:, :2].mean(axis=0), abs=1e-9)
-    assert zmp[-1] == pytest.approx(feet[:, :2].mean(axis=0) + [0.05 * robot.height_com, 0.0])
+    middle = feet[:, :2].mean(axis=0) + rest
+    assert zmp[0] == pytest.approx(middle)
+    assert zmp[-1] == pytest.approx(middle + [0.05 * robot.height_com, 0.0])
     assert np.abs(np.diff(zmp, axis=0)).max() < 0.02  # and nowhere at once
     qpos = perform_plan(robot, plan, "x")
     com = np.array([com_of(robot, q) for q in qpos]) - [0.0, 0.0, feet[:, 2].mean()]
@@ -75,7 +78,7 @@ def test_a_step_beyond_the_legs_is_refused() -> None:
         ("steps: [{foot: left, lift: 1.4, land: 2}, {foot: right, lift: 1.7, land: 2.5}]",
          "one after the other"),
         ("steps: [{foot: left, lift: 1.4, land: 2.9}]", "1.3 s of standing are needed"),
-        ("loop: true\nsteps: [{foot: left, lift: 1, land: 2}]", "not with loop"),
+        ("loop: true\nsteps: [{foot: left, lift: 1.4, land: 1.7}]", "not with loop"),
         ("steps: [{foot: middle, lift: 1, land: 2}]", "left, right"),
     ],
 )  # fmt: skip
