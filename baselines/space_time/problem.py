@@ -61,8 +61,8 @@ class Problem:
         self.third = sparse.kron(third, sparse.identity(nv), format="csr")
         self.rho = (2.0 * np.pi * crossover) ** -6
         self.inner = np.arange(1, len(scene) - 1)
-        self.low = scene.robot.joint_range[:, 0] + MARGIN
-        self.high = scene.robot.joint_range[:, 1] - MARGIN
+        inner = scene.robot.joint_range + np.array([MARGIN, -MARGIN])
+        self.low, self.high = np.sort(inner, axis=1).T  # of a range below two margins the middle
 
     def cost(self) -> Cost:
         """The cost of the postures as they are."""
@@ -98,11 +98,8 @@ class Problem:
         cost = self._quadratic(np.concatenate(errors), jacobians, moves)
         columns = (self.inner[:, None] * nv + np.arange(6, nv)).ravel()
         joints = scene.qpos[1:-1, 7:]
-        low, high = np.maximum(self.low - joints, -trust), np.minimum(self.high - joints, trust)
-        # a joint that is beyond its range comes back by `trust` at most
-        low, high = np.minimum(low, trust), np.maximum(high, -trust)
-        low, high = np.minimum(low, high), np.maximum(low, high)
-        found = solve_program(cost, columns, low.ravel(), high.ravel(), penalised)
+        low, high = (np.clip(end - joints, -trust, trust).ravel() for end in (self.low, self.high))
+        found = solve_program(cost, columns, low, high, penalised)
         return None if found is None else found.reshape(-1, nv)
 
     def _wanted(self) -> list[Penalised]:

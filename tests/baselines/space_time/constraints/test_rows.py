@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -119,12 +120,18 @@ def test_the_support_is_the_hull_of_the_planted_soles() -> None:
 
 
 def test_touch_is_the_gap_between_surfaces() -> None:
-    """A hand moved along the way to what it is to touch comes nearer by as much."""
+    """The hand is a sphere and what it may touch a capsule: c to the segment, less both radii."""
     scene = swaying(size=0.0)
     touch = Touch(point="hand_left", body="pelvis")
-    rows = rows_at(touch, scene, 10)[0]
-    assert 0.02 < rows.value[0] < 0.5
-    gradient = rows.parts[10][0]
+    model, data = scene.model, scene.at(10)
+    hand, (hip,) = touch.geoms(scene)
+    assert model.geom_type[hand] == mujoco.mjtGeom.mjGEOM_SPHERE
+    assert model.geom_type[hip] == mujoco.mjtGeom.mjGEOM_CAPSULE
+    way = data.geom_xpos[hand] - data.geom_xpos[hip]
+    axis, half = data.geom_xmat[hip].reshape(3, 3)[:, 2], model.geom_size[hip, 1]
+    gap = np.linalg.norm(way - np.clip(way @ axis, -half, half) * axis)
+    gap -= model.geom_size[hand, 0] + model.geom_size[hip, 0]
+    assert rows_at(touch, scene, 10)[0].value[0] == pytest.approx(gap, abs=1e-6)
     for _ in range(3):
         now = rows_at(touch, scene, 10)[0]
         gradient = now.parts[10][0]
