@@ -1,17 +1,19 @@
-"""What legs with flat soles can do of long steps and of stairs: `python -m tests.performance.walking_bounds`.
+"""What legs with flat soles can do: `python -m tests.performance.walking_bounds`.
 
 Statics in the sagittal plane. Both soles are flat at the moment when the foot behind leaves the
-ground, so its leg, of at most ℓ = |hip − ankle| with the knee at the end of its range, holds the hip
-down; and the leg ahead, bent by that, has to bear the robot alone. With the CoP p and the CoM c the
-force of the ground points from p to c, and grows by n = F/(m g) until a motor of the leg ahead is at
-its limit. n below 1 is a place where the robot sinks whatever it does. c_x − p = −v/ω is where a
-pendulum of speed v just gets over p; 0 is standing. The place of the hip is the one with the largest n.
+ground, so its leg, of at most ℓ = |hip − ankle| with the knee at the end of its range, holds the
+hip down; and the leg ahead, bent by that, has to bear the robot alone. With the CoP p and the CoM c
+the force of the ground points from p to c, and grows by n = F/(m g) until a motor of the leg ahead
+is at its limit. n below 1 is a place where the robot sinks whatever it does. c_x − p = −v/ω is
+where a pendulum of speed v just gets over p; 0 is standing. The place of the hip is the one with
+the largest n.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 from poise.envs.robots.robot import Robot, load_robot
@@ -48,8 +50,6 @@ class Body:
 
 def body_of(robot: Robot) -> Body:
     """The humanoid's."""
-    import mujoco
-
     m, d = robot.model, mujoco.MjData(robot.model)
     d.qpos[:] = robot.standing_qpos
     mujoco.mj_forward(m, d)
@@ -160,37 +160,86 @@ def best(body: Body, step: float, rise: float, lean: float, before: float) -> Su
 
 
 def least_width(robot: Robot) -> float:
-    """Between the middles of the soles with both legs turned in as far as hips go, pelvis level."""
-    import mujoco
-
+    """Between the middles of the soles [m] with both legs turned in as far as hips go, the knees
+    as straight as they get, the pelvis level."""
     m, d = robot.model, mujoco.MjData(robot.model)
     d.qpos[:] = robot.standing_qpos
     for side in ("right", "left"):
-        joint = m.joint(f"{side}_hip_x")
-        d.qpos[joint.qposadr[0]] = joint.range[1]
-        d.qpos[m.joint(f"{side}_hip_y").qposadr[0]] = d.qpos[
-            m.joint(f"{side}_ankle_y").qposadr[0]
-        ] = 0.0
-        d.qpos[m.joint(f"{side}_knee").qposadr[0]] = m.joint(f"{side}_knee").range[1]
-    mujoco.mj_forward(m, d)
+        for name, angle in (
+            ("hip_x", m.joint(f"{side}_hip_x").range[1]),
+            ("hip_y", 0.0),
+            ("ankle_y", 0.0),
+            ("knee", m.joint(f"{side}_knee").range[1]),
+        ):
+            d.qpos[m.joint(f"{side}_{name}").qposadr[0]] = angle
+    mujoco.mj_kinematics(m, d)
     return float(abs(d.body("left_foot").xpos[1] - d.body("right_foot").xpos[1]))
+
+
+def stairs(body: Body, omega: float) -> None:
+    """A table of rises: n where the foot behind leaves."""
+    print("| step [m] | rise [m] | lean [°] | v [m/s] | n | by | knee [°] | hip [m] |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    for step, rises, speeds in (
+        (0.28, (0.10, 0.15, 0.18), (0.0,)),  # to the next tread, both feet on each
+        (0.30, (0.05, 0.10, 0.15), (0.0, 0.25, 0.5)),
+    ):
+        for rise in rises:
+            for lean in (0.0, 15.0, 30.0):
+                for v in speeds:
+                    s = best(body, step, rise, np.radians(lean), -v / omega)
+                    print(f"| {step:g} | {rise:g} | {lean:g} | {v:g} | {s.lift:.2f} | {s.by} "
+                          f"| {np.degrees(s.bend):.0f} | {s.height:.2f} |", flush=True)  # fmt: skip
+
+
+def long_steps(body: Body) -> None:
+    """A table of steps on level ground: how high the hip may be, and what that asks of the leg
+    that bears the robot in the middle of its stance and of the one that swings."""
+    print("| step [m] | v [m/s] | both feet [s] | hip at most [m] | knee in mid-stance [°] "
+          "| n there | hip of the swing [rad/s] | [N·m] | knee of the swing [rad/s] |")  # fmt: skip
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    for step, v in ((0.4, 0.8), (0.5, 0.8), (0.6, 0.8), (0.6, 1.0), (0.7, 1.0)):
+        for both in (0.04, 0.08):
+            behind = 0.5 * (step + v * both)  # of the hip, when the foot leaves
+            most = 0.0  # with the knee bent as far as the thigh must be within the hip's range
+            for bend in np.arange(body.least_bend, 1.5, 0.005):
+                ell = length(body, bend)
+                if ell <= behind:
+                    break
+                hip = np.array([behind, np.sqrt(ell * ell - behind * behind)])
+                thigh = hip - knee_of(body, hip, np.zeros(2))
+                if np.arctan2(thigh[0], thigh[1]) <= body.most_extension:
+                    most = max(most, float(hip[1]))
+            found = []  # in the middle of the stance, the hip where it is easiest
+            for x in np.arange(-0.1, 0.1, 0.005):
+                hip = np.array([x, most])
+                ankle = np.array([x, min(0.1, most - 0.2)])  # of the swinging foot, passing
+                found.append(support(body, hip, ankle, 0.0, 0.0))
+            mid = max(found, key=lambda each: each.lift)
+            time = step / v - both
+            swing = 2.0 * np.arctan2(behind, most)  # [rad] that the line hip–ankle turns
+            fastest = 1.5 * swing / time  # of a cubic from rest to rest
+            inertia = (
+                body.m_thigh * (0.5 * body.thigh) ** 2
+                + body.m_shank * (0.9 * body.thigh) ** 2
+                + body.m_foot * body.thigh**2
+            )  # of a leg with the shank folded up
+            torque = 6.0 * swing / time**2 * inertia
+            folded = bend_of(body, most - min(0.1, most - 0.2))
+            straight = bend_of(body, float(np.hypot(behind, most)))
+            knee = 1.5 * 2.0 * (folded - straight) / time
+            print(f"| {step:g} | {v:g} | {both:g} | {most:.3f} | {np.degrees(mid.bend):.0f} "
+                  f"| {mid.lift:.2f} ({mid.by}) | {fastest:.1f} | {torque:.0f} "
+                  f"| {knee:.1f} |", flush=True)  # fmt: skip
 
 
 def main() -> None:
     robot = load_robot("humanoid")
     body = body_of(robot)
-    print(body)
-    print(f"leg {body.reach:.3f} m; feet no closer than {least_width(robot):.3f} m, pelvis level\n")
-    print("| step [m] | rise [m] | lean [°] | v [m/s] | n | by | knee [°] | hip [m] |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
-    omega = robot.omega
-    for step, rises in ((0.28, (0.10, 0.15, 0.18)), (0.30, (0.05, 0.10, 0.15))):
-        for rise in rises:
-            for lean in (0.0, 15.0, 30.0):
-                for v in (0.0, 0.25, 0.5) if step == 0.30 else (0.0,):
-                    s = best(body, step, rise, np.radians(lean), -v / omega)
-                    print(f"| {step:g} | {rise:g} | {lean:g} | {v:g} | {s.lift:.2f} | {s.by} "
-                          f"| {np.degrees(s.bend):.0f} | {s.height:.2f} |", flush=True)  # fmt: skip
+    print(f"leg {body.reach:.3f} m; feet no closer than {least_width(robot):.3f} m\n")
+    long_steps(body)
+    print()
+    stairs(body, robot.omega)
 
 
 if __name__ == "__main__":

@@ -45,8 +45,8 @@ def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = N
     """Write the page from files summary.json that have J50s, or folders that hold one; returns it.
 
     Results of a suite that walks make the page of walks, and results of both kinds none. Without a
-    `page` it is `PAGE` or `WALKING_PAGE`. Raises ConfigError for another file, or of another suite, seed, robot or reference than the
-    first; PoiseError when the page cannot be written.
+    `page` it is `PAGE` or `WALKING_PAGE`. Raises ConfigError for another file, or of another
+    suite, seed, robot or reference than the first; PoiseError when the page cannot be written.
     """
     summaries = {}
     for source in sources:

@@ -13,9 +13,10 @@ HEAD = """# Leaderboard of walks
 
 <!-- Written by `poise leaderboard {source}`: change the results, not this page. -->
 
-Suite `{suite}`, robot `{robot}`, seed {seed}; Poise {poise}, MuJoCo {mujoco}. Intervals are 95 %; what the columns mean:
-[walking.md](walking.md#figures). J50 is of pushes of 0.1 s while it walks{pushed}. Falls a minute are of walks
-without a push. A controller that took a force from nowhere has no rank.
+Suite `{suite}`, robot `{robot}`, seed {seed}; Poise {poise}, MuJoCo {mujoco}. Intervals are 95 %;
+what the columns mean: [walking.md](walking.md#figures). J50 is of pushes of 0.1 s while it
+walks{pushed}. Falls a minute are of walks without a push. A controller that took a force from
+nowhere has no rank.
 
 """
 NONE = "–"
