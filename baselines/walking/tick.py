@@ -53,7 +53,6 @@ from .dcm import (
     transfer_point,
 )
 from .models.reference import share_load
-from .stumble import wait_at_edge
 from .treads import (
     advance_over_edges,
     apex_of_step,
@@ -405,7 +404,6 @@ def swing_tick(t: WalkTick) -> None:
         advance_over_edges(t)
     else:
         advance_over(w, apex_of_step(t), c.gains.period)
-        wait_at_edge(t)
     contacts = c.on_second if foot == 0 else c.on_first
     contacts.limited[0] = 0
     solve_contacts(c, contacts)
