@@ -25,6 +25,9 @@ class Treads(Block):
     rise: np.ndarray  # (2,)
     lower: np.ndarray  # (2,)
     arrive: float
+    lean: float  # [rad/m]
+    lean_from: float  # [m]
+    leaning: np.ndarray  # (1,) of the trunk ahead, now [rad]
     left: np.ndarray  # (3,) where the swinging foot lifted off [m]
     aim: np.ndarray  # (1,) int: the surface that the step goes to
     target: np.ndarray  # (1,) height of the foothold that is being weighed [m]

@@ -37,6 +37,9 @@ class TreadConfig:
     lower: float = field(default=0.62, metadata=POSITIVE)  # when it begins to come down, going up
     lower_down: float = field(default=0.7, metadata=POSITIVE)
     arrive: float = field(default=0.98, metadata=POSITIVE)  # when it is above its foothold
+    # the trunk leans ahead by so much for each h of a rise beyond `lean_from` [rad/h]
+    lean: float = field(default=5.0, metadata=NOT_NEGATIVE)
+    lean_from: float = field(default=0.135, metadata=NOT_NEGATIVE)
 
 
 @dataclass(frozen=True)

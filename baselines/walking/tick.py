@@ -59,6 +59,7 @@ from .treads import (
     feet_are_level,
     follow_line,
     footholds_given,
+    lean_ahead,
     meet_treads,
     settle_on_tread,
 )
@@ -448,6 +449,8 @@ def gait_tick(t: WalkTick) -> bool:
     m = t.walk.memory
     follow_command(t)
     copy_reference(t.walk)
+    if footholds_given(t) and t.gait.treads.lean > 0.0:
+        lean_ahead(t)
     if m.swinging[0] and has_landed(t.walk):
         touch_down(t)
     if not m.swinging[0]:

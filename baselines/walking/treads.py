@@ -17,6 +17,7 @@ from .command import CLEARANCE
 
 FREE = 1.0  # [m] a surface that is longer leaves footholds free: several steps fit on it
 SIDE_BY_SIDE = 0.08  # [m] between feet that are not one behind the other
+LEANING = 0.25  # [s] in which the trunk comes to lean
 LEVEL = 0.02  # [m] between surfaces of one height
 MOST_STEPS = 4  # before the first tread, in which the steps become as long as meets it
 NOT_HELD = 1.0  # [m] cost of a foothold where no surface holds the sole
@@ -107,6 +108,42 @@ def meet_treads(t: WalkTick, period: float) -> None:
     steps = 1.0 if r.aim[0] > i else max(steps, 2.0)
     if steps <= MOST_STEPS:
         g.planned[0] = way / (steps * period)
+
+
+@compiled
+def rise_near(r: Treads, place: np.ndarray) -> float:
+    """The highest of the edges up that a sole at `place` has just passed or is before [m]."""
+    i, highest = surface_below(r.surfaces, place[0], place[1]), 0.0
+    if i < 0:
+        return highest
+    for k in (i, i + 1):  # the edge between surfaces k − 1 and k
+        if k < 1 or k >= r.surfaces.shape[0]:
+            continue
+        edge = r.surfaces[k, X_MIN]
+        if abs(edge - place[0]) > r.approach:
+            continue
+        before = surface_height(r.surfaces, k - 1, 0.0, edge)
+        highest = max(highest, surface_height(r.surfaces, k, 0.0, edge) - before)
+    return highest
+
+
+@compiled
+def lean_ahead(t: WalkTick) -> None:
+    """Turn the trunk that is asked for ahead, by what the rise of the edges near the stance sole
+    takes: a hip behind the CoM spares the knee of the leg ahead (docs/walking.md#stairs)."""
+    c, r, own = t.walk, t.gait.treads, t.walk.reference_out
+    foot = c.memory.foot[0]
+    stance = c.state.sole_point[1 - foot if c.memory.swinging[0] else foot]
+    asked = r.lean * max(rise_near(r, stance) - r.lean_from, 0.0)
+    r.leaning[0] += min(c.gains.period / LEANING, 1.0) * (asked - r.leaning[0])
+    cos, sin, level = np.cos(r.leaning[0]), np.sin(r.leaning[0]), c.memory.level_frame
+    for a in range(3):
+        ahead = level[0, 0] * own.root_axes[0, a] + level[1, 0] * own.root_axes[1, a]
+        up = own.root_axes[2, a]
+        more = cos * ahead + sin * up - ahead
+        own.root_axes[0, a] += level[0, 0] * more
+        own.root_axes[1, a] += level[1, 0] * more
+        own.root_axes[2, a] = cos * up - sin * ahead
 
 
 @compiled

@@ -172,6 +172,7 @@ class Walk(Commanded, CaptureStep):
         for member in self.gait.members():
             if isinstance(member, np.ndarray):
                 member[...] = 0
+        self.gait.treads.leaning[:] = 0.0
 
     def walk_tick(self, state: RobotState, targets: Targets) -> WalkTick:
         """The block that the kernel `walk_tick` works on."""

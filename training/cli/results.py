@@ -38,21 +38,22 @@ def leaderboard(
     ],
     /,
     *,
-    page: Path = Path("docs/leaderboard.md"),
+    page: Path | None = None,
 ) -> None:
-    """Write the leaderboard page from benchmarks' results.
+    """Write the leaderboard page from benchmarks' results, or that of walks from results of walks.
 
     Args:
-        results: summary.json of poise benchmark, or the folder that holds it. Controllers of
-            later results are added, or take the place of earlier ones of their name.
-        page: the Markdown file to write.
+        results: summary.json of poise benchmark, or of poise evaluate with a suite of walks such
+            as walkers, or the folder that holds it. Controllers of later results are added, or
+            take the place of earlier ones of their name.
+        page: the Markdown file to write; docs/leaderboard.md, or docs/walking-leaderboard.md for
+            walks, if not given.
     """
     from poise.training.results.leaderboard import write_leaderboard
 
     if not results:
         raise ConfigError("needs one or more results", field="results")
-    write_leaderboard(results, page)
-    print(page)
+    print(write_leaderboard(results, page))
 
 
 def replay(

@@ -1,4 +1,4 @@
-"""The leaderboard page, generated from committed files summary.json."""
+"""The leaderboard pages, generated from committed files summary.json."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from poise.training.running.files import SUMMARY
 from poise.training.running.summary import Entry, Summary
 
 from .summary import read_summary
+from .walking_leaderboard import is_of_walks, walking_leaderboard
 
+PAGE, WALKING_PAGE = Path("docs/leaderboard.md"), Path("docs/walking-leaderboard.md")
 HEAD = """# Leaderboard{of}
 
 <!-- Written by `poise leaderboard {source}`: change the result, not this page. -->
@@ -40,18 +42,30 @@ SAME: Final = (
 )  # of results whose rows may stand in one table
 
 
-def write_leaderboard(sources: Sequence[str | Path], page: str | Path) -> None:
-    """Write the page from files summary.json that have J50s, or folders that hold one.
+def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = None) -> Path:
+    """Write the page from files summary.json that have J50s, or folders that hold one; returns it.
 
-    Raises ConfigError for another file, or of another suite, seed, robot or reference than the
-    first; PoiseError when the page cannot be written.
+    Results of a suite that walks make the page of walks, and results of both kinds none. Without a
+    `page` it is `PAGE` or `WALKING_PAGE`. Raises ConfigError for another file, or of another
+    suite, seed, robot or reference than the first; PoiseError when the page cannot be written.
     """
     summaries = {}
     for source in sources:
         path = Path(source)
         path = path / SUMMARY if is_folder(path) else path
         summaries[str(source)] = read_summary(path)
-    write_atomic(page, leaderboard(summaries))
+    walks = {source: is_of_walks(summary) for source, summary in summaries.items()}
+    for source, of_walks in walks.items():
+        if of_walks != next(iter(walks.values())):
+            raise ConfigError("is not of walks as the first is, or the other way round",
+                              source=source, field="suite")  # fmt: skip
+    if all(walks.values()):
+        page = Path(page or WALKING_PAGE)
+        write_atomic(page, walking_leaderboard(summaries))
+    else:
+        page = Path(page or PAGE)
+        write_atomic(page, leaderboard(summaries))
+    return page
 
 
 def merged(summaries: Mapping[str, Summary]) -> tuple[Summary, dict[str, str]]:

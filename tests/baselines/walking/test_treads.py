@@ -111,3 +111,22 @@ def test_ground_without_treads_leaves_footholds_free():
     assert given_footholds(Flat(), robot(), config) == []
     assert given_footholds(Slope(), robot(), config) == []
     assert len(given_footholds(Stairs(count=3), robot(), config)) == 4
+
+
+def test_the_trunk_leans_ahead_over_high_stairs_only(env):
+    """What the leading knee cannot bear of an upright robot; it is upright again on the landing."""
+
+    def leans(rise, seconds):
+        over(env, Stairs(count=2, rise=rise), (2.0, WALK))
+        most = 0.0
+        for _ in range(round(seconds / 0.02)):
+            env.step_without_info(np.zeros(len(env.action_names)))
+            most = max(most, float(env.controller.gait.treads.leaning[0]))
+        return most, float(env.controller.gait.treads.leaning[0])
+
+    config, h = TreadConfig(), robot().height_com
+    most, end = leans(0.15, 3.5)
+    assert not env.fallen and env.simulation.state.support_height == pytest.approx(0.3, abs=0.01)
+    asked = config.lean * (0.15 / h - config.lean_from)
+    assert 0.9 * asked < most <= asked and end < 0.1 * asked
+    assert leans(0.10, 2.0) == (0.0, 0.0)
