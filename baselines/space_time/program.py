@@ -110,7 +110,8 @@ class _Entries:
     """Dense blocks of a sparse matrix."""
 
     def __init__(self) -> None:
-        self.rows, self.columns, self.values = ([np.zeros(0)] for _ in range(3))
+        self.rows, self.columns = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
+        self.values = [np.zeros(0)]
 
     def add(self, row: int, column: int, block: np.ndarray) -> None:
         """A block with its first entry at (row, column)."""
@@ -121,6 +122,6 @@ class _Entries:
 
     def matrix(self, rows: int, columns: int) -> sparse.csr_matrix:
         """The matrix (rows, columns)."""
-        where = (np.concatenate(self.rows).astype(int), np.concatenate(self.columns).astype(int))
+        where = (np.concatenate(self.rows), np.concatenate(self.columns))
         entries = (np.concatenate(self.values), where)
         return sparse.coo_matrix(entries, shape=(rows, columns)).tocsr()

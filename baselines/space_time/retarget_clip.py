@@ -101,8 +101,11 @@ def retarget_clip(
     if not 0.1 <= crossover <= 100.0:
         raise ConfigError(f"must be from 0.1 to 100, not {crossover:g}", field="crossover")
     clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
-    source = constraints if isinstance(constraints, (str, Path)) else None
-    wanted = read_constraints(source) if source is not None else tuple(constraints)
+    if isinstance(constraints, (str, Path)):
+        source: str | Path | None = constraints
+        wanted = read_constraints(constraints)
+    else:
+        source, wanted = None, tuple(constraints)
     chosen: Solver = solver or ("spacetime" if wanted else "frame")
     limbs, targets, heading = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
     if heading is not None and (chosen != "frame" or wanted):

@@ -85,7 +85,8 @@ class Hand:
 
 def hands(robot: Robot, made: RetargetedClip, targets: BodyTargets) -> dict[str, tuple[float, ...]]:
     """Side → mean error [m] where the hand can be there, share of such frames, mean of the rest."""
-    limbs, found = find_limbs(robot), {}
+    limbs = find_limbs(robot)
+    found: dict[str, tuple[float, ...]] = {}
     for side in ("left", "right") if limbs.has_arms else ():
         hand, frames = Hand(robot, limbs, side), range(0, len(targets), EVERY)
         errors = np.array(

@@ -43,8 +43,9 @@ class Reach(Constraint):
         bound = np.full(len(given), self.within)
         for frame in frames:
             data = scene.at(frame)
-            place = sum(sign * p.place(data) for p, sign in points)
-            derivative = sum(sign * p.jacobian(scene.model, data) for p, sign in points)
+            place = np.sum([sign * p.place(data) for p, sign in points], axis=0)
+            moved = [sign * p.jacobian(scene.model, data) for p, sign in points]
+            derivative = np.sum(moved, axis=0)
             yield Rows({frame: derivative[given]}, place[given] - goal, -bound, bound)
 
     def about(self) -> str:

@@ -113,7 +113,7 @@ def test_a_foot_that_is_not_planted_is_lifted() -> None:
 def test_bad_arguments() -> None:
     robot = robot_named("humanoid")
     with pytest.raises(ConfigError, match=r"solver: .*\(choices: frame, spacetime, grid\)"):
-        retarget_clip(clip(), robot, solver="magic")  # type: ignore[arg-type]
+        retarget_clip(clip(), robot, solver="magic")
     with pytest.raises(ConfigError, match="crossover: must be from 0.1 to 100, not 0"):
         retarget_clip(clip(), robot, crossover=0.0)
     many = [Height(point="pelvis", least=0.1)] * 10
