@@ -132,8 +132,8 @@ class Synthesis:
         """Why a physical transition cannot be made, or nothing."""
         assert self.robot_joins is not None  # or there is no such kind
         said = self.check(transition) if self.check is not None else ""
-        clips = (self.stage.clips[name] for name in (transition.before, transition.after))
-        return said or self.robot_joins.refusal(*clips, transition, through)
+        before, after = (self.stage.clips[name] for name in (transition.before, transition.after))
+        return said or self.robot_joins.refusal(before, after, transition, through)
 
     def _places(self, state: StateName | None, script: Script) -> dict[Place, float]:
         if state is None:
@@ -189,8 +189,8 @@ class Synthesis:
         if kind != PHYSICAL:
             return self.joins[kind](last, part, transition.duration), None
         assert self.robot_joins is not None
-        clips = (self.stage.clips[name] for name in (transition.before, transition.after))
-        way = self.robot_joins.way(*clips, transition)
+        clips = self.stage.clips
+        way = self.robot_joins.way(clips[transition.before], clips[transition.after], transition)
         between, part = (clip if clip.dt == last.dt else clip.resampled(last.dt)
                          for clip in (way.clip, part))  # fmt: skip
         return laid_on(laid_on(last, between), part), way.record()

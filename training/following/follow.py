@@ -139,7 +139,7 @@ def performer(
         ConfigError: no such controller, or one that plays no motions.
     """
     fall = fall or fall_limits(motion, robot)
-    given = {"motion": motion, "pushes": None, "duration": duration, "fall": fall}
+    given: dict[str, Any] = {"motion": motion, "pushes": None, "duration": duration, "fall": fall}
     given |= {} if tempo is None else {"tempo": tempo}
     try:
         return load_agent(controller, robot, **given)

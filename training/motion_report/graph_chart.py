@@ -65,13 +65,12 @@ def matrix_chart(graph: MotionGraph) -> Markup:
         svg.text(LEFT + CELL * (i + 0.5), TOP - 8.0, short(before), "name", transform=turned)
         for j, after in enumerate(names):
             x = LEFT + CELL * j
-            size = {"x": x, "y": y, "width": CELL, "height": CELL}
             if np.isfinite(value := table[i, j]):
                 deep = f"{0.85 - 0.75 * np.sqrt(value / most) if most > 0.0 else 0.85:.2f}"
-                svg.add("rect", **size, class_="cell yes", opacity=deep)
+                svg.add("rect", x=x, y=y, width=CELL, height=CELL, class_="cell yes", opacity=deep)
                 svg.text(x + 0.5 * CELL, y + 0.5 * CELL + 4.0, _number(value), "on small middle")
                 continue
-            svg.add("rect", **size, class_="cell no")
+            svg.add("rect", x=x, y=y, width=CELL, height=CELL, class_="cell no")
             said = reasons.get((before, after), "none")
             _mark(svg, _reason(said), x + 0.5 * CELL, y + 0.5 * CELL, f"{before} → {after}: {said}")
     for k, reason in enumerate(used):

@@ -79,5 +79,6 @@ class Tracer:
         steps = np.maximum(np.diff(time, prepend=time[0] - 1.0), 1e-9)
         tempo = np.diff(motion_time, prepend=motion_time[0] - 1.0) / steps
         tempo[0] = tempo[1] if len(tempo) > 1 else 1.0
-        return Trace(time, motion_time, tempo, *rows[:, 2:6].T, rows[:, 6:8], rows[:, 8:],
-                     self._pushes, self._fallen)  # fmt: skip
+        beta, joints, bodies, com = rows[:, 2:6].T
+        return Trace(time, motion_time, tempo, beta, joints, bodies, com, rows[:, 6:8],
+                     rows[:, 8:], self._pushes, self._fallen)  # fmt: skip

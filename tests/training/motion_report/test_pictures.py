@@ -92,7 +92,7 @@ def test_a_timeline_has_a_row_for_each_layer_and_the_durations_of_transitions() 
     assert "over 1" in {e.text for e in drawing.iter("text")}
     for wrong in ({}, {"played": [{}]}, {"played": "x", "duration": 1.0}, []):
         with pytest.raises(ConfigError, match="holds no record of a script"):
-            timeline_picture(wrong)  # type: ignore[arg-type]
+            timeline_picture(wrong)
 
 
 def test_a_performance_is_seen_with_its_push(tmp_path: Path) -> None:
