@@ -70,12 +70,14 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
 
 
 def _expect_alike(summary: Summary, other: Summary, first: str, source: str) -> None:
-    for key in ("suite", "seed"):
-        if summary[key] != other[key]:
+    for key, own, theirs in (
+        ("suite", summary["suite"], other["suite"]),
+        ("seed", summary["seed"], other["seed"]),
+        ("robot.name", summary["robot"]["name"], other["robot"]["name"]),
+        ("robot.mass", summary["robot"]["mass"], other["robot"]["mass"]),
+    ):
+        if own != theirs:
             raise ConfigError(f"is not that of {first}", source=source, field=key)
-    for key in ("name", "mass"):
-        if summary["robot"][key] != other["robot"][key]:
-            raise ConfigError(f"is not that of {first}", source=source, field=f"robot.{key}")
 
 
 def _levels(entry: Entry, part: str) -> list[WalkLevel]:
