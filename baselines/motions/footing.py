@@ -217,7 +217,8 @@ def _stepped(times: np.ndarray, values: np.ndarray, down: np.ndarray) -> PPoly:
     """A curve (F, m) that rests at its mean while the sole is planted, and is C² between."""
     stances = _stances(down)
     rests = [values[a : b + 1].mean(axis=0) for a, b in stances]
-    breaks, parts = [times[0]], []
+    breaks: list[float] = [float(times[0])]
+    parts: list[np.ndarray] = []
     for k, (a, b) in enumerate(stances):
         if b > a:
             constant = np.zeros((4, 1, values.shape[1]))

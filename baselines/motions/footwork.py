@@ -83,7 +83,7 @@ def plan_zmp(robot: Robot, plan: FootPlan, rest: np.ndarray) -> np.ndarray:
 
     both = plan.planted.all(axis=1)
     for k in np.flatnonzero(~both):
-        out[k] = over(int(np.argmax(plan.planted[k])), k)
+        out[k] = over(int(np.argmax(plan.planted[k])), int(k))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], both.astype(int), [0]])))
     for a, b in edges.reshape(-1, 2):
         middle = plan.places[a, :, :2].mean(axis=0) + rest

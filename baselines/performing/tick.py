@@ -53,7 +53,7 @@ def motion_time(t: PerformTick) -> float:
 @compiled
 def phase_at(switches: np.ndarray, time: float) -> int:
     """The row of `planted` that holds at a time [s]."""
-    return np.searchsorted(switches, time, side="right")
+    return int(np.searchsorted(switches, time, side="right"))
 
 
 @compiled

@@ -82,7 +82,7 @@ def find_paces(clip: Clip) -> tuple[list[Pace], np.ndarray]:
         for k, (a, b) in enumerate(zip(begins, ends, strict=True)):
             if a == 0:
                 continue
-            left = ends[k - 1] if k else max(a - round(SWING / clip.dt), 0)
+            left = int(ends[k - 1]) if k else max(int(a) - round(SWING / clip.dt), 0)
             apex = float(heights[left : a + 1, foot].max()) - low
             at, yaw = np.median(places[a : b + 1, foot], axis=0), headings[a : b + 1, foot].mean()
             found.append(Pace(foot, left * clip.dt, a * clip.dt, at, float(yaw), apex))

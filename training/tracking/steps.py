@@ -50,7 +50,9 @@ class StepErrors:
     def update(self) -> None:
         """Call it after every policy step."""
         controller = self._env.controller
-        performance = controller.performance if isinstance(controller, MotionStep) else None
+        if not isinstance(controller, MotionStep):
+            return
+        performance = controller.performance
         if performance is None or not performance.performing[0]:
             self._resting, self._swung = [None, None], [False, False]
             return

@@ -5,13 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial import ConvexHull
 
-from poise.baselines.stepping.cop_region import (
-    LOAD_FRACTIONS,
-    CopRegion,
-    ankle_limits,
-    nominal_feet,
-    rest_ahead,
-)
+from poise.baselines.motions.feet import ankle_limits, nominal_feet
+from poise.baselines.stepping.cop_region import LOAD_FRACTIONS, CopRegion, rest_ahead
 from poise.envs.maths.pendulum import capture_distance, drifted
 from poise.envs.maths.polygons import clipped
 from poise.envs.maths.vectors import turn
