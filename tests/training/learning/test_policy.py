@@ -152,7 +152,7 @@ def test_a_missing_file_is_named(folder, name):
     (folder / name).unlink()
     with pytest.raises(ConfigError, match=f"policy: {name}: no {name}"):
         load_policy(folder)
-    with pytest.raises(ConfigError, match="nowhere: no such folder.*choices: ppo-torque"):
+    with pytest.raises(ConfigError, match="nowhere: no such folder.*choices: ppo-position"):
         load_policy(folder / "nowhere")
 
 
