@@ -90,11 +90,11 @@ def test_a_packaged_policy_is_known_by_its_folder(
     assert agent.fingerprint == load_agent(str(finished_run() / "last"), robot).fingerprint
     assert agent.fingerprint != load_agent("residual", robot).fingerprint
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
-    names = ["ppo-torque", "residual", "residual-lqr-lip", "residual-pd", "residual-step"]
-    names += ["residual-torque"]
+    names = ["ppo-position", "ppo-torque", "residual", "residual-lqr-lip", "residual-pd"]
+    names += ["residual-step", "residual-torque"]
     others = ["residual-walk", "residual-whole-g1"]
     assert packaged("policies") == [*names, *others]
-    assert default_controllers()[-6:] == tuple(names)
+    assert default_controllers()[-7:] == tuple(names)
     assert default_controllers("unitree_g1")[-1] == "residual-whole-g1"
     with pytest.raises(ConfigError, match=", ".join([*names, *others, "zero"])):
         load_agent("residual-abe07", robot)

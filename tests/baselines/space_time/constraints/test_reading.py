@@ -37,7 +37,7 @@ def test_packaged_files_are_valid(name: str) -> None:
         (f"{HEAD}{{kind: grab}}\n", r"s\[0\].kind: no such kind: 'grab' \(choices: apart,"),
         (f"{HEAD}{{point: hand_left}}\n", r"s\[0\].kind: this field is missing \(choices"),
         (f"{HEAD}{{kind: reach, point: hand_left}}\n", r"s\[0\].place: .* is missing"),
-        (f"{HEAD}{REACH}, perod: always}}\n", r"s\[0\].perod: unknown field, did you mean period\?"),
+        (f"{HEAD}{REACH}, perod: always}}\n", r"s\[0\].perod: unknown field.* mean period\?"),
         (f"{HEAD}{REACH}, period: never}}\n", r"s\[0\].period: .*\(choices: always, at, "),
         (f"{HEAD}{REACH}, period: {{when: 1}}}}\n", r"s\[0\].period.when: unknown field "
          r"\(choices: at, contact, phase\)"),
