@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import PushSampler, Range
+from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.trial import Trial
 
 from .draw import MOST_TRIALS, Draw, Part, check_rising, generator, start_seed
@@ -36,10 +37,8 @@ class Random(Part):
         _check_forces(self.pushes)
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
-        limits, sampler = draw.limits, self.pushes
-        sampler = replace(sampler, bodies=sampler.bodies or draw.bodies)
-        if sampler.unit == "controller_fraction" and limits.table is None:
-            sampler = replace(sampler, unit="ankle_fraction")
+        limits = draw.limits
+        sampler = _measured(replace(self.pushes, bodies=self.pushes.bodies or draw.bodies), limits)
         trials = []
         for here in range(number, number + self.trials):
             rng = generator(draw.seed, here)
@@ -55,8 +54,9 @@ class Sequence(Part):
 
     `pushes.count` of them at most. The impulse of all but the first is multiplied by a number
     drawn from `later`. Without `bodies` the robot's first push body is pushed; a magnitude in
-    controller_fraction is one of `--limits`, which may be a controller's own. `limit_fraction` is
-    left out: no single push decides a trial.
+    controller_fraction is one of `--limits`, which may be a controller's own, or of what ankles
+    hold where no J50 of the robot was measured. `limit_fraction` is left out: no single push
+    decides a trial.
     """
 
     trials: int = field(default=50, metadata={"min": 1, "max": MOST_TRIALS})
@@ -76,8 +76,8 @@ class Sequence(Part):
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
         limits = draw.limits
-        sampler = replace(self.pushes, bodies=self.pushes.bodies or draw.bodies[:1])
-        trials = []
+        bodies = self.pushes.bodies or draw.bodies[:1]
+        sampler, trials = _measured(replace(self.pushes, bodies=bodies), limits), []
         for here in range(number, number + self.trials):
             rng = generator(draw.seed, here)
             drawn = sampler.sample(rng, limits.robot, limits.margin, limits.table)
@@ -96,6 +96,13 @@ class Quiet(Part):
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
         return [draw.trial(k, (), part="quiet") for k in range(number, number + self.trials)]
+
+
+def _measured(sampler: PushSampler, limits: PushLimits) -> PushSampler:
+    """The sampler, by the ankle limit where no J50 of the robot was measured."""
+    if sampler.unit == "controller_fraction" and limits.table is None:
+        return replace(sampler, unit="ankle_fraction")
+    return sampler
 
 
 def _check_forces(pushes: PushSampler) -> None:

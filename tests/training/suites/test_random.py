@@ -70,6 +70,20 @@ def test_a_share_of_a_controllers_own_limits(limits: PushLimits) -> None:
     assert [push.impulse for t in trials for push in t.pushes] == [8.0] * 4
 
 
+def test_without_a_measured_j50_the_ankle_limit_counts(limits: PushLimits) -> None:
+    """The pushes of a sequence are the same but for their size, a share of what ankles hold."""
+    bare = PushLimits(limits.robot)
+    for known, trial in zip(
+        drawn(load_suite("in-step").resized(20), limits),
+        drawn(load_suite("in-step").resized(20), bare),
+        strict=True,
+    ):
+        first = trial.pushes[0]
+        assert 1.0 <= bare.fraction(first) <= 1.4
+        assert first.direction == known.pushes[0].direction
+        assert bare.fraction(first) == pytest.approx(limits.fraction(known.pushes[0]))
+
+
 def test_later_pushes_are_played(limits: PushLimits) -> None:
     """A huge second push makes a fall, after it."""
     agent = load_agent("momentum-qp", limits.robot, duration=2.0, pushes=None)
