@@ -18,6 +18,7 @@ import pytest
 
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.registry import controller_config
+from poise.baselines.space_time.constraints.reading import read_constraints
 from poise.configs.archives import MEMBERS, UNPACKED_BYTES, Archive, read_arrays
 from poise.configs.errors import ConfigError, PoiseError, shown
 from poise.configs.files import packaged, resolve
@@ -58,6 +59,7 @@ LOADERS: dict[str, Callable[[Any], Any]] = {
     "tuning": tune_config,
     "limits": lambda path: load_limits(robot(), path),
     "human": load_knee_moment,
+    "constraints": read_constraints,
 }
 BOMB = "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 12))
 BOMB = f"a0: &a0 [x, x, x, x, x, x, x, x, x]\n{BOMB}"

@@ -127,7 +127,7 @@ def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
     if found.action != "residual":
         steps = "residual-torque" if found.step_residual.torque > 0.0 else "residual-step"
         others = {"torque": "ppo-torque", "step": steps, "whole": "residual-whole-g1"}
-        others["walk"] = "residual-walk"
+        others |= {"walk": "residual-walk", "position": "ppo-position"}
         assert name == others[found.action]
     else:
         on_baseline = found.controller == "momentum-qp"
