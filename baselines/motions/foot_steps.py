@@ -19,7 +19,6 @@ from .splines import rest_spline
 RATE = 1.0 / 30.0  # [s] between the postures of a motion with steps
 LEAST = 0.1  # [s] from lift-off to touchdown, and on both feet
 STANDING = 1.3  # [s] of standing that it takes to shift the weight to one foot, and back
-FOOT = ("left", "right")
 
 
 @dataclass(frozen=True)
