@@ -47,3 +47,4 @@ def pytest_sessionstart(session):
     from poise.baselines.warmup import prepare
 
     prepare("contacts", "planner")
+    prepare("walking", "performing", "whole", "rows")  # once, and not in each of xdist's processes

@@ -30,6 +30,7 @@ from poise.baselines.stepping.cop_region import CopRegion
 from poise.baselines.whole_body.momentum_qp import com_offset
 from poise.envs.maths.polygons import half_planes
 from poise.envs.physics.simulation import Simulation
+from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import load_robot
 from poise.training.trials.push_limits import load_limits
 
@@ -112,11 +113,12 @@ def limit(simulation, start, direction, duration, lever, hip_torque):
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robot", default="humanoid")
-    parser.add_argument("--body", default="torso")
+    parser.add_argument("--body", help="that is pushed; by default the trunk")
     parser.add_argument("--duration", type=float, default=0.1)
     parser.add_argument("--hips", type=float, default=240.0, help="largest L̇ of the ground [N·m]")
     given = parser.parse_args()
     robot = load_robot(given.robot)
+    given.body = given.body or push_bodies(robot)[0]
     simulation = Simulation(robot)
     mujoco.mj_forward(robot.model, simulation.data)
     lever = float(simulation.data.body(given.body).xipos[2] - robot.height_com)

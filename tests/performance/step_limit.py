@@ -39,6 +39,7 @@ from poise.baselines.whole_body.momentum_qp import com_offset
 from poise.envs.maths.polygons import half_planes
 from poise.envs.physics.arrays import dof_chain
 from poise.envs.physics.simulation import Simulation
+from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import load_robot
 
 from .flywheel_limit import turn_budget
@@ -196,7 +197,7 @@ def limit(body, direction, duration, lever, torque, begin, first, times):
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robot", default="humanoid")
-    parser.add_argument("--body", default="torso")
+    parser.add_argument("--body", help="that is pushed; by default the trunk")
     parser.add_argument("--duration", type=float, default=0.1)
     parser.add_argument("--begin", type=float, default=0.05, help="the first foot leaves [s]")
     parser.add_argument("--hips", type=float, default=240.0, help="largest L̇ of the ground [N·m]")
@@ -208,6 +209,7 @@ def main() -> None:
     parser.add_argument("--directions", type=int, default=16)
     given = parser.parse_args()
     robot = load_robot(given.robot)
+    given.body = given.body or push_bodies(robot)[0]
     body = measure(robot, given)
     data = mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing_qpos
