@@ -127,7 +127,7 @@ def print_lost(lost: Mapping[str, Sequence[int]], folder: Path, console: Console
         more = f", … ({len(numbers)})" if len(numbers) > SHOWN else ""
         command = ["poise", "view", str(folder), "--trial", str(numbers[0]), "--controllers", name]
         console.print(f"lost trials of {name}: {some}{more} ({shlex.join(command)})",
-                      markup=False, highlight=False, soft_wrap=True)  # fmt: skip
+                      markup=False, highlight=False, emoji=False, soft_wrap=True)  # fmt: skip
 
 
 def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
