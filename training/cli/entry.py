@@ -23,7 +23,7 @@ from poise.training.running.stopping import (
 from .arguments import check_flags
 from .commands import COMMANDS
 
-SHELLS = ("bash", "zsh", "fish", "tcsh")  # for which tyro writes completions
+SHELLS = ("bash", "zsh", "fish")  # for which tyro writes completions
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
 
