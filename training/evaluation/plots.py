@@ -99,8 +99,10 @@ def _bounds(fits: Mapping[str, EnvelopeFit]) -> dict[str, list[Bound | None]]:
 
 def _left_out(fits: Mapping[str, EnvelopeFit]) -> str:
     """What is not drawn, in words; empty where all is."""
-    whole = all(_enough(f) for fit in fits.values() for f in fit.fits)
-    return "" if whole else f"Not drawn: directions with fewer than {FEWEST} trials."
+    enough = [_enough(f) for fit in fits.values() for f in fit.fits]
+    if not any(enough):
+        return f"Nothing is drawn: no direction has {FEWEST} trials."
+    return "" if all(enough) else f"Not drawn: directions with fewer than {FEWEST} trials."
 
 
 def _enough(direction: DirectionFit) -> bool:

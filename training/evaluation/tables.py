@@ -18,7 +18,8 @@ from .walk_tables import walk_tables
 
 NONE = "–"
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
-HALF_AT, P_VALUE, STEPS = "half at", "McNemar p", "steps, mean"  # headings that are explained
+HALF_AT, P_VALUE, STEPS = "half at", "McNemar p", "steps, mean"
+FAILURES = "solver failures"  # this and those above are headings that are explained
 SEPARATED = 0.05  # p below which the trials separate two controllers
 SHOWN = 5  # lost trials of a controller that are listed
 IN_PAIRS = ("lost, won", P_VALUE)  # headings whose figures the table of pairs has
@@ -104,6 +105,10 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
                      f"{summary['scale']} are recovered; larger is better")  # fmt: skip
     if STEPS in headings:
         notes.append(f"{STEPS}: of all trials, those that were lost too")
+    if FAILURES in headings:
+        shared = sum(e["solver_failures_recovered"] for e in summary["controllers"].values())
+        notes.append(f"{FAILURES}: ticks of all trials, also of robots that were falling; "
+                     f"{shared} in trials that were recovered")  # fmt: skip
     p_values = [pair["p_mcnemar"] for pair in summary["pairs"] if "p_mcnemar" in pair]
     if p_values:
         close = sum(p >= SEPARATED for p in p_values)
@@ -175,7 +180,7 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         ("chatter [1/s]", figure(lambda e: _at_rest(e, e["torque_variation_median"], ".2f"))),
         (STEPS, figure(lambda e: _number(e["steps_mean"] or None, ".1f"))),
         ("of one-step limit", figure(lambda e: f"{e['step_share_1_mean']:.2f}")),
-        ("solver failures", figure(lambda e: f"{e['solver_failures'] or NONE}")),
+        (FAILURES, figure(lambda e: f"{e['solver_failures'] or NONE}")),
         ("of them in recoveries", figure(
             lambda e: f"{e['solver_failures_recovered']}" if e["solver_failures"] else NONE)),
         ("mean |action|", figure(lambda e: _number(e["mean_abs_action"] or None, ".3f"))),

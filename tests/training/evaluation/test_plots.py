@@ -37,3 +37,5 @@ def test_sectors_of_few_trials_are_no_results_and_bounds_are_marked(
     assert drawn["note"] == "Not drawn: directions with fewer than 5 trials."
     plots.draw_plots(tmp_path, plan, {"a": played[4:]})
     assert drawn["note"] == ""
+    plots.draw_plots(tmp_path, plan, {"a": played[:4]})
+    assert drawn["note"] == "Nothing is drawn: no direction has 5 trials."

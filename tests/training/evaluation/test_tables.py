@@ -80,6 +80,8 @@ def test_the_words_of_a_table_are_explained_below_it() -> None:
     line = f"McNemar p ≥ 0.05: these trials do not separate the two ({len(pairs) - below} of "
     assert line in text and "steps, mean: of all trials" in text
     assert "half at:" not in text
+    failures = sum(each["solver_failures_recovered"] for each in summary["controllers"].values())
+    assert f"were falling; {failures} in trials that were recovered" in text
     for entry in summary["controllers"].values():
         entry.update(fraction50=0.8, fraction50_bound=None, steps_mean=0.0)
     summary["pairs"] = []
