@@ -87,7 +87,7 @@ def print_summary(summary: Summary, console: Console) -> None:
     for each in (*walk_tables(summary), *motion_tables(summary)):
         console.print(each)
     if summary["pairs"]:
-        console.print(_pairs(summary))
+        console.print(_pairs(summary, console.width))
     for line in _notes(summary, [heading for heading, _ in columns]):
         console.print(line, markup=False, highlight=False)
     for line in seed_lines(summary["seeds"]):
@@ -105,10 +105,10 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
                      f"{summary['scale']} are recovered; larger is better")  # fmt: skip
     if STEPS in headings:
         notes.append(f"{STEPS}: of all trials, those that were lost too")
-    if FAILURES in headings:
-        shared = sum(e["solver_failures_recovered"] for e in summary["controllers"].values())
+    of_won = [e.get("solver_failures_recovered") for e in summary["controllers"].values()]
+    if FAILURES in headings and None not in of_won:  # results of old have none
         notes.append(f"{FAILURES}: ticks of all trials, also of robots that were falling; "
-                     f"{shared} in trials that were recovered")  # fmt: skip
+                     f"{sum(filter(None, of_won))} in trials that were recovered")  # fmt: skip
     p_values = [pair["p_mcnemar"] for pair in summary["pairs"] if "p_mcnemar" in pair]
     if p_values:
         close = sum(p >= SEPARATED for p in p_values)
@@ -189,10 +189,13 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
     ]  # fmt: skip
 
 
-def _pairs(summary: Summary) -> Table:
+def _pairs(summary: Summary, width: int) -> Table:
+    """For a console of this width, of which the figures need some 44 columns."""
     table = Table()
     titles = [f"{pair['b']} against {pair['a']}" for pair in summary["pairs"]]
-    table.add_column("b against a", overflow="fold", width=_room(titles, 34))
+    table.add_column(
+        "b against a", overflow="fold", width=_room(titles, min(max(width - 44, 16), 34))
+    )
     gain = any("j50_gain" in pair for pair in summary["pairs"])
     names = ["both", "only a (lost)", "only b (won)", "neither", P_VALUE]
     for name in names + (["J50 gain [95 %]"] if gain else []):
