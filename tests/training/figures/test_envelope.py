@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from poise.training.figures import style
 from poise.training.figures.envelope import fall_probability, polar_envelope
-from poise.training.statistics.fits import LogisticFit, fit_logistic
+from poise.training.statistics.fits import Bound, LogisticFit, fit_logistic
 from poise.training.statistics.rates import wilson_interval
 
 ANGLES = np.arange(8) * 45.0
@@ -114,7 +114,7 @@ def test_envelope_with_a_missing_direction(tmp_path):
 
 def test_bounds_are_hollow_and_point_to_where_j50_is(tmp_path, figures):
     """Outwards where more was recovered than was tried, inwards where less; inside the rings."""
-    sides = [None, "lower", None, "upper", None, None, None, None]
+    sides: list[Bound | None] = [None, "lower", None, "upper", None, None, None, None]
     polar_envelope(tmp_path / "a.png", {"a": circle(15), "b": circle(4)}, bounds={"a": sides})
     ax = figures[0].axes[0]
     (line,) = (x for x in ax.lines if x.get_label() == "a")
