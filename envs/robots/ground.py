@@ -146,7 +146,8 @@ def set_options(spec: mujoco.MjSpec, options: OptionDescription) -> None:
     picture.offwidth, picture.offheight = max(picture.offwidth, 1280), max(picture.offheight, 960)
 
 
-def _add_ground(spec: mujoco.MjSpec, name: str) -> None:
+def install_daylight(spec: mujoco.MjSpec) -> None:
+    """A sky and a lamp where the model has none, so that it can be seen; physics know neither."""
     if not any(t.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for t in spec.textures):
         spec.add_texture(
             name="poise_sky",
@@ -157,6 +158,11 @@ def _add_ground(spec: mujoco.MjSpec, name: str) -> None:
             width=64,
             height=384,
         )
+    if not spec.lights:
+        spec.worldbody.add_light(name="poise_lamp", pos=[0.0, 0.0, 4.0], dir=[0.0, 0.0, -1.0])
+
+
+def _add_ground(spec: mujoco.MjSpec, name: str) -> None:
     spec.add_texture(
         name="poise_ground",
         type=mujoco.mjtTexture.mjTEXTURE_2D,

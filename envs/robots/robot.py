@@ -24,6 +24,7 @@ from .ground import (
     CONTACT_SENSOR,
     add_contact_sensors,
     check_ground,
+    install_daylight,
     install_ground,
     set_options,
 )
@@ -258,6 +259,7 @@ def _prepare(
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i}"
     ground = install_ground(spec, description.ground, source)
+    install_daylight(spec)
     model = _compile(spec, source)
     check_numbers(model, DYNAMICS + CONTACTS, source)
     _check_bodies(model, description, source)

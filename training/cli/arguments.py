@@ -1,9 +1,15 @@
-"""The types of arguments that several sub-commands take."""
+"""The types of arguments that several sub-commands take, and a first look at what is given."""
 
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
 import tyro
+
+from poise.configs.errors import ConfigError
+from poise.configs.files import resolve
+from poise.configs.reading import is_folder
 
 Names = Annotated[
     tuple[str, ...],
@@ -23,3 +29,23 @@ Allow = Annotated[
         "or a policy, or a policy's file of TorchScript (.pt, .pth, .jit, .ts); repeatable.",
     ),
 ]
+
+
+def check_folders(*paths: str | Path) -> None:
+    """Raise ConfigError for a folder that there is not, before what reads it is imported."""
+    for path in paths:
+        if not is_folder(path):
+            raise ConfigError("no such folder", source=path)
+
+
+def check_flags(args: Sequence[str], kinds: Mapping[str, str]) -> None:
+    """Raise ConfigError for the name of nothing behind a flag, of a command that takes long to read
+    its flags.
+
+    Args:
+        args: of the command.
+        kinds: flag → the kind of what it names, a folder of poise.configs.
+    """
+    for flag, value in pairwise(args):
+        if flag in kinds:
+            resolve(kinds[flag], value)

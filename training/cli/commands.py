@@ -77,8 +77,9 @@ def evaluate(
 
     Args:
         controllers: a name of `poise list`, such as residual (a shipped policy), zero (no torque),
-            a .yaml file of a controller, a folder written by poise train, with --seeds too, or
-            module:Class.
+            a .yaml file of a controller, a folder written by poise train, with --seeds too, or a
+            class of your own, my_file.py:Class or module:Class. What a file or a folder names so
+            needs --allow my_file.py:Class besides.
         suite: random, envelope, grid, quiet, repeated, in-step, follow, those of poise benchmark,
             or a .yaml file.
         out: folder to write to; out/SUITE if not given.
@@ -97,6 +98,9 @@ def evaluate(
         overwrite: replace what the folder holds.
     """
     from poise.configs.outputs import check_out_file
+    from poise.training.trials.names import check_names
+
+    check_names(controllers, robot=robot, suite=suite)
     from poise.training.evaluation.evaluate import evaluate, measured_limits
 
     if write_limits is not None:
@@ -135,8 +139,9 @@ def benchmark(
 
     Args:
         out: folder to write to.
-        controllers: names as poise evaluate takes them; all packaged ones that can rest if not
-            given.
+        controllers: names as poise evaluate takes them, also my_file.py:Class (one that a file or
+            a folder names needs --allow my_file.py:Class besides); all packaged ones that can rest
+            if not given.
         suite: quick (minutes), standard (an hour), full (many hours), those of poise evaluate, or a
             .yaml file.
         robot: a packaged robot or a .yaml description.
@@ -152,6 +157,9 @@ def benchmark(
 
     choose_gl_backend()
     from poise.baselines.allowance import named
+    from poise.training.trials.names import check_names
+
+    check_names(controllers, robot=robot, suite=suite)
     from poise.training.evaluation.evaluate import benchmark
 
     summary = benchmark(
@@ -206,6 +214,13 @@ def tune(
         resume: go on with the search that the folder holds.
     """
     from poise.baselines.allowance import named
+    from poise.configs.files import resolve
+    from poise.training.trials.names import check_name, check_names
+
+    resolve("tuning", config)
+    check_names(robot=robot)
+    if policy is not None:
+        check_name(policy)
     from poise.training.tuning.search import tune, tune_config
 
     given = {"controller": controller, "robot": robot, "policy": policy,

@@ -20,9 +20,10 @@ from poise.training.running.stopping import (
     stoppable,
 )
 
+from .arguments import check_flags
 from .commands import COMMANDS
 
-SHELLS = ("bash", "zsh", "fish", "tcsh")  # for which tyro writes completions
+SHELLS = ("bash", "zsh", "fish")  # for which tyro writes completions
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
 
@@ -110,6 +111,7 @@ def _run(args: list[str]) -> int:
     if args and not args[0].startswith("-") and args[0] not in COMMANDS:
         raise _unknown(args[0])
     if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass
+        check_flags(args, {"--config": "training", "--robot": "robots"})
         from .train import run
 
         run(args[1:])

@@ -26,6 +26,9 @@ def export(
             summary.json: its figures go into the card.
         licence: of the policy, as Hugging Face abbreviates it; of a packaged one it is known.
     """
+    from poise.training.trials.names import check_policy_name
+
+    check_policy_name(policy)
     from poise.training.export.export import export_policy
 
     worst = export_policy(policy, out, result=result, licence=licence, allow=allow)

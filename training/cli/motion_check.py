@@ -113,6 +113,9 @@ def follow(
             pressure, errors, tempo, and the timeline of a script's motion.
     """
     from poise.baselines.allowance import allowing
+    from poise.training.trials.names import check_names
+
+    check_names([controller], robot=robot, motion=motion)
     from poise.baselines.motions.tempo import Tempo
     from poise.training.following.fastest import STARTS, find_fastest
     from poise.training.following.follow import follow as perform

@@ -8,7 +8,7 @@ import tyro
 from poise.configs.errors import ConfigError
 from poise.training.running.terminal import terminal
 
-from .arguments import Allow, Folder
+from .arguments import Allow, Folder, check_folders
 
 if TYPE_CHECKING:
     from poise.training.results.replay import Replay
@@ -25,6 +25,7 @@ def compare(
         a: written by poise benchmark or poise evaluate.
         b: another of the same kind.
     """
+    check_folders(a, b)
     from poise.training.results.compare import compare, print_comparison
 
     print_comparison(compare(a, b), a, b, terminal())
@@ -81,6 +82,8 @@ def replay(
 
         choose_gl_backend()
     from poise.configs.outputs import check_out_file
+
+    check_folders(folder)
     from poise.training.results.film import film
     from poise.training.results.replay import replay
 
@@ -125,6 +128,8 @@ def report(
 
     choose_gl_backend()
     from poise.configs.outputs import check_out_file
+
+    check_folders(folder)
     from poise.training.report.page import write_report
 
     if out is not None:

@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +18,8 @@ from poise.configs.schema import build, to_dict
 from poise.training.learning.checkpoints import STATE, find_checkpoint
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.policy_files import read_state
-from poise.training.learning.seeds import SEEDS
-from poise.training.learning.train import LAST, train
+from poise.training.learning.seeds import SEEDS, evaluations, start_and_best
+from poise.training.learning.train import BEST, LAST, train
 from poise.training.learning.train_seeds import train_seeds
 from poise.training.running.executor import Backend
 from poise.training.running.terminal import terminal
@@ -66,12 +67,50 @@ def run(args: Sequence[str]) -> None:
         if note:
             print(f"poise: {note}", file=sys.stderr)
         print(best)
+        for line in last_words(command.settings, out):
+            print(line)
         return
-    train_seeds(
+    summary = train_seeds(
         command.settings, command.seeds, out, resume=command.resume, allow=allow,
         workers=command.workers, backend=command.backend, console=terminal(),
     )  # fmt: skip
     print(out / SEEDS)
+    best_run = max(summary["runs"], key=lambda run: evaluations(run)[1]["score"])
+    for line in next_commands(command.settings, out, out / best_run["folder"]):
+        print(line)
+
+
+def last_words(config: TrainConfig, out: Path) -> list[str]:
+    """What was recovered of the held-out pushes, and the commands that come next."""
+    checkpoint = find_checkpoint(out / LAST)
+    rows = [] if checkpoint is None else read_state(checkpoint / STATE)["evaluations"]
+    start, best = start_and_best(rows)
+    if start is None or best is None:
+        return []
+    of_what = config.start_from or (config.controller if controls(config) else "the first policy")
+    measured = (
+        f"of {config.evaluation.trials} held-out pushes recovered: {start['recovered']:.1%} by "
+        f"{of_what}, {best['recovered']:.1%} by {out / BEST} (at step {best['timesteps']:,})"
+    )
+    return [measured, *next_commands(config, out, out)]
+
+
+def next_commands(config: TrainConfig, out: Path, shown: Path) -> list[str]:
+    """How to measure what was trained into `out` on pushes of its own, and how to look at it."""
+    robot = [] if config.robot == HUMANOID else ["--robot", config.robot]
+    allow = [word for name in named(config.controller) for word in ("--allow", name)]
+    names = [config.controller, str(out)] if controls(config) else [str(out)]
+    suite = ["--suite", "walk-push"] if config.action == "walk" else []
+    to = ["--out", str(Path("out") / out.name)]
+    return [
+        f"next: {shlex.join(['poise', 'evaluate', *names, *suite, *robot, *to, *allow])}",
+        f"      {shlex.join(['poise', 'view', str(shown), *robot, *allow])}",
+    ]
+
+
+def controls(config: TrainConfig) -> bool:
+    """Whether a controller is below the policy."""
+    return config.action not in ("torque", "position")
 
 
 def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:

@@ -7,7 +7,7 @@ import tyro
 
 from poise.configs.errors import ConfigError
 
-from .arguments import Allow, Switch
+from .arguments import Allow, Switch, check_folders
 
 Shown = Annotated[
     tuple[str, ...],
@@ -76,6 +76,12 @@ def view(
     from poise.envs.viewing.gl import choose_gl_backend
 
     choose_gl_backend()
+    from poise.training.trials.names import check_names
+
+    if trial is None:
+        check_names(shown, robot=robot, motion=motion)
+    else:
+        check_folders(*shown)
     from poise.training.view.view import view, view_trial
 
     if trial is None:

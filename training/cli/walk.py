@@ -60,6 +60,9 @@ def walk(
 
     if video is not None:
         choose_gl_backend()
+    from poise.training.trials.names import check_names
+
+    check_names([controller], robot=robot)
     from poise.training.sessions.walk import walk
 
     walk(speed, left=left, turn=math.radians(turn), step_time=step_time,
@@ -114,6 +117,11 @@ def gait(
         push_suite: another suite with a part walk_push, or a .yaml file of one.
         workers: processes of that suite; all cores if not given.
     """
+    from poise.configs.files import resolve
+    from poise.training.trials.names import check_names
+
+    check_names(robot=robot, suite=push_suite)
+    resolve("human", human)
     from poise.training.gaits.compare import compare_gaits
     from poise.training.gaits.tables import print_gaits
 

@@ -67,3 +67,8 @@ def ankle_limits(played: Played, limits: PushLimits) -> np.ndarray:
     """The ankle limit [N·s] for the push of every trial."""
     direction, _, duration = pushes(played)
     return np.array([limits.ankle(d, t) for d, t in zip(direction, duration, strict=True)])
+
+
+def lost(played: Played) -> list[int]:
+    """The numbers of the trials that were not recovered, in rising order."""
+    return [trial.number for trial, outcome in played if not outcome.recovered]

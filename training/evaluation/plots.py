@@ -7,12 +7,14 @@ import numpy as np
 
 from poise.training.figures.envelope import Band, Curve, fall_probability, polar_envelope
 from poise.training.running.files import PLOTS
-from poise.training.statistics.bootstrap import EnvelopeFit, mean_over_directions
-from poise.training.statistics.fits import fit_logistic
+from poise.training.statistics.bootstrap import DirectionFit, EnvelopeFit, mean_over_directions
+from poise.training.statistics.fits import Bound, fit_logistic
 from poise.training.suites.plan import Plan
 from poise.training.trials.step_limits import COUNTS, DRAWN, NStepLimit, groups, line_name
 
 from .played import DIRECTIONAL, Played, ankle_limits, fractions, part, pushes, sectors, won
+
+FEWEST = 5  # trials of a direction whose J50 is drawn
 
 
 def draw_plots(
@@ -43,13 +45,15 @@ def draw_plots(
         around = limits.around(2.0)
         limit = [limits.ankle(d, duration) for d in around]
         lines = _step_lines(steps or {}, fine, duration)
-        polar_envelope(polar, _bands(fits), ankle_limit=(around, limit), step_limits=lines)
+        polar_envelope(polar, _bands(fits), ankle_limit=(around, limit), step_limits=lines,
+                       bounds=_bounds(fits), note=_left_out(fits))  # fmt: skip
     else:
         fits = {name: sectors(own) for name, own in shown.items()}
         fraction = {name: fractions(own) for name, own in shown.items()}
         unit = f"of the {limits.scale}"
         title = f"Recovered fraction of the {limits.scale} by push direction"
-        polar_envelope(polar, _bands(fits), title=title, unit=unit)
+        polar_envelope(polar, _bands(fits), title=title, unit=unit, bounds=_bounds(fits),
+                       note=_left_out(fits))  # fmt: skip
         label = f"push impulse, as a fraction of the {limits.scale}"
     fall_probability(
         fall,
@@ -76,13 +80,30 @@ def _step_lines(
 
 
 def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, Band]:
-    """Direction, J50 and its interval, as `polar_envelope` takes them."""
+    """Direction, J50 and its interval, as `polar_envelope` takes them; NaN of too few trials."""
     return {
         name: (
             list(fit.directions),
-            [f.fit.j50 for f in fit.fits],
-            [f.j50_ci.low for f in fit.fits],
-            [f.j50_ci.high for f in fit.fits],
+            [f.fit.j50 if _enough(f) else np.nan for f in fit.fits],
+            [f.j50_ci.low if _enough(f) else np.nan for f in fit.fits],
+            [f.j50_ci.high if _enough(f) else np.nan for f in fit.fits],
         )
         for name, fit in fits.items()
     }
+
+
+def _bounds(fits: Mapping[str, EnvelopeFit]) -> dict[str, list[Bound | None]]:
+    """Which J50s are only bounds."""
+    return {name: [f.fit.bound for f in fit.fits] for name, fit in fits.items()}
+
+
+def _left_out(fits: Mapping[str, EnvelopeFit]) -> str:
+    """What is not drawn, in words; empty where all is."""
+    enough = [_enough(f) for fit in fits.values() for f in fit.fits]
+    if not any(enough):
+        return f"Nothing is drawn: no direction has {FEWEST} trials."
+    return "" if all(enough) else f"Not drawn: directions with fewer than {FEWEST} trials."
+
+
+def _enough(direction: DirectionFit) -> bool:
+    return direction.fit.trials >= FEWEST

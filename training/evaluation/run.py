@@ -28,8 +28,9 @@ from poise.training.running.terminal import print_paths, progress_bar
 from poise.training.suites.draw import MOST_TRIALS
 from poise.training.suites.plan import Plan
 from poise.training.suites.suite import load_suite
-from poise.training.trials.agents import Agent, check_follows, check_walks
+from poise.training.trials.agents import Agent, check_follows, check_may_walk, check_walks
 from poise.training.trials.jobs import Job, play
+from poise.training.trials.names import check_name
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import NStepLimit, curves, stepping_limits
 from poise.training.trials.table import trial_row
@@ -39,10 +40,10 @@ from .figures import controller_entry, robot_figures
 from .folder import ResultFolder, Settings, check_folder
 from .motions import suite_repertoire, suite_stage
 from .pairs import pair_figures
-from .played import RATED, Played
+from .played import RATED, Played, lost
 from .plots import draw_plots
 from .seed_groups import seed_groups
-from .tables import print_summary, ranked
+from .tables import print_lost, print_summary, ranked
 from .tick_times import tick_times
 
 FEW = 5  # controllers, of which the rate of each is shown while they play
@@ -88,6 +89,9 @@ class Run:
         self.limits, self.reference = measured(self.robot), reference
         self.repertoire = suite_repertoire(self.suite, self.robot, self.out, overwrite)
         self._plan(seed, names)  # refuses what does not fit the robot
+        if self.suite.walks:
+            for name in names:
+                check_may_walk(name, f"suite {suite}")
         prepare()
         self.stage = suite_stage(self.suite, robot, self.out)
         self.agents = {name: self.stage.load(name, self.robot) for name in names}
@@ -134,6 +138,9 @@ class Run:
             rows.sort(key=lambda row: row[0].number)  # of one number, in the order of the names
             folder.finish([trial_row(*row) for row in rows], summary)
         print_summary(summary, self.console)
+        print_lost(
+            {name: lost(played[name]) for name in summary["ranking"]}, self.out, self.console
+        )
         print_paths([*drawn, self.out / TRIALS, self.out / SUMMARY], self.console)
         return summary
 
@@ -238,6 +245,7 @@ def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | N
     for name in names:
         if list(names).count(name) > 1:
             raise ConfigError(f"{shown(name)} is given twice", field="controllers")
+        check_name(name)
     for value, name, least in ((seed, "seed", 0), (workers, "workers", 1), (trials, "trials", 1)):
         if value is not None and value < least:
             raise ConfigError(f"must be at least {least}, not {value}", field=name)

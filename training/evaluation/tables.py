@@ -1,8 +1,10 @@
-"""A result for people: tables in the terminal, rows of the leaderboard."""
+"""A result for people: tables in the terminal, what their words mean, rows of the leaderboard."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import shlex
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
@@ -16,7 +18,11 @@ from .walk_tables import walk_tables
 
 NONE = "–"
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
-IN_PAIRS = ("lost, won", "McNemar p")  # headings whose figures the table of pairs has
+HALF_AT, P_VALUE, STEPS = "half at", "McNemar p", "steps, mean"
+FAILURES = "solver failures"  # this and those above are headings that are explained
+SEPARATED = 0.05  # p below which the trials separate two controllers
+SHOWN = 5  # lost trials of a controller that are listed
+IN_PAIRS = ("lost, won", P_VALUE)  # headings whose figures the table of pairs has
 BOUNDS = {None: "", "lower": "≥ ", "upper": "≤ "}
 
 
@@ -81,12 +87,52 @@ def print_summary(summary: Summary, console: Console) -> None:
     for each in (*walk_tables(summary), *motion_tables(summary)):
         console.print(each)
     if summary["pairs"]:
-        console.print(_pairs(summary))
+        console.print(_pairs(summary, console.width))
+    for line in _notes(summary, [heading for heading, _ in columns]):
+        console.print(line, markup=False, highlight=False)
     for line in seed_lines(summary["seeds"]):
         console.print(line, markup=False, highlight=False)
     for name, entry in summary["controllers"].items():
         if entry["errors"]:
             console.print(f"[red]{escape(name)} raised an error in {entry['errors']} trials[/red]")
+
+
+def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
+    """What the tables' words mean, of those that are there."""
+    notes = []
+    if any(heading.startswith(HALF_AT) for heading in headings):
+        notes.append(f"{HALF_AT}: half of the pushes that are this fraction of the "
+                     f"{summary['scale']} are recovered; larger is better")  # fmt: skip
+    if STEPS in headings:
+        notes.append(f"{STEPS}: of all trials, those that were lost too")
+    of_won = [e.get("solver_failures_recovered") for e in summary["controllers"].values()]
+    if FAILURES in headings and None not in of_won:  # results of old have none
+        notes.append(f"{FAILURES}: ticks of all trials, also of robots that were falling; "
+                     f"{sum(filter(None, of_won))} in trials that were recovered")  # fmt: skip
+    p_values = [pair["p_mcnemar"] for pair in summary["pairs"] if "p_mcnemar" in pair]
+    if p_values:
+        close = sum(p >= SEPARATED for p in p_values)
+        notes.append(f"{P_VALUE} ≥ {SEPARATED:g}: these trials do not separate the two"
+                     f" ({close} of {len(p_values)} pairs)")  # fmt: skip
+    return notes
+
+
+def print_lost(lost: Mapping[str, Sequence[int]], folder: Path, console: Console) -> None:
+    """The numbers of trials that each controller has lost, and how to look at one of them.
+
+    Args:
+        lost: name → the numbers of the trials that it did not recover.
+        folder: of the result.
+        console: where the lines are printed.
+    """
+    for name, numbers in lost.items():
+        if not numbers:
+            continue
+        some = ", ".join(str(number) for number in numbers[:SHOWN])
+        more = f", … ({len(numbers)})" if len(numbers) > SHOWN else ""
+        command = ["poise", "view", str(folder), "--trial", str(numbers[0]), "--controllers", name]
+        console.print(f"lost trials of {name}: {some}{more} ({shlex.join(command)})",
+                      markup=False, highlight=False, emoji=False, soft_wrap=True)  # fmt: skip
 
 
 def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
@@ -120,21 +166,21 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         ("worst J50", figure(lambda e: f"{e['j50_min']:.1f}")),
         ("η mean", figure(lambda e: with_range(e["eta_mean"], e["eta_mean_ci95"], ".2f"))),
         ("η worst", figure(lambda e: f"{e['eta_min']:.2f}")),
-        (f"half at, of {summary['scale']}", figure(
+        (f"{HALF_AT}, of {summary['scale']}", figure(
             lambda e: f"{BOUNDS[e['fraction50_bound']]}{e['fraction50']:.2f}")),
         (f"recovered{of_mix}", figure(
             lambda e: with_range(e["recovered_rate"], e["recovered_ci95"], ".0%"))),
         ("never fell", figure(_never_fell)),
         ("lost, won", lost),
-        ("McNemar p", p_value),
+        (P_VALUE, p_value),
         ("CoM drift [mm]", figure(lambda e: _number(e["com_drift_max"], ".1f", 1000.0))),
         ("feet drift [mm]", figure(lambda e: _number(e["foot_drift_max"], ".1f", 1000.0))),
         ("lean at the end [°]", figure(lambda e: _number(e["unpushed_lean_max"], ".2f"))),
         ("power [W]", figure(lambda e: _at_rest(e, e["mean_power_median"], ".0f"))),
         ("chatter [1/s]", figure(lambda e: _at_rest(e, e["torque_variation_median"], ".2f"))),
-        ("steps, mean", figure(lambda e: _number(e["steps_mean"] or None, ".1f"))),
+        (STEPS, figure(lambda e: _number(e["steps_mean"] or None, ".1f"))),
         ("of one-step limit", figure(lambda e: f"{e['step_share_1_mean']:.2f}")),
-        ("solver failures", figure(lambda e: f"{e['solver_failures'] or NONE}")),
+        (FAILURES, figure(lambda e: f"{e['solver_failures'] or NONE}")),
         ("of them in recoveries", figure(
             lambda e: f"{e['solver_failures_recovered']}" if e["solver_failures"] else NONE)),
         ("mean |action|", figure(lambda e: _number(e["mean_abs_action"] or None, ".3f"))),
@@ -143,12 +189,15 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
     ]  # fmt: skip
 
 
-def _pairs(summary: Summary) -> Table:
+def _pairs(summary: Summary, width: int) -> Table:
+    """For a console of this width, of which the figures need some 44 columns."""
     table = Table()
     titles = [f"{pair['b']} against {pair['a']}" for pair in summary["pairs"]]
-    table.add_column("b against a", overflow="fold", width=_room(titles, 34))
+    table.add_column(
+        "b against a", overflow="fold", width=_room(titles, min(max(width - 44, 16), 34))
+    )
     gain = any("j50_gain" in pair for pair in summary["pairs"])
-    names = ["both", "only a (lost)", "only b (won)", "neither", "McNemar p"]
+    names = ["both", "only a (lost)", "only b (won)", "neither", P_VALUE]
     for name in names + (["J50 gain [95 %]"] if gain else []):
         table.add_column(name, justify="right", overflow="fold")
     for title, pair in zip(titles, summary["pairs"], strict=True):

@@ -30,7 +30,7 @@ def walk_tables(summary: Summary) -> Iterator[Table]:
 def _levels(name: str, levels: list[WalkLevel], columns: Columns) -> Table:
     """The columns that have any figure."""
     table = Table(title=escape(name), title_justify="left")
-    table.add_column("command", no_wrap=True)
+    table.add_column("command", overflow="fold")
     forms = [(head, form) for head, form in columns if {form(level) for level in levels} - {NONE}]
     for heading, _ in forms:
         table.add_column(heading, justify="right", overflow="fold")
@@ -101,7 +101,7 @@ def _phases(phases: dict[str, list[PhaseJ50]]) -> Table:
     table.add_column("controller", overflow="fold")
     middles = sorted({entry["phase"] for found in phases.values() for entry in found})
     for middle in middles:
-        table.add_column(f"{middle:.3f}", justify="right")
+        table.add_column(f"{middle:.3f}", justify="right", overflow="fold")
     for name, found in phases.items():
         known = {entry["phase"]: f"{entry['j50']:.1f}" for entry in found}
         table.add_row(escape(name), *(known.get(middle, NONE) for middle in middles))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal, cast
 
@@ -11,11 +11,11 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import ArrayLike
 
-from poise.training.statistics.fits import LogisticFit, check_trials, trial_bins
+from poise.training.statistics.fits import Bound, LogisticFit, check_trials, trial_bins
 from poise.training.statistics.rates import wilson_interval
 from poise.training.trials.step_limits import shown_out_to
 
-from .style import GREY, INK, legend_below, look, saved_figure
+from .style import GREY, INK, Look, legend_below, look, saved_figure
 
 Unit = Literal["N·s", "N·s/kg", "fraction"]
 Curve = tuple[ArrayLike, ArrayLike]  # directions [°], values
@@ -26,6 +26,8 @@ IMPULSE_LABEL = {
     "fraction": "push impulse, as a fraction of the ankle limit",
 }
 IMPULSE_FORMAT = {"N·s": "{:.1f} N·s", "N·s/kg": "{:.3f} N·s/kg", "fraction": "{:.2f}"}
+SIDES = {None: 0.0, "lower": 1.0, "upper": -1.0}  # of a bound: out or in is the true J50
+ARROW = 0.11  # length of an arrow over the largest value that is drawn
 RING_STEPS = [1, 2, 5, 10]
 RING_LABELS = 33.75  # direction of the ring labels [°], between two of sixteen directions
 
@@ -36,6 +38,8 @@ def polar_envelope(
     *,
     ankle_limit: Curve | None = None,
     step_limits: Mapping[str, Curve] | None = None,
+    bounds: Mapping[str, Sequence[Bound | None]] | None = None,
+    note: str = "",
     title: str = "Recovered impulse by push direction",
     unit: str = "N·s",
 ) -> None:
@@ -47,6 +51,9 @@ def polar_envelope(
             count counter-clockwise from forward, in any order; [low, high] is drawn as a band.
         ankle_limit: (directions [°], limit), the impulse that the ankles alone can hold.
         step_limits: name → the same for what a number of steps can stop; far out it is cut off.
+        bounds: name → what each j50 of its envelope is a bound of, see `LogisticFit.bound`. Bounds
+            are hollow, with an arrow to the side where the true J50 is.
+        note: a sentence below the title, of what is not drawn.
         title: above the plot.
         unit: of j50 and limit.
 
@@ -59,6 +66,7 @@ def polar_envelope(
         ax.set_theta_zero_location("N")
         ax.set_theta_direction(1)
         top, far = 0.0, [0.0]
+        drawn: list[tuple[np.ndarray, np.ndarray, np.ndarray, Look]] = []
         if ankle_limit is not None:
             theta, (limit,) = _closed(*ankle_limit)
             ax.plot(theta, limit, color=INK, lw=1.3, ls=(0, (5, 3)), label="ankle limit", zorder=2)
@@ -69,8 +77,11 @@ def polar_envelope(
             ax.plot(theta, limit, color=GREY, lw=1.3, ls=dots, label=name, zorder=2)
             far.append(float(np.nanmax(limit)))
         for k, (name, (directions, *values)) in enumerate(envelopes.items()):
-            theta, (j50, low, high) = _closed(directions, *values)
-            style = look(k)
+            sides = [SIDES[bound] for bound in (bounds or {}).get(name, ())]
+            theta, (j50, low, high, side) = _closed(
+                directions, *values, sides or np.zeros(np.shape(directions))
+            )
+            style, known = look(k), np.isfinite(j50)
             ax.fill_between(theta, low, high, color=style.colour, alpha=0.2, lw=0, zorder=3)
             ax.plot(
                 theta,
@@ -78,10 +89,13 @@ def polar_envelope(
                 color=style.colour,
                 ls=style.line,
                 marker=style.marker,
+                markevery=list(np.flatnonzero(side == 0)),
                 label=name,
                 zorder=4,
             )
-            top = max(top, float(np.nanmax([np.nanmax(j50), np.nanmax(high)])))
+            drawn.append((theta[known], j50[known], side[known], style))
+            top = max([top, *j50[known], *high[known]])
+        top = _draw_bounds(ax, drawn, top)
         top = shown_out_to(top, far)
         names = {0: "forward", 90: "left", 180: "backward", 270: "right"}
         angles = range(0, 360, 45)
@@ -96,13 +110,36 @@ def polar_envelope(
         ax.spines["polar"].set_color("#CCCCCC")
         figure.suptitle(title)
         ax.set_title(
-            f"J50 [{unit}]: half of the pushes are recovered. Band: 95 % interval.",
+            f"J50 [{unit}]: half of the pushes are recovered. Band: 95 % interval."
+            + (f"\n{note}" if note else ""),
             loc="center",
             color=GREY,
             size=10,
             weight="normal",
         )
         legend_below(figure)
+
+
+def _draw_bounds(
+    ax: PolarAxes, drawn: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, Look]], top: float
+) -> float:
+    """Hollow markers where J50 is a bound, with arrows to where the true one is.
+
+    `top` is the largest radius that is drawn; returns what it is with the arrows.
+    """
+    length, ends = ARROW * top, [top]
+    for theta, j50, side, style in drawn:
+        for angle, radius, sign in zip(theta, j50, side, strict=True):
+            if not sign:
+                continue
+            ends.append(max(radius + sign * length, 0.0))
+            arrow = {"arrowstyle": "->", "color": style.colour, "lw": 1.4}
+            ax.annotate("", (angle, ends[-1]), (angle, radius), arrowprops=arrow, zorder=5)
+            ax.plot(angle, radius, color=style.colour, marker=style.marker, mfc="white", zorder=6)
+    if len(ends) > 1:
+        label = "hollow: only a bound"
+        ax.plot([], [], color=GREY, ls="", marker="o", mfc="white", label=label)
+    return max(ends)
 
 
 def fall_probability(

@@ -44,7 +44,7 @@ def motion_tables(summary: Summary) -> Iterator[Table]:
 
 def _levels(name: str, levels: list[MotionLevel]) -> Table:
     table = Table(title=escape(name), title_justify="left")
-    table.add_column("of J50", justify="right")
+    table.add_column("of J50", justify="right", overflow="fold")
     table.add_column("motion", no_wrap=True)
     for heading in ("fell \\[95 %]", *_headings(levels)):
         table.add_column(heading, justify="right", overflow="fold")
@@ -73,7 +73,7 @@ def _in_motion(found: dict[str, list[InMotion]]) -> Table:
     table.add_column("controller", overflow="fold")
     table.add_column("motion", no_wrap=True)
     for heading in ("trials", "of J50 \\[95 %]", "over standing \\[95 %]"):
-        table.add_column(heading, justify="right")
+        table.add_column(heading, justify="right", overflow="fold")
     for name, rows in found.items():
         for row in rows:
             sign = BOUNDS[row["share50_bound"]]

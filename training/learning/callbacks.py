@@ -211,7 +211,8 @@ class Progress(BaseCallback):
     def _on_rollout_end(self) -> None:
         seconds = time.perf_counter() - self._start
         speed = (self.num_timesteps - self._start_steps) / max(seconds, 1e-9)
-        rate = f"recovered {np.mean(self._episodes):.0%}" if self._episodes else ""
+        # of the policy that explores, under the curriculum's pushes: no held-out rate
+        rate = f"recovered in training {np.mean(self._episodes):.0%}" if self._episodes else ""
         assert self._bar is not None  # made at the start of the training
         self._bar.update(
             self._task, completed=self.num_timesteps, rate=f"{rate}  {speed:,.0f} steps/s"

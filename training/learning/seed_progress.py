@@ -74,7 +74,7 @@ class SeedProgress:
             except ConfigError:  # just being replaced
                 continue
             rates = [row["recovered"] for row in state.get("evaluations", [])]
-            text = f"recovered {rates[0]:.1%}" if rates else ""
+            text = f"held out, recovered {rates[0]:.1%}" if rates else ""
             text += f", best {max(rates[1:]):.1%}" if rates[1:] else ""
             steps = min(state["timesteps"], run.config.steps)
             self._bar.update(task, completed=steps, rate=text)

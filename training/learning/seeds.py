@@ -52,6 +52,15 @@ def evaluations(entry: SeedEntry) -> tuple[Evaluation, Evaluation]:
     return start, best
 
 
+def start_and_best(
+    rows: Sequence[Evaluation],
+) -> tuple[Evaluation | None, Evaluation | None]:
+    """The first evaluation, and the best, first of equals, of what was trained; None: none yet."""
+    trained = [row for row in rows if row["timesteps"] > 0] or rows
+    best = max(trained, key=lambda row: row["score"], default=None)
+    return (rows[0] if rows else None), best
+
+
 def seed_folder(out: Path, seed: int) -> Path:
     """The folder of a seed's run."""
     return out / f"seed-{seed}"

@@ -19,7 +19,7 @@ from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import controller_config
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
-from poise.configs.files import write_atomic
+from poise.configs.files import resolve, write_atomic
 from poise.configs.outputs import check_out_folder
 from poise.configs.schema import build, read_yaml, to_yaml
 from poise.envs.balance.base import BalanceEnv
@@ -69,7 +69,9 @@ def train(
     keeps(out / LAST, f"what is trained is kept in {out}; go on with --resume")
     start = None if checkpoint else first_policy(config.start_from)
     torch.set_num_threads(1)
+    resolve("robots", config.robot)
     if config.action not in ("torque", "position"):  # else nothing of the controllers is called
+        controller_config(config.controller)  # refused before anything is compiled
         prepare()
     with ExitStack() as stack:
         robot = load_robot(config.robot)

@@ -28,7 +28,15 @@ from .checkpoints import CONFIG, STATE, find_checkpoint
 from .config import TrainConfig
 from .policy_files import read_state
 from .seed_progress import SeedProgress, print_seeds
-from .seeds import SEEDS, SeedEntry, SeedSummary, evaluations, read_seeds, seed_folder
+from .seeds import (
+    SEEDS,
+    SeedEntry,
+    SeedSummary,
+    evaluations,
+    read_seeds,
+    seed_folder,
+    start_and_best,
+)
 from .train import LAST, check_folder, check_pushes, train
 
 
@@ -181,15 +189,13 @@ def _entry(run: SeedRun) -> SeedEntry:
     """The evaluations of a run at its start and at its best, for seeds.json."""
     checkpoint = find_checkpoint(run.folder / LAST)
     state: dict[str, Any] = read_state(checkpoint / STATE) if checkpoint else {"timesteps": 0}
-    rows = state.get("evaluations") or [None]
-    trained = [row for row in rows if row and row["timesteps"] > 0] or rows
-    best = max(trained, key=lambda row: row["score"] if row else 0.0)  # the first of equals
+    start, best = start_and_best(state.get("evaluations", []))
     return {
         "seed": run.config.seed,
         "folder": run.folder.name,
         "timesteps": state["timesteps"],
         "finished": state["timesteps"] >= run.config.steps,
-        "start": rows[0],
+        "start": start,
         "best": best,
     }
 

@@ -97,10 +97,10 @@ def _holding(holding: Holding) -> str:
 def _directions(check: RobotCheck) -> Table:
     """Every other direction, and the mean over all."""
     table = Table(title="push of 0.1 s", title_justify="left")
-    headings = ("direction", "CoM to edge [mm]", "CoP by ankles [mm]", "in place [N·s]", "[N·s/kg]",
-                "one step ≤ [N·s]", "[N·s/kg]")  # fmt: skip
+    headings = ("direction", "CoM to edge [mm]", "CoP by ankles [mm]", "in place [N·s]",
+                "in place [N·s/kg]", "one step ≤ [N·s]", "one step ≤ [N·s/kg]")  # fmt: skip
     for heading in headings:
-        table.add_column(heading, justify="right")
+        table.add_column(heading, justify="right", overflow="fold")
     for each in check.directions[::EVERY]:
         table.add_row(
             f"{each.direction:g}°",

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from poise.baselines.policy_files.reading import RIVALS
 from poise.configs.files import packaged
-from poise.training.trials.agents import NO_CONTROL
+from poise.training.trials.names import NO_CONTROL
 
 from .spec import SessionSpec, Spec
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from poise.baselines.allowance import allows
-from poise.baselines.walking.schedule import parse_commands
+from poise.baselines.walking.config import WalkConfig
+from poise.baselines.walking.reach import check_command
+from poise.baselines.walking.schedule import TimedCommand, parse_commands
+from poise.baselines.walking.walk import allocate_gait, limits_of_legs
 from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.balance.base import BalanceEnv
@@ -17,11 +20,11 @@ from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
-from poise.envs.terrain.terrain import make_terrain
+from poise.envs.terrain.terrain import Terrain, make_terrain
 from poise.envs.viewing.camera import Camera, beside
 from poise.training.figures.encoder import FORMS
 from poise.training.figures.video import record
-from poise.training.trials.agents import Agent, check_walks, load_agent
+from poise.training.trials.agents import Agent, check_may_walk, check_walks, load_agent
 from poise.training.trials.play import run_trial
 from poise.training.trials.trial import Outcome, Trial
 
@@ -86,6 +89,7 @@ def walk(
     commands = parse_commands(asked, "command")
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
     ground = make_terrain(terrain, "walk")
+    check_asked(controller, loaded, commands, ground)  # a controller takes long to be made
     agent = load_agent(controller, loaded, duration=duration, pushes=None, terrain=ground)
     check_walks(controller, agent, "walk")
     trial = Trial(0, seed, pushes, commands=commands)
@@ -99,6 +103,19 @@ def walk(
         _film(agent, trial, video)
         say(str(video))
     return outcome
+
+
+def check_asked(
+    controller: str, robot: Robot, commands: Sequence[TimedCommand], terrain: Terrain
+) -> None:
+    """Raise ConfigError, as the controller itself would, if its description tells that it does not
+    walk, or, of one that plans its steps, that `robot` cannot on level ground what is asked."""
+    config = check_may_walk(controller, "walk")
+    if isinstance(config, WalkConfig) and terrain.flat:
+        gait, limits = config.gait, limits_of_legs(robot, config.gait)
+        arrays = allocate_gait(gait, robot.units, limits)
+        for command in commands:
+            check_command(command, robot, arrays, limits or gait.limits, gait.swing)
 
 
 def parse_push(text: str, start: float, duration: float, robot: Robot) -> Push:

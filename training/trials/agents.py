@@ -13,20 +13,24 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
-from poise.baselines.plugins import find_plugin, make_plugin, plugin_config
+from poise.baselines.plugins import PluginConfig, find_plugin, make_plugin, plugin_config
 from poise.baselines.policy_files.config import PolicyFileConfig
-from poise.baselines.policy_files.reading import RIVALS, is_policy
+from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import ControllerConfig, controller_config, walking_controllers
-from poise.configs.errors import ConfigError, meant, shown
+from poise.baselines.walking.config import WalkConfig
+from poise.baselines.walking.simbicon import SimbiconConfig
+from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged
-from poise.configs.reading import is_file, is_folder
+from poise.configs.reading import is_folder
 from poise.configs.schema import to_dict, to_yaml
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.robots.robot import Robot
 
-SHIPPED, NO_CONTROL = "residual", "zero"
+from .names import NO_CONTROL, check_name
+
+SHIPPED = "residual"
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,29 +79,33 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
     return _idle(name, env, to_yaml(_wherever(config)))
 
 
-def check_name(name: str) -> None:
-    """Raise ConfigError, which lists what there is, unless a controller may be called so.
-
-    Nothing is loaded for that, and nothing compiled; what the name stands for may still be wrong.
-    """
-    names = (*packaged("controllers"), *packaged(RIVALS), *packaged("policies"), NO_CONTROL)
-    of_file = is_file(name) and Path(name).suffix in (".yaml", ".yml")
-    if not (name in names or of_file or is_folder(name) or is_policy(name) or is_plugin(name)):
-        raise ConfigError(
-            f"no such controller: {shown(name)}{meant(name, names) or ';'} give a name, a .yaml "
-            "file of a controller, a folder written by poise train, an ONNX file or a folder with "
-            "a deploy.yaml, or module:Class",
-            field="controller",
-            choices=names,
-        )
-
-
 def check_walks(name: str, agent: Agent, source: str) -> None:
     """Raise ConfigError unless the controller of an agent walks; `source` is what asks for it."""
     env = agent.env
     if not isinstance(env, ResidualBalanceEnv) or env.command is None:
-        raise ConfigError(f"the controller {shown(name)} does not walk", source=source,
-                          field="controller", choices=walking_controllers())  # fmt: skip
+        raise does_not_walk(name, source)
+
+
+def check_may_walk(name: str, source: str) -> ControllerConfig | None:
+    """The configuration of a controller that is described by a packaged name or a file, or None.
+
+    Raises ConfigError as `check_walks` where that tells that it does not walk: nothing is compiled
+    for it.
+    """
+    check_name(name)
+    described = name in packaged("controllers") or Path(name).suffix in (".yaml", ".yml")
+    if not described or is_policy(name):
+        return None
+    config = controller_config(name)
+    if not isinstance(config, (WalkConfig, SimbiconConfig, PluginConfig)):
+        raise does_not_walk(name, source)
+    return config
+
+
+def does_not_walk(name: str, source: str) -> ConfigError:
+    """The error of a controller that does not walk where `source` asks for one that does."""
+    return ConfigError(f"the controller {shown(name)} does not walk", source=source,
+                       field="controller", choices=walking_controllers())  # fmt: skip
 
 
 def check_follows(name: str, agent: Agent, source: str) -> None:

@@ -125,7 +125,9 @@ class Panel:
     def tell(self, text: str, paused: bool, at: float, first: float, last: float) -> None:
         """Bring the status, the button and the timeline [s] up to date."""
         self.status.content = text
-        self.pause.label = "Play" if paused else "Pause"
+        if self.pause.label != (label := "Play" if paused else "Pause"):
+            self.pause.label = label
+            self.pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
         if last > first:
             self.timeline.max, self.timeline.min = last, first
             self.timeline.value = min(max(at, first), last)

@@ -7,12 +7,11 @@ from pathlib import Path
 
 from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError
-from poise.configs.files import resolve
 from poise.training.sessions.live import Play
 from poise.training.sessions.loading import load_live
 from poise.training.sessions.recorded import recorded_trial
 from poise.training.sessions.spec import MOST, STANDING, SessionSpec, Spec, TrialSpec
-from poise.training.trials.agents import check_name
+from poise.training.trials.names import check_names
 
 from .origins import Visits
 from .server import check_installed, check_port, greeting, serving, until_ctrl_c
@@ -117,9 +116,7 @@ def _check(spec: SessionSpec, seconds: float | None, native: bool) -> None:
         most = "one controller is shown by --native" if native else f"at most {MOST} side by side"
         raise ConfigError(f"{most}, not {count}", field="controllers")
     _check_seconds(seconds)
-    resolve("robots", spec.robot)
-    for name in spec.controllers:
-        check_name(name)
+    check_names(spec.controllers, robot=spec.robot, motion=spec.motion)
 
 
 def _check_seconds(seconds: float | None) -> None:

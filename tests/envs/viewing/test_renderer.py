@@ -4,6 +4,7 @@ import contextlib
 import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -21,6 +22,7 @@ from poise.envs.viewing import window as viewer
 from poise.envs.viewing.appearance import FIELD_OF_VIEW
 from poise.envs.viewing.overlays import push_arrows
 from poise.envs.viewing.renderer import Camera, SceneRenderer
+from tests.support.small_biped import write_biped
 
 PUSH = {"impulse": 14.0, "direction": 90.0, "duration": 0.1, "start": 0.04, "body": "torso"}
 
@@ -93,6 +95,28 @@ def test_frame_shows_the_robot_upright_in_the_middle(can_render, simulation):
     assert 5 < rows.min() < 40 and 75 < rows.max() < 115
     assert 60 < columns.mean() < 100
     assert np.ptp(rows) > np.ptp(columns)
+
+
+def test_a_model_without_a_lamp_or_a_sky_films_as_bright_as_one_with_both(
+    can_render: None, tmp_path: Path
+) -> None:
+    """It gets them when it is loaded; they are no part of its dynamics."""
+    floor = '<geom name="floor" type="plane" size="5 5 0.1"/>'
+    lamp = '<light pos="0 0 4" dir="0 0 -1"/>'
+    sky = '<texture type="skybox" builtin="flat" rgb1="1 1 1" width="8" height="8"/>'
+    frames, moved = [], []
+    for name, world, asset in (("dark", floor, ""), ("lit", floor + lamp, sky)):
+        (tmp_path / name).mkdir()
+        robot = load_robot(write_biped(tmp_path / name, world=world, asset=asset))
+        simulation = Simulation(robot)
+        renderer = SceneRenderer(simulation, human=False, width=160, height=120)
+        frames.append(renderer.render())
+        renderer.close()
+        simulation.step(np.zeros(simulation.model.nu), 10)
+        moved.append((robot.fingerprint, simulation.data.qpos.tobytes()))
+    dark, lit = (frame.mean() for frame in frames if frame is not None)
+    assert dark > 180 and dark == pytest.approx(lit, rel=0.02)
+    assert moved[0] == moved[1]
 
 
 def test_same_state_gives_the_same_frame(can_render, simulation):

@@ -52,6 +52,61 @@ def test_help_is_light() -> None:
         assert name in done.stdout
 
 
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["evaluate", "momentum-pq"],
+        ["benchmark", "--out", "out", "--controllers", "momentum-pq"],
+        ["view", "momentum-pq"],
+        ["view", "nowhere", "--trial", "3"],
+        ["walk", "--robot", "robby"],
+        ["gait", "--compare", "lip", "--out", "out", "--human", "me"],
+        ["export", "residul", "--out", "out"],
+        ["train", "--out", "out", "--config", "residul"],
+    ],
+    ids=" ".join,
+)
+def test_a_wrong_name_is_refused_before_anything_heavy_is_imported(
+    args: list[str],
+) -> None:
+    """In a process that has none of it yet."""
+    code = (
+        f"import sys\nfrom poise.training.cli import main\ncode = main({args})\n"
+        "heavy = {'mujoco', 'numba', 'torch', 'scipy', 'matplotlib'} & set(sys.modules)\n"
+        "assert not heavy, heavy\nsys.exit(code)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.startswith("poise: "), done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["walk", "--speed", "9"],
+        ["walk", "--controller", "momentum-qp"],
+        ["evaluate", "walk", "momentum-qp", "--suite", "walk", "--out", "out"],
+    ],
+    ids=" ".join,
+)
+def test_what_cannot_be_walked_is_refused_before_a_controller_is_made(
+    args: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Making one compiles its kernels."""
+
+    def never(*_: object) -> None:
+        raise AssertionError("compiles")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("poise.training.sessions.walk.load_agent", never)
+    monkeypatch.setattr(run, "prepare", never)
+    assert main(args) == 2
+    assert capsys.readouterr().err.startswith("poise: ")
+
+
 def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"poise {poise.__version__}\n"
@@ -69,13 +124,13 @@ def test_bash_completes_commands_and_flags(capsys: pytest.CaptureFixture[str]) -
     assert "evaluate" in done.stdout.splitlines()[0] and "--suite" in done.stdout.splitlines()[1]
 
 
-@pytest.mark.parametrize("given", [[], ["cmd"], ["bash", "zsh"]])
+@pytest.mark.parametrize("given", [[], ["cmd"], ["tcsh"], ["bash", "zsh"]])
 def test_a_shell_without_completion_is_one_line(
     given: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["--print-completion", *given]) == 2
     err = capsys.readouterr().err
-    assert err == "poise: print-completion: needs a shell (choices: bash, zsh, fish, tcsh)\n"
+    assert err == "poise: print-completion: needs a shell (choices: bash, zsh, fish)\n"
 
 
 @pytest.mark.parametrize(("name", "hint"), [("evalute", ", did you mean evaluate?"), ("xyz", "")])
@@ -188,6 +243,15 @@ def test_a_broken_pipe_of_another_kind_is_raised(
             ["evaluate", "zero", "--suite", "walk"],
             "suite walk: controller: the controller 'zero' do",
         ),
+        (["walk", "--speed", "9"], "out of reach: 'humanoid' can at most"),
+        (["walk", "--controller", "momentum-qp"], "the controller 'momentum-qp' does not walk"),
+        (["walk", "--controller", "wlk"], "no such controller: 'wlk', did you mean walk?"),
+        (["export", "residul", "--out", "out"], "policy: no such policy: 'residul', did you mean"),
+        (["view", "momentum-pq"], "no such controller: 'momentum-pq', did you mean momentum-qp?"),
+        (["view", "nowhere", "--trial", "3"], "nowhere: no such folder"),
+        (["tune", "--out", "out", "--policy", "residul"], "'residul', did you mean residual?"),
+        (["train", "--out", "out", "--controller", "pid"], "controllers: no such name: 'pid'"),
+        (["train", "--out", "out", "--robot", "robby"], "robots: no such name: 'robby'"),
         (["robot", "robot.yaml", "--out", "run/a.json"], "robot.yaml: feet: a biped has two feet"),
     ],
 )
@@ -251,7 +315,10 @@ def test_evaluate_and_replay(
     suite, out = str(write_suite(tmp_path, RANDOM)), str(tmp_path / "out")
     args = ["evaluate", "zero", "--suite", suite, "--out", out, "--trials", "2", "--seed", "3"]
     assert main(args) == 0
-    assert InProcess.played == 2 and f"{out}/summary.json" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert InProcess.played == 2 and f"{out}/summary.json" in shown
+    command = f"poise view {out} --trial 0 --controllers zero"
+    assert f"lost trials of zero: 0, 1 ({command})\n" in shown
     assert main(args) == 0 and InProcess.played == 2
     other = [*args[:-1], "4"]
     assert main(other) == 2
@@ -285,6 +352,16 @@ def test_list_names_what_is_packaged(capsys: pytest.CaptureFixture[str]) -> None
     assert {"robots", "envs", "controllers", "suites"} < set(folders)
     for kind in folders:
         assert f"{kind}: {', '.join(packaged(kind))}\n" in shown
+
+
+@pytest.mark.parametrize("command", ["evaluate", "benchmark"])
+def test_help_says_how_an_own_class_is_named(
+    capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "--allow my_file.py:Class" in shown and shown.count("my_file.py:Class") == 2
 
 
 @pytest.mark.parametrize("command", ["evaluate", "benchmark", "replay", "report", "tune", "train"])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from poise.training.cli.train import steps_note
+from poise.training.cli.train import last_words, steps_note
+from poise.training.learning.callbacks import Progress
 from tests.support.shared import finished_run, tiny_config
 
 
@@ -30,3 +32,45 @@ def test_a_run_that_is_finished_says_so() -> None:
     )
     more = replace(tiny_config(), steps=200)
     assert steps_note(more, out, resume=True).endswith("it ended at 256")
+
+
+def test_a_run_ends_with_what_it_measured_and_what_comes_next() -> None:
+    """The rates are those of evaluations.csv; the commands name the run."""
+    out = finished_run()
+    with (out / "evaluations.csv").open(newline="") as file:
+        first, *trained = list(csv.DictReader(file))
+    best = max(trained, key=lambda row: float(row["recovered"]))
+    measured, evaluate, view = last_words(tiny_config(), out)
+    assert measured == (
+        f"of 5 held-out pushes recovered: {float(first['recovered']):.1%} by momentum-qp, "
+        f"{float(best['recovered']):.1%} by {out}/best (at step {best['timesteps']})"
+    )
+    assert evaluate == f"next: poise evaluate momentum-qp {out} --out out/run"
+    assert view == f"      poise view {out}"
+
+
+def test_what_comes_next_fits_the_run() -> None:
+    """Its robot, a controller from outside, a walk; a policy alone is compared with nothing."""
+    out = finished_run()
+    other = replace(tiny_config(), robot="tall", controller="mine.py:Mine")
+    _, evaluate, view = last_words(other, out)
+    assert evaluate.endswith(f"evaluate mine.py:Mine {out} --robot tall --out out/run "
+                             "--allow mine.py:Mine")  # fmt: skip
+    assert view.endswith(f"view {out} --robot tall --allow mine.py:Mine")
+    assert "--suite walk-push" in last_words(replace(tiny_config(), action="walk"), out)[1]
+    first, evaluate, _ = last_words(replace(tiny_config(), action="position"), out)
+    assert "by the first policy" in first and f"evaluate {out} --out" in evaluate
+    assert last_words(tiny_config(), Path("nowhere")) == []
+
+
+def test_the_progress_line_tells_the_exploring_policy_from_the_held_out_rate(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    progress = Progress(100)
+    progress.num_timesteps = 50
+    progress.locals = {"infos": [{"is_success": True}, {"is_success": False}, {}]}
+    progress._on_training_start()
+    progress._on_step()
+    progress._on_rollout_end()
+    progress.close()
+    assert "recovered in training 50%" in capsys.readouterr().out

@@ -5,13 +5,13 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from rich.console import Console
 
-from poise.training.evaluation.tables import places, print_summary, ranked
-from poise.training.running.summary import Entry
+from poise.training.evaluation.tables import places, print_lost, print_summary, ranked
+from poise.training.running.summary import Entry, Summary
 
 RESULTS = sorted((Path(__file__).parents[3] / "docs/results").rglob("*.json"))
 EDGES = "│┃┓┐┩┘┛"
@@ -61,3 +61,42 @@ def test_tables_fold_and_are_not_cut(path: Path, width: int) -> None:
     rows = [line for line in text.getvalue().splitlines() if line[0] in "│┃┏┡└"]
     assert rows and all(line[-1] in EDGES for line in rows)
     assert "…" not in text.getvalue()
+
+
+def printed(summary: dict[str, Any]) -> str:
+    """What `print_summary` prints, in 120 columns."""
+    text = io.StringIO()
+    print_summary(cast(Summary, summary), Console(file=text, width=120))
+    return text.getvalue()
+
+
+def test_the_words_of_a_table_are_explained_below_it() -> None:
+    """Those that are there: of fractions of a limit, of p-values, of steps."""
+    summary = json.loads(RESULTS[0].read_text())
+    pairs = [pair["p_mcnemar"] for pair in summary["pairs"]]
+    below = sum(p < 0.05 for p in pairs)
+    assert 0 < below < len(pairs)
+    text = printed(summary)
+    line = f"McNemar p ≥ 0.05: these trials do not separate the two ({len(pairs) - below} of "
+    assert line in text and "steps, mean: of all trials" in text
+    assert "half at:" not in text
+    failures = sum(each["solver_failures_recovered"] for each in summary["controllers"].values())
+    assert f"were falling; {failures} in trials that were recovered" in text
+    for entry in summary["controllers"].values():
+        entry.update(fraction50=0.8, fraction50_bound=None, steps_mean=0.0)
+    summary["pairs"] = []
+    text = printed(summary)
+    assert "half at: half of the pushes that are this fraction of the ankle limit are" in text
+    assert "McNemar" not in text and "steps, mean" not in text
+
+
+def test_lost_trials_are_listed_with_the_command_that_shows_one() -> None:
+    """Five of each controller that has lost any, whatever its name; lines are not broken."""
+    text = io.StringIO()
+    lost = {"a": [], "my [own].py:B": [3, 17], "c": list(range(4, 12))}
+    print_lost(lost, Path("out/x"), Console(file=text, width=40))
+    assert text.getvalue().splitlines() == [
+        "lost trials of my [own].py:B: 3, 17 "
+        "(poise view out/x --trial 3 --controllers 'my [own].py:B')",
+        "lost trials of c: 4, 5, 6, 7, 8, … (8) (poise view out/x --trial 4 --controllers c)",
+    ]

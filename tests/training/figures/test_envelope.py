@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from poise.training.figures import style
 from poise.training.figures.envelope import fall_probability, polar_envelope
-from poise.training.statistics.fits import LogisticFit, fit_logistic
+from poise.training.statistics.fits import Bound, LogisticFit, fit_logistic
 from poise.training.statistics.rates import wilson_interval
 
 ANGLES = np.arange(8) * 45.0
@@ -110,6 +110,28 @@ def test_envelope_with_a_missing_direction(tmp_path):
     j50[2] = low[2] = high[2] = np.nan
     polar_envelope(tmp_path / "a.png", {"a": (directions, j50, low, high)})
     assert (tmp_path / "a.png").stat().st_size > 10_000
+
+
+def test_bounds_are_hollow_and_point_to_where_j50_is(tmp_path, figures):
+    """Outwards where more was recovered than was tried, inwards where less; inside the rings."""
+    sides: list[Bound | None] = [None, "lower", None, "upper", None, None, None, None]
+    polar_envelope(tmp_path / "a.png", {"a": circle(15), "b": circle(4)}, bounds={"a": sides})
+    ax = figures[0].axes[0]
+    (line,) = (x for x in ax.lines if x.get_label() == "a")
+    assert line.get_markevery() == [0, 2, 4, 5, 6, 7, 8]  # the first again at the end
+    hollow = [x for x in ax.lines if x.get_markerfacecolor() == "white" and len(x.get_xdata())]
+    assert [np.degrees(x.get_xdata()[0]) for x in hollow] == pytest.approx([45.0, 135.0])
+    assert {x.get_ydata()[0] for x in hollow} == {15.0}
+    (out, inwards) = ax.texts[-2:]
+    assert out.xy[1] > 15.5 and inwards.xy[1] < 14.5 and ax.get_ylim()[1] > out.xy[1]
+    assert "hollow: only a bound" in [text.get_text() for text in figures[0].legends[0].get_texts()]
+
+
+def test_a_picture_of_too_few_trials_says_so(tmp_path, figures):
+    """Also where nothing at all is drawn."""
+    nothing = np.full(8, np.nan)
+    polar_envelope(tmp_path / "a.png", {"a": (ANGLES, nothing, nothing, nothing)}, note="None.")
+    assert figures[0].axes[0].get_title().endswith("None.")
 
 
 @pytest.mark.parametrize("count", [1, 5])

@@ -7,6 +7,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -179,7 +180,12 @@ def test_the_command_takes_seeds(
     assert {run.config.ppo.gamma for run in given} == {0.9}
     assert {run.config.threads for run in given} == {1}
     assert read_yaml(out / "seed-4/config.yaml")["seed"] == 4
-    assert capsys.readouterr().out.rstrip().endswith("seeds.json")
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[-3:-1] == [
+        str(out / "seeds.json"),
+        f"next: poise evaluate momentum-qp {out} --out out/out",
+    ]
+    assert re.fullmatch(rf"      poise view {out}/seed-[45]", shown[-1])
     train_command(["--out", str(out), "--resume"])
     assert len(given) == 2
     train_command(["--out", str(out), "--resume", "--steps", str(2 * SHORT)])

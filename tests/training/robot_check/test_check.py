@@ -162,6 +162,9 @@ def test_the_table_says_it(check: RobotCheck) -> None:
                  "60 N·m", f"{check.in_place:.1f}", f"{check.one_step / check.mass:.2f}",
                  "controllers in place: abe07", "controllers stepping: capture-step"):  # fmt: skip
         assert part in text, part
+    heading = next(line for line in text.splitlines() if "in place" in line)
+    for column in ("direction", "in place [N·s]", "in place [N·s/kg]", "one step ≤ [N·s/kg]"):
+        assert column in heading
     refused = {STEPPING: Uses((), {"capture-step": "has [no] feet"})}
     text = shown(replace(check, controllers=refused, one_foot={"left": None}, licence="[MIT]"))
     assert "controllers stepping: none\n  not capture-step: has [no] feet" in text

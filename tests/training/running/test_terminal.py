@@ -36,3 +36,9 @@ def test_a_quiet_console_shows_no_progress() -> None:
         with progress_bar(console) as bar:
             bar.update(bar.add_task("", total=2, rates=""), completed=1, rates="")
         assert ("trials" in text.getvalue()) == is_terminal
+
+
+def test_a_class_of_one_letter_is_no_emoji(capsys: pytest.CaptureFixture[str]) -> None:
+    """Rich would print my.py and a red letter."""
+    terminal.terminal().print("my.py:B: 3")
+    assert capsys.readouterr().out == "my.py:B: 3\n"

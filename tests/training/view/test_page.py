@@ -191,6 +191,7 @@ def test_controls_ask_and_the_loop_does(view: BrowserView) -> None:
     at = view.play.at
     view.run(0.1)
     assert view.play.at == at and view.panel.pause.label == "Play"
+    assert view.panel.pause.icon == viser.Icon.PLAYER_PLAY
     view.ask(view.step)
     view.run(0.1)
     assert view.play.at == at + 1

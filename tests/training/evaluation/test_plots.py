@@ -1,0 +1,41 @@
+"""training/evaluation/plots.py: what of random pushes is drawn as a result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from poise.training.evaluation import plots
+
+
+def trial(direction: float, fraction: float, recovered: bool) -> Any:
+    """A trial of the part `random`, and its outcome."""
+    push = SimpleNamespace(direction=direction, impulse=20.0 * fraction, duration=0.1)
+    pushed = SimpleNamespace(part="random", push=push, limit_fraction=fraction)
+    return pushed, SimpleNamespace(recovered=recovered)
+
+
+def test_sectors_of_few_trials_are_no_results_and_bounds_are_marked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ahead 4 trials, to the left 5 that were all recovered, backward 6 of either end."""
+    drawn: dict[str, Any] = {}
+    monkeypatch.setattr(plots, "polar_envelope", lambda *args, **given: drawn.update(given, a=args))
+    played = [trial(2.0 * k, 1.0 + 0.1 * k, k < 2) for k in range(4)]
+    played += [trial(85.0 + k, 0.8 + 0.1 * k, True) for k in range(5)]
+    played += [trial(180.0, 0.7 + 0.1 * k, k < 3) for k in range(6)]
+    plan: Any = SimpleNamespace(limits=SimpleNamespace(scale="ankle limit"))
+    plots.draw_plots(tmp_path, plan, {"a": played})
+    directions, j50, low, high = drawn["a"][1]["a"]
+    assert directions == [0.0, 90.0, 180.0]
+    assert [np.isnan(each).tolist() for each in (j50, low, high)] == 3 * [[True, False, False]]
+    assert j50[1] == pytest.approx(1.2) and drawn["bounds"] == {"a": [None, "lower", None]}
+    assert drawn["note"] == "Not drawn: directions with fewer than 5 trials."
+    plots.draw_plots(tmp_path, plan, {"a": played[4:]})
+    assert drawn["note"] == ""
+    plots.draw_plots(tmp_path, plan, {"a": played[:4]})
+    assert drawn["note"] == "Nothing is drawn: no direction has 5 trials."

@@ -1,0 +1,56 @@
+"""Names that a user gives, checked before anything heavy is imported or compiled for them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from poise.baselines.allowance import is_plugin
+from poise.baselines.policy_files.reading import RIVALS, is_policy
+from poise.configs.errors import ConfigError, meant, shown
+from poise.configs.files import packaged, resolve
+from poise.configs.reading import is_file, is_folder
+
+NO_CONTROL = "zero"
+
+
+def check_names(
+    controllers: Sequence[str] = (),
+    *,
+    robot: str | None = None,
+    suite: str | None = None,
+    motion: str | None = None,
+) -> None:
+    """Raise ConfigError, which lists what there is, for a name of nothing; see `check_name`."""
+    for kind, name in (("robots", robot), ("suites", suite), ("motions", motion)):
+        if name is not None and Path(name).suffix != ".npz":  # a robot's motion
+            resolve(kind, name)
+    for name in controllers:
+        check_name(name)
+
+
+def check_name(name: str) -> None:
+    """Raise ConfigError, which lists what there is, unless a controller may be called so.
+
+    Nothing is loaded for that, and nothing compiled; what the name stands for may still be wrong.
+    """
+    names = (*packaged("controllers"), *packaged(RIVALS), *packaged("policies"), NO_CONTROL)
+    of_file = is_file(name) and Path(name).suffix in (".yaml", ".yml")
+    if not (name in names or of_file or is_folder(name) or is_policy(name) or is_plugin(name)):
+        raise ConfigError(
+            f"no such controller: {shown(name)}{meant(name, names) or ';'} give a name, a .yaml "
+            "file of a controller, a folder written by poise train, an ONNX file or a folder with "
+            "a deploy.yaml, or module:Class",
+            field="controller",
+            choices=names,
+        )
+
+
+def check_policy_name(name: str) -> None:
+    """Raise ConfigError unless a policy of `poise train` may be called so; as `check_name`."""
+    names = packaged("policies")
+    if name not in names and not is_folder(name):
+        raise ConfigError(
+            f"no such policy: {shown(name)}{meant(name, names) or ';'} give a packaged one or a "
+            "folder written by poise train",
+            field="policy",
+            choices=names,
+        )
