@@ -35,11 +35,26 @@ class TreadConfig:
     rise: float = field(default=0.48, metadata=POSITIVE)  # when it is as high as it gets, going up
     rise_down: float = field(default=0.3, metadata=POSITIVE)  # the same, going down
     lower: float = field(default=0.62, metadata=POSITIVE)  # when it begins to come down, going up
-    lower_down: float = field(default=0.7, metadata=POSITIVE)
+    lower_down: float = field(default=0.8, metadata=POSITIVE)
     arrive: float = field(default=0.98, metadata=POSITIVE)  # when it is above its foothold
     # the trunk leans ahead by so much for each h of a rise beyond `lean_from` [rad/h]
     lean: float = field(default=5.0, metadata=NOT_NEGATIVE)
     lean_from: float = field(default=0.135, metadata=NOT_NEGATIVE)
+
+
+@dataclass(frozen=True)
+class UnevenConfig:
+    """The swing over ground that turns out to be uneven where level ground was believed.
+
+    It is uneven while soles that stand differ in height by more than `least`, and for some steps
+    after: each keeps the fraction `memory` of the difference before. The foot is then lifted above
+    its own ground, too, where that is the higher one.
+    """
+
+    least: float = field(default=0.0127, metadata=POSITIVE)  # [h]
+    memory: float = field(default=0.8, metadata={"min": 0.0, "max": 1.0})
+    hold: float = field(default=0.2, metadata=NOT_NEGATIVE)  # of a swing, before it goes forward
+    clearance: float = field(default=0.03, metadata=NOT_NEGATIVE)  # more [h]
 
 
 @dataclass(frozen=True)
@@ -76,6 +91,7 @@ class GaitConfig:
         )
     )  # fmt: skip
     treads: TreadConfig = field(default_factory=TreadConfig, metadata={"omit": "default"})
+    uneven: UnevenConfig = field(default_factory=UnevenConfig, metadata={"omit": "default"})
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
 

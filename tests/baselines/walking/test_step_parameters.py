@@ -122,6 +122,10 @@ def test_a_width_is_commanded(width):
     [
         ({"ahead": 9.0}, r"command\.ahead: 9 m/s is steps of .* 'humanoid' can at most .* m/s"),
         ({"left": -2.0}, r"left: -2 m/s is .* to the side .* 'humanoid' can at most .* m/s"),
+        (
+            {"turn": 1.9},
+            r"turn: 1\.9 rad/s in steps of .* 'humanoid' can -.* \(-.*°/s\), where its hi",
+        ),
         ({"ahead": 0.5, "clearance": 0.9}, r"clearance: 0\.9 m is out of reach.* joints end"),
         ({"ahead": 0.5, "width": 0.05}, r"width: 0\.05 m is out of reach.* soles do not overlap"),
         ({"ahead": 0.5, "width": 1.0}, r"width: 1 m is out of reach"),
@@ -152,7 +156,7 @@ def test_the_reach_of_a_robot_is_what_it_is_not_refused(name):
             for outside in (False, True):
                 value = end + sign * 3e-3 * outside  # [m], [m/s] or [rad]
                 said[told, sign, outside] = _refused(walker, told, value)
-    assert len(said) == 2 * 9 and {key: key[2] for key in said} == said
+    assert len(said) == 2 * 11 and {key: key[2] for key in said} == said
     assert reach.own_width == pytest.approx(0.288 * robot(name).height_com)
 
 
