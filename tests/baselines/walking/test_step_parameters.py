@@ -106,6 +106,16 @@ def test_a_step_length_is_commanded():
     assert np.abs(found.ahead(4.0)).max() == pytest.approx(0.22, abs=0.03)
 
 
+def test_steps_that_last_longer_than_the_planner_lets_them_by_itself_stay_as_long():
+    """Steps of 0.5 m at 0.8 m/s last 0.59 s, and its own longest are 0.57 s."""
+    found = Played((10.0, GaitCommand(0.8, step_length=0.5)))
+    env = found.env
+    own = env.controller.gait_limits.time_max / env.robot.omega
+    assert not env.fallen and own < 0.57
+    assert np.abs(found.ahead(4.0)).max() == pytest.approx(0.5, abs=0.03)
+    assert env.controller._swing.duration > own + 0.01
+
+
 @pytest.mark.parametrize("width", [0.12, 0.28])
 def test_a_width_is_commanded(width):
     """Also one below what the planner chooses itself."""
