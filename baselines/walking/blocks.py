@@ -63,11 +63,6 @@ class Gait(Block):
     cop: np.ndarray  # (2,) that was asked for last on one foot [m]
     middle: np.ndarray  # (2,) between the soles at the last touchdown [m]
     step_clock: np.ndarray  # (1,) since then [s]; < 0: there was none
-    uneven_from: float  # see `UnevenConfig` [m]
-    uneven_memory: float
-    uneven_hold: float
-    uneven_clearance: float  # [m]
-    uneven: np.ndarray  # (1,) how much the heights of the last footholds differed [m]
     treads: Treads
 
 

@@ -43,21 +43,6 @@ class TreadConfig:
 
 
 @dataclass(frozen=True)
-class UnevenConfig:
-    """The swing over ground that turns out to be uneven where level ground was believed.
-
-    It is uneven while soles that stand differ in height by more than `least`, and for some steps
-    after: each keeps the fraction `memory` of the difference before. The foot is then lifted above
-    its own ground, too, where that is the higher one.
-    """
-
-    least: float = field(default=0.0127, metadata=POSITIVE)  # [h]
-    memory: float = field(default=0.8, metadata={"min": 0.0, "max": 1.0})
-    hold: float = field(default=0.2, metadata=NOT_NEGATIVE)  # of a swing, before it goes forward
-    clearance: float = field(default=0.03, metadata=NOT_NEGATIVE)  # more [h]
-
-
-@dataclass(frozen=True)
 class GaitConfig:
     """The gait: its times, its width, how it follows a command, and the QP of its ticks."""
 
@@ -91,7 +76,6 @@ class GaitConfig:
         )
     )  # fmt: skip
     treads: TreadConfig = field(default_factory=TreadConfig, metadata={"omit": "default"})
-    uneven: UnevenConfig = field(default_factory=UnevenConfig, metadata={"omit": "default"})
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
 

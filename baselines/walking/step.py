@@ -18,7 +18,7 @@ from poise.baselines.motions.offsets import (
 from poise.baselines.stepping.cop_region import single_support_region
 from poise.baselines.stepping.guidance import limit_posture
 from poise.baselines.stepping.search import clip_to_width, set_start, to_step_frame, to_world
-from poise.baselines.stepping.swing import FROZEN, advance_over, aim_swing, quintic, time_left
+from poise.baselines.stepping.swing import FROZEN, advance_over, aim_swing, time_left
 from poise.baselines.stepping.tick import solve_contacts
 from poise.envs.compiled.calls import run
 from poise.envs.compiled.jit import compiled
@@ -206,23 +206,6 @@ def plan_foothold(t: WalkTick) -> None:
 
 
 @compiled
-def advance_freely(t: WalkTick) -> None:
-    """Move the swing to a free foothold a tick further: over uneven ground higher, and up before it
-    goes forward."""
-    g, w, dt = t.gait, t.walk.swing, t.walk.gains.period
-    apex = apex_of_step(t)
-    if g.uneven[0] <= g.uneven_from:
-        advance_over(w, apex, dt)
-        return
-    now, left, hold = w.reference, g.treads.left, g.uneven_hold * w.duration[0] - w.time[0]
-    x, dx, ddx, y, dy, ddy = now[0, 0], now[1, 0], now[2, 0], now[0, 1], now[1, 1], now[2, 1]
-    advance_over(w, apex + g.uneven_clearance + max(left[2] - w.ground[0], 0.0), dt)
-    if hold > dt:
-        now[0, 0], now[1, 0], now[2, 0] = quintic(x, dx, ddx, left[0], 0.0, 0.0, hold, dt)
-        now[0, 1], now[1, 1], now[2, 1] = quintic(y, dy, ddy, left[1], 0.0, 0.0, hold, dt)
-
-
-@compiled
 def swing_tick(t: WalkTick) -> None:
     """A tick on one foot."""
     c, g, w = t.walk, t.gait, t.walk.swing
@@ -235,7 +218,7 @@ def swing_tick(t: WalkTick) -> None:
     if footholds_given(t):
         advance_over_edges(t)
     else:
-        advance_freely(t)
+        advance_over(w, apex_of_step(t), c.gains.period)
     contacts = c.on_second if foot == 0 else c.on_first
     contacts.limited[0] = 0
     solve_contacts(c, contacts)

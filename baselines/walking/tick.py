@@ -157,8 +157,6 @@ def lift_off(t: WalkTick) -> None:
     point = c.state.sole_point
     start_swing(c.swing, point[foot], point[1 - foot, 2], step_time(t.gait))
     copy_into(point[foot], t.gait.treads.left)
-    uneven = t.gait.uneven
-    uneven[0] = max(abs(point[0, 2] - point[1, 2]), t.gait.uneven_memory * uneven[0])
 
 
 @compiled

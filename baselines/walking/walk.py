@@ -72,11 +72,6 @@ def allocate_gait(
         cop=guarded_zeros(2),
         middle=guarded_zeros(2),
         step_clock=guarded_zeros(1),
-        uneven_from=c.uneven.least * h,
-        uneven_memory=float(c.uneven.memory),
-        uneven_hold=float(c.uneven.hold),
-        uneven_clearance=c.uneven.clearance * h,
-        uneven=guarded_zeros(1),
         treads=allocate_treads(config.treads, list(surfaces), h),
     )
 

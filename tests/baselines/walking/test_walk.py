@@ -191,31 +191,3 @@ def test_legs_that_would_land_too_late_do_not_walk():
         env.step(np.zeros(len(env.action_names)))
     assert env.controller.steps == 0 and not env.controller.walking
     assert not env.fallen
-
-
-def test_feet_rise_before_they_go_forward_where_the_ground_turned_out_uneven():
-    """Over a step of 3 cm that it does not see, for a fifth of the swing, and higher; on level
-    ground they go forward at once."""
-    terrain = {"kind": "stairs", "rise": 0.03, "count": 1, "start": 0.6, "unseen": True}
-    env = ResidualStepEnv(controller="walk", duration=9.0, pushes=None, terrain=terrain)
-    env.reset(seed=1, options={"command": {"ahead": 0.4}})
-    walker, early, highest = env.controller, {True: [], False: []}, {True: [], False: []}
-    gait, swing = walker.gait, walker._swing
-    for _ in range(350):
-        env.step(np.zeros(len(env.action_names)))
-        uneven = gait.uneven[0] > gait.uneven_from
-        if walker.memory.swinging[0] and env.simulation.time > 2.0:
-            if 0.1 < swing.time / swing.duration < 0.2:
-                way = swing.reference[0, :2] - gait.treads.left[:2]
-                early[uneven].append(np.linalg.norm(way))
-            highest[uneven].append(swing.reference[0, 2] - swing.arrays.ground[0])
-    assert not env.fallen and env.simulation.state.com[0] > 1.0
-    assert max(early[True]) < 1e-3 < 4e-3 < max(early[False])
-    assert max(highest[True]) > max(highest[False]) + 0.9 * gait.uneven_clearance
-
-
-def test_level_ground_is_never_uneven():
-    """However the feet come down, also after a push: their soles are one height when both stand."""
-    push = {"impulse": 14.0, "direction": 90.0, "start": 3.1, "duration": 0.1}
-    _, _, env = walk((7.0, GaitCommand(0.5)), push=[push], seed=4)
-    assert not env.fallen and env.controller.gait.uneven[0] < env.controller.gait.uneven_from
