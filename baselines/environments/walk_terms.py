@@ -6,7 +6,7 @@ import numpy as np
 
 from poise.baselines.stepping.blocks import StepMemory
 from poise.baselines.walking.blocks import Gait
-from poise.baselines.walking.tick import step_time
+from poise.baselines.walking.step import step_time
 from poise.envs.balance.observation import GROUND, Terms
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled

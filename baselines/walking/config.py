@@ -35,7 +35,7 @@ class TreadConfig:
     rise: float = field(default=0.48, metadata=POSITIVE)  # when it is as high as it gets, going up
     rise_down: float = field(default=0.3, metadata=POSITIVE)  # the same, going down
     lower: float = field(default=0.62, metadata=POSITIVE)  # when it begins to come down, going up
-    lower_down: float = field(default=0.7, metadata=POSITIVE)
+    lower_down: float = field(default=0.8, metadata=POSITIVE)
     arrive: float = field(default=0.98, metadata=POSITIVE)  # when it is above its foothold
     # the trunk leans ahead by so much for each h of a rise beyond `lean_from` [rad/h]
     lean: float = field(default=5.0, metadata=NOT_NEGATIVE)

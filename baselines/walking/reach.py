@@ -4,10 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from poise.baselines.motions.feet import foot_signs
 from poise.baselines.stepping.config import StepLimits, SwingTask
 from poise.baselines.stepping.swing_speed import highest_lift, swing_time
 from poise.configs.errors import ConfigError
+from poise.envs.physics.legs import turn_range
 from poise.envs.robots.robot import Robot
 
 from .arms import ROLES, has_arms, largest_swing
@@ -19,7 +22,8 @@ ROUNDING = 1e-9  # [m] of a width that a user reads and gives back
 FINE = 1e-3  # [m] to which the highest clearance is found
 
 Pair = tuple[float, float]  # least and most
-TOLD = ("ahead", "left", "width", "clearance", "step_length", "arm_swing")  # pairs of a `Reach`
+#: pairs of a `Reach`
+TOLD = ("ahead", "left", "turn", "width", "clearance", "step_length", "arm_swing")
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,7 @@ class Reach:
 
     Attributes:
         ahead, left: in steps of the gait's own time and width [m/s].
+        turn: likewise, in place [rad/s].
         width, step_length: see `GaitCommand` [m].
         clearance: in the longest swing that the planner takes [m].
         arm_swing: [rad]; 0 at most for a robot that does not say which joints swing its arms.
@@ -38,6 +43,7 @@ class Reach:
 
     ahead: Pair
     left: Pair
+    turn: Pair
     width: Pair
     clearance: Pair
     step_length: Pair
@@ -56,6 +62,7 @@ def reach_of(robot: Robot, gait: Gait, limits: StepLimits, swing: SwingTask) -> 
     return Reach(
         ahead=(-back / period, far / period),
         left=(-aside, aside),
+        turn=_turn_range(0.0, gait.width, time, gait.transfer_time, robot, limits),
         width=_width_range(robot, limits),
         clearance=(0.0, _highest_clearance(robot, swing, limits.time_max / robot.omega)),
         step_length=(0.0, limits.ahead * robot.height_com),
@@ -81,6 +88,7 @@ def check_command(
     `gait` and `limits` are those of its steps, lengths of `limits` in h.
     """
     _check_steps(command, robot, gait, limits)
+    _check_turn(command, robot, gait, limits)
     _check_width(command, robot, limits)
     _check_clearance(command, robot, gait, limits, swing)
     _check_arms(command, robot)
@@ -147,6 +155,21 @@ def _widest_step(width: float, swing: float, robot: Robot, limits: StepLimits) -
     return max(min(far, 0.5 * limits.side_speed * h * robot.omega * swing), 0.0)
 
 
+def _turn_range(
+    ahead: float, width: float, swing: float, transfer: float, robot: Robot, limits: StepLimits
+) -> Pair:
+    """The fastest turns to the right and to the left at a speed `ahead` [m/s], both in [rad/s].
+
+    A foot stands for T + 2 T_d, in which the trunk turns over it by what its hip lets it. In a step
+    of T + T_d the foot on the outside of the turn goes W/2 times the turn farther than the CoM.
+    """
+    period, stands = swing + transfer, swing + 2.0 * transfer
+    right, left = turn_range(robot)  # of the foot that stands: the trunk's turn is the other way
+    outside = _longest_step(ahead, swing, robot, limits) - abs(ahead) * period
+    farthest = max(2.0 * outside / (width * period), 0.0)
+    return max(-left / stands, -farthest), min(-right / stands, farthest)
+
+
 def _width_range(robot: Robot, limits: StepLimits) -> Pair:
     return least_width(robot), limits.width_max * robot.height_com
 
@@ -163,6 +186,18 @@ def _highest_clearance(robot: Robot, swing: SwingTask, time: float) -> float:
         else:
             high = middle
     return low
+
+
+def _check_turn(command: GaitCommand, robot: Robot, gait: Gait, limits: StepLimits) -> None:
+    """No faster than hips turn while a foot stands, and than its outer foot steps."""
+    swing, period = steps_of(command, gait)
+    width = command.width or gait.width
+    low, high = _turn_range(command.ahead, width, swing, gait.transfer_time, robot, limits)
+    if not low - ROUNDING <= command.turn <= high + ROUNDING:
+        raise _out_of_reach("turn", f"{command.turn:.3g} rad/s in steps of {period:.3g} s", robot,
+                            f"{low:.3g} to {high:.3g} rad/s there ({np.degrees(low):.3g} to "
+                            f"{np.degrees(high):.3g} °/s), where its hips and its outer foot "
+                            "reach")  # fmt: skip
 
 
 def _check_width(command: GaitCommand, robot: Robot, limits: StepLimits) -> None:

@@ -57,6 +57,26 @@ def find_legs(robot: Robot) -> tuple[Leg, ...]:
     )
 
 
+def turn_range(robot: Robot) -> tuple[float, float]:
+    """How far, to the right (≤ 0) and to the left, both feet can be turned from the trunk in the
+    standing posture [rad]: by the joints of each leg whose axes are within 45° of the vertical.
+
+    ±π at most; (0, 0) for legs without such a joint.
+    """
+    data, model = standing_data(robot), robot.model
+    low, high = -np.pi, np.pi
+    for leg in find_legs(robot):
+        ends = np.zeros(2)
+        for joint in (model.joint(name) for name in leg.joints):
+            up = data.xaxis[joint.id, 2]
+            if abs(up) > ALONG:
+                limited = bool(model.jnt_limited[joint.id])
+                span = joint.range - data.qpos[joint.qposadr[0]] if limited else (-np.pi, np.pi)
+                ends += np.sort(np.sign(up) * np.asarray(span))
+        low, high = max(low, ends[0]), min(high, ends[1])
+    return min(float(low), 0.0), max(float(high), 0.0)
+
+
 def _chain(model: mujoco.MjModel, body: int) -> list[int]:
     """The joints between the world and a body."""
     joints: list[int] = []

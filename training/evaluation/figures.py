@@ -140,6 +140,7 @@ def envelope(
         )
     ]
     figures: EnvelopeFigures = {
+        "push_duration": float(duration[0]),
         "j50_mean": fit.j50_mean,
         "j50_mean_ci95": fit.j50_mean_ci,
         "j50_mean_per_mass": fit.j50_mean / mass,

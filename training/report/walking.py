@@ -16,7 +16,8 @@ from .charts import Series
 from .svg import Chart, Svg, colour, dash, ticks
 
 PARTS = {"walk": "walk", "gait": "steps", "velocity": "course", "walk_push": "pushed",
-         "walk_kick": "kicked", "walk_repeated": "pushed again and again"}  # fmt: skip
+         "walk_kick": "kicked", "walk_repeated": "pushed again and again",
+         "terrains": "terrain"}  # fmt: skip
 Figures = dict[str, tuple[str, str, str]]
 #: key of a level → title, note, format
 REACHED: Figures = {
@@ -28,6 +29,8 @@ REACHED: Figures = {
     "speed_error_rms": ("RMS error [m/s]", "of the strides' velocities from the command", ".3f"),
     "turn_error_rms": ("of the turn [rad/s]", "root mean square over the strides", ".3f"),
     "circle_error": ("Off the circle [m]", "largest distance", ".3f"),
+    "surfaces_passed": ("Surfaces passed", "of the terrain, mean", ".1f"),
+    "edge_contacts": ("Edges touched", "times that a foot came to touch one, mean", ".2f"),
 }
 COSTS: Figures = {
     "step_length": ("Step [m]", "length, along the heading", ".3f"),
@@ -90,7 +93,7 @@ def _levels(
             _words(PARTS.get(level["part"], level["part"])),
             _words(level["level"]),
             *cells(level),
-            *(figure_cell(level, key, form) for key, (_, _, form) in figures.items()),
+            *(_figure(level, key, form) for key, (_, _, form) in figures.items()),
         ]
         for name in order
         for level in results.summary["controllers"][name].get("walks", ())
@@ -98,6 +101,12 @@ def _levels(
     whole = Table(table.name, table.caption, columns, rows).without_empty()
     known = {column.key for column in whole.columns}
     return whole if known & {*figures} else None
+
+
+def _figure(level: WalkLevel, key: str, form: str) -> Cell:
+    """A figure of a level; level ground has no edges that nobody touched."""
+    there = key != "edge_contacts" or level.get("surfaces_passed") is not None
+    return figure_cell(level if there else {}, key, form)
 
 
 def phase_table(results: Results, order: Sequence[str]) -> Table | None:

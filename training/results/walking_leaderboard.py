@@ -14,9 +14,10 @@ HEAD = """# Leaderboard of walks
 <!-- Written by `poise leaderboard {source}`: change the results, not this page. -->
 
 Suite `{suite}`, robot `{robot}`, seed {seed}; Poise {poise}, MuJoCo {mujoco}. Intervals are 95 %;
-what the columns mean: [walking.md](walking.md#figures). J50 is of pushes of 0.1 s while it
-walks{pushed}. Falls a minute are of walks without a push. A controller that took a force from
-nowhere has no rank.
+what the columns mean: [walking.md](walking.md#figures). Falls a minute are of walks without a push.
+A controller that took a force from nowhere has no rank.
+
+{j50}
 
 """
 NONE = "–"
@@ -49,7 +50,6 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
             raise ConfigError(f"has no walks of the commands of {first}", source=origin[name],
                               field=f"controllers.{name}")  # fmt: skip
     names = sorted(entries, key=lambda name: _order(entries[name]))
-    pushed = {level["level"] for entry in entries.values() for level in _levels(entry, PUSHED)}
     versions = summary["versions"]
     text = HEAD.format(
         source=" ".join(summaries),
@@ -58,7 +58,7 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
         seed=summary["seed"],
         poise=versions.get("poise"),
         mujoco=versions.get("mujoco"),
-        pushed=f" ({', '.join(sorted(pushed))})" if pushed else "",
+        j50=_pushed(entries),
     )
     text += _table(*_ranking(entries, names))
     for command in commands:
@@ -78,6 +78,21 @@ def _expect_alike(summary: Summary, other: Summary, first: str, source: str) -> 
     ):
         if own != theirs:
             raise ConfigError(f"is not that of {first}", source=source, field=key)
+
+
+def _pushed(entries: Mapping[str, Entry]) -> str:
+    """What J50 is of, in a sentence: the command of the walks, and how long a push takes, as far as
+    the results say it."""
+    told = {level["level"] for entry in entries.values() for level in _levels(entry, PUSHED)}
+    known = {name: each["push_duration"] for name, each in entries.items()
+             if "push_duration" in each}  # fmt: skip
+    text = "J50 is of pushes while it walks" + (f" ({', '.join(sorted(told))})" if told else "")
+    for duration in sorted(set(known.values())):
+        names = [f"`{name}`" for name, its in known.items() if its == duration]
+        whose = "" if len(names) == sum("j50_mean" in each for each in entries.values()) else (
+            f" for {', '.join(names)}")  # fmt: skip
+        text += f", of {duration:g} s{whose}"
+    return text + "."
 
 
 def _levels(entry: Entry, part: str) -> list[WalkLevel]:

@@ -108,8 +108,9 @@ class Direction(DirectionJ50, total=False):
 
 
 class EnvelopeFigures(TypedDict, total=False):
-    """J50 over the directions."""
+    """J50 over the directions, of pushes of `push_duration` [s]; older results do not say it."""
 
+    push_duration: float
     j50_mean: float
     j50_mean_ci95: Interval
     j50_mean_per_mass: float

@@ -106,6 +106,17 @@ def test_a_step_length_is_commanded():
     assert np.abs(found.ahead(4.0)).max() == pytest.approx(0.22, abs=0.03)
 
 
+def test_steps_that_last_longer_than_the_planner_lets_them_by_itself_stay_as_long():
+    """Steps of 0.5 m at 0.8 m/s last 0.59 s, and its own longest are 0.57 s."""
+    found = Played((10.0, GaitCommand(0.8, step_length=0.5)))
+    env = found.env
+    own = env.controller.gait_limits.time_max / env.robot.omega
+    assert not env.fallen and own < 0.57
+    both = found.down.all(axis=1)[found.last(4.0)]
+    assert np.abs(found.ahead(4.0))[both].mean() == pytest.approx(0.5, abs=0.04)
+    assert env.controller._swing.duration > own + 0.01
+
+
 @pytest.mark.parametrize("width", [0.12, 0.28])
 def test_a_width_is_commanded(width):
     """Also one below what the planner chooses itself."""
@@ -122,6 +133,10 @@ def test_a_width_is_commanded(width):
     [
         ({"ahead": 9.0}, r"command\.ahead: 9 m/s is steps of .* 'humanoid' can at most .* m/s"),
         ({"left": -2.0}, r"left: -2 m/s is .* to the side .* 'humanoid' can at most .* m/s"),
+        (
+            {"turn": 1.9},
+            r"turn: 1\.9 rad/s in steps of .* 'humanoid' can -.* \(-.*°/s\), where its hi",
+        ),
         ({"ahead": 0.5, "clearance": 0.9}, r"clearance: 0\.9 m is out of reach.* joints end"),
         ({"ahead": 0.5, "width": 0.05}, r"width: 0\.05 m is out of reach.* soles do not overlap"),
         ({"ahead": 0.5, "width": 1.0}, r"width: 1 m is out of reach"),
@@ -152,7 +167,7 @@ def test_the_reach_of_a_robot_is_what_it_is_not_refused(name):
             for outside in (False, True):
                 value = end + sign * 3e-3 * outside  # [m], [m/s] or [rad]
                 said[told, sign, outside] = _refused(walker, told, value)
-    assert len(said) == 2 * 9 and {key: key[2] for key in said} == said
+    assert len(said) == 2 * 11 and {key: key[2] for key in said} == said
     assert reach.own_width == pytest.approx(0.288 * robot(name).height_com)
 
 

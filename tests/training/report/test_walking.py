@@ -51,6 +51,20 @@ def test_a_page_of_walks(results: Results) -> None:
     assert "walking as commanded in the last two strides" in page
 
 
+def test_edges_are_of_walks_on_a_terrain(results: Results) -> None:
+    """Not of level ground, where none could be touched."""
+    level, *others = results.summary["controllers"]["walk"]["walks"]
+    stairs: Any = {**level, "part": "terrains", "surfaces_passed": 8.5, "edge_contacts": 0.25}
+    entry: Any = {**results.summary["controllers"]["walk"], "walks": [stairs, *others]}
+    made = dataclasses.replace(results, summary={**results.summary, "controllers": {"walk": entry}})
+    assert all(other["edge_contacts"] == 0.0 for other in others)
+    found = rows(walking.walk_table(made, ["walk"]))
+    assert [(row["part"], row["surfaces_passed"], row["edge_contacts"]) for row in found] == [
+        ("terrain", "8.5", "0.25"), ("walk", "", ""), ("pushed", "", "")
+    ]  # fmt: skip
+    assert "edge_contacts" not in rows(walking.walk_table(results, ["walk"]))[0]
+
+
 def phases(*found: tuple[float, float, float, str | None]) -> list[dict[str, Any]]:
     return [
         {"phase": phase, "trials": 9, "recovered": 4, "j50": j50, "j50_ci95": (j50 - 1.0, high),

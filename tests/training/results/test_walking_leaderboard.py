@@ -73,6 +73,27 @@ def test_one_without_a_j50_comes_last_without_a_rank(tmp_path: Path) -> None:
     assert ranked[1][2] == "–"
 
 
+def test_the_page_says_what_j50_is_of() -> None:
+    """The command, and how long a push takes, of those that say it."""
+    first, second = read_summary(ONE), read_summary(OTHER)
+    pushes = "J50 is of pushes while it walks (ahead 0.5)"
+
+    def told(*durations: float | None) -> str:
+        for summary, duration in zip((first, second), durations, strict=True):
+            (entry,) = summary["controllers"].values()
+            entry.pop("push_duration", None)
+            if duration is not None:
+                entry["push_duration"] = duration
+        (line,) = [line for line in walking_leaderboard({"a": first, "b": second}).splitlines()
+                   if line.startswith("J50 is")]  # fmt: skip
+        return line
+
+    assert told(None, None) == f"{pushes}."
+    assert told(0.2, 0.2) == f"{pushes}, of 0.2 s."
+    assert told(0.1, None) == f"{pushes}, of 0.1 s for `walk`."
+    assert told(0.2, 0.1) == f"{pushes}, of 0.1 s for `walk-spring`, of 0.2 s for `walk`."
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
