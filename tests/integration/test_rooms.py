@@ -26,8 +26,8 @@ FLOORS = """
  3 envs/maths, envs/terrain, baselines/solvers, baselines/warmup
  3 training/running
  4 envs/robots, baselines/clips
- 5 envs/pushes, baselines/inverse_kinematics, baselines/joining
- 6 envs/physics, baselines/matching, baselines/motion_graphs
+ 5 envs/pushes, baselines/joining
+ 6 envs/physics, baselines/inverse_kinematics, baselines/matching, baselines/motion_graphs
  7 envs/sensors, envs/viewing, baselines/controller
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
