@@ -19,7 +19,7 @@ from poise.baselines.motions.splines import piecewise, rest_spline
 from poise.envs.robots.robot import load_robot
 
 STEPS, ROUNDS = 50, 60
-STEP = {"controller": "motion-step"}
+STEP: dict[str, object] = {"controller": "motion-step"}
 KINDS: dict[str, dict[str, object]] = {
     "standing": {},
     "keyframes (squat)": {"motion": "squat"},
