@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from poise.configs.errors import ConfigError
+from poise.envs.maths.easing import ease
 
 from .rotations import about_z, heading_angle, inverse, multiply, rotate, slerp
 from .skeleton import SIDES, Skeleton
@@ -162,12 +163,12 @@ class Clip:
         """
         begin = self.duration - min(_positive(blend, self.name, "blend"), self.duration)
         u = np.clip((self.times - begin) / (self.duration - begin), 0.0, 1.0)
-        ease = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-        root = self.root + ease[:, None] * (self.root[0] - self.root[-1])
+        grown = ease(u)[:, None]
+        root = self.root + grown * (self.root[0] - self.root[-1])
         gap = multiply(inverse(self.rotations[-1]), self.rotations[0])
         whole = np.broadcast_to(gap, self.rotations.shape)
         identity = np.broadcast_to([1.0, 0.0, 0.0, 0.0], whole.shape)
-        rotations = multiply(self.rotations, slerp(identity, whole, ease[:, None]))
+        rotations = multiply(self.rotations, slerp(identity, whole, grown))
         return replace(self, root=root, rotations=rotations)
 
     def repeated(self, count: int) -> Clip:

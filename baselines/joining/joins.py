@@ -15,6 +15,7 @@ import numpy as np
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.rotations import slerp
 from poise.configs.errors import ConfigError
+from poise.envs.maths.easing import ease
 
 from .states import State, minus, plus, state_at, turned_rate, vector_rate
 
@@ -147,11 +148,6 @@ JOINS: dict[str, Callable[[Clip, Clip, float], Clip]] = {
     "capture": capture,
     "inertial": inertial,
 }
-
-
-def ease(u: np.ndarray) -> np.ndarray:
-    """α(u) = 10u³ − 15u⁴ + 6u⁵: from 0 to 1, at rest at both ends."""
-    return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
 
 def faced_like(clip: Clip, other: Clip) -> Clip:

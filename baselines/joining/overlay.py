@@ -12,8 +12,7 @@ from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.groups import GROUPS, LinkGroup
 from poise.baselines.clips.rotations import IDENTITY, inverse, multiply, slerp
 from poise.configs.errors import ConfigError
-
-from .joins import ease
+from poise.envs.maths.easing import ease
 
 BLEND = 0.3  # [s] in which a layer comes and goes
 

@@ -14,9 +14,9 @@ from poise.envs.robots.robot import Robot
 
 from .feet import foot_signs, nominal_feet
 from .footwork import FootPlan
+from .robot_clip import RATE
 from .splines import rest_spline
 
-RATE = 1.0 / 30.0  # [s] between the postures of a motion with steps
 LEAST = 0.1  # [s] from lift-off to touchdown, and on both feet
 STANDING = 1.3  # [s] of standing that it takes to shift the weight to one foot, and back
 

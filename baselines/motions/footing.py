@@ -78,11 +78,6 @@ class Footing(Copyable):
                       for a, b in zip(begins, ends, strict=True)]  # fmt: skip
         return sorted(found, key=lambda swing: swing[1])
 
-    @property
-    def single_support(self) -> float:
-        """The longest time on one sole [s]."""
-        return max((end - begin for _, begin, end in self.swings), default=0.0)
-
 
 def check_planted(planted: np.ndarray, source: str) -> None:
     """Raise ConfigError unless `planted` (F, 2) says of every frame which soles are planted.

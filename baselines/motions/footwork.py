@@ -11,6 +11,7 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
 from scipy.spatial.transform import Rotation
 
 from poise.configs.errors import ConfigError
+from poise.envs.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
 from .feet import bearing_polygon, nominal_feet
@@ -91,20 +92,20 @@ def plan_zmp(robot: Robot, plan: FootPlan, rest: np.ndarray) -> np.ndarray:
         after = middle if b == frames else over(int(np.argmax(plan.planted[b])), b)
         length = round(SHIFT / plan.dt)
         if b - a <= 2 * length and a > 0 and b < frames:
-            out[a:b] = before + _ease(b - a) * (after - before)
+            out[a:b] = before + _eased(b - a) * (after - before)
             continue
         out[a:b] = middle
         count = min(length, b - a)
         if a > 0:
-            out[a : a + count] = before + _ease(count) * (middle - before)
+            out[a : a + count] = before + _eased(count) * (middle - before)
         if b < frames:
-            out[b - count : b] = middle + _ease(count) * (after - middle)
+            out[b - count : b] = middle + _eased(count) * (after - middle)
     return out
 
 
-def _ease(count: int) -> np.ndarray:
+def _eased(count: int) -> np.ndarray:
     u = (np.arange(count)[:, None] + 1.0) / (count + 1.0)
-    return np.asarray(u**3 * (10.0 - 15.0 * u + 6.0 * u**2))
+    return ease(u)
 
 
 def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
@@ -200,7 +201,7 @@ def _smoothed(turns: np.ndarray, width: float) -> np.ndarray:
 def _led(com: np.ndarray, frames: int) -> np.ndarray:
     """The CoM (F, 2) at rest at both ends, to which it is led over so many frames."""
     u = np.linspace(0.0, 1.0, frames + 1)
-    fade = (u**3 * (10.0 - 15.0 * u + 6.0 * u**2))[:, None]
+    fade = ease(u)[:, None]
     out = com.copy()
     out[: frames + 1] = com[0] + fade * (com[: frames + 1] - com[0])
     out[-frames - 1 :] = com[-1] + fade[::-1] * (com[-frames - 1 :] - com[-1])

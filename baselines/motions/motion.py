@@ -19,11 +19,11 @@ from poise.configs.schema import build, read_yaml
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 
-from .foot_steps import RATE, FootStep, check_steps, plan_steps
+from .foot_steps import FootStep, check_steps, plan_steps
 from .footwork import perform_plan
 from .postures import LevelKinematics
 from .reference_motion import ReferenceMotion
-from .robot_clip import read_robot_clip, reference_from, stepped_reference
+from .robot_clip import RATE, read_robot_clip, reference_from, stepped_reference
 from .splines import piecewise, rest_spline
 
 SAMPLING = 0.02  # [s] between the postures whose height and root orientation are computed

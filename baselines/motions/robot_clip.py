@@ -23,6 +23,7 @@ from .postures import LevelKinematics
 from .reference_motion import ReferenceMotion
 from .splines import piecewise, rest_spline
 
+RATE = 1.0 / 30.0  # [s] between the postures of the clips that are made here
 FEWEST = 4  # frames that a spline at rest at both ends takes
 MOST = 20_000
 LEVEL = 0.02  # [m] by which a sole may leave the plane of both

@@ -10,12 +10,8 @@ motion goes on from the new stance.
 import numpy as np
 
 from poise.baselines.motions.footing import COM, PLACE, ROOT, SPIN, TURN
-from poise.baselines.motions.splines import evaluate
 from poise.baselines.motions.targets import root_reference
-from poise.baselines.motions.tempo import CHANGE, RATE, TIME
-from poise.baselines.stepping.cop_region import double_support_region, single_support_region
 from poise.baselines.stepping.guidance import limit_posture
-from poise.baselines.stepping.recentring import set_level_frame, stop_recentring
 from poise.baselines.stepping.swing import start_swing
 from poise.baselines.stepping.tick import (
     FIRST_LOAD,
@@ -23,153 +19,28 @@ from poise.baselines.stepping.tick import (
     has_landed,
     solve_contacts,
 )
-from poise.baselines.whole_body.tick import ContactTick
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.polygons import find_nearest
-from poise.envs.maths.vectors import along, copy_into, rotated, turned
+from poise.envs.maths.vectors import copy_into, rotated, turned
 
-from .blocks import COS, GROUND, SIN, PerformTick, X, Y
+from .blocks import COS, GROUND, SIN, PerformTick
+from .catching import ask_to_rest, go_on, leave, may_go_on
+from .schedule import (
+    beyond_reach,
+    lifted_foot,
+    motion_time,
+    next_switch,
+    pendulum_rate,
+    phase_at,
+    put_frame,
+    reached_region,
+    sample_footing,
+    to_world,
+    wanted_cop,
+)
 
 UNLOADED, LEAST_LOAD = 1.15, 0.03  # [m g] that a foot may bear when it begins to, and as it, leaves
 SETTLING = 0.3  # [s] before the first lift-off until which the motion's frame is that of the soles
-AHEAD = 0.4  # [s] before a lift-off by which the motion must have gone on
-
-
-@compiled
-def go_on_from(contacts: ContactTick, torques: np.ndarray) -> None:
-    """Let the next tick change these `torques` (nv−6,) of the last one no more than it may."""
-    copy_into(torques, contacts.applied)
-    copy_into(torques, contacts.memory.torques)
-    contacts.follows[0] = 1
-
-
-@compiled
-def motion_time(t: PerformTick) -> float:
-    """The motion's own time [s]."""
-    p = t.performance
-    return p.pace.memory[TIME] if p.pace.waits else p.clock[0]
-
-
-@compiled
-def phase_at(switches: np.ndarray, time: float) -> int:
-    """The row of `planted` that holds at a time [s]."""
-    return int(np.searchsorted(switches, time, side="right"))
-
-
-@compiled
-def next_switch(t: PerformTick, time: float) -> float:
-    """When the planted soles change next [s]; infinite after the last step."""
-    switches = t.performance.switches
-    i = phase_at(switches, time)
-    return switches[i] if i < switches.shape[0] else np.inf
-
-
-@compiled
-def lifted_foot(t: PerformTick, phase: int) -> int:
-    """The foot that is in the air in a phase; −1: none."""
-    planted = t.performance.planted
-    for foot in range(2):
-        if planted[phase, foot] == 0:
-            return foot
-    return -1
-
-
-@compiled
-def sample_footing(t: PerformTick, time: float) -> None:
-    """The motion's CoM, root and soles, into `samples`, in the motion's frame."""
-    p = t.performance
-    evaluate(p.knots, p.coeffs, False, time, p.samples[0], p.samples[1], p.samples[2])
-    if p.pace.waits:
-        rate, change = p.pace.memory[RATE], p.pace.memory[CHANGE]
-        for j in range(p.samples.shape[1]):
-            p.samples[2, j] = rate * rate * p.samples[2, j] + change * p.samples[1, j]
-            p.samples[1, j] *= rate
-
-
-@compiled
-def put_frame(t: PerformTick) -> None:
-    """Let the motion's frame be where its soles are as the robot's are now."""
-    s, p = t.own.state, t.performance
-    feet, place = s.sole_point, p.samples[0]
-    p.frame[COS], p.frame[SIN] = s.heading[0], s.heading[1]
-    x = 0.5 * (place[PLACE[0]] + place[PLACE[1]])
-    y = 0.5 * (place[PLACE[0] + 1] + place[PLACE[1] + 1])
-    x, y = turned(s.heading[0], s.heading[1], x, y)
-    p.frame[X] = 0.5 * (feet[0, 0] + feet[1, 0]) - x
-    p.frame[Y] = 0.5 * (feet[0, 1] + feet[1, 1]) - y
-    p.frame[GROUND] = 0.5 * (feet[0, 2] + feet[1, 2])
-    set_level_frame(t.own.memory.level_frame, p.frame[COS], p.frame[SIN])
-
-
-@compiled
-def to_world(t: PerformTick) -> None:
-    """Turn CoM and places of `samples` to the world."""
-    p = t.performance
-    for column in (COM, PLACE[0], PLACE[1], SPIN):
-        for r in range(3):
-            x, y = p.samples[r, column], p.samples[r, column + 1]
-            x, y = turned(p.frame[COS], p.frame[SIN], x, y)
-            p.samples[r, column], p.samples[r, column + 1] = x, y
-        if column != SPIN:
-            p.samples[0, column] += p.frame[X]
-            p.samples[0, column + 1] += p.frame[Y]
-            p.samples[0, column + 2] += p.frame[GROUND]
-
-
-@compiled
-def stance_differs(t: PerformTick) -> bool:
-    """Return whether the feet stand otherwise to each other than the motion's do now."""
-    s, p = t.own.state, t.performance
-    feet, place = s.sole_point, p.samples[0]
-    x, y = along(
-        s.heading[0], s.heading[1], feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1]
-    )  # fmt: skip
-    x -= place[PLACE[0]] - place[PLACE[1]]
-    y -= place[PLACE[0] + 1] - place[PLACE[1] + 1]
-    return np.sqrt(x * x + y * y) > p.stance_error
-
-
-@compiled
-def pendulum_rate(t: PerformTick) -> float:
-    """ω² = (g + c̈_z)/(c_z − ground) of the motion [1/s²]."""
-    p = t.performance
-    height = p.samples[0, COM + 2] - p.frame[GROUND]
-    return (t.own.robot.gravity + p.samples[2, COM + 2]) / max(height, 1e-3)
-
-
-@compiled
-def wanted_cop(t: PerformTick, gain: float, out: np.ndarray) -> None:
-    """p_ref + (1 + gain) (ξ − ξ_ref) into `out` (≥ 2,) [m]; p_ref = c − c̈/ω² − δ is the ZMP."""
-    s, samples = t.own.state, t.performance.samples
-    rate = pendulum_rate(t)
-    omega = np.sqrt(rate)
-    for a in range(2):
-        j = COM + a
-        error = s.com[a] - samples[0, j] + (s.com_vel[a] - samples[1, j]) / omega
-        zmp = samples[0, j] - samples[2, j] / rate - samples[0, SPIN + a]
-        out[a] = zmp + (1.0 + gain) * error
-
-
-@compiled
-def reached_region(t: PerformTick) -> int:
-    """The corners of what the soles in contact reach, into `memory.region`; how many they are."""
-    c, m = t.own, t.own.memory
-    feet, level, region = c.state.sole_point, m.level_frame, t.own.search.region
-    cos, sin = level[0, 0], level[1, 0]
-    if m.swinging[0]:
-        stance = 1 - m.foot[0]
-        return single_support_region(region, stance, feet[stance], cos, sin, m.region)
-    return double_support_region(region, feet, cos, sin, c.cloud, m.region)
-
-
-@compiled
-def beyond_reach(t: PerformTick, corners: int) -> float:
-    """How far the least CoP that keeps ξ − ξ_ref from growing is outside what soles reach [m]."""
-    c = t.own
-    wanted_cop(t, 0.0, c.vector)
-    find_nearest(c.memory.region[:corners], c.vector, c.pair)
-    x, y = c.vector[0] - c.pair[0], c.vector[1] - c.pair[1]
-    return np.sqrt(x * x + y * y)
 
 
 @compiled
@@ -251,61 +122,6 @@ def follow_foot(t: PerformTick) -> None:
 
 
 @compiled
-def leave(t: PerformTick) -> None:
-    """Hand over to the planner of steps, in the middle of a swing too."""
-    c, p, m, w = t.capture, t.performance, t.own.memory, t.own.swing
-    p.performing[0], p.rested[0] = 0, 0.0
-    p.left[0] += 1
-    stop_recentring(c.recentring)
-    m.recovering[0], m.corners[0] = 0, 0
-    go_on_from(c.on_both, t.own.on_both.applied)
-    if m.swinging[0]:
-        m.recovering[0], m.load_fraction[0] = 1, 0.0
-        w.time[0], w.time_offset[0] = 0.0, 0.0
-        w.duration[0] = c.search.time_max
-    elif m.steps[0] == 0:
-        ws = c.standing.problem.workspace
-        copy_into(t.own.on_both.applied, ws.tau)
-        copy_into(t.own.on_both.problem.workspace.wrenches, ws.wrenches)
-
-
-@compiled
-def may_go_on(t: PerformTick, time: float) -> bool:
-    """Return whether the motion can go on from here; then its frame is put under it."""
-    p, m, period = t.performance, t.own.memory, t.own.gains.period
-    p.rested[0] = 0.0 if m.swinging[0] or m.recovering[0] else p.rested[0] + period
-    if p.rested[0] < p.rest_time or lifted_foot(t, phase_at(p.switches, time)) >= 0:
-        return False
-    if next_switch(t, time) - time < AHEAD or stance_differs(t):
-        return False
-    put_frame(t)
-    to_world(t)
-    return beyond_reach(t, reached_region(t)) <= 0.0
-
-
-@compiled
-def ask_to_rest(t: PerformTick) -> None:
-    """The targets while it catches itself: standing, with the motion's trunk and arms."""
-    s, own, given, robot = t.own.state, t.resting, t.given, t.own.robot
-    copy_into(given.q_ref, own.q_ref)
-    copy_into(given.v_ref, own.v_ref)
-    copy_into(given.a_ref, own.a_ref)
-    for i in range(t.legs.shape[0]):
-        j = t.legs[i]
-        own.q_ref[j], own.v_ref[j], own.a_ref[j] = robot.q_standing[j], 0.0, 0.0
-    cos, sin = s.heading[0], s.heading[1]
-    for a in range(3):
-        x, y = robot.root_standing[0, a], robot.root_standing[1, a]
-        own.root_axes[0, a], own.root_axes[1, a] = turned(cos, sin, x, y)
-        own.root_axes[2, a] = robot.root_standing[2, a]
-        own.root_vel[a] = own.root_acc[a] = own.com_vel[a] = own.com_acc[a] = 0.0
-        own.angular_momentum[a] = 0.0
-    own.com[0], own.com[1] = s.origin[0] + cos * t.com_offset, s.origin[1] + sin * t.com_offset
-    own.com[2] = s.origin[2] + robot.height_com
-    own.cop[0], own.cop[1] = own.com[0], own.com[1]
-
-
-@compiled
 def perform(t: PerformTick, time: float) -> bool:
     """A tick of the performance; False instead of torques where the planner has to take over."""
     c, p, m = t.own, t.performance, t.own.memory
@@ -333,16 +149,6 @@ def perform(t: PerformTick, time: float) -> bool:
         m.clock[0] += c.gains.period
     solve_contacts(c, contacts)
     return True
-
-
-@compiled
-def go_on(t: PerformTick) -> None:
-    """Perform again, from the stance that the planner has led to."""
-    c, p, m = t.capture, t.performance, t.own.memory
-    before = c.standing.problem.workspace.tau if m.steps[0] == 0 else c.on_both.applied
-    go_on_from(t.own.on_both, before)
-    p.performing[0], m.corners[0] = 1, 0
-    stop_recentring(c.recentring)
 
 
 @compiled

@@ -14,10 +14,10 @@ from poise.baselines.motions.feet import foot_signs, nominal_feet
 from poise.baselines.motions.foot_steps import STANDING
 from poise.baselines.motions.footing import root_turns
 from poise.baselines.motions.footwork import FootPlan
+from poise.baselines.motions.robot_clip import RATE
 from poise.configs.errors import ConfigError
+from poise.envs.maths.easing import ease
 from poise.envs.robots.robot import Robot
-
-from .targets import RATE
 
 BOTH = 0.1  # [s] on both feet between two steps, at least
 SWING = 0.4  # [s] of a step whose begin or end the clip does not show
@@ -161,7 +161,7 @@ def plan_paces(
         goal[0] += ahead
         apex = float(np.clip(scale * pace.apex, LOWEST * h, HIGHEST * h))
         u = np.linspace(0.0, 1.0, b - a + 1)[:, None]
-        way = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+        way = ease(u)
         places[a : b + 1, foot] += way * (goal - places[a, foot])
         places[a : b + 1, foot, 2] += apex * _hump(u[:, 0])
         tip = min(DIP * apex / (0.5 * float(np.ptp(robot.soles[foot].polygon[:, 0]))), MOST_DIP)
@@ -184,7 +184,7 @@ def _hump(u: np.ndarray) -> np.ndarray:
     """From 0 to 1 at u = 0.45 and back, C² and at rest at both ends."""
     up, down = np.clip(u / 0.45, 0.0, 1.0), np.clip((1.0 - u) / 0.55, 0.0, 1.0)
     v = np.minimum(up, down)
-    return np.asarray(v**3 * (10.0 - 15.0 * v + 6.0 * v**2))
+    return ease(v)
 
 
 def _heights(frames: int, times: list[tuple[int, ...]], h: float) -> np.ndarray:
@@ -193,4 +193,4 @@ def _heights(frames: int, times: list[tuple[int, ...]], h: float) -> np.ndarray:
     down = np.clip((k - times[0][0] * RATE + 0.7) / 0.7, 0.0, 1.0)
     up = np.clip((times[-1][1] * RATE + 0.7 - k) / 0.7, 0.0, 1.0)
     v = np.minimum(down, up)
-    return np.asarray(h * (1.0 - (1.0 - WALKING) * v**3 * (10.0 - 15.0 * v + 6.0 * v**2)))
+    return np.asarray(h * (1.0 - (1.0 - WALKING) * ease(v)))

@@ -9,13 +9,13 @@ import numpy as np
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.contacts import measure_contacts
 from poise.baselines.motions.footwork import perform_plan
-from poise.baselines.motions.robot_clip import About, RobotClip
+from poise.baselines.motions.robot_clip import RATE, About, RobotClip
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .limbs import Limbs, find_limbs
 from .paces import LONGEST, clip_heading, longest_step, plan_paces
-from .targets import RATE, BodyTargets, between_standing, clip_targets, standing_targets
+from .targets import BodyTargets, between_standing, clip_targets, standing_targets
 
 SMOOTH = 3.0  # [Hz] of the low-pass on what the clip asks for, and on the joints
 LEAD = 1.0  # [s] from standing into the clip, and back
@@ -66,7 +66,29 @@ def retarget(
             missing.
         PoiseError: no posture keeps the soles and the limits.
     """
-    limbs, whole, heading = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
+    asked = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
+    return retarget_to(asked, clip, robot, smooth=smooth, lead=lead)
+
+
+class AskedOf(NamedTuple):
+    """What a clip asks of a robot.
+
+    Attributes:
+        limbs: the robot's.
+        targets: from standing to standing.
+        heading: of a clip with steps [rad]; None for feet that stay.
+    """
+
+    limbs: Limbs
+    targets: BodyTargets
+    heading: float | None
+
+
+def retarget_to(
+    asked: AskedOf, clip: Clip, robot: Robot, *, smooth: float, lead: float
+) -> Retargeted:
+    """`retarget` for what `targets_on` has found with the same arguments; raises what it does."""
+    limbs, whole, heading = asked
     solved = _solver()(robot, limbs, whole, smooth)
     about = About(robot.name, robot.fingerprint, clip.name, clip.name, clip.licence)
     qpos, stance, stride = solved.qpos, None, 1.0
@@ -87,11 +109,8 @@ def retarget(
     )
 
 
-def targets_on(
-    clip: Clip, robot: Robot, *, smooth: float, lead: float, planted: bool
-) -> tuple[Limbs, BodyTargets, float | None]:
-    """The robot's limbs, what a clip asks of it from standing to standing, and the heading of a
-    clip with steps [rad]; None for feet that stay. See `retarget`."""
+def targets_on(clip: Clip, robot: Robot, *, smooth: float, lead: float, planted: bool) -> AskedOf:
+    """What a clip asks of a robot; arguments and errors as of `retarget`."""
     for name, value in (("smooth", smooth), ("lead", lead)):
         if not 0.0 < value <= 100.0:
             raise ConfigError(f"must be above 0 and at most 100, not {value:g}", field=name)
@@ -99,7 +118,8 @@ def targets_on(
     limbs = find_limbs(robot)
     heading = clip_heading(clip) if steps else None
     targets = clip_targets(clip, limbs.has_arms, smooth, heading)
-    return limbs, between_standing(targets, standing_targets(robot, limbs), lead), heading
+    whole = between_standing(targets, standing_targets(robot, limbs), lead)
+    return AskedOf(limbs, whole, heading)
 
 
 def _stepped(

@@ -11,7 +11,9 @@ from scipy.signal import butter, sosfiltfilt
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.rotations import heading_angle
 from poise.baselines.clips.skeleton import SIDES
+from poise.baselines.motions.robot_clip import RATE
 from poise.configs.errors import ConfigError
+from poise.envs.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
 from .limbs import Limbs
@@ -26,7 +28,6 @@ LINES = {
 }
 ARMS = ("shoulders", *(f"{part}_{side}" for part in ("upper_arm", "forearm") for side in SIDES))
 UPRIGHT = 0.9  # of the legs' length: at least so high are the hips of somebody who stands
-RATE = 1.0 / 30.0  # [s] between frames
 FEW = 8  # frames: a shorter clip cannot be smoothed
 
 
@@ -90,13 +91,13 @@ def between_standing(clip: BodyTargets, standing: BodyTargets, lead: float) -> B
     Ways follow α(u) = 10u³ − 15u⁴ + 6u⁵ on great circles.
     """
     u = np.arange(1, max(round(lead / RATE), 1)) * RATE / lead
-    ease = np.concatenate([[0.0], u**3 * (10.0 - 15.0 * u + 6.0 * u**2)])
+    way = np.concatenate([[0.0], ease(u)])
     directions = {}
     for name, values in clip.directions.items():
         rest = standing.directions[name][0]
-        begin = _circle(rest, values[0], ease)
-        directions[name] = np.concatenate([begin, values, _circle(rest, values[-1], ease)[::-1]])
-    begin, end = (1.0 + ease * (height - 1.0) for height in clip.height[[0, -1]])
+        begin = _circle(rest, values[0], way)
+        directions[name] = np.concatenate([begin, values, _circle(rest, values[-1], way)[::-1]])
+    begin, end = (1.0 + way * (height - 1.0) for height in clip.height[[0, -1]])
     return BodyTargets(directions, np.concatenate([begin, clip.height, end[::-1]]))
 
 

@@ -13,15 +13,14 @@ import numpy as np
 from poise.baselines.clips.bvh import read_bvh
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import find_bvh
-from poise.baselines.motions.robot_clip import RobotClip
+from poise.baselines.motions.robot_clip import RATE, RobotClip
 from poise.baselines.retargeting.retarget import (
     LEAD,
     SMOOTH,
     Retargeted,
-    retarget,
+    retarget_to,
     targets_on,
 )
-from poise.baselines.retargeting.targets import RATE
 from poise.baselines.space_time.constraints.constraint import Constraint
 from poise.baselines.space_time.constraints.reading import check_constraints, read_constraints
 from poise.baselines.space_time.constraints.scene import Scene
@@ -107,15 +106,16 @@ def retarget_clip(
     else:
         source, wanted = None, tuple(constraints)
     chosen: Solver = solver or ("spacetime" if wanted else "frame")
-    limbs, targets, heading = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
+    given = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
+    limbs, targets, heading = given
     if heading is not None and (chosen != "frame" or wanted):
         raise ConfigError("its feet step: only the solver 'frame', without constraints, is for "
                           "such clips (--planted takes the feet as planted)", source=clip.name,
                           field="solver" if chosen != "frame" else "constraints")  # fmt: skip
     shape = np.tile(robot.standing_qpos, (len(targets), 1))
     check_constraints(wanted, _scene(robot, limbs, shape, lead), source)
-    made = retarget(clip, robot, smooth=smooth, lead=lead, planted=planted)
-    from .asked import Asked  # mink is there: `retarget` has used it
+    made = retarget_to(given, clip, robot, smooth=smooth, lead=lead)
+    from .asked import Asked  # mink is there: `retarget_to` has used it
     from .grid import by_trial
     from .problem import Problem
     from .quality import measure

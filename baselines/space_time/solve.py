@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from typing import NamedTuple
 
 from poise.configs.errors import PoiseError
 
@@ -17,22 +15,7 @@ SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step that are tried
 ENOUGH, MET = 1e-3, 0.02  # decreases that end it: of the cost, relative; of the penalties
 
 
-class Optimum(NamedTuple):
-    """How the optimum was found.
-
-    Attributes:
-        before, after: costs of the first and of the last postures.
-        programs: how many were solved.
-        seconds: of the processor.
-    """
-
-    before: Cost
-    after: Cost
-    programs: int
-    seconds: float
-
-
-def optimise(problem: Problem, progress: Callable[[int, Cost], None] | None = None) -> Optimum:
+def optimise(problem: Problem, progress: Callable[[int, Cost], None] | None = None) -> None:
     """Move the postures of the problem's scene to a minimum of its cost.
 
     Each program gives displacements; the largest of their shares 1, ½, ¼ and 0.1 is taken that
@@ -41,8 +24,7 @@ def optimise(problem: Problem, progress: Callable[[int, Cost], None] | None = No
 
     Raises PoiseError if OSQP breaks down in the first program.
     """
-    scene, begun = problem.scene, time.thread_time()
-    cost = first = problem.cost()
+    scene, cost = problem.scene, problem.cost()
     trust, solved = TRUST, 0
     while solved < MOST and trust > LEAST_TRUST:
         step = problem.step(trust)
@@ -72,4 +54,3 @@ def optimise(problem: Problem, progress: Callable[[int, Cost], None] | None = No
         if enough:
             break
         trust = min(2.0 * trust, TRUST) if share == 1.0 else 0.5 * trust
-    return Optimum(first, cost, solved, time.thread_time() - begun)

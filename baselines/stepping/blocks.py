@@ -135,6 +135,8 @@ class StepGains(Block):
     """The gains of a `CaptureStepConfig` in SI units."""
 
     step_margin: float  # [m]
+    crouch_margin: float  # [m] more for a motion that crouches by 1 m
+    turn_limit: float  # of the root against the motion's [rad]
     momentum_gain: float  # [m per N·m·s]
     restep_margin: float  # [m]
     gain: float  # k of p = ξ + k (ξ − ξ_ref)
@@ -165,6 +167,8 @@ class StepMemory(Block):
     load_fraction: np.ndarray  # (1,) of this load that it still bears
     region: np.ndarray  # (2 n + 1, 2) CoP region of both soles since the last touchdown [m]
     corners: np.ndarray  # (1,) int: how many rows of it count; 0: it is not known
+    moved: np.ndarray  # (1,) int: 1 once the motion has moved
+    return_fraction: np.ndarray  # (1,) of the way from the stance's posture to the motion's
 
 
 @dataclass(frozen=True, eq=False)

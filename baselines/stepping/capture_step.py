@@ -71,6 +71,8 @@ def step_gains(
     h, omega = units.height, units.omega
     return StepGains(
         step_margin=c.step_margin * h if steps else np.inf,
+        crouch_margin=c.crouch_margin,
+        turn_limit=float(np.radians(c.turn_limit)),
         momentum_gain=c.momentum_gain * omega / units.force,
         restep_margin=c.restep_margin * h,
         gain=float(c.gain),
@@ -102,6 +104,8 @@ def allocate_step_memory(region: RegionArrays) -> StepMemory:
         load_fraction=guarded_zeros(1),
         region=guarded_zeros((2 * corners + 1, 2)),
         corners=guarded_zeros(1, whole),
+        moved=guarded_zeros(1, whole),
+        return_fraction=guarded_zeros(1),
     )
 
 

@@ -5,12 +5,45 @@ import numpy as np
 from poise.baselines.motions.offsets import COM_X, COM_Y, COM_Z, COP_X, COP_Y, LEAN_X, LEAN_Y
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.polygons import find_nearest
-from poise.envs.maths.vectors import copy_into, rotation_error, turned
+from poise.envs.maths.vectors import copy_into, rotated, rotation_error, turn_error, turned
 
 from .blocks import CaptureTick
 from .feedback import HEIGHT, STANCE, SWING, pivot_offset
 from .recentring import LOADING, SHIFTING, limit_cop_distance
 from .search import set_capture_point
+
+STILL = 1e-6  # [rad/s] of the joints together, slower is rounding
+RETURN = 0.3  # of the way back to the motion in 1/ω
+UPRIGHT = 0.95  # [h] a motion that has the CoM lower crouches
+
+
+@compiled
+def crouch(t: CaptureTick) -> float:
+    """How far below 0.95 h the motion has the CoM [m]; 0 where it stands."""
+    height = t.reference_in.com[2] - t.state.origin[2] - t.offsets[COM_Z]
+    return max(UPRIGHT * t.robot.height_com - height, 0.0)
+
+
+@compiled
+def moves(t: CaptureTick) -> bool:
+    """Return whether the motion that is asked for moves; standing does not, but for rounding."""
+    rates, total = t.reference_in.v_ref, 0.0
+    for j in range(rates.shape[0]):
+        total += rates[j] * rates[j]
+    return total > STILL * STILL
+
+
+@compiled
+def turned_away(t: CaptureTick) -> tuple[float, float]:
+    """The angle of the root from where the motion has it [rad], and how fast it grows [rad/s]."""
+    s, given, error = t.state, t.reference_in, t.vector
+    scale = turn_error(s.root_axes, given.root_axes, error)
+    angle, rate = 0.0, 0.0
+    for a in range(3):
+        angle += error[a] * error[a]
+        rate += error[a] * (given.root_vel[a] - s.qvel[3 + a])
+    angle = np.sqrt(angle)
+    return scale * angle, rate / max(angle, 1e-9)
 
 
 @compiled
@@ -69,6 +102,10 @@ def guide_com(
     x, y = turned(cos, sin, offsets[COM_X], offsets[COM_Y])
     rest_x += x
     rest_y += y
+    back = t.memory.return_fraction[0]
+    if back > 0.0 and not t.memory.recovering[0]:  # the motion is gone on with
+        rest_x += back * (t.reference_in.com[0] - rest_x)
+        rest_y += back * (t.reference_in.com[1] - rest_y)
     desired, xi = t.vector, t.search.capture_point
     set_capture_point(t.search)
     desired[0] = xi[0] + g.gain * (xi[0] - rest_x)
@@ -93,6 +130,41 @@ def guide_com(
     if t.memory.swinging[0]:
         own.com[2] += t.search.feedback.added[HEIGHT] - g.swing_com_drop
     own.com_vel[2] = own.com_acc[2] = 0.0
+    limit_posture(t)
+
+
+@compiled
+def world(axes: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
+    """A vector (3,) of a frame in the world."""
+    return (
+        axes[0, 0] * v[0] + axes[0, 1] * v[1] + axes[0, 2] * v[2],
+        axes[1, 0] * v[0] + axes[1, 1] * v[1] + axes[1, 2] * v[2],
+        axes[2, 0] * v[0] + axes[2, 1] * v[1] + axes[2, 2] * v[2],
+    )
+
+
+@compiled
+def return_to_motion(t: CaptureTick) -> None:
+    """Lead height of the CoM and root to the motion's, once the robot is home and calm; guides the
+    CoM to the motion's from the next tick on."""
+    s, m, given, own = t.state, t.memory, t.reference_in, t.reference_out
+    if m.recovering[0]:
+        m.return_fraction[0] = 0.0
+        return
+    m.return_fraction[0] = min(m.return_fraction[0] + RETURN * s.omega[0] * t.gains.period, 1.0)
+    back = m.return_fraction[0]
+    own.com[2] += back * (given.com[2] - own.com[2])
+    own.com_vel[2], own.com_acc[2] = back * given.com_vel[2], back * given.com_acc[2]
+    axis, R = t.vector, own.root_axes
+    scale = turn_error(R, given.root_axes, axis)
+    sine = np.sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2])
+    x, y, z = world(R, axis)
+    if sine > 0.0:
+        x, y, z = x / sine, y / sine, z / sine
+    cos, sin = np.cos(back * scale * sine), np.sin(back * scale * sine)
+    for a in range(3):
+        R[0, a], R[1, a], R[2, a] = rotated(x, y, z, cos, sin, R[:, a])
+        own.root_vel[a] = back * given.root_vel[a]
     limit_posture(t)
 
 

@@ -14,7 +14,7 @@ from poise.envs.maths.vectors import copy_into
 from .blocks import BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, CaptureTick
 from .cop_region import distance_beyond, double_support_region, single_support_region
 from .feedback import LATER_STEP, LX, LY
-from .guidance import copy_reference, guide_com
+from .guidance import copy_reference, crouch, guide_com, moves, return_to_motion, turned_away
 from .recentring import (
     INACTIVE,
     SWINGING,
@@ -37,6 +37,9 @@ from .swing import (
     time_left,
 )
 
+LEAD = 0.7  # [1/ω] by which the turn of the root is looked ahead; in a crouch by less
+DEEP = 0.1  # [h] of a crouch in which it is not
+AWAY = 1.0  # [rad/s] a slower turn is no reason for a step
 LOW = 0.04  # [h] above the ground: a foot that touches it higher up stands on its edge
 FIRST_LOAD = 0.3  # [m g] that a foot may bear at touchdown; then the limit rises
 FZ = 2  # of a sole's wrench
@@ -66,7 +69,15 @@ def must_step(t: CaptureTick) -> bool:
         return outside > g.restep_margin + t.offsets[TRIGGER]
     x, y = x - s.origin[0], y - s.origin[1]  # of the fall
     turning = (x * s.momentum[LY] - y * s.momentum[LX]) / max(np.sqrt(x * x + y * y), 1e-9)
-    return outside + g.momentum_gain * turning > g.step_margin + t.offsets[TRIGGER]
+    margin = g.step_margin
+    if moves(t):
+        angle, rate = turned_away(t)
+        low = crouch(t)
+        lead = LEAD / s.omega[0] * max(1.0 - low / (DEEP * t.robot.height_com), 0.0)
+        if rate > AWAY and angle + lead * rate > g.turn_limit:
+            return True
+        margin += g.crouch_margin * low * max(1.0 - (angle / g.turn_limit) ** 2, 0.0)
+    return outside + g.momentum_gain * turning > margin + t.offsets[TRIGGER]
 
 
 @compiled
@@ -91,7 +102,7 @@ def begin_step(t: CaptureTick, to_nominal: bool) -> None:
         plan_step(q)
     foot = q.best_foot[0]
     m.steps[0] += 1
-    m.recovering[0] = 1
+    m.recovering[0], m.return_fraction[0] = 1, 0.0
     m.foot[0], m.swinging[0] = foot, 1
     start_swing(t.swing, s.sole_point[foot], s.sole_point[1 - foot, 2], q.best[BEST_TIME])
     aim_swing(t.swing, q.best[BEST_X], q.best[BEST_Y], q.best[BEST_TIME])
@@ -167,6 +178,8 @@ def double_support_tick(t: CaptureTick) -> None:
     stride_x, stride_y = feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1]
     ground = 0.5 * (feet[0, 2] + feet[1, 2])
     guide_com(t, m.region[: m.corners[0]], g.cop_overreach, ground, stride_x, stride_y)
+    if m.moved[0]:
+        return_to_motion(t)
     t.on_both.limited[0] = 0
     if m.clock[0] < g.load_time:
         weight = t.robot.mass * t.robot.gravity
@@ -191,6 +204,8 @@ def capture_tick(t: CaptureTick) -> None:
     """One tick of `CaptureStep`: `tau` holds torques, unless `to_python` says that Python must."""
     m = t.memory
     t.to_python[0] = 0
+    if not m.moved[0] and moves(t):
+        m.moved[0] = 1
     if not m.swinging[0]:
         if must_step(t):
             begin_step(t, False)

@@ -23,11 +23,11 @@ MOST = 14  # files in a room
 FLOORS = """
  1 configs, training/statistics
  2 envs/compiled, baselines/allowance, baselines/scripts
- 3 envs/maths, envs/terrain, baselines/clips, baselines/solvers, baselines/warmup
+ 3 envs/maths, envs/terrain, baselines/solvers, baselines/warmup
  3 training/running
- 4 envs/robots, baselines/joining
- 5 envs/pushes, baselines/inverse_kinematics, baselines/matching, baselines/motion_graphs
- 6 envs/physics
+ 4 envs/robots, baselines/clips
+ 5 envs/pushes, baselines/joining
+ 6 envs/physics, baselines/inverse_kinematics, baselines/matching, baselines/motion_graphs
  7 envs/sensors, envs/viewing, baselines/controller
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body

@@ -1,6 +1,7 @@
 """Random transitions between packaged clips, made by physics and by a fixed rule, and performed.
 
     python -m tests.performance.joins --count 200 --out joins.jsonl
+    python -m tests.performance.joins --count 200 --refusals     # only whether these are wrong
 
 Each leaves one clip and enters another at random times. `physical` gives a join or refuses. What it
 gives is performed by momentum-qp, and so is the seed's rule for the same pair: a cubic of the
@@ -137,6 +138,20 @@ def _with(robot: Robot, clips: dict[str, RobotClip], pair: Pair, joints: np.ndar
                      first, f"{pair.before}-{pair.after}", frames)  # fmt: skip
 
 
+def judge_refusal(
+    robot: Robot, clips: dict[str, RobotClip], pair: Pair, seed: int
+) -> dict[str, Any]:
+    """The record of one pair of which nothing is performed unless it is refused."""
+    record: dict[str, Any] = pair._asdict() | {"seed": seed, "given": True}
+    try:
+        physical_join(robot, clips[pair.before], clips[pair.after],
+                      leave=pair.leave, enter=pair.enter)  # fmt: skip
+    except JoinRefused as refusal:
+        record |= {"given": False, "reason": str(refusal).split(": ", 1)[1],
+                   "works": _works(robot, clips, pair, seed)}  # fmt: skip
+    return record
+
+
 def judge_pair(
     robot: Robot, clips: dict[str, RobotClip], pair: Pair, seed: int, grid: bool
 ) -> dict[str, Any]:
@@ -185,20 +200,25 @@ def print_summary(records: list[dict[str, Any]]) -> None:
     """Falls, errors and refusals, with intervals."""
     given = [r for r in records if r["given"]]
     refused = [r for r in records if not r["given"]]
-    through, bent = (sum(r[name] for r in given) for name in ("through", "bent"))
-    print(f"{len(records)} pairs, {len(given)} given, {through} of them through standing, "
-          f"{bent} bent, {len(refused)} refused")  # fmt: skip
-    _print_falls("physical", [r["fallen"] for r in given], [r["error"] for r in given])
-    for name, part in (("the rule, the same pairs", given), ("the rule, all", records)):
-        played = [r for r in part if "rule_fallen" in r]
-        _print_falls(name, [r["rule_fallen"] for r in played], [r["rule_error"] for r in played])
-        print(f"  no motion at all: {len(part) - len(played)}")
+    print(f"{len(records)} pairs, {len(given)} given, {len(refused)} refused")
+    if all("fallen" in r for r in given):
+        _print_performed(given, records)
     tried = [r for r in refused if "works" in r]
     if tried:
         wrong = sum(r["works"] is not None for r in tried)
         low, high = wilson_interval(wrong, len(tried))
         print(f"wrong refusals: {wrong} of {len(tried)} ({low:.1%} to {high:.1%}), "
               f"{wrong / len(records):.1%} of all pairs")  # fmt: skip
+
+
+def _print_performed(given: list[dict[str, Any]], records: list[dict[str, Any]]) -> None:
+    through, bent = (sum(r[name] for r in given) for name in ("through", "bent"))
+    print(f"of those given {through} through standing, {bent} bent")
+    _print_falls("physical", [r["fallen"] for r in given], [r["error"] for r in given])
+    for name, part in (("the rule, the same pairs", given), ("the rule, all", records)):
+        played = [r for r in part if "rule_fallen" in r]
+        _print_falls(name, [r["rule_fallen"] for r in played], [r["rule_error"] for r in played])
+        print(f"  no motion at all: {len(part) - len(played)}")
 
 
 def _print_falls(name: str, fallen: list[bool], errors: list[float]) -> None:
@@ -217,13 +237,19 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--no-grid", action="store_true", help="leave refusals unexamined")
+    parser.add_argument("--refusals", action="store_true", help="examine refusals alone")
     parser.add_argument("--out", type=Path, help="file of one JSON line a pair")
     given = parser.parse_args()
     robot = load_robot()
     clips = {name: retarget(read_bvh(find_bvh(name)).clip, robot).clip for name in CLIPS}
     records = []
     for i, pair in enumerate(draw(clips, given.count, given.seed)):
-        records.append(judge_pair(robot, clips, pair, given.seed + i, not given.no_grid))
+        seed = given.seed + i
+        records.append(judge_refusal(robot, clips, pair, seed) if given.refusals else
+                       judge_pair(robot, clips, pair, seed, not given.no_grid))  # fmt: skip
+        if not records[-1]["given"]:
+            print(f"pair {i}: {records[-1]['reason']}; works: {records[-1].get('works')}",
+                  flush=True)  # fmt: skip
         if given.out is not None:
             with given.out.open("a") as file:
                 file.write(json.dumps(records[-1]) + "\n")

@@ -30,7 +30,7 @@ def join(
     enter: float = 0.0,
     robot: str = "humanoid",
 ) -> None:
-    """Play one clip after the other, with a transition between them; see docs/motions.md.
+    """Play one clip after the other, with a transition between them; see docs/motion-synthesis.md.
 
     Args:
         first: a .bvh file, or the name of a packaged clip; for physical a robot's .npz.
@@ -71,7 +71,7 @@ def match(
     seconds: float = 10.0,
     start: str = "",
 ) -> None:
-    """Make a motion that does what is asked for, by motion matching; see docs/motions.md.
+    """Make a motion that does what is asked for, by motion matching; see docs/motion-synthesis.md.
 
     Args:
         files: .bvh files or names of packaged clips, all of one skeleton. None: CMU's subject 02.

@@ -16,6 +16,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.maths.easing import eased
 from poise.envs.maths.pendulum import Units
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
@@ -155,7 +156,7 @@ def share_load(r: Reference, leg: int, fraction: float, duration: float) -> None
     `duration` [s] over: w = 10 s³ − 15 s⁴ + 6 s⁵, whose first two derivatives are 0 at both ends.
     An infinite duration has no rates."""
     s = min(max(fraction, 0.0), 1.0)
-    w = s * s * s * (10.0 + s * (6.0 * s - 15.0))
+    w = eased(s)
     rate = 30.0 * s * s * (1.0 - s) * (1.0 - s) / duration
     accel = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (duration * duration)
     for i, sign in ((leg, 1.0), (1 - leg, -1.0)):

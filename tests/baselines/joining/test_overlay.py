@@ -10,9 +10,9 @@ from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.groups import GROUPS, LinkGroup
 from poise.baselines.clips.library import find_bvh
 from poise.baselines.clips.rotations import angle_between
-from poise.baselines.joining.joins import ease
 from poise.baselines.joining.overlay import Layer, overlay
 from poise.configs.errors import ConfigError
+from poise.envs.maths.easing import ease
 
 ARMS = (GROUPS["arms"],)
 

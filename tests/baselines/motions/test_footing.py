@@ -35,7 +35,6 @@ def rows(*runs: tuple[int, int, int]) -> np.ndarray:
 def test_a_sole_rests_while_it_is_planted_and_swings_between(kick: Footing) -> None:
     ((foot, lift, land),) = kick.swings
     assert (foot, lift, land) == (1, pytest.approx(1.5), pytest.approx(3.3))
-    assert kick.single_support == pytest.approx(1.8)
     start = kick.sample(0.0).places
     for time in np.arange(0.0, 5.0, 0.07):
         sample = kick.sample(time)

@@ -8,9 +8,10 @@ import pytest
 
 from poise.baselines.feasibility.check import check_motion
 from poise.baselines.motions.feet import nominal_feet
-from poise.baselines.motions.foot_steps import RATE, FootStep, Waypoint, plan_steps
+from poise.baselines.motions.foot_steps import FootStep, Waypoint, plan_steps
 from poise.baselines.motions.footwork import com_over, perform_plan, plan_zmp, real_zmp
 from poise.baselines.motions.motion import load_motion
+from poise.baselines.motions.robot_clip import RATE
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 from tests.support.physics import robot_named

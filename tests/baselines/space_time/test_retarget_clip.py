@@ -11,7 +11,6 @@ from poise.baselines.clips.bvh import read_bvh
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import find_bvh
 from poise.baselines.motions.robot_clip import reference_from
-from poise.baselines.retargeting.limbs import find_limbs
 from poise.baselines.retargeting.retarget import targets_on
 from poise.baselines.space_time.asked import Asked, soles_over_floor
 from poise.baselines.space_time.constraints.constraint import Constraint, violation
@@ -121,4 +120,3 @@ def test_bad_arguments() -> None:
         retarget_clip(clip(), robot, solver="grid", constraints=many, lead=LEAD)
     with pytest.raises(ConfigError, match="constraints: no such name: 'nothing'"):
         retarget_clip(clip(), robot, constraints="nothing")
-    assert find_limbs(robot).has_arms
