@@ -190,11 +190,11 @@ class CaptureStepConfig:
     momentum_gain: float = _number(0.0, min=0.0)
     # While a motion moves, a first step begins, too, when the root turns away from it and is going
     # to be `turn_limit` [°] off in 0.7/ω; and `step_margin` grows by `crouch_margin` of what the
-    # motion has the CoM below 0.95 h, less as the root is turned.
+    # motion has the CoM below 0.95 h, less as the root is turned. 180 and 0 are without.
     turn_limit: float = field(
-        default=180.0, metadata={"above": 0.0, "max": 180.0, "omit": "default"}
+        default=60.0, metadata={"above": 0.0, "max": 180.0, "omit": "default"}
     )
-    crouch_margin: float = field(default=0.0, metadata={"min": 0.0, "omit": "default"})
+    crouch_margin: float = field(default=0.25, metadata={"min": 0.0, "omit": "default"})
     restep_margin: float = 0.01  # further steps begin when ξ is this far outside
     gain: float = _number(1.0, above=0.0)  # k of p = ξ + k (ξ − ξ_ref)
     cop_overreach: float = _number(0.0, min=0.0)  # of p over its region: costs angular momentum
