@@ -222,10 +222,10 @@ def test_a_command_says_what_a_file_wants_to_run(
         check_allowed(ground.code)
 
 
-def test_a_name_for_allow_has_a_form(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_name_for_allow_has_a_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """module:Class, nothing else."""
     for name in ("module", "a:b:c", "own.yaml", "evil\x1b[2J:C"):
-        assert main(["replay", "nowhere", "--trial", "0", "--allow", name]) == 2
+        assert main(["replay", str(tmp_path), "--trial", "0", "--allow", name]) == 2
         assert "allow" in capsys.readouterr().err
 
 

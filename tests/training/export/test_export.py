@@ -135,7 +135,7 @@ def spoil(folder: Path, name: str) -> Path:
 
 
 BAD = {
-    "no such folder, and no packaged policy": lambda f: ["momentum-qp"],
+    "no such policy: 'momentum-qp'": lambda f: ["momentum-qp"],
     "no policy.zip": lambda f: [str(spoil(f, "policy.zip"))],
     "out: is not empty": lambda f: ["residual", "--out", str(finished_run())],
     "out: is not a folder": lambda f: ["residual", "--out", __file__],

@@ -55,7 +55,7 @@ PUSH = "{impulse: 20, direction: 90, body: torso, start: 0.1}"
         (["zero", "--controllers", "zero"], "controllers: goes with --trial"),
         (["nowhere", "--trial", "3"], "nowhere: no such folder"),
         (["--trial", "3"], "trial: goes with one folder"),
-        (["nowhere", "--trial", "3", "--seconds", "0"], "seconds: must be above 0, not 0.0"),
+        ([".", "--trial", "3", "--seconds", "0"], "seconds: must be above 0, not 0.0"),
     ],
 )
 def test_what_cannot_be_shown_is_one_line(
