@@ -128,12 +128,12 @@ def test_intervals_may_be_open() -> None:
         ("leaderboard", "mix", None),
         ("leaderboard-residual-torque", "mix", None),
         *(
-            (robot, None, f"leaderboard-{robot}.md")
+            (robot, "mix", f"leaderboard-{robot}.md")
             for robot in ("unitree_g1", "unitree_h1", "booster_t1")
         ),
     ],
 )
-def test_the_committed_results_are_read(name: str, rated: str | None, page: str | None) -> None:
+def test_the_committed_results_are_read(name: str, rated: str, page: str | None) -> None:
     """Those of the leaderboards have the form of today, and the pages of robots are theirs."""
     path = Path(__file__).parents[3] / f"docs/results/{name}.json"
     summary = read_summary(path)
