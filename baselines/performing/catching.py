@@ -1,9 +1,8 @@
 """How the planner of steps takes over from a performance, and how the motion goes on after it."""
 
-import numpy as np
 
 from poise.baselines.stepping.recentring import stop_recentring
-from poise.baselines.whole_body.tick import ContactTick
+from poise.baselines.whole_body.tick import go_on_from
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import copy_into, turned
 
@@ -20,14 +19,6 @@ from .schedule import (
 )
 
 AHEAD = 0.4  # [s] before a lift-off by which the motion must have gone on
-
-
-@compiled
-def go_on_from(contacts: ContactTick, torques: np.ndarray) -> None:
-    """Let the next tick change these `torques` (nv−6,) of the last one no more than it may."""
-    copy_into(torques, contacts.applied)
-    copy_into(torques, contacts.memory.torques)
-    contacts.follows[0] = 1
 
 
 @compiled

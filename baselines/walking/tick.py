@@ -10,7 +10,7 @@ from poise.baselines.stepping.guidance import copy_reference
 from poise.baselines.stepping.recentring import set_level_frame, stop_recentring
 from poise.baselines.stepping.swing import start_swing
 from poise.baselines.stepping.tick import FIRST_LOAD, capture_tick, has_landed, solve_contacts
-from poise.baselines.whole_body.tick import ContactTick
+from poise.baselines.whole_body.tick import go_on_from
 from poise.envs.compiled.jit import compiled
 from poise.envs.maths.polygons import find_nearest
 from poise.envs.maths.vectors import along, copy_into, turned
@@ -30,14 +30,6 @@ def is_commanded(g: Gait) -> bool:
     c = g.command
     speed = np.sqrt(c[0] * c[0] + c[1] * c[1])
     return speed > g.speed_margin or abs(c[2]) * g.width > g.speed_margin
-
-
-@compiled
-def go_on_from(contacts: ContactTick, torques: np.ndarray) -> None:
-    """Let the next tick change these `torques` (nv−6,) of the last one no more than it may."""
-    copy_into(torques, contacts.applied)
-    copy_into(torques, contacts.memory.torques)
-    contacts.follows[0] = 1
 
 
 @compiled

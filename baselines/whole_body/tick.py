@@ -209,3 +209,11 @@ def contact_tick(t: ContactTick):
     """Run one tick with a subset: its workspace's `tau` (nv−6,) then holds torques."""
     assemble_contacts(t)
     solve_contacts(t)
+
+
+@compiled
+def go_on_from(t: ContactTick, torques: np.ndarray) -> None:
+    """Let the next tick change these `torques` (nv−6,) of the last one no more than it may."""
+    copy_into(torques, t.applied)
+    copy_into(torques, t.memory.torques)
+    t.follows[0] = 1

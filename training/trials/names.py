@@ -20,8 +20,10 @@ def check_names(
     motion: str | None = None,
 ) -> None:
     """Raise ConfigError, which lists what there is, for a name of nothing; see `check_name`."""
+    if motion is not None and Path(motion).suffix == ".npz":  # a robot's motion
+        motion = None
     for kind, name in (("robots", robot), ("suites", suite), ("motions", motion)):
-        if name is not None and Path(name).suffix != ".npz":  # a robot's motion
+        if name is not None:
             resolve(kind, name)
     for name in controllers:
         check_name(name)

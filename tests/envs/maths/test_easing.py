@@ -7,6 +7,7 @@ from numpy.polynomial import Polynomial
 from poise.envs.maths.easing import ease, eased
 
 QUINTIC = Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+ROUNDING = 31.0 * np.finfo(float).eps  # of terms of up to 10, 15 and 6 that add up to 1
 
 
 def test_from_rest_to_rest():
@@ -32,5 +33,6 @@ def test_no_way_from_rest_to_rest_has_less_jerk():
 
 
 def test_compiled_code_has_the_same():
+    """But for rounding: it adds the terms in another order."""
     values = np.linspace(0.0, 1.0, 101)
-    np.testing.assert_allclose([eased(u) for u in values], ease(values), rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose([eased(u) for u in values], ease(values), rtol=0.0, atol=ROUNDING)
