@@ -12,6 +12,7 @@ from rich.table import Table
 
 from poise.training.following.motion_tables import motion_tables
 from poise.training.running.summary import Entry, Interval, Summary
+from poise.training.running.terminal import BESIDE, in_parts
 
 from .seed_groups import seed_lines
 from .walk_tables import walk_tables
@@ -74,16 +75,18 @@ def print_summary(summary: Summary, console: Console) -> None:
         if heading not in IN_PAIRS
         and not {text(name) for name in summary["ranking"]} <= {NONE, "0"}
     ]
-    table = Table(title=title, title_justify="left")
-    table.add_column("#", justify="right")
-    table.add_column("controller", overflow="fold", width=_room(summary["ranking"], 16))
-    for heading, _ in columns:
-        table.add_column(heading, justify="right", overflow="fold")
-    rank = places(summary["controllers"])
-    for name in summary["ranking"]:
-        place = str(rank[name] or NONE)
-        table.add_row(place, escape(name), *(text(name) for _, text in columns))
-    console.print(table)
+    names, rank = summary["ranking"], places(summary["controllers"])
+    named = _room(names, 16)
+    cells = {heading: [text(name) for name in names] for heading, text in columns}
+    for k, part in enumerate(in_parts(cells, console.width - named - 2 * BESIDE - 3)):
+        table = Table(title=None if k else title, title_justify="left")
+        table.add_column("#", justify="right")
+        table.add_column("controller", overflow="fold", width=named)
+        for heading, width in part.items():
+            table.add_column(heading, justify="right", overflow="fold", width=width)
+        for name, row in zip(names, zip(*(cells[h] for h in part), strict=True), strict=True):
+            table.add_row(str(rank[name] or NONE), escape(name), *row)
+        console.print(table)
     for each in (*walk_tables(summary), *motion_tables(summary)):
         console.print(each)
     if summary["pairs"]:
@@ -190,11 +193,11 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
 
 
 def _pairs(summary: Summary, width: int) -> Table:
-    """For a console of this width, of which the figures need some 44 columns."""
+    """For a console of this width, of which the figures need some 60 columns."""
     table = Table()
     titles = [f"{pair['b']} against {pair['a']}" for pair in summary["pairs"]]
     table.add_column(
-        "b against a", overflow="fold", width=_room(titles, min(max(width - 44, 16), 34))
+        "b against a", overflow="fold", width=_room(titles, min(max(width - 60, 16), 34))
     )
     gain = any("j50_gain" in pair for pair in summary["pairs"])
     names = ["both", "only a (lost)", "only b (won)", "neither", P_VALUE]

@@ -1,7 +1,7 @@
 """The terminal, and what it shows while an evaluation runs."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from rich.progress import (
 )
 
 WIDTH = 120  # of tables that no terminal shows
+BESIDE = 3  # characters of a table's column besides its text
 SHORTEST, LONGEST = 10.0, 300.0  # [s] between lines of progress, where no terminal shows a bar
 GROWTH = 0.1  # the time between lines, over the time that has passed
 
@@ -72,3 +73,26 @@ def print_paths(paths: Sequence[Path], console: Console) -> None:
     """Print one path a line, whole, as it is to be copied."""
     for path in paths:
         console.print(str(path), markup=False, highlight=False, soft_wrap=True)
+
+
+def in_parts(cells: Mapping[str, Sequence[str]], room: int) -> list[dict[str, int]]:
+    """Headings and the widths of their columns, in parts as wide as `room`.
+
+    A column has room for its longest word, and for whole texts where the part leaves it.
+    """
+    parts: list[dict[str, int]] = [{}]
+    left = room
+    for heading, texts in cells.items():
+        word = max(len(word) for text in (heading, *texts) for word in text.split())
+        if parts[-1] and word + BESIDE > left:
+            parts.append({})
+            left = room
+        parts[-1][heading] = word
+        left -= word + BESIDE
+    for part in parts:
+        left = room - sum(part.values()) - BESIDE * len(part)
+        for heading in part:
+            more = min(max(map(len, (heading, *cells[heading]))) - part[heading], left)
+            part[heading] += max(more, 0)
+            left -= max(more, 0)
+    return parts

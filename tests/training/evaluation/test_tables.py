@@ -63,11 +63,23 @@ def test_tables_fold_and_are_not_cut(path: Path, width: int) -> None:
     assert "…" not in text.getvalue()
 
 
-def printed(summary: dict[str, Any]) -> str:
-    """What `print_summary` prints, in 120 columns."""
+def printed(summary: dict[str, Any], width: int = 120) -> str:
+    """What `print_summary` prints."""
     text = io.StringIO()
-    print_summary(cast(Summary, summary), Console(file=text, width=120))
+    print_summary(cast(Summary, summary), Console(file=text, width=width))
     return text.getvalue()
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
+def test_no_word_of_the_ranking_is_broken(width: int) -> None:
+    """What does not fit beside each other is in tables below each other, with one title."""
+    summary = json.loads(RESULTS[0].read_text())
+    text = printed({**summary, "pairs": []}, width)
+    for word in ("worst", "recovered", "one-step", "failures", "recoveries"):
+        assert f" {word} " in text
+    first = summary["controllers"][summary["ranking"][0]]
+    assert f" {first['j50_min']:.1f} " in text and f" {first['eta_min']:.2f} " in text
+    assert text.count(summary["suite"]) == 1
 
 
 def test_the_words_of_a_table_are_explained_below_it() -> None:
