@@ -1,6 +1,5 @@
 """How the planner of steps takes over from a performance, and how the motion goes on after it."""
 
-
 from poise.baselines.stepping.recentring import stop_recentring
 from poise.baselines.whole_body.tick import go_on_from
 from poise.envs.compiled.jit import compiled
