@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from poise.training.figures.envelope import Band, Curve, fall_probability, polar_envelope
-from poise.training.running.files import PLOTS
+from poise.training.figures.learning_curve import Point, learning_curve
+from poise.training.learning.seeds import KEPT
+from poise.training.running.files import CURVE, PLOTS
 from poise.training.statistics.bootstrap import DirectionFit, EnvelopeFit, mean_over_directions
 from poise.training.statistics.fits import Bound, fit_logistic
 from poise.training.suites.plan import Plan
@@ -22,11 +24,13 @@ def draw_plots(
     plan: Plan,
     played: Mapping[str, Played],
     steps: Mapping[str, NStepLimit] | None = None,
+    timesteps: Mapping[str, int | None] | None = None,
 ) -> list[Path]:
     """Write the plots of a result; returns their paths, none without pushes that have a limit.
 
     Where J50 of directions is measured, they show what `steps` of the first controller that steps
-    could stop; else, the random pushes.
+    could stop; else, the random pushes. Of the policies that a run has kept, J50 is also drawn over
+    the `timesteps` that they have learned from.
     """
     polar, fall = (folder / name for name in PLOTS)
     limits = plan.limits
@@ -62,7 +66,28 @@ def draw_plots(
         unit="fraction",
         xlabel=label,
     )
-    return [polar, fall]
+    curve = _draw_curve(folder / CURVE, fits, timesteps or {}) if directional else []
+    return [polar, fall, *curve]
+
+
+def _draw_curve(
+    path: Path, fits: Mapping[str, EnvelopeFit], timesteps: Mapping[str, int | None]
+) -> list[Path]:
+    """Draw mean J50 over environment steps, if a run has kept more policies than one."""
+    runs: dict[str, list[Point]] = {}
+    kept = {name: Path(name).parent for name in fits if Path(name).parent.name == KEPT}
+    for name, parent in kept.items():
+        fit, learned_from = fits[name], timesteps.get(name)
+        assert learned_from is not None  # what is kept is a policy
+        point = (learned_from, fit.j50_mean, *fit.j50_mean_ci)
+        runs.setdefault(str(parent.parent), []).append(point)
+    if not any(len(points) > 1 for points in runs.values()):
+        return []
+    bounded = any(fits[name].bounded for name in kept)
+    note = "In some directions J50 is only a bound." if bounded else ""
+    others = {name: fit.j50_mean for name, fit in fits.items() if name not in kept}
+    learning_curve(path, runs, others, note=note)
+    return [path]
 
 
 def _step_lines(

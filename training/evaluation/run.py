@@ -133,7 +133,8 @@ class Run:
             steps = stepping_limits(agents.values(), outcomes, self.limits)
             ticks = tick_times(agents) if timed else dict.fromkeys(names)
             summary = self._summary(folder, plan, played, steps, ticks)
-            drawn = draw_plots(self.out, plan, played, steps) if plots else []
+            learned = {name: agent.timesteps for name, agent in agents.items()}
+            drawn = draw_plots(self.out, plan, played, steps, learned) if plots else []
             rows = [(trial, name, outcome) for name in names for trial, outcome in played[name]]
             rows.sort(key=lambda row: row[0].number)  # of one number, in the order of the names
             folder.finish([trial_row(*row) for row in rows], summary)
@@ -156,6 +157,8 @@ class Run:
         entries = {name: controller_entry(played[name], plan, steps.get(name)) for name in played}
         for name, entry in entries.items():
             entry["tick_us"], entry["fingerprint"] = ticks[name], settings.controllers[name]
+            if (learned_from := self.agents[name].timesteps) is not None:
+                entry["timesteps"] = learned_from
         first = next(iter(played))
         reference = self.reference if self.reference and self.reference in played else first
         against = [(reference, name) for name in played if name != reference]

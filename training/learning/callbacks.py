@@ -49,7 +49,11 @@ class Throughput(BaseCallback):
 
 
 class Checkpoints(BaseCallback):
-    """Writes last/ after every rollout, and best/ after the best evaluation of what was trained."""
+    """Writes last/ after every rollout, and best/ after the best evaluation of what was trained.
+
+    With `keep_every` of the configuration a policy is also kept in `kept`/STEPS, at the start and
+    whenever so many more steps are done.
+    """
 
     model: PPO
 
@@ -59,12 +63,13 @@ class Checkpoints(BaseCallback):
         robot: Robot,
         last: Path,
         best: Path,
+        kept: Path,
         table: Path,
         state: dict[str, Any],
     ):
         super().__init__()
         self.config, self.robot = config, robot  # as it is described, whatever it is trained on
-        self.last, self.best, self.table = last, best, table
+        self.last, self.best, self.kept, self.table = last, best, kept, table
         self.rows: list[dict[str, float]] = list(state.get("evaluations", []))
         self._next = state.get("next_evaluation", 0)
         scores = [row["score"] for row in self.rows if row["timesteps"] > 0]
@@ -83,6 +88,7 @@ class Checkpoints(BaseCallback):
     def _on_rollout_start(self) -> None:
         # the update of the rollout before is done: its weights are new
         self._save(self.last)  # first, so that a kill in the evaluation loses nothing
+        self._keep()
         if self.num_timesteps >= self._next:
             self._evaluate()
             self._save(self.last)
@@ -90,10 +96,17 @@ class Checkpoints(BaseCallback):
     def _on_training_end(self) -> None:
         self._evaluate()
         self._save(self.last)
+        self._keep()
         self.close()
 
     def _on_step(self) -> bool:
         return True
+
+    def _keep(self) -> None:
+        every, rollout = self.config.keep_every, self.model.n_steps * self.model.n_envs
+        now = self.num_timesteps
+        if every and now // every > (now - rollout) // every:
+            self._save(self.kept / f"{now:010d}")
 
     def _evaluate(self) -> None:
         if self.rows and self.rows[-1]["timesteps"] == self.num_timesteps:

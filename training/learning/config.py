@@ -110,6 +110,8 @@ class TrainConfig:
     seed: int = field(default=0, metadata={"min": 0, "max": MOST_SEED})
     steps: int = field(default=3_000_000, metadata={"min": 1})  # [environment steps]
     threads: int = field(default=2, metadata={"min": 1})
+    # [environment steps] after which a policy is kept for learning curves; None: none is
+    keep_every: int | None = field(default=None, metadata={"min": 1, "omit": "default"})
     # a policy whose weights and statistics are the first ones; or one from outside, see `imported`
     start_from: str | None = None
     env: EnvConfig = field(default_factory=EnvConfig)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:  # it loads scipy
     from poise.training.statistics.seeds import SeedFigures
 
 SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
+KEPT = "kept"  # folder of a run: its policies, by their steps
 
 
 class Evaluation(TypedDict):

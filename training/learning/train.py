@@ -34,10 +34,12 @@ from .config import TrainConfig
 from .imported import import_policy
 from .policy import locate_policy
 from .schedules import CurriculumCallback, ExplorationCallback
+from .seeds import KEPT
 from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
 
 LAST, BEST = "last", "best"
+MAY_CHANGE = ("steps", "threads", "keep_every")  # of a configuration that a run goes on with
 
 
 @allows()
@@ -51,13 +53,14 @@ def train(
 ) -> Path:
     """Train into the folder `out`; returns the folder of the best checkpoint.
 
-    `out` gets config.yaml, evaluations.csv, tensorboard/, and the policy folders best/ and last/.
+    `out` gets config.yaml, evaluations.csv, tensorboard/, and the policy folders best/, last/ and,
+    with `keep_every`, kept/STEPS.
     `resume` goes on from last/, which is written after every rollout; the configuration must be
-    the same but for `steps` and `threads`. A new run begins with the policy `config.start_from`,
-    if there is one, of the same robot; its network may be smaller (`widened`). The same
-    configuration gives the same weights, whatever the number of threads; a resumed run starts new
-    episodes, and so differs. A controller from outside (``module:Class``) that the configuration
-    names must be among `allow`.
+    the same but for `steps`, `threads` and `keep_every`. A new run begins with the policy
+    `config.start_from`, if there is one, of the same robot; its network may be smaller
+    (`widened`). The same configuration gives the same weights, whatever the number of threads; a
+    resumed run starts new episodes, and so differs. A controller from outside (``module:Class``)
+    that the configuration names must be among `allow`.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
     round; when the configurations or robots differ; when a file of last/ cannot be read; for
@@ -94,7 +97,7 @@ def train(
         write_atomic(out / CONFIG, to_yaml(config))
         model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
         table = out / "evaluations.csv"
-        checkpoints = Checkpoints(config, robot, out / LAST, out / BEST, table, state)
+        checkpoints = Checkpoints(config, robot, out / LAST, out / BEST, out / KEPT, table, state)
         stack.callback(checkpoints.close)
         schedules = [CurriculumCallback(config), ExplorationCallback(config)]
         callbacks = [Throughput(), *schedules, checkpoints]
@@ -247,7 +250,7 @@ def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
     if checkpoint is None:
         raise ConfigError("holds no run to resume", source=str(out), field="resume")
     before = build(TrainConfig, read_yaml(checkpoint / CONFIG), str(checkpoint / CONFIG))
-    same = replace(before, steps=config.steps, threads=config.threads)
+    same = replace(before, **{name: getattr(config, name) for name in MAY_CHANGE})
     if same != config:
         different = [
             name for name in TrainConfig.__dataclass_fields__

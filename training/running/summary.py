@@ -291,6 +291,7 @@ class Entry(Played, Counts, EnvelopeFigures, Fractions, total=False):
 
     tick_us: Number
     fingerprint: str
+    timesteps: int
     factors: list[Factor]
     eurobench: Eurobench
     walks: list[WalkLevel]

@@ -43,6 +43,7 @@ class Agent:
         act: deterministic action (na,) for an observation (no,).
         fingerprint: hash of the controller's configuration and the policy's weights.
         begin: called at the start of every trial, for policies with a memory.
+        timesteps: environment steps that a policy of `poise train` has learned from.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Agent:
     act: Callable[[np.ndarray], np.ndarray]
     fingerprint: str
     begin: Callable[[], object] | None = None
+    timesteps: int | None = None
 
 
 def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
@@ -149,12 +151,12 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
     world = {k: v for k, v in to_dict(policy.config).items() if k not in TRAINING}
     below = controller_fingerprint(policy.config)
     content = _hash(to_yaml(world).encode(), below.encode(), *policy.content())
-    return Agent(name, env, policy.act, content)
+    return Agent(name, env, policy.act, content, timesteps=policy.state["timesteps"])
 
 
 # fields of a training configuration that do not change how its policy plays
 TRAINING = (
-    *("seed", "steps", "threads", "physics_step", "start_from"),
+    *("seed", "steps", "threads", "keep_every", "physics_step", "start_from"),
     *("ppo", "curriculum", "evaluation"),
 )
 ENVIRONMENTS = {

@@ -39,3 +39,25 @@ def test_sectors_of_few_trials_are_no_results_and_bounds_are_marked(
     assert drawn["note"] == ""
     plots.draw_plots(tmp_path, plan, {"a": played[:4]})
     assert drawn["note"] == "Nothing is drawn: no direction has 5 trials."
+
+
+@pytest.mark.parametrize("names", [("r/kept/10", "r/kept/20", "qp"), ("r/kept/10", "qp", "s/last")])
+def test_what_a_run_has_kept_is_drawn_over_its_steps(
+    names: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two policies of a run are a curve, one is none; J50 is that of the fits."""
+    drawn: list[Any] = []
+    monkeypatch.setattr(plots, "learning_curve", lambda *args, **given: drawn.append((args, given)))
+    fits: Any = {
+        name: SimpleNamespace(j50_mean=10.0 + k, j50_mean_ci=(9.0 + k, 12.0 + k), bounded=k == 1)
+        for k, name in enumerate(names)
+    }
+    path = tmp_path / "learning_curve.png"
+    found = plots._draw_curve(path, fits, {"r/kept/10": 10, "r/kept/20": 20, "s/last": 5})
+    if "r/kept/20" not in names:
+        assert found == [] and not drawn
+        return
+    assert found == [path]
+    (given, note), *rest = drawn
+    assert given == (path, {"r": [(10, 10.0, 9.0, 12.0), (20, 11.0, 10.0, 13.0)]}, {"qp": 12.0})
+    assert note == {"note": "In some directions J50 is only a bound."} and not rest

@@ -26,6 +26,7 @@ from poise.training.learning import callbacks, schedules
 from poise.training.learning.checkpoints import FILES, POLICY, STATE
 from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, train_config
 from poise.training.learning.policy import load_policy
+from poise.training.learning.seeds import KEPT
 from poise.training.learning.train import _env_seed, train
 from poise.training.learning.train_seeds import train_seeds
 from poise.training.trials.agents import load_agent
@@ -76,6 +77,25 @@ def test_a_run_writes_everything():
     for tag in ("evaluation/recovered", "train/loss", "rollout/ep_rew_mean", "curriculum/largest"):
         assert tag in tags
     assert [s.step for s in events.Scalars("evaluation/recovered")] == [0, 128, 192]
+
+
+def test_policies_are_kept_when_told(tmp_path):
+    """At the start and whenever so many more steps are done; the training keeps its bits."""
+    train(tiny_config(steps=128, keep_every=100), tmp_path, progress=False)
+    assert sorted(path.name for path in (tmp_path / KEPT).iterdir()) == [
+        f"{n:010d}" for n in (0, 128)
+    ]
+    train(tiny_config(keep_every=ROLLOUT), tmp_path, resume=True, progress=False)
+    kept = sorted((tmp_path / KEPT).iterdir())
+    assert [int(path.name) for path in kept] == [0, 128, 192]
+    assert state(tmp_path, f"{KEPT}/0000000128")["timesteps"] == 128
+    train(tiny_config(steps=128), tmp_path / "plain", progress=False)
+    for a, b in zip(
+        weights(tmp_path, f"{KEPT}/0000000128"), weights(tmp_path / "plain"), strict=True
+    ):
+        assert np.array_equal(a, b)
+    agent = load_agent(str(kept[1]), robot())
+    assert agent.timesteps == 128
 
 
 def test_best_is_the_best_evaluation():
