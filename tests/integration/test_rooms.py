@@ -41,12 +41,13 @@ FLOORS = """
 14 training/trials
 15 training/figures, training/following, training/open_loop, training/standalone
 15 training/suites, training/tuning
-16 training/evaluation, training/qp_set, training/robot_check
-17 training/gaits, training/results
-18 training/export, training/report, training/sessions
-19 training/motion_report, training/view
-20 training/cli
-21 envs, baselines, training
+16 training/metrics, training/qp_set, training/robot_check
+17 training/evaluation
+18 training/gaits, training/results
+19 training/export, training/report, training/sessions
+20 training/motion_report, training/view
+21 training/cli
+22 envs, baselines, training
 """
 FLOOR = {
     room: int(line.split()[0])

@@ -30,13 +30,13 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled import warmup
 from poise.training.cli.entry import main
 from poise.training.evaluation.evaluate import benchmark, evaluate
-from poise.training.evaluation.seed_groups import seed_groups
 from poise.training.export.export import export_policy
 from poise.training.learning.checkpoints import check_controller, controller_fingerprint
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import train_seeds
+from poise.training.metrics.seed_groups import seed_groups
 from poise.training.qp_set.export import write_qp_set
 from poise.training.report import page
 from poise.training.report.page import write_report

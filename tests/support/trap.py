@@ -16,8 +16,8 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged_folder
 from poise.configs.schema import to_dict, to_yaml
 from poise.envs.balance.config import StartNoise
-from poise.training.evaluation.figures import controller_entry, robot_figures
 from poise.training.evaluation.folder import Settings
+from poise.training.metrics.entry import controller_entry, robot_figures
 from poise.training.running.files import csv_text, plain
 from poise.training.running.provenance import circumstances, versions
 from poise.training.running.summary import FORMAT, Summary

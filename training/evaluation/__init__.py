@@ -1,1 +1,1 @@
-"""`poise evaluate`: its course, its folder, its figures."""
+"""`poise evaluate` and `poise benchmark`: course, folder, tables, plots."""

@@ -8,13 +8,21 @@ import numpy as np
 from poise.training.figures.envelope import Band, Curve, fall_probability, polar_envelope
 from poise.training.figures.learning_curve import Point, learning_curve
 from poise.training.learning.seeds import KEPT
+from poise.training.metrics.played import (
+    DIRECTIONAL,
+    Played,
+    ankle_limits,
+    fractions,
+    part,
+    pushes,
+    sectors,
+    won,
+)
 from poise.training.running.files import CURVE, PLOTS
 from poise.training.statistics.bootstrap import DirectionFit, EnvelopeFit, mean_over_directions
 from poise.training.statistics.fits import Bound, fit_logistic
 from poise.training.suites.plan import Plan
 from poise.training.trials.step_limits import COUNTS, DRAWN, NStepLimit, groups, line_name
-
-from .played import DIRECTIONAL, Played, ankle_limits, fractions, part, pushes, sectors, won
 
 FEWEST = 5  # trials of a direction whose J50 is drawn
 

@@ -19,6 +19,11 @@ from poise.configs.outputs import check_out_folder
 from poise.configs.schema import to_dict
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.learning.seeds import expand_seeds
+from poise.training.metrics.entry import controller_entry, robot_figures
+from poise.training.metrics.motions import suite_repertoire, suite_stage
+from poise.training.metrics.pairs import pair_figures
+from poise.training.metrics.played import RATED, Played, lost
+from poise.training.metrics.seed_groups import seed_groups
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS, plain
 from poise.training.running.provenance import circumstances, versions
@@ -36,13 +41,8 @@ from poise.training.trials.step_limits import NStepLimit, curves, stepping_limit
 from poise.training.trials.table import trial_row
 from poise.training.trials.trial import Trial
 
-from .figures import controller_entry, robot_figures
 from .folder import ResultFolder, Settings, check_folder
-from .motions import suite_repertoire, suite_stage
-from .pairs import pair_figures
-from .played import RATED, Played, lost
 from .plots import draw_plots
-from .seed_groups import seed_groups
 from .tables import print_lost, print_summary, ranked
 from .tick_times import tick_times
 

@@ -11,10 +11,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from poise.training.following.motion_tables import motion_tables
+from poise.training.metrics.seed_groups import seed_lines
 from poise.training.running.summary import Entry, Interval, Summary
 from poise.training.running.terminal import BESIDE, in_parts
 
-from .seed_groups import seed_lines
 from .walk_tables import walk_tables
 
 NONE = "–"

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from markupsafe import Markup
 
-from poise.training.evaluation.played import DIRECTIONAL
+from poise.training.metrics.played import DIRECTIONAL
 from poise.training.results.read import Record, Results
 from poise.training.running.summary import Interval, both_ends
 from poise.training.statistics.fits import fit_logistic, trial_bins

@@ -9,8 +9,8 @@ from typing import Final
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_folder
-from poise.training.evaluation.seed_groups import seed_lines
 from poise.training.evaluation.tables import places, ranked, table_columns
+from poise.training.metrics.seed_groups import seed_lines
 from poise.training.running.files import SUMMARY
 from poise.training.running.summary import Entry, Summary
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build
 from poise.envs.robots.robot import load_robot
-from poise.training.evaluation.motions import suite_stage
+from poise.training.metrics.motions import suite_stage
 from poise.training.running.files import SETTINGS
 from poise.training.suites.suite import Suite
 from poise.training.trials.agents import Agent

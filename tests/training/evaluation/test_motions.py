@@ -16,9 +16,9 @@ from poise.baselines.motions.robot_clip import read_robot_clip
 from poise.configs.errors import ConfigError
 from poise.envs.pushes.push import Push
 from poise.training.evaluation.evaluate import evaluate
-from poise.training.evaluation.motions import in_motion, motion_levels
 from poise.training.evaluation.tables import print_summary
 from poise.training.following.repertoire import load_repertoire
+from poise.training.metrics.motions import in_motion, motion_levels
 from poise.training.report.page import write_report
 from poise.training.results.replay import replay
 from poise.training.trials.trial import Outcome, Trial

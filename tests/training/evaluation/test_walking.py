@@ -1,4 +1,4 @@
-"""Suites of walks: played, counted, shown; training/evaluation/walking.py and walk_tables.py."""
+"""Suites of walks: played, counted, shown; training/metrics/walking.py and walk_tables.py."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from poise.envs.pushes.push import Kick, Push
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate
 from poise.training.evaluation.walk_tables import walk_tables
-from poise.training.evaluation.walking import phase_figures, walk_levels
+from poise.training.metrics.walking import phase_figures, walk_levels
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.running.summary import EnvelopeFigures

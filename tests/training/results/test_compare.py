@@ -1,4 +1,4 @@
-"""training/results/compare.py and leaderboard.py, training/evaluation/figures.py, pairs.py and
+"""training/results/compare.py and leaderboard.py, training/metrics/entry.py, pairs.py and
 tick_times.py.
 """
 
@@ -16,10 +16,10 @@ from rich.console import Console
 from poise.configs.errors import ConfigError
 from poise.configs.schema import to_yaml
 from poise.training.cli.entry import main
-from poise.training.evaluation.figures import controller_entry
 from poise.training.evaluation.folder import Settings
-from poise.training.evaluation.pairs import alike, pair_figures, paired
 from poise.training.evaluation.tick_times import tick_times
+from poise.training.metrics.entry import controller_entry
+from poise.training.metrics.pairs import alike, pair_figures, paired
 from poise.training.results.compare import compare, print_comparison
 from poise.training.results.leaderboard import leaderboard, write_leaderboard
 from poise.training.results.summary import read_summary

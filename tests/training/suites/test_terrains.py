@@ -15,7 +15,7 @@ from poise.envs.pushes.sampler import LimitTable
 from poise.envs.robots.robot import load_robot
 from poise.envs.terrain.stairs import Stairs
 from poise.envs.terrain.stones import Stones
-from poise.training.evaluation.walking import walk_levels
+from poise.training.metrics.walking import walk_levels
 from poise.training.suites.plan import Plan
 from poise.training.suites.suite import Suite, load_suite
 from poise.training.trials.agents import load_agent

@@ -19,8 +19,8 @@ from poise.envs.maths.pendulum import drifted, duration_factor
 from poise.training.evaluation import plots
 from poise.training.evaluation import run as evaluation
 from poise.training.evaluation.evaluate import evaluate
-from poise.training.evaluation.figures import controller_entry
 from poise.training.evaluation.plots import _step_lines
+from poise.training.metrics.entry import controller_entry
 from poise.training.trials.agents import Agent, load_agent
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.step_limits import (

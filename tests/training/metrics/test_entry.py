@@ -1,4 +1,4 @@
-"""training/evaluation/figures.py and training/evaluation/pairs.py."""
+"""training/metrics/entry.py and training/metrics/pairs.py."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 from poise.baselines.stepping.config import StepLimits
 from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import load_robot
-from poise.training.evaluation.figures import controller_entry
-from poise.training.evaluation.pairs import pair_figures
+from poise.training.metrics.entry import controller_entry
+from poise.training.metrics.pairs import pair_figures
 from poise.training.running.files import plain
 from poise.training.running.summary import Entry, Pair
 from poise.training.suites.plan import Plan

@@ -1,4 +1,4 @@
-"""training/evaluation/seed_groups.py."""
+"""training/metrics/seed_groups.py."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import pytest
 from scipy import stats
 
 from poise.configs.errors import ConfigError
-from poise.training.evaluation import seed_groups as module
-from poise.training.evaluation.seed_groups import seed_groups, seed_lines
 from poise.training.learning.seeds import expand_seeds
+from poise.training.metrics import seed_groups as module
+from poise.training.metrics.seed_groups import seed_groups, seed_lines
 from poise.training.statistics.seeds import seed_figures
 
 
