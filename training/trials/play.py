@@ -107,7 +107,9 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     first = min(starts, default=None)
     left = int(np.argmax(foot_signs(env.robot)))
     phase = None if first is None else walk.phase_at(first, left)
-    outcome = replace(outcome, **figures, push_phase=phase, com_drift=None, recovery_time=None)
+    outcome = replace(
+        outcome, **figures, push_phase=phase, com_drift=None, foot_drift=None, recovery_time=None
+    )
     terrain = env.simulation.robot.terrain
     if not terrain.flat:
         last, passed = len(terrain.surfaces()) - 1, outcome.surfaces_passed

@@ -70,6 +70,7 @@ def test_a_suite_of_walks(tmp_path: Path, in_process: type[InProcess]) -> None:
     results = load_results(out)
     assert results.trial(results.record("walk", 2)).kicks[0].start == 4.0
     assert not replay(results, 2).differences
+    assert "drift" not in text.getvalue()  # of robots that are to stay where they are
     assert "falls a minute" in text.getvalue() and "cost of transport" in text.getvalue()
 
 
