@@ -9,6 +9,7 @@ from matplotlib.ticker import EngFormatter
 
 from .style import GREY, legend_below, look, saved_figure
 
+DASHES = ((0, (6, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)), (0, (3, 4)))  # of what does not learn
 Point = tuple[int, float, float, float]  # environment steps; J50, its interval's ends
 
 
@@ -41,13 +42,13 @@ def learning_curve(
             ax.fill_between(steps, low, high, color=style.colour, alpha=0.2, lw=0)
             ax.plot(steps, j50, color=style.colour, ls=style.line, marker=style.marker, label=name)
         for k, (name, level) in enumerate((others or {}).items()):
-            ax.axhline(level, color=GREY, lw=1.3, ls=(0, (4, 1.5 + 1.5 * k)), label=name)
+            ax.axhline(level, color=GREY, lw=1.3, ls=DASHES[k % len(DASHES)], label=name)
         ax.set_xlim(left=0)
         ax.set_ylim(bottom=0)
         ax.xaxis.set_major_formatter(EngFormatter(sep=""))
         ax.set_xlabel("environment steps")
         ax.set_ylabel(f"mean J50 [{unit}]")
-        figure.suptitle("Recovered impulse while it learns")
+        figure.suptitle("Recovered impulse while it learns", x=0.01, ha="left")
         ax.set_title(
             "J50: half of the pushes are recovered. Band: 95 % interval."
             + (f"\n{note}" if note else ""),
