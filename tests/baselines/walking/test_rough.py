@@ -7,7 +7,7 @@ from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.registry import load_controller
 from poise.baselines.stepping.config import SwingTask
 from poise.baselines.stepping.swing import Swing, advance_high, aim_swing
-from poise.baselines.stepping.swing_speed import possible_limits
+from poise.baselines.stepping.swing_speed import swing_time
 from poise.baselines.walking.command import GaitCommand
 from poise.baselines.walking.config import GaitConfig
 from poise.baselines.walking.tick import stands_higher
@@ -44,7 +44,7 @@ def test_the_foot_is_high_before_it_is_far_and_comes_down_when_it_is_there():
         way.append((swing.time, *swing.reference[0, [0, 2]], *swing.reference[1:, 2]))
     time, x, z, speed, accel = np.array(way).T
     high = (time > 0.35 * 0.4) & (time < 0.75 * 0.4)
-    assert np.all(np.abs(z[high] - top) < 1e-4)
+    assert np.all(np.abs(z[high] - top) < 2e-3)
     assert z[x < 0.05].max() > 0.08  # up, where most swings go ahead
     assert x[time >= 0.75 * 0.4].min() > 0.85 * 0.3
     assert (x[-1], z[-1], speed[-1]) == pytest.approx((0.3, 0.01, -swing.landing_speed), abs=2e-3)
@@ -86,9 +86,8 @@ def test_a_foot_that_higher_ground_holds_up_has_landed():
 def test_a_foot_that_comes_down_late_has_as_much_time_as_its_motors_need():
     config = load_controller("walk-rough", robot())._gait_config
     assert config.lifting.lift == pytest.approx(0.25) and GaitConfig().lifting.lift == 0.45
-    slow = possible_limits(robot(), config.limits, SwingTask(clearance=0.25, lift=0.25))
-    quick = possible_limits(robot(), config.limits, SwingTask(clearance=0.25, lift=0.35))
-    assert slow.time_min > quick.time_min
+    late, soon = (swing_time(robot(), swing, 0.1) for swing in (config.lifting, config.swing))
+    assert late == pytest.approx(0.35 / 0.25 * soon)
 
 
 def test_a_foot_does_not_come_down_before_it_is_up():
