@@ -101,6 +101,18 @@ def advance_over(w: SwingArrays, apex: float, dt: float) -> None:
     w.time[0] += dt
 
 
+@compiled
+def advance_high(w: SwingArrays, top: float, lower: float, dt: float) -> None:
+    """The same over rough ground: up to a height `top` [m] at `lift`, and on at it until the
+    fraction `lower`: the foot is high before it is far, and comes down where it is to land."""
+    start, now = w.time[0], w.reference
+    z, speed, accel = now[0, 2], now[1, 2], now[2, 2]
+    advance_over(w, top - w.ground[0], dt)
+    end = lower * w.duration[0]
+    if w.lift * w.duration[0] <= w.time[0] < end:
+        now[0, 2], now[1, 2], now[2, 2] = quintic(z, speed, accel, top, 0.0, 0.0, end - start, dt)
+
+
 class Swing(Copyable):
     """The reference of one swing foot, planned anew each tick from its own last value: C² always.
 

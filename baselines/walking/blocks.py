@@ -52,6 +52,7 @@ class Gait(Block):
     start_time: float  # [s]
     speed_margin: float  # [m/s]
     time_min: float  # of a step, whatever the command says [s]
+    lower: float  # from when a swinging foot comes down [of the swing]; 0: once it is up
     command: np.ndarray  # (8,) see `GaitCommand.array`
     velocity: np.ndarray  # (3,) ahead, left, turn, which follow the command
     error: np.ndarray  # (2,) what the sum of the velocity's errors adds to it [m/s]

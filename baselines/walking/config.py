@@ -1,6 +1,6 @@
 """The configuration of controllers that walk; numbers have the units of `stepping/config.py`."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from poise.baselines.stepping.config import CaptureStepConfig, StepLimits, SwingTask
@@ -65,6 +65,9 @@ class GaitConfig:
     speed_margin: float = field(default=0.01, metadata=NOT_NEGATIVE)  # slower is standing [h ω]
     # of the joints of arms that swing as commanded, in the posture of the QP
     arm_weight: float = field(default=30.0, metadata={**POSITIVE, "omit": "default"})
+    # until this fraction of the swing the foot stays as high as it is at `swing.lift`, over its own
+    # ground and the stance sole's; 0: it comes down once it is up, and only the latter counts
+    lower: float = field(default=0.0, metadata={"min": 0.0, "max": 0.95, "omit": "default"})
     torque_rate_limit: float = field(default=0.6, metadata=POSITIVE)  # as in `CaptureStepConfig`
     root_accel: float = field(default=60.0, metadata=POSITIVE)
     swing_accel: float = field(default=14.0, metadata=POSITIVE)
@@ -78,6 +81,15 @@ class GaitConfig:
     treads: TreadConfig = field(default_factory=TreadConfig, metadata={"omit": "default"})
     swing: SwingTask = field(default_factory=SwingTask)
     qp: MomentumQPConfig = field(default_factory=MomentumQPConfig)
+
+    def __post_init__(self) -> None:
+        if 0.0 < self.lower < self.swing.lift:
+            raise ValueError(f"lower: must be 0 or at least swing.lift, {self.swing.lift:g}")
+
+    @property
+    def lifting(self) -> SwingTask:
+        """`swing` with the fraction of the time in which the foot rises or, if less, comes down."""
+        return replace(self.swing, lift=min(self.swing.lift, 1.0 - self.lower))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from poise.baselines.motions.offsets import (
 from poise.baselines.stepping.cop_region import single_support_region
 from poise.baselines.stepping.guidance import limit_posture
 from poise.baselines.stepping.search import clip_to_width, set_start, to_step_frame, to_world
-from poise.baselines.stepping.swing import FROZEN, advance_over, aim_swing, time_left
+from poise.baselines.stepping.swing import FROZEN, advance_high, advance_over, aim_swing, time_left
 from poise.baselines.stepping.tick import solve_contacts
 from poise.envs.compiled.calls import run
 from poise.envs.compiled.jit import compiled
@@ -217,6 +217,9 @@ def swing_tick(t: WalkTick) -> None:
     ask_for(t, stance[2], w.foothold[0] - stance[0], w.foothold[1] - stance[1], g.cop)
     if footholds_given(t):
         advance_over_edges(t)
+    elif g.lower > 0.0:
+        top = max(w.ground[0], g.treads.left[2]) + apex_of_step(t)
+        advance_high(w, top, g.lower, c.gains.period)
     else:
         advance_over(w, apex_of_step(t), c.gains.period)
     contacts = c.on_second if foot == 0 else c.on_first

@@ -8,7 +8,7 @@ import numpy as np
 from poise.baselines.stepping.cop_region import distance_beyond, double_support_region
 from poise.baselines.stepping.guidance import copy_reference
 from poise.baselines.stepping.recentring import set_level_frame, stop_recentring
-from poise.baselines.stepping.swing import start_swing
+from poise.baselines.stepping.swing import LANDING, start_swing
 from poise.baselines.stepping.tick import FIRST_LOAD, capture_tick, has_landed, solve_contacts
 from poise.baselines.whole_body.tick import go_on_from
 from poise.envs.compiled.jit import compiled
@@ -21,6 +21,8 @@ from .step import ask_for, offset_from, put_middle, step_time, step_width, swing
 from .treads import feet_are_level, footholds_given, lean_ahead, meet_treads
 
 LOADED, UNLOADED = 1.5, 1.15  # rates at which the load may go to a foot, and must leave one [1/T_d]
+HELD_UP = 0.013  # [h] above where the swing leads it: the ground holds the foot up
+FLAT = 0.978  # cosine of 12°, the most that a sole is tilted then
 LEAST_LOAD = 0.03  # [m g] that a foot may bear until it leaves
 
 
@@ -139,6 +141,18 @@ def transfer_tick(t: WalkTick) -> bool:
 
 
 @compiled
+def stands_higher(t: WalkTick) -> bool:
+    """Return whether the foot stands on ground that is higher than was believed: late in its swing
+    it touches, not on an edge of its sole, and does not come down where it is led."""
+    c, w, foot = t.walk, t.walk.swing, t.walk.memory.foot[0]
+    late = w.time[0] > LANDING * w.duration[0]
+    if footholds_given(t) or not late or c.state.contacts[foot] < 0.5:
+        return False
+    above = c.state.sole_point[foot, 2] - w.reference[0, 2]
+    return above > HELD_UP * c.robot.height_com and c.state.sole_axes[foot, 2, 2] > FLAT
+
+
+@compiled
 def lift_off(t: WalkTick) -> None:
     """Begin the swing of the foot that did not step last."""
     c, m = t.walk, t.walk.memory
@@ -209,7 +223,7 @@ def gait_tick(t: WalkTick) -> bool:
     copy_reference(t.walk)
     if footholds_given(t) and t.gait.treads.lean > 0.0:
         lean_ahead(t)
-    if m.swinging[0] and has_landed(t.walk):
+    if m.swinging[0] and (has_landed(t.walk) or stands_higher(t)):
         touch_down(t)
     if not m.swinging[0]:
         if has_stopped(t):

@@ -61,6 +61,7 @@ def allocate_gait(
         start_time=c.start_time / omega,
         speed_margin=c.speed_margin * h * omega if limits else np.inf,
         time_min=(limits or c.limits).time_min / omega,
+        lower=float(c.lower),
         command=guarded_zeros(ENTRIES),
         velocity=guarded_zeros(3),
         error=guarded_zeros(2),
@@ -78,7 +79,7 @@ def allocate_gait(
 
 def limits_of_legs(robot: Robot, gait: GaitConfig) -> StepLimits | None:
     """The limits of a gait's steps that this robot's legs can keep; None: they cannot step."""
-    return possible_limits(robot, gait.limits, gait.swing, gait.qp.torque.share)
+    return possible_limits(robot, gait.limits, gait.lifting, gait.qp.torque.share)
 
 
 def over_treads(config: GaitConfig) -> GaitConfig:
@@ -130,12 +131,12 @@ class Walk(Commanded, CaptureStep):
 
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError with the limits of this robot for a command out of its reach."""
-        check_command(command, self.robot, self.gait, self.gait_limits, self._gait_config.swing)
+        check_command(command, self.robot, self.gait, self.gait_limits, self._gait_config.lifting)
 
     @property
     def reach(self) -> Reach:
         """What its robot can be told, on the terrain that it believes to walk on."""
-        return reach_of(self.robot, self.gait, self.gait_limits, self._gait_config.swing)
+        return reach_of(self.robot, self.gait, self.gait_limits, self._gait_config.lifting)
 
     @property
     def terrain(self) -> Terrain:
