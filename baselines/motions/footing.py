@@ -186,7 +186,7 @@ def root_turns(robot: Robot, qpos: np.ndarray) -> np.ndarray:
     return np.asarray((both * standing.inv()).as_rotvec())
 
 
-def _stances(down: np.ndarray) -> list[tuple[int, int]]:
+def stances_of(down: np.ndarray) -> list[tuple[int, int]]:
     """First and last frame of every time that a sole is planted."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], down.astype(int), [0]])))
     return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
@@ -195,7 +195,7 @@ def _stances(down: np.ndarray) -> list[tuple[int, int]]:
 def _check_rest(
     times: np.ndarray, places: np.ndarray, turns: np.ndarray, down: np.ndarray, source: str
 ) -> None:
-    for first, last in _stances(down):
+    for first, last in stances_of(down):
         own = slice(first, last + 1)
         away = np.linalg.norm(places[own] - np.median(places[own], axis=0), axis=1)
         away = np.maximum(away, np.abs(places[own, 2]))
@@ -210,7 +210,7 @@ def _check_rest(
 
 def _stepped(times: np.ndarray, values: np.ndarray, down: np.ndarray) -> PPoly:
     """A curve (F, m) that rests at its mean while the sole is planted, and is C² between."""
-    stances = _stances(down)
+    stances = stances_of(down)
     rests = [values[a : b + 1].mean(axis=0) for a, b in stances]
     breaks: list[float] = [float(times[0])]
     parts: list[np.ndarray] = []

@@ -121,7 +121,7 @@ def plan(
     from poise.training.following.script_tables import print_plan
 
     tree = find_script(script)
-    synthesis = open_synthesis(graph, robot, kind)
+    synthesis = open_synthesis(graph, robot, kind, script=tree)
     print_plan(synthesis.plan(tree, k), sequence_text(tree.sequence), terminal())
     if table:
         print(to_csv(tree), end="")
@@ -160,7 +160,7 @@ def synth(
     if report is not None:
         check_page(report)
     tree = between(find_script(script), start, goal)
-    synthesis = open_synthesis(graph, robot, kind, least)
+    synthesis = open_synthesis(graph, robot, kind, least, tree)
     begin = time.monotonic()
     clip, record = synthesis.make(tree)
     if robot is None:
