@@ -66,6 +66,12 @@ class Footing(Copyable):
         planted = self.planted[np.searchsorted(self.switches, t, side="right")] > 0
         return FootingSample(out[:, :3], out[:, 3:6], places, turns, planted)
 
+    def at_speed(self, factor: float) -> Footing:
+        """The contacts of the motion `factor` > 0 times as fast; δ is its square times as large."""
+        coeffs = self.coeffs * float(factor) ** np.arange(self.coeffs.shape[1])[:, None]
+        coeffs[:, :, SPIN:] *= factor**2
+        return Footing(self.knots / factor, coeffs, self.switches / factor, self.planted)
+
     @property
     def swings(self) -> list[tuple[int, float, float]]:
         """Foot, lift-off and touchdown [s] of every step, in order."""

@@ -73,6 +73,17 @@ def home_frames(robot: Robot, qpos: np.ndarray, planted: np.ndarray) -> np.ndarr
     return np.asarray(planted.all(axis=1) & (gaps < NEAR) & (tilts < NEARLY))
 
 
+def why_not_home(robot: Robot, qpos: np.ndarray, planted: np.ndarray) -> str:
+    """Why a posture (nq,) with `planted` soles (2,) is not one of `home_frames`; empty if it is."""
+    if not planted.all():
+        return "a sole is in the air"
+    gap, turned = (float(values[0]) for values in away_from_home(robot, qpos[None]))
+    if gap < NEAR and turned < NEARLY:
+        return ""
+    return (f"the feet are {100.0 * gap:.1f} cm and {np.degrees(turned):.0f}° from how they stand "
+            "in standing")  # fmt: skip
+
+
 def at_rest(robot: Robot, qpos: np.ndarray, planted: np.ndarray) -> np.ndarray:
     """Postures (F, nq) whose soles rest while they are `planted` (F, 2), flat on the ground.
 

@@ -28,7 +28,7 @@ from poise.baselines.motion_graphs.motion_graph import Transition
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.motions.robot_clip import FEWEST, About, RobotClip, reference_from
-from poise.baselines.motions.stances import away_from_home
+from poise.baselines.motions.stances import why_not_home
 from poise.baselines.retargeting.performed import STILL, planted_qpos
 from poise.baselines.retargeting.robot_bvh import clip_of_robot, robot_qpos
 from poise.configs.errors import PoiseError
@@ -139,13 +139,9 @@ class RobotJoins:
         frame = 0 if first else len(clip) - 1
         if clip.support is None or clip.support.home[frame]:
             return ""
-        time = f"at {frame * clip.dt:.2f} s of {clip.name!r}"
-        if not clip.support.planted[frame].all():
-            return f"{time} a sole is in the air"
-        gap, turned = away_from_home(self.robot, robot_qpos(clip.part(slice(frame, frame + 1)),
-                                                            self.robot))  # fmt: skip
-        return (f"{time} the feet are {100.0 * gap[0]:.1f} cm and {np.degrees(turned[0]):.0f}° from "
-                "how they stand")  # fmt: skip
+        qpos = robot_qpos(clip.part(slice(frame, frame + 1)), self.robot)[0]
+        said = why_not_home(self.robot, qpos, clip.support.planted[frame])
+        return f"at {frame * clip.dt:.2f} s of {clip.name!r} {said}"
 
     def _found(self, before: Clip, after: Clip, transition: Transition, through: bool) -> Way | str:
         direct = self._ways.get((transition, False)) if through else ""
