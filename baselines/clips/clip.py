@@ -208,7 +208,7 @@ class Clip:
 
 
 def together(clips: Sequence[Clip]) -> Clip:
-    """The frames of clips of one skeleton and rate, one after the other; the rest is the first's."""
+    """The frames of clips of one skeleton and rate, in order; all else is the first one's."""
     root, rotations = (np.concatenate([getattr(clip, name) for clip in clips])
                        for name in ("root", "rotations"))  # fmt: skip
     known = any(clip.support is not None for clip in clips)

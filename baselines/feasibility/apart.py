@@ -62,8 +62,8 @@ def check_rates(before: RobotClip, after: RobotClip) -> None:
     """Raise ConfigError for two clips, one with steps, at two rates."""
     steps = before.planted is not None or after.planted is not None
     if steps and abs(before.dt - after.dt) > 1e-9:
-        raise ConfigError(f"has {1.0 / after.dt:.3g} frames a second, and {before.about.name!r} has "
-                          f"{1.0 / before.dt:.3g}: with steps both must have as many",
+        raise ConfigError(f"has {1.0 / after.dt:.3g} frames a second, and {before.about.name!r} "
+                          f"has {1.0 / before.dt:.3g}: with steps both must have as many",
                           source=after.about.name, field="dt")  # fmt: skip
 
 
@@ -86,4 +86,6 @@ def in_one(
     contacts.insert(1, np.ones((len(middle), 2), dtype=bool))
     soles = np.concatenate(contacts)
     qpos = carried(qpos, place_of(robot, qpos[0]), home_place(robot))
-    return RobotClip(replace(before.about, name=name), before.dt, at_rest(robot, qpos, soles), soles)
+    return RobotClip(
+        replace(before.about, name=name), before.dt, at_rest(robot, qpos, soles), soles
+    )

@@ -121,7 +121,7 @@ def physical_join(
     enter = first * after.dt if steps else enter
     stretches = (stretch_at(robot, before, last, "leave"), stretch_at(robot, after, first, "enter"))
     shaper = make_shaper(robot, before.dt, [motion for motion, _ in stretches], limits)
-    a, b = _sides(shaper, (before, after), stretches, last, enter)
+    a, b = _sides(shaper, before, stretches, last, enter)
     way = way_between(shaper, a, b, time_price, through)
     if isinstance(way, str):
         raise JoinRefused(f"no way from {before.about.name!r} at {last * before.dt:.2f} s to "
@@ -257,12 +257,10 @@ def part_of(shaper: Shaper, way: Attempt) -> JoinPart:
 
 
 def _sides(
-    shaper: Shaper, clips: Sequence[RobotClip], stretches: Sequence[Stretch], last: int,
-    enter: float,
+    shaper: Shaper, before: RobotClip, stretches: Sequence[Stretch], last: int, enter: float
 ) -> tuple[End, End]:  # fmt: skip
     """A at its frame `last` and B at `enter` [s], with the frames beside them."""
-    (before, after), dt = clips, shaper.dt
-    (left, there), (entered, here) = stretches
+    dt, (left, there), (entered, here) = shaper.dt, *stretches
     a = shaper.end(left, (last - there.start) * dt, before.qpos[there.start : last + 1, 7:])
     enter -= here.start * dt
     times = np.arange(enter, entered.duration + 1e-9, dt)

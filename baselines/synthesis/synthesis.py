@@ -133,8 +133,8 @@ class Synthesis:
                 free = (times <= early) if first else (times >= late)
                 if needed and not free.any():
                     word = "lead to" if first else "follow"
-                    raise ConfigError(f"nothing can {word} {shown(name)}: {joins.away(clip, first)}",
-                                      source=script.source)  # fmt: skip
+                    said = f"nothing can {word} {shown(name)}: {joins.away(clip, first)}"
+                    raise ConfigError(said, source=script.source)  # fmt: skip
 
     def _by_hand(self, actions: Actions, i: int, script: Script) -> Transition:
         """The transition of the arrow after action `i`; an error says where the arrow stands."""

@@ -53,7 +53,7 @@ def steps_clip(robot: Robot, name: str, steps: Sequence[FootStep], duration: flo
 @functools.cache
 def ahead_clip(robot: Robot, length: float = 0.1) -> RobotClip:
     """A step ahead with the left foot, in h, and the right foot beside it."""
-    way = [(Waypoint(lift + 0.3, length / 2.0, up=0.05),) for lift in (1.3, 2.3)]
-    steps = [FootStep(foot, lift, lift + 0.6, over, ahead=length)
-             for foot, lift, over in zip(("left", "right"), (1.3, 2.3), way, strict=True)]  # fmt: skip
+    ways = [(Waypoint(lift + 0.3, length / 2.0, up=0.05),) for lift in (1.3, 2.3)]
+    steps = [FootStep("left", 1.3, 1.9, ways[0], ahead=length),
+             FootStep("right", 2.3, 2.9, ways[1], ahead=length)]  # fmt: skip
     return steps_clip(robot, "ahead", steps, 4.3)

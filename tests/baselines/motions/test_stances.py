@@ -33,7 +33,9 @@ def test_home_is_where_both_soles_stand_as_in_standing_in_any_place() -> None:
     assert clip.planted[staggered].all()
     gap, turned = away_from_home(robot, moved[staggered][None])
     assert gap[0] == pytest.approx(0.05 * robot.height_com, abs=1e-3) and turned[0] < 1e-3
-    assert f"{100 * gap[0]:.1f} cm and 0°" in why_not_home(robot, moved[staggered], np.ones(2, bool))
+    assert f"{100 * gap[0]:.1f} cm and 0°" in why_not_home(
+        robot, moved[staggered], np.ones(2, bool)
+    )
     assert why_not_home(robot, moved[0], np.ones(2, bool)) == ""
 
 
