@@ -63,6 +63,19 @@ def test_velocities_are_those_of_the_places(kick: Footing) -> None:
             assert rate == pytest.approx(b[..., 1, :], abs=1e-6), name
 
 
+def test_a_faster_motion_has_its_contacts_earlier() -> None:
+    motion = load_motion("kick", robot_named("humanoid"))
+    fast = motion.at_speed(1.25)
+    assert motion.footing is not None and fast.footing is not None
+    ((foot, lift, land),) = fast.footing.swings
+    assert (foot, lift, land) == (1, pytest.approx(1.5 / 1.25), pytest.approx(3.3 / 1.25))
+    own, other = motion.footing.sample(2.5), fast.footing.sample(2.0)
+    for power in range(3):
+        for name in ("com", "root", "places", "turns"):
+            a, b = (getattr(sample, name)[..., power, :] for sample in (own, other))
+            np.testing.assert_allclose(b, a * 1.25**power, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("planted", "reason"),
     [
