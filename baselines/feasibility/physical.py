@@ -119,9 +119,10 @@ def physical_join(
     check_rates(before, after)
     steps = before.planted is not None or after.planted is not None
     enter = first * after.dt if steps else enter
-    stretches = (stretch_at(robot, before, last, "leave"), stretch_at(robot, after, first, "enter"))
-    shaper = make_shaper(robot, before.dt, [motion for motion, _ in stretches], limits)
-    a, b = _sides(shaper, before, stretches, last, enter)
+    left = stretch_at(robot, before, last, "leave")
+    entered = stretch_at(robot, after, first, "enter")
+    shaper = make_shaper(robot, before.dt, [left.motion, entered.motion], limits)
+    a, b = _sides(shaper, before, left, last, entered, enter)
     way = way_between(shaper, a, b, time_price, through)
     if isinstance(way, str):
         raise JoinRefused(f"no way from {before.about.name!r} at {last * before.dt:.2f} s to "
@@ -257,15 +258,15 @@ def part_of(shaper: Shaper, way: Attempt) -> JoinPart:
 
 
 def _sides(
-    shaper: Shaper, before: RobotClip, stretches: Sequence[Stretch], last: int, enter: float
-) -> tuple[End, End]:  # fmt: skip
+    shaper: Shaper, before: RobotClip, left: Stretch, last: int, entered: Stretch, enter: float
+) -> tuple[End, End]:
     """A at its frame `last` and B at `enter` [s], with the frames beside them."""
-    dt, (left, there), (entered, here) = shaper.dt, *stretches
-    a = shaper.end(left, (last - there.start) * dt, before.qpos[there.start : last + 1, 7:])
-    enter -= here.start * dt
-    times = np.arange(enter, entered.duration + 1e-9, dt)
-    frames = np.array([entered.sample(time).q_ref for time in times])
-    return a, shaper.end(entered, enter, frames)
+    dt, first = shaper.dt, left.frames.start
+    a = shaper.end(left.motion, (last - first) * dt, before.qpos[first : last + 1, 7:])
+    enter -= entered.frames.start * dt
+    times = np.arange(enter, entered.motion.duration + 1e-9, dt)
+    frames = np.array([entered.motion.sample(time).q_ref for time in times])
+    return a, shaper.end(entered.motion, enter, frames)
 
 
 def _kept(clip: RobotClip, frames: slice) -> RobotClip:

@@ -201,7 +201,7 @@ def play(
         source = read_bvh(find_bvh(file), unit, up, forward).clip
         made = retarget(source, body, planted=planted)
         clip, heading = made.clip, None if made.clip.planted is None else clip_heading(source)
-        skeleton = beside_of(body, source, made.scale, made.begins, heading)
+        skeleton = beside_of(body, source, made.scale, made.begins, heading, made.stride)
     frames = write_playback(video, body, clip.qpos, clip.dt, skeleton, size)
     print(f"{frames} frames")
     print(video)

@@ -38,13 +38,19 @@ class Skeletons:
         begins: time of the playback at which the clip begins [s]; its ends are held.
         place: (3,) where its root stands over the ground at its begin [m].
         size: the robot's CoM height [m].
+        stride: share of its way over the ground that it goes, so that it stays beside a robot whose
+            steps are shorter.
     """
 
-    def __init__(self, clip: Clip, scale: float, begins: float, place: np.ndarray, size: float):
+    def __init__(
+        self, clip: Clip, scale: float, begins: float, place: np.ndarray, size: float,
+        stride: float = 1.0,
+    ):  # fmt: skip
         self.clip, self.begins, self.size = clip, begins, size
         places = scale * clip.places()
         places -= places[0, 0] * [1.0, 1.0, 0.0] + [0.0, 0.0, float(places[..., 2].min())]
-        self.places = places + place
+        way = (places[:, :1] - places[0, 0]) * [1.0, 1.0, 0.0]
+        self.places = places + place - (1.0 - stride) * way
 
     def root(self, time: float) -> np.ndarray:
         """(2,) where it is over the ground at a time of the playback [s]."""
@@ -78,7 +84,7 @@ def playback_frames(
     view, screen = mujoco.MjvCamera(), OffScreen(model, *size)
     point(view, camera, robot.height_com)
     times = np.arange(0.0, (len(qpos) - 1) * dt + 1e-9, 1.0 / RATE)
-    seen = _looked_at(qpos[:, :2], dt, times, skeleton)
+    seen = looked_at(qpos[:, :2], dt, times, skeleton)
     try:
         for time, middle in zip(times, seen, strict=True):
             view.lookat = np.append(middle, LOOK_AT * robot.height_com)
@@ -94,7 +100,7 @@ def playback_frames(
         screen.close()
 
 
-def _looked_at(
+def looked_at(
     root: np.ndarray, dt: float, times: np.ndarray, skeleton: Skeletons | None
 ) -> np.ndarray:
     """(n, 2) between robot and skeleton, smoothed over a second; still where they hardly move."""
@@ -135,13 +141,15 @@ def write_playback(
 
 
 def beside_of(
-    robot: Robot, clip: Clip, scale: float, begins: float, heading: float | None = None
-) -> Skeletons:
+    robot: Robot, clip: Clip, scale: float, begins: float, heading: float | None = None,
+    stride: float = 1.0,
+) -> Skeletons:  # fmt: skip
     """The skeleton of a clip to the left of a robot that stands.
 
-    `heading` is where the robot has ahead in the clip [rad]; None: where it faces at its begin.
+    `heading` is where the robot has ahead in the clip [rad]; None: where it faces at its begin. The
+    rest is as of `Skeletons`.
     """
     size = robot.height_com
     place = np.append(robot.standing_qpos[:2] + [0.0, BESIDE * size], 0.0)
     turned = clip.turned(-(float(clip.facing()[0]) if heading is None else heading))
-    return Skeletons(turned, scale, begins, place, size)
+    return Skeletons(turned, scale, begins, place, size, stride)
