@@ -58,7 +58,8 @@ def graph(
     """Find out which clips may follow which, and where: a motion graph as YAML.
 
     Args:
-        files: .bvh files or names of packaged clips, all of one skeleton; with a robot .npz too.
+        files: .bvh files or names of packaged clips, all of one skeleton; with a robot a .npz, or
+            a motion with steps by its name or .yaml, too.
         out: the .yaml file to write.
         robot: whose motions the clips become.
         coefficient: largest K of a transition.

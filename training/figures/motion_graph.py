@@ -87,7 +87,8 @@ def _circle(axes: Axes, graph: MotionGraph, table: np.ndarray) -> None:
     for place, name in zip(places, graph.names, strict=True):
         beside = abs(place[0]) > 0.3
         axes.text(
-            *(1.09 * place),
+            1.09 * place[0],
+            1.09 * place[1],
             _short(name),
             ha=("left" if place[0] > 0.0 else "right") if beside else "center",
             va="center" if beside else ("bottom" if place[1] > 0.0 else "top"),
