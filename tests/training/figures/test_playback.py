@@ -31,7 +31,7 @@ def test_the_skeleton_stands_beside_and_moves_with_the_clip() -> None:
     assert min(heights) >= 0.0
 
 
-def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_islooked_at() -> None:
+def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_is_looked_at() -> None:
     robot = robot_named("humanoid")
     clip = read_bvh(find_bvh("cmu02_walk")).clip
     whole, half = (beside_of(robot, clip, 0.9, 1.0, clip_heading(clip), stride)
@@ -43,7 +43,7 @@ def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_islooked_at() -> Non
     times = np.arange(0.0, end, 1.0 / 25.0)
     root = np.zeros((len(times), 2))
     seen = looked_at(root, 1.0 / 25.0, times, half)
-    assert seen[-1] == pytest.approx(0.5 * half.root(end), abs=0.05)
+    assert seen[-1] == pytest.approx(0.5 * half.root(end), abs=0.1)  # smoothed
     assert np.abs(np.diff(seen, axis=0)).max() < 0.05
     still = beside_of(robot, read_bvh(find_bvh("cmu02_squat")).clip, 0.9, 1.0)
     assert np.ptp(looked_at(root, 1.0 / 25.0, times, still), axis=0).max() == 0.0

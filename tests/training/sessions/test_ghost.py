@@ -1,6 +1,7 @@
 """The ghost of a motion with steps goes on with them, from where the robot stood."""
 
 import numpy as np
+import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.motions.robot_clip import reference_from
@@ -23,5 +24,6 @@ def test_the_ghost_of_steps_goes_ahead_with_them() -> None:
     assert np.hypot(*(end.middle - begin.middle)) > 0.09 * robot.height_com
     np.testing.assert_allclose(begin.middle, env.simulation.state.origin[:2], atol=1e-3)
     assert np.abs(np.diff(qpos[:, :3], axis=0)).max() < 0.02  # 1 m/s: it never jumps
-    assert away_from_home(robot, qpos[[0, -1]])[0].max() < 2e-3
+    gaps = away_from_home(robot, qpos[[0, -1]])[0]  # the start is disturbed, so are the soles
+    assert gaps[1] == pytest.approx(gaps[0], abs=1e-6) and gaps[0] < 1e-2
     np.testing.assert_allclose(ghost(times[-1]).positions[robot.root_body_id], qpos[-1, :3])
