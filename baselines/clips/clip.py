@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from poise.envs.maths.easing import ease
 
 from .rotations import about_z, heading_angle, inverse, multiply, rotate, slerp
 from .skeleton import SIDES, Skeleton
+from .support import Support
 
 MIRROR = np.array([1.0, -1.0, 1.0])  # of places, in the plane of x and z
 MIRROR_TURN = np.array([1.0, -1.0, 1.0, -1.0])  # of quaternions
@@ -29,6 +31,7 @@ class Clip:
         root: (F, 3) places of the root [m].
         rotations: (F, J, 4) of the joints relative to their parents, scalar first.
         licence: under which the file may be used; empty if nothing is known.
+        support: the contacts of a robot's motion with steps; None: not known, or no steps.
     """
 
     name: str
@@ -37,8 +40,11 @@ class Clip:
     root: np.ndarray
     rotations: np.ndarray
     licence: str = ""
+    support: Support | None = None
 
     def __post_init__(self) -> None:
+        if self.support is not None and len(self.support.home) != len(self.root):
+            raise ValueError(f"{len(self.support.home)} rows of contacts, {len(self.root)} frames")
         for array in (self.root, self.rotations):
             array.setflags(write=False)
 
@@ -54,6 +60,16 @@ class Clip:
     def times(self) -> np.ndarray:
         """(F,) times of the frames [s]."""
         return np.arange(len(self)) * self.dt
+
+    def supported(self) -> Support:
+        """The contacts; without any known both soles, where the robot stands."""
+        return Support.both(len(self)) if self.support is None else self.support
+
+    def part(self, chosen: slice | np.ndarray) -> Clip:
+        """Some of the frames."""
+        support = None if self.support is None else self.support.at(chosen)
+        return replace(self, root=self.root[chosen], rotations=self.rotations[chosen],
+                       support=support)  # fmt: skip
 
     def places(self) -> np.ndarray:
         """(F, J, 3) places of all joints [m]."""
@@ -78,7 +94,9 @@ class Clip:
         count = self.duration / dt + 1e-9 + 1.0
         times = np.arange(_frames(count, self.name, "rate")) * dt
         root, rotations = self.sample(times)
-        return replace(self, dt=dt, root=root, rotations=rotations)
+        nearest = np.minimum(np.round(times / self.dt).astype(int), len(self) - 1)
+        support = None if self.support is None else self.support.at(nearest)
+        return replace(self, dt=dt, root=root, rotations=rotations, support=support)
 
     def cut(self, start: float, end: float) -> Clip:
         """What lies between two times [s], to the nearest frames.
@@ -93,8 +111,7 @@ class Clip:
                 f"must be two times within 0 and {self.duration:.3f} s, in order, not "
                 f"{start:g} and {end:g}", source=self.name, field="cut",
             )  # fmt: skip
-        chosen = slice(first, last + 1)
-        return replace(self, root=self.root[chosen], rotations=self.rotations[chosen])
+        return self.part(slice(first, last + 1))
 
     def at_speed(self, factor: float) -> Clip:
         """The clip `factor` > 0 times as fast, at the same rate of frames.
@@ -107,7 +124,7 @@ class Clip:
 
     def reversed(self) -> Clip:
         """The frames in the opposite order."""
-        return replace(self, root=self.root[::-1], rotations=self.rotations[::-1])
+        return self.part(slice(None, None, -1))
 
     def mirrored(self) -> Clip:
         """Left and right exchanged: the mirror image in the plane of x and z.
@@ -126,7 +143,9 @@ class Clip:
         skeleton = replace(old, offsets=old.offsets[other] * MIRROR, end_parents=ends,
                            end_offsets=old.end_offsets * MIRROR)  # fmt: skip
         rotations = self.rotations[:, other] * MIRROR_TURN
-        return replace(self, skeleton=skeleton, root=self.root * MIRROR, rotations=rotations)
+        support = None if self.support is None else self.support.mirrored()
+        return replace(self, skeleton=skeleton, root=self.root * MIRROR, rotations=rotations,
+                       support=support)  # fmt: skip
 
     def turned(self, angle: float) -> Clip:
         """The clip turned about the world's z axis by a finite `angle` [rad], else ConfigError."""
@@ -185,10 +204,16 @@ class Clip:
             following = self.turned(float(turned[-1] - turned[0]) * len(parts))
             step = (parts[-1].root[-1] - following.root[0]) * np.array([1.0, 1.0, 0.0])
             parts.append(following.moved(step))
-        pieces = [(part.root, part.rotations) for part in parts]
-        root = np.concatenate([pieces[0][0], *(r[1:] for r, _ in pieces[1:])])
-        rotations = np.concatenate([pieces[0][1], *(r[1:] for _, r in pieces[1:])])
-        return replace(self, root=root, rotations=rotations)
+        return together([parts[0], *(part.part(slice(1, None)) for part in parts[1:])])
+
+
+def together(clips: Sequence[Clip]) -> Clip:
+    """The frames of clips of one skeleton and rate, in order; all else is the first one's."""
+    root, rotations = (np.concatenate([getattr(clip, name) for clip in clips])
+                       for name in ("root", "rotations"))  # fmt: skip
+    known = any(clip.support is not None for clip in clips)
+    support = Support.together([clip.supported() for clip in clips]) if known else None
+    return replace(clips[0], root=root, rotations=rotations, support=support)
 
 
 def _frames(count: float, source: str, field: str) -> int:

@@ -93,6 +93,7 @@ class Feasibility:
         times: (n,) [s].
         zmp: (n, 2) [m]; support: (k, 2) hull of the soles [m]; zmp_margin: (n,) distance of the
             ZMP to the hull's edge, above 0 inside [m].
+        reach: (n, 2, 2) least and largest x and y of the soles that are planted [m].
         friction: (n,) ‖f_t‖/(μ f_z); load: (n,) f_z/(m g).
         torque: (n, nu) |τ|/τ_max with the least wrenches of the soles.
         speed: (n, nj) |q̇| [rad/s]; excess: (n, nj) over the joint's range, below 0 inside [rad].
@@ -106,6 +107,7 @@ class Feasibility:
     zmp: np.ndarray
     support: np.ndarray
     zmp_margin: np.ndarray
+    reach: np.ndarray
     friction: np.ndarray
     load: np.ndarray
     torque: np.ndarray
@@ -213,6 +215,7 @@ def judge(
         zmp=trajectory.zmp,
         support=support,
         zmp_margin=margin,
+        reach=_reach(robot, trajectory),
         friction=np.hypot(force[:, 0], force[:, 1]) / (ground_friction(robot) * force[:, 2]),
         load=force[:, 2] / robot.units.force,
         torque=np.abs(torque),
@@ -223,6 +226,17 @@ def judge(
         motors=robot.motor_names,
         joints=robot.joint_names,
     )
+
+
+def _reach(robot: Robot, path: Trajectory) -> np.ndarray:
+    """(n, 2, 2) least and largest x and y of the planted soles [m]."""
+    corners = path.corners[:, :, :2]
+    down = np.ones(corners.shape[:2], dtype=bool)
+    if path.planted is not None:
+        counts = [len(sole.polygon) for sole in robot.soles]
+        down = path.planted[:, np.repeat(np.arange(len(counts)), counts)]
+    low, high = (np.where(down[..., None], corners, away) for away in (np.inf, -np.inf))
+    return np.stack([low.min(axis=1), high.max(axis=1)], axis=1)
 
 
 def ground_friction(robot: Robot) -> float:

@@ -12,7 +12,7 @@ from .check import Feasibility, FeasibilityLimits
 EDGE = 0.1  # [s] beside a cut in which a join may be as bad as the clip is there
 FADE = 0.1  # [s] after that in which it may be so in part
 #: arrays of `Feasibility` with a row for each sample
-SAMPLED = ("times", "zmp", "zmp_margin", "friction", "load", "torque", "speed", "excess",
+SAMPLED = ("times", "zmp", "zmp_margin", "reach", "friction", "load", "torque", "speed", "excess",
            "drift", "gap")  # fmt: skip
 MORE = 1.05  # times as bad, since splines through other frames differ a little
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from poise.baselines.motions.footwork import com_over
+from poise.baselines.motions.foot_steps import plan_of
+from poise.baselines.motions.footing import sole_poses
+from poise.baselines.motions.footwork import com_over, perform_plan
 from poise.baselines.motions.legs import PlantedLegs
 from poise.baselines.motions.reference_motion import ReferenceMotion
-from poise.baselines.motions.robot_clip import RobotClip, check_both_planted, reference_from
-from poise.configs.errors import PoiseError
+from poise.baselines.motions.robot_clip import RobotClip, reference_from
+from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.maths.polygons import half_planes, nearest_inside
 from poise.envs.robots.robot import Robot
 
@@ -51,14 +54,16 @@ def fit_motion(clip: RobotClip, robot: Robot, limits: FeasibilityLimits | None =
     """The first of these that keeps the limits: as it is, slower, with the CoM moved, both.
 
     Tempos are 0.9, 0.8, … 0.5. The CoM is moved over the ground, with trunk and arms as they are
-    and legs that reach their soles, see `moved_com`.
+    and legs that reach their soles, see `moved_com`. With steps the CoM is planned again at every
+    tempo, see `perform_plan`.
 
     Raises:
         NotFitted: nothing helps; the worst sample is named.
         ConfigError: the clip is no motion of this robot.
     """
-    check_both_planted(clip, clip.about.name, "a fit")
     slowed = [(1.0, clip), *((tempo, replace(clip, dt=clip.dt / tempo)) for tempo in TEMPOS)]
+    if clip.planted is not None:
+        return _fit_steps(slowed, clip.planted, robot, limits)
     for tempo, slow in slowed:
         judged = check_motion(slow, robot, limits)
         if judged.feasible:
@@ -72,6 +77,32 @@ def fit_motion(clip: RobotClip, robot: Robot, limits: FeasibilityLimits | None =
         nearest = min(nearest, judged, key=lambda one: one.lacking)
     raise NotFitted(f"{clip.about.name}: no tempo from 0.5 on and no shift of the centre of mass "
                     f"makes it possible: {nearest.reason}")  # fmt: skip
+
+
+def _fit_steps(
+    slowed: Sequence[tuple[float, RobotClip]], planted: np.ndarray, robot: Robot,
+    limits: FeasibilityLimits | None,
+) -> Fitted:  # fmt: skip
+    """The first tempo at which a motion with steps, or one with its CoM planned anew, holds."""
+    judged = check_motion(slowed[0][1], robot, limits)
+    if judged.feasible:
+        return Fitted(slowed[0][1], 1.0, 0.0, judged)
+    reason, least = judged.reason, judged.lacking
+    for tempo, slow in slowed:
+        name = slow.about.name
+        try:
+            qpos = perform_plan(robot, plan_of(robot, slow.qpos, slow.dt, planted), name)
+        except ConfigError:  # limbs that swing too fast at this tempo
+            continue
+        made = replace(slow, qpos=qpos)
+        judged = check_motion(made, robot, limits)
+        if judged.feasible:
+            way = (sole_poses(robot, qpos)[0] - sole_poses(robot, slow.qpos)[0])[:, :2]
+            return Fitted(made, tempo, float(np.linalg.norm(way, axis=1).max()), judged)
+        if judged.lacking < least:
+            reason, least = judged.reason, judged.lacking
+    raise NotFitted(f"{slowed[0][1].about.name}: no tempo from 0.5 on with the centre of mass "
+                    f"planned again makes it possible: {reason}")  # fmt: skip
 
 
 def moved_com(

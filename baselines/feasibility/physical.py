@@ -11,10 +11,11 @@ import numpy as np
 from poise.baselines.motions.legs import PlantedLegs
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
-from poise.baselines.motions.robot_clip import RobotClip, check_both_planted, reference_from
+from poise.baselines.motions.robot_clip import RobotClip
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.robots.robot import Robot
 
+from .apart import Stretch, check_rates, in_one, stretch_at
 from .check import Feasibility, FeasibilityLimits
 from .curve import Curve
 from .ends import Attempt, End
@@ -97,7 +98,7 @@ def physical_join(
     planted. Chosen is the least K + λ D, D from 0.2 to 2.5 s, that keeps `FeasibilityLimits`;
     within 0.1 s of a cut it may be as bad as the clip is there. If none does with the clips'
     accelerations at the cuts, the curve begins and ends without any. A motion is a C² spline
-    through its frames, so the join is C² in any case.
+    through its frames, so the join is C² in any case. B goes on from where A's feet stand.
 
     Args:
         robot: whose motions they are.
@@ -109,19 +110,19 @@ def physical_join(
         limits: what the join has to keep.
 
     Raises:
-        ConfigError: a time outside of its clip, a motion of another robot, or one with steps.
+        ConfigError: a time outside of its clip, a motion of another robot; a cut in a step, or
+            where the feet stand otherwise than in standing, see `stretch_at`.
         JoinRefused: no duration is possible, nor the way by standing.
     """
-    for clip in (before, after):
-        check_both_planted(clip, clip.about.name, "a physical join")
-    motions = [reference_from(clip, robot, clip.about.name) for clip in (before, after)]
     last = _frame(before, before.duration if leave is None else leave, "leave")
-    _frame(after, enter, "enter")
-    shaper = make_shaper(robot, before.dt, motions, limits)
-    times = np.arange(enter, after.duration + 1e-9, before.dt)
-    frames = np.array([motions[1].sample(time).q_ref for time in times])
-    a = shaper.end(motions[0], last * before.dt, before.qpos[: last + 1, 7:])
-    b = shaper.end(motions[1], enter, frames)
+    first = _frame(after, enter, "enter")
+    check_rates(before, after)
+    steps = before.planted is not None or after.planted is not None
+    enter = first * after.dt if steps else enter
+    left = stretch_at(robot, before, last, "leave")
+    entered = stretch_at(robot, after, first, "enter")
+    shaper = make_shaper(robot, before.dt, [left.motion, entered.motion], limits)
+    a, b = _sides(shaper, before, left, last, entered, enter)
     way = way_between(shaper, a, b, time_price, through)
     if isinstance(way, str):
         raise JoinRefused(f"no way from {before.about.name!r} at {last * before.dt:.2f} s to "
@@ -129,7 +130,11 @@ def physical_join(
     made = [attempt.qpos for attempt in way if attempt.qpos is not None]
     between = pause(shaper, made)
     name = f"{before.about.name}-{after.about.name}"
-    clip = assembled(shaper, before, name, [a.frames, *between, b.frames])
+    if steps:
+        kept = _kept(before, slice(0, last + 1)), _kept(after, slice(first, None))
+        clip = in_one(shaper.planted, *kept, between, name)
+    else:
+        clip = assembled(shaper, before, name, [a.frames, *between, b.frames])
     parts = tuple(part_of(shaper, attempt) for attempt in way)
     start, length = last * before.dt, (sum(map(len, between)) + 1) * before.dt
     return PhysicalJoin(clip, start, enter, start, start + length, parts)
@@ -250,6 +255,23 @@ def part_of(shaper: Shaper, way: Attempt) -> JoinPart:
     bent, calm = bool(np.any(way.curve.bends)), not np.any(way.curve.coefficients[2])
     coefficient = way.curve.energy(shaper.masses)
     return JoinPart(way.curve.duration, coefficient, bent, calm, way.feasibility)
+
+
+def _sides(
+    shaper: Shaper, before: RobotClip, left: Stretch, last: int, entered: Stretch, enter: float
+) -> tuple[End, End]:
+    """A at its frame `last` and B at `enter` [s], with the frames beside them."""
+    dt, first = shaper.dt, left.frames.start
+    a = shaper.end(left.motion, (last - first) * dt, before.qpos[first : last + 1, 7:])
+    enter -= entered.frames.start * dt
+    times = np.arange(enter, entered.motion.duration + 1e-9, dt)
+    frames = np.array([entered.motion.sample(time).q_ref for time in times])
+    return a, shaper.end(entered.motion, enter, frames)
+
+
+def _kept(clip: RobotClip, frames: slice) -> RobotClip:
+    planted = None if clip.planted is None else clip.planted[frames]
+    return replace(clip, qpos=clip.qpos[frames], planted=planted)
 
 
 def _frame(clip: RobotClip, time: float, field: str) -> int:

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from poise.baselines.clips.clip import Clip
+from poise.baselines.clips.clip import Clip, together
 from poise.baselines.clips.rotations import slerp
 from poise.configs.errors import ConfigError
 from poise.envs.maths.easing import ease
@@ -161,7 +161,7 @@ def laid_on(before: Clip, after: Clip) -> Clip:
     What is left of a difference between the two postures is a step between two frames.
     """
     after = _placed(faced_like(after, before), before.root[-1])
-    return _joined([(before.root, before.rotations), (after.root[1:], after.rotations[1:])], before)
+    return together([before, after.part(slice(1, None))])
 
 
 def ends(before: Clip, after: Clip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -198,7 +198,7 @@ def _placed(clip: Clip, place: np.ndarray) -> Clip:
 
 def _joined(parts: list[tuple[np.ndarray, np.ndarray]], like: Clip) -> Clip:
     root, rotations = (np.concatenate([part[i] for part in parts]) for i in range(2))
-    return replace(like, root=root, rotations=rotations)
+    return replace(like, root=root, rotations=rotations, support=None)
 
 
 def _vector_rates(gap: np.ndarray, rate: np.ndarray) -> np.ndarray:

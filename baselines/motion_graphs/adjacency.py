@@ -46,6 +46,8 @@ class Frames(NamedTuple):
         planted: (n, 2), or None where the feet are not known.
         masses: (3 + 3J,) for the coefficient.
         duration: of the clip [s].
+        joints: their names.
+        home: (n,) whether a clip with steps can be left or entered; None: always.
     """
 
     name: str
@@ -57,12 +59,14 @@ class Frames(NamedTuple):
     masses: np.ndarray
     duration: float
     joints: tuple[str, ...]
+    home: np.ndarray | None = None
 
 
 def frames_of(clip: Clip, sampling: float = SAMPLING, planted: bool | None = None) -> Frames:
     """A clip's frames about `sampling` [s] apart, the first and the last among them.
 
-    `planted` says that both feet always stand, or do not; None measures it where feet are known.
+    `planted` says that both feet always stand, or do not; None measures it where feet are known. A
+    clip that knows its contacts has them.
 
     Raises ConfigError if the skeleton's hips are not known by name.
     """
@@ -75,9 +79,10 @@ def frames_of(clip: Clip, sampling: float = SAMPLING, planted: bool | None = Non
     x, y = rates[:, 0].copy(), rates[:, 1].copy()
     rates[:, 0], rates[:, 1] = cos * x - sin * y, sin * x + cos * y
     heights = clip.root[chosen] * np.array([0.0, 0.0, 1.0])
+    home = None if clip.support is None else clip.support.home[chosen]
     return Frames(clip.name, clip.times[chosen], heights, rotations, rates,
                   _planted(clip, chosen, planted), moved_shares(clip.skeleton), clip.duration,
-                  clip.skeleton.names)  # fmt: skip
+                  clip.skeleton.names, home)  # fmt: skip
 
 
 def all_rates(clip: Clip) -> np.ndarray:
@@ -91,6 +96,8 @@ def all_rates(clip: Clip) -> np.ndarray:
 
 
 def _planted(clip: Clip, chosen: np.ndarray, planted: bool | None) -> np.ndarray | None:
+    if clip.support is not None:
+        return clip.support.planted[chosen]
     if planted is not None:
         return np.full((len(chosen), 2), planted)
     try:
@@ -243,6 +250,9 @@ def _possible(before: Frames, after: Frames, thresholds: Thresholds) -> np.ndarr
     possible[:, -WHOLE:] = False
     if thresholds.contacts and before.planted is not None and after.planted is not None:
         possible &= (before.planted[:, None] == after.planted).all(axis=2)
+    for home, across in ((before.home, np.s_[:, None]), (after.home, np.s_[None])):
+        if home is not None:
+            possible &= home[across]
     if before.name == after.name:
         apart = np.abs(before.times[:, None] - after.times) >= SAME
         apart[-1, 0] = True

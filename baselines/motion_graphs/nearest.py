@@ -39,6 +39,8 @@ def nearest_places(
     away: dict[Place, float] = {}
     for name, each in frames.items():
         gaps = distances(each, *posture)
+        if each.home is not None:
+            gaps = np.where(each.home, gaps, np.inf)
         best = int(np.argmin(gaps))
         away[name, float(each.times[best])] = float(gaps[best])
     found = {place: price * gap for place, gap in away.items() if np.degrees(gap) <= near}

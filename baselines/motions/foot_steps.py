@@ -13,6 +13,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .feet import foot_signs, nominal_feet
+from .footing import root_turns, sole_poses
 from .footwork import FootPlan
 from .robot_clip import RATE
 from .splines import rest_spline
@@ -91,3 +92,10 @@ def plan_steps(
         places[b:, foot] = points[-1, :3]
         planted[a + 1 : b, foot] = False
     return FootPlan(RATE, joints, root, np.full(frames, h), places, turns, planted)
+
+
+def plan_of(robot: Robot, qpos: np.ndarray, dt: float, planted: np.ndarray) -> FootPlan:
+    """What postures (F, nq) with `planted` soles (F, 2) ask of a robot, but for where their CoM and
+    its legs go."""
+    com, places, turns = sole_poses(robot, qpos)
+    return FootPlan(dt, qpos[:, 7:], root_turns(robot, qpos), com[:, 2], places, turns, planted)

@@ -66,6 +66,12 @@ class Footing(Copyable):
         planted = self.planted[np.searchsorted(self.switches, t, side="right")] > 0
         return FootingSample(out[:, :3], out[:, 3:6], places, turns, planted)
 
+    def at_speed(self, factor: float) -> Footing:
+        """The contacts of the motion `factor` > 0 times as fast; δ is its square times as large."""
+        coeffs = self.coeffs * float(factor) ** np.arange(self.coeffs.shape[1])[:, None]
+        coeffs[:, :, SPIN:] *= factor**2
+        return Footing(self.knots / factor, coeffs, self.switches / factor, self.planted)
+
     @property
     def swings(self) -> list[tuple[int, float, float]]:
         """Foot, lift-off and touchdown [s] of every step, in order."""
@@ -186,7 +192,7 @@ def root_turns(robot: Robot, qpos: np.ndarray) -> np.ndarray:
     return np.asarray((both * standing.inv()).as_rotvec())
 
 
-def _stances(down: np.ndarray) -> list[tuple[int, int]]:
+def stances_of(down: np.ndarray) -> list[tuple[int, int]]:
     """First and last frame of every time that a sole is planted."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], down.astype(int), [0]])))
     return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
@@ -195,7 +201,7 @@ def _stances(down: np.ndarray) -> list[tuple[int, int]]:
 def _check_rest(
     times: np.ndarray, places: np.ndarray, turns: np.ndarray, down: np.ndarray, source: str
 ) -> None:
-    for first, last in _stances(down):
+    for first, last in stances_of(down):
         own = slice(first, last + 1)
         away = np.linalg.norm(places[own] - np.median(places[own], axis=0), axis=1)
         away = np.maximum(away, np.abs(places[own, 2]))
@@ -210,7 +216,7 @@ def _check_rest(
 
 def _stepped(times: np.ndarray, values: np.ndarray, down: np.ndarray) -> PPoly:
     """A curve (F, m) that rests at its mean while the sole is planted, and is C² between."""
-    stances = _stances(down)
+    stances = stances_of(down)
     rests = [values[a : b + 1].mean(axis=0) for a, b in stances]
     breaks: list[float] = [float(times[0])]
     parts: list[np.ndarray] = []

@@ -118,6 +118,9 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
         ConfigError: a place that the legs cannot reach, a joint out of its range, or limbs whose
             angular momentum takes the ZMP 4 cm from where it is planned.
     """
+    if len(plan.height) < 2.0 * LEAD / plan.dt + 2.0:
+        raise ConfigError(f"lasts {len(plan.height) * plan.dt:.2f} s: too short for the weight to "
+                          "shift", source=source, field="feet")  # fmt: skip
     legs, ground = PlantedLegs(robot), float(nominal_feet(robot)[:, 2].mean())
     standing = robot.standing_qpos
     times = np.arange(len(plan.height)) * plan.dt

@@ -14,7 +14,7 @@ from scipy.interpolate import BSpline, PPoly
 
 from poise.baselines.clips.interpolation import MOST_OF_POLYNOMIAL, curve_through
 from poise.configs.errors import ConfigError, shown
-from poise.configs.files import resolve
+from poise.configs.files import packaged_folder, resolve
 from poise.configs.schema import build, read_yaml
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
@@ -23,7 +23,14 @@ from .foot_steps import FootStep, check_steps, plan_steps
 from .footwork import perform_plan
 from .postures import LevelKinematics
 from .reference_motion import ReferenceMotion
-from .robot_clip import RATE, read_robot_clip, reference_from, stepped_reference
+from .robot_clip import (
+    RATE,
+    About,
+    RobotClip,
+    read_robot_clip,
+    reference_from,
+    stepped_reference,
+)
 from .splines import piecewise, rest_spline
 
 SAMPLING = 0.02  # [s] between the postures whose height and root orientation are computed
@@ -115,6 +122,56 @@ def make_motion(
 ) -> ReferenceMotion:
     """The motion of a description for one robot; errors as in `load_motion`."""
     kinematics = LevelKinematics(robot)
+    times, joints, com_xy = _key_curves(description, robot, kinematics, source)
+    if description.steps:
+        qpos, planted = _stepped(description, joints, robot, source)
+        return stepped_reference(name, robot, qpos, RATE, planted, source)
+
+    # height and root orientation follow from the joints
+    dense = np.linspace(times[0], times[-1], 1 + int(np.ceil(times[-1] / SAMPLING)))
+    level = [kinematics.posture(q) for q in joints(dense)]
+    height = rest_spline(dense, np.array([posture.com[2:] for posture in level]))
+    root = rest_spline(dense, np.array([kinematics.root_rotation(p) for p in level]))
+    _check_range(dense, joints(dense), robot, source)
+
+    knots, coeffs = piecewise([joints, com_xy, height, root])
+    return ReferenceMotion(name, knots, coeffs, description.loop)
+
+
+def load_steps(motion: str | Path, robot: Robot) -> RobotClip:
+    """The frames of a packaged motion with steps (`kick`), or of such a .yaml file.
+
+    Raises ConfigError as `load_motion`, and for a motion without steps.
+    """
+    path = resolve("motions", motion)
+    description = build(MotionDescription, read_yaml(path), str(path))
+    if not description.steps:
+        raise ConfigError("has no steps: of keyframes only motions with steps become clips",
+                          source=path, field="steps")  # fmt: skip
+    _, joints, _ = _key_curves(description, robot, LevelKinematics(robot), str(path))
+    qpos, planted = _stepped(description, joints, robot, str(path))
+    return RobotClip(About(robot.name, robot.fingerprint, path.stem), RATE, qpos, planted)
+
+
+def motions_with_steps() -> list[str]:
+    """Names of the packaged motions whose feet leave the ground."""
+    return sorted(path.stem for path in packaged_folder("motions").glob("*.yaml")
+                  if "steps" in read_yaml(path))  # fmt: skip
+
+
+def _stepped(
+    description: MotionDescription, joints: BSpline | PPoly, robot: Robot, source: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Postures (F, nq), `RATE` apart, and the planted soles (F, 2)."""
+    frames = joints(np.arange(0.0, description.keyframes[-1].time + 0.5 * RATE, RATE))
+    plan = plan_steps(description.steps, frames, np.zeros((len(frames), 3)), robot, source)
+    return perform_plan(robot, plan, source), plan.planted
+
+
+def _key_curves(
+    description: MotionDescription, robot: Robot, kinematics: LevelKinematics, source: str
+) -> tuple[np.ndarray, BSpline | PPoly, BSpline | PPoly]:
+    """Times (n,) of the keyframes [s], and the curves of joints and CoM through them."""
     com = np.array([key.com for key in description.keyframes])
     if description.com_unit == "fraction":
         com = com * kinematics.support_extent()
@@ -129,23 +186,7 @@ def make_motion(
     standing = robot.standing_qpos[7:]
     keys = description.keyframes
     rates = [_posture(key.rates, robot, source, "rates") - standing for key in keys]
-    joints, com_xy = _curves(description.interpolation, times, postures, com, np.array(rates))
-
-    if description.steps:
-        frames = joints(np.arange(0.0, times[-1] + 0.5 * RATE, RATE))
-        plan = plan_steps(description.steps, frames, np.zeros((len(frames), 3)), robot, source)
-        qpos = perform_plan(robot, plan, source)
-        return stepped_reference(name, robot, qpos, RATE, plan.planted, source)
-
-    # height and root orientation follow from the joints
-    dense = np.linspace(times[0], times[-1], 1 + int(np.ceil(times[-1] / SAMPLING)))
-    level = [kinematics.posture(q) for q in joints(dense)]
-    height = rest_spline(dense, np.array([posture.com[2:] for posture in level]))
-    root = rest_spline(dense, np.array([kinematics.root_rotation(p) for p in level]))
-    _check_range(dense, joints(dense), robot, source)
-
-    knots, coeffs = piecewise([joints, com_xy, height, root])
-    return ReferenceMotion(name, knots, coeffs, description.loop)
+    return times, *_curves(description.interpolation, times, postures, com, np.array(rates))
 
 
 def _curves(

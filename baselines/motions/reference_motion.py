@@ -60,7 +60,8 @@ class ReferenceMotion(Copyable):
         """The motion `factor` > 0 times as fast: q(factor t)."""
         powers = float(factor) ** np.arange(self.coeffs.shape[1])
         coeffs = self.coeffs * powers[:, None]
-        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop)
+        footing = None if self.footing is None else self.footing.at_speed(factor)
+        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop, footing)
 
     def sample(self, t: float) -> MotionSample:
         """The reference at time t [s]."""

@@ -122,13 +122,6 @@ def _read_planted(path: str | Path, frames: int) -> np.ndarray:
     return np.asarray(planted > 0.0)
 
 
-def check_both_planted(clip: RobotClip, source: str | Path, what: str) -> None:
-    """Raise ConfigError for a motion with steps, for `what` keeps both soles planted."""
-    if clip.planted is not None:
-        raise ConfigError(f"its feet leave the ground: {what} keeps both planted", source=source,
-                          field="planted")  # fmt: skip
-
-
 def reference_from(
     clip: RobotClip, robot: Robot, source: str, rest: bool = True
 ) -> ReferenceMotion:

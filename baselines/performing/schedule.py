@@ -135,9 +135,16 @@ def reached_region(t: PerformTick) -> int:
 
 @compiled
 def beyond_reach(t: PerformTick, corners: int) -> float:
-    """How far the least CoP that keeps ξ − ξ_ref from growing is outside what soles reach [m]."""
+    """How much further outside what soles reach the least CoP that keeps ξ − ξ_ref from growing is
+    than the motion's own ZMP [m]: what a motion asks for itself for a moment is no fall."""
+    return _outside(t, corners, 0.0) - _outside(t, corners, -1.0)
+
+
+@compiled
+def _outside(t: PerformTick, corners: int, gain: float) -> float:
+    """How far `wanted_cop` is outside what soles reach [m]."""
     c = t.own
-    wanted_cop(t, 0.0, c.vector)
+    wanted_cop(t, gain, c.vector)
     find_nearest(c.memory.region[:corners], c.vector, c.pair)
     x, y = c.vector[0] - c.pair[0], c.vector[1] - c.pair[1]
     return np.sqrt(x * x + y * y)

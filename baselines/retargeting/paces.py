@@ -138,7 +138,7 @@ def plan_paces(
         stride: by which lengths of steps are less than that.
     """
     paces, origin = find_paces(clip)
-    before = max(round((BEFORE - paces[0].lift) / RATE) - lead, 0)
+    before = _longer(paces, lead)
     last = lead + before + round((paces[-1].land + AFTER) / RATE)
     frames = max(before + len(qpos), last)
     whole = np.pad(qpos, ((before, frames - before - len(qpos)), (0, 0)), mode="edge")
@@ -171,6 +171,15 @@ def plan_paces(
         planted[a + 1 : b, foot] = False
     return FootPlan(RATE, whole[:, 7:], root_turns(robot, whole), _heights(frames, times, h),
                     places, turns, planted)  # fmt: skip
+
+
+def frames_before(clip: Clip, lead: int) -> int:
+    """How many frames of standing a clip along x has before it, `lead` of them at least."""
+    return lead + _longer(find_paces(clip)[0], lead)
+
+
+def _longer(paces: list[Pace], lead: int) -> int:
+    return max(round((BEFORE - paces[0].lift) / RATE) - lead, 0)
 
 
 def longest_step(clip: Clip, scale: float) -> float:

@@ -14,7 +14,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 from .limbs import Limbs, find_limbs
-from .paces import LONGEST, clip_heading, longest_step, plan_paces
+from .paces import LONGEST, clip_heading, frames_before, longest_step, plan_paces
 from .targets import BodyTargets, between_standing, clip_targets, standing_targets
 
 SMOOTH = 3.0  # [Hz] of the low-pass on what the clip asks for, and on the joints
@@ -31,6 +31,7 @@ class Retargeted(NamedTuple):
         sole_error, direction_error, penetration, time_per_frame: as in `Solved`.
         limit_excess: largest excess over a joint limit [rad]; 0 if there is none.
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
+        begins: when the clip begins in the motion [s].
     """
 
     clip: RobotClip
@@ -41,6 +42,7 @@ class Retargeted(NamedTuple):
     time_per_frame: float
     limit_excess: float
     stride: float = 1.0
+    begins: float = LEAD
 
 
 def retarget(
@@ -91,10 +93,11 @@ def retarget_to(
     limbs, whole, heading = asked
     solved = _solver()(robot, limbs, whole, smooth)
     about = About(robot.name, robot.fingerprint, clip.name, clip.name, clip.licence)
-    qpos, stance, stride = solved.qpos, None, 1.0
+    qpos, stance, stride, begins = solved.qpos, None, 1.0, lead
     if heading is not None:
         walk = clip.resampled(RATE).turned(-heading)
         qpos, stance, stride = _stepped(walk, robot, limbs, qpos, lead)
+        begins = RATE * frames_before(walk, max(round(lead / RATE), 1))
     joints = qpos[:, 7:]
     excess = np.maximum(robot.joint_range[:, 0] - joints, joints - robot.joint_range[:, 1])
     return Retargeted(
@@ -106,6 +109,7 @@ def retarget_to(
         solved.time_per_frame,
         float(max(excess.max(), 0.0)),
         stride,
+        begins,
     )
 
 

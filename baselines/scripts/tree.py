@@ -110,3 +110,19 @@ class Script:
     sequence: Sequence
     text: str = field(default="", compare=False)
     source: str = field(default="script", compare=False)
+
+
+def clip_names(script: Script) -> set[str]:
+    """The names of clips in a script, those that it defines among them."""
+    found: set[str] = set()
+
+    def look(sequence: Sequence) -> None:
+        for term in (term for overlay in sequence.overlays for term in overlay.terms):
+            if isinstance(term.body, ClipName):
+                found.add(term.body.name)
+            elif isinstance(term.body, Sequence):
+                look(term.body)
+
+    for sequence in (*(define.sequence for define in script.defines), script.sequence):
+        look(sequence)
+    return found

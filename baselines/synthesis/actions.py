@@ -46,10 +46,16 @@ Item = tuple[Arrow, Overlay, int]  # the arrow before it, how many definitions i
 
 
 class Reader:
-    """The actions of a script on a stage; `make` turns an inner sequence into one clip."""
+    """The actions of a script on a stage.
 
-    def __init__(self, script: Script, stage: Stage, make: Callable[[Actions], Clip]):
-        self.script, self.stage, self.make = script, stage, make
+    `make` turns an inner sequence into one clip. `again` is given every clip that has been changed.
+    """
+
+    def __init__(
+        self, script: Script, stage: Stage, make: Callable[[Actions], Clip],
+        again: Callable[[Clip], Clip],
+    ):  # fmt: skip
+        self.script, self.stage, self.make, self.again = script, stage, make, again
         self.count = 0
 
     def actions(self) -> Actions:
@@ -129,7 +135,15 @@ class Reader:
         for term in overlay.terms[1:]:
             over = tuple(m for m in term.modifiers if m.kind in OVER)
             layers.append(layer_of(self._clip(term, seen, OVER), over, self.script))
-        return overlaid(base, layers, overlay.terms[1].at, self.script)
+        at = overlay.terms[1].at
+        return self._planned(overlaid(base, layers, at, self.script), at)
+
+    def _planned(self, clip: Clip, at: int) -> Clip:
+        """A clip that has been changed; an error says where."""
+        try:
+            return self.again(clip)
+        except ConfigError as error:
+            raise self._wrong(error.message, at) from None
 
     def _clip(self, term: Term, seen: int, skipped: tuple[str, ...]) -> Clip:
         """The clip of a term by itself, but for modifiers of the kinds `skipped`."""
@@ -146,12 +160,14 @@ class Reader:
         for modifier in modifiers:
             if modifier.kind not in skipped:
                 clip = changed(clip, modifier, self.script)
+                clip = self._planned(clip, modifier.at) if modifier.kind == "@" else clip
         return clip
 
     def _found(self, body: ClipName) -> str:
         name = self.stage.find(body.name)
         if name is None:
-            names = [*(define.name for define in self.script.defines), *self.stage.packed]
+            names = [*(define.name for define in self.script.defines), *self.stage.packed,
+                     *self.stage.others]  # fmt: skip
             raise self._wrong(f"no motion {shown(body.name)}", body.at, names)
         return name
 

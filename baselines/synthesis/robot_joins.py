@@ -28,8 +28,9 @@ from poise.baselines.motion_graphs.motion_graph import Transition
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.baselines.motions.robot_clip import FEWEST, About, RobotClip, reference_from
+from poise.baselines.motions.stances import why_not_home
 from poise.baselines.retargeting.performed import STILL, planted_qpos
-from poise.baselines.retargeting.robot_bvh import clip_of_robot
+from poise.baselines.retargeting.robot_bvh import clip_of_robot, robot_qpos
 from poise.configs.errors import PoiseError
 from poise.envs.robots.robot import Robot
 
@@ -62,10 +63,17 @@ class Way:
 
 
 class _Side(NamedTuple):
-    """A clip as joins see it: its motion, and joints of its frames (F, nj)."""
+    """A clip, or what of it is without a step about a time, as joins see it.
+
+    Attributes:
+        motion: of the frames.
+        joints: (F, nj) of them.
+        begin: time in the clip [s].
+    """
 
     motion: ReferenceMotion
     joints: np.ndarray
+    begin: float = 0.0
 
 
 class RobotJoins:
@@ -80,7 +88,7 @@ class RobotJoins:
 
     def __init__(self, robot: Robot, limits: FeasibilityLimits | None = None):
         self.robot, self.limits = robot, limits
-        self._sides: dict[str, _Side | str] = {}
+        self._sides: dict[tuple[str, int], _Side | str] = {}
         self._ways: dict[tuple[Transition, bool], Way | str] = {}
 
     def refusal(
@@ -110,6 +118,9 @@ class RobotJoins:
 
         Raises JoinRefused if the robot cannot begin or end so.
         """
+        word = "begin from" if first else "end in"
+        if said := self.away(clip, first):
+            raise JoinRefused(f"the motion cannot {word} standing: {said}")
         side = self._made_side(_piece(clip, first))
         gap = np.abs(side.joints[0 if first else -1] - self.robot.standing_qpos[7:])
         if gap.max() <= STILL:
@@ -120,15 +131,23 @@ class RobotJoins:
         pair = (standing, here) if first else (here, standing)
         made = self._direct(shaper, *pair)
         if isinstance(made, str):
-            word = "begin from" if first else "end in"
             raise JoinRefused(f"the motion cannot {word} standing: {made}")
         return made
+
+    def away(self, clip: Clip, first: bool) -> str:
+        """Why a clip with steps cannot be joined at its begin, or its end; nothing if it can."""
+        frame = 0 if first else len(clip) - 1
+        if clip.support is None or clip.support.home[frame]:
+            return ""
+        qpos = robot_qpos(clip.part(slice(frame, frame + 1)), self.robot)[0]
+        said = why_not_home(self.robot, qpos, clip.support.planted[frame])
+        return f"at {frame * clip.dt:.2f} s of {clip.name!r} {said}"
 
     def _found(self, before: Clip, after: Clip, transition: Transition, through: bool) -> Way | str:
         direct = self._ways.get((transition, False)) if through else ""
         if isinstance(direct, Way):
             return direct
-        sides = self._side(before), self._side(after)
+        sides = self._side(before, transition.leave), self._side(after, transition.enter)
         a, b = sides
         if isinstance(a, str) or isinstance(b, str):
             return a if isinstance(a, str) else str(b)
@@ -161,27 +180,40 @@ class RobotJoins:
         span = height_span([side.motion for side in sides])
         return replace(self._first_shaper, dt=dt, heights=span)
 
-    def _side(self, clip: Clip) -> _Side | str:
-        if clip.name not in self._sides:
+    def _side(self, clip: Clip, time: float) -> _Side | str:
+        """What there is of a clip about a time [s]; or why it is nothing that can be joined."""
+        run = slice(0, len(clip))
+        if clip.support is not None:
+            frame = min(round(time / clip.dt), len(clip) - 1)
+            run = clip.support.run(frame)
+            if run.stop <= frame:
+                part = clip.part(slice(0, frame + 1))
+                return self.away(part, first=False)
+        key = (clip.name, run.start)
+        if key not in self._sides:
             try:
-                self._sides[clip.name] = self._made_side(clip)
+                self._sides[key] = self._made_side(clip.part(run), run.start * clip.dt)
             except PoiseError as error:
-                self._sides[clip.name] = str(error)
-        return self._sides[clip.name]
+                self._sides[key] = str(error)
+        return self._sides[key]
 
-    def _made_side(self, clip: Clip) -> _Side:
+    def _made_side(self, clip: Clip, begin: float = 0.0) -> _Side:
         """Raises PoiseError for what the robot cannot follow, soles off the ground for one."""
         if len(clip) < FEWEST:
             raise PoiseError(f"{clip.name!r} has fewer than {FEWEST} frames")
-        qpos = planted_qpos(clip, self.robot)
+        if clip.support is None:
+            qpos = planted_qpos(clip, self.robot)
+        else:
+            placed = self._first_shaper.planted.placed
+            qpos = np.array([placed(q[7:]) for q in robot_qpos(clip, self.robot)])
         about = About(self.robot.name, self.robot.fingerprint, clip.name)
         motion = reference_from(RobotClip(about, clip.dt, qpos), self.robot, clip.name, rest=False)
-        return _Side(motion, qpos[:, 7:])
+        return _Side(motion, qpos[:, 7:], begin)
 
 
 def _end(shaper: Shaper, side: _Side, time: float, entered: bool) -> End:
     """The end of a side at a time [s], with the frames that are played next to it."""
-    steps = np.arange(NEIGHBOURS) * shaper.dt
+    time, steps = max(time - side.begin, 0.0), np.arange(NEIGHBOURS) * shaper.dt
     times = time + steps if entered else time - steps[::-1]
     kept = times[(times > -1e-9) & (times < side.motion.duration + 1e-9)]
     frames = np.array([side.motion.sample(t).q_ref for t in np.maximum(kept, 0.0)])
@@ -190,5 +222,8 @@ def _end(shaper: Shaper, side: _Side, time: float, entered: bool) -> End:
 
 def _piece(clip: Clip, first: bool) -> Clip:
     """The frames at one end of a motion."""
-    chosen = slice(None, LED) if first else slice(-LED, None)
-    return replace(clip, root=clip.root[chosen], rotations=clip.rotations[chosen])
+    run = slice(0, len(clip))
+    if clip.support is not None:
+        run = clip.support.run(0 if first else len(clip) - 1)
+    least, most = (run.start, run.start + LED) if first else (run.stop - LED, run.stop)
+    return clip.part(slice(max(least, run.start), min(most, run.stop)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -25,16 +26,17 @@ class Stage:
         graph: with a node for every clip.
         clips: name → clip; `frames` likewise.
         derived: name of a clip that a script made → its text.
+        others: clips that there are, too, and that are not loaded.
     """
 
-    def __init__(self, graph: MotionGraph, clips: dict[str, Clip]):
+    def __init__(self, graph: MotionGraph, clips: dict[str, Clip], others: Iterable[str] = ()):
         missing = [name for name in graph.names if name not in clips]
         if missing:
             raise ConfigError(f"the clip {missing[0]!r} is not loaded", source="graph")
         self.graph = graph
         self.clips = {name: clips[name] for name in graph.names}
         self.frames = {name: self._frames(name, clip) for name, clip in self.clips.items()}
-        self.packed = graph.names
+        self.packed, self.others = graph.names, tuple(others)
         self.derived: dict[str, str] = {}
 
     def _frames(self, name: str, clip: Clip) -> Frames:
@@ -81,7 +83,10 @@ def changed(clip: Clip, modifier: Modifier, script: Script) -> Clip:
     """A clip after one modifier; an error says where the modifier stands."""
     try:
         if modifier.kind == "[":
-            return clip.cut(*modifier.numbers)
+            clip = clip.cut(*modifier.numbers)
+            if clip.support is not None and not clip.support.planted[[0, -1]].all():
+                raise ConfigError("cuts a step: both soles must be planted there")
+            return clip
         if modifier.kind == "@":
             return clip.at_speed(modifier.numbers[0])
         if modifier.kind == "mirrored":  # on the same bones: sides may differ by a millimetre

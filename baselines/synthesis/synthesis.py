@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, replace
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
-
-from poise.baselines.clips.clip import Clip
+from poise.baselines.clips.clip import Clip, together
 from poise.baselines.joining.joins import JOINS, laid_on
-from poise.baselines.motion_graphs.motion_graph import MotionGraph, StatePlace, Transition
+from poise.baselines.motion_graphs.motion_graph import (
+    MotionGraph,
+    StatePlace,
+    Transition,
+    earliest_part,
+    latest_part,
+)
 from poise.baselines.motion_graphs.nearest import nearest_places
 from poise.baselines.motion_graphs.paths import Path, Place, Step, Task
 from poise.baselines.motion_graphs.search import best_paths
+from poise.baselines.retargeting.performed import planned_again
 from poise.baselines.scripts.printer import text_of
 from poise.baselines.scripts.tokens import wrong
 from poise.baselines.scripts.tree import Script, StateName
@@ -41,6 +46,7 @@ class Synthesis:
         robot_joins: of the robot whose clips they are, for transitions of the kind `physical`. Of
             these the ones of the best path are made first; what the robot cannot do is gone round,
             or by standing where there is no other way.
+        others: clips that are not loaded, for errors.
     """
 
     def __init__(
@@ -51,11 +57,12 @@ class Synthesis:
         joins: Mapping[str, Join] = JOINS,
         check: Check | None = None,
         robot_joins: RobotJoins | None = None,
+        others: Iterable[str] = (),
     ):
         self.kinds = (*joins, *([PHYSICAL] if robot_joins else []))
         if kind not in self.kinds:
             raise ConfigError(f"no transition {shown(kind)} here", field="kind", choices=self.kinds)
-        self.stage = Stage(graph, dict(clips))
+        self.stage = Stage(graph, dict(clips), others)
         self.kind, self.joins, self.check = kind, joins, check
         self.robot_joins = robot_joins
 
@@ -64,7 +71,7 @@ class Synthesis:
 
         Raises ConfigError with line and column, or for a script that has no way.
         """
-        reader = Reader(script, self.stage, lambda inner: self._inner(inner, script))
+        reader = Reader(script, self.stage, lambda inner: self._inner(inner, script), self._again)
         actions = reader.actions()
         return self._plan(actions, k, script)
 
@@ -89,8 +96,15 @@ class Synthesis:
         """A sequence in brackets as one clip."""
         return self._play(self._plan(actions, 1, script))[0]
 
+    def _again(self, clip: Clip) -> Clip:
+        """A clip after a change: what has steps is planned again for them."""
+        if clip.support is None or self.robot_joins is None:
+            return clip
+        return planned_again(clip, self.robot_joins.robot)
+
     def _plan(self, actions: Actions, k: int, script: Script) -> Plan:
         arrows, kinds = {}, {}
+        self._check_steps(actions, script)
         for i, arrow in enumerate(actions.arrows):
             if not arrow.kind:
                 continue
@@ -103,12 +117,34 @@ class Synthesis:
             raise ConfigError(error.message, source=script.source, choices=error.choices) from None
         return Plan(actions, tuple(paths), kinds)
 
+    def _check_steps(self, actions: Actions, script: Script) -> None:
+        """Raise ConfigError for clips with steps that no transition can lead to, or on from."""
+        joins = self.robot_joins
+        for i, name in enumerate(actions.names):
+            clip = self.stage.clips[name]
+            if clip.support is None or joins is None:
+                continue
+            if len(actions.names) > 1 and self.kind != PHYSICAL:
+                raise ConfigError(f"{shown(name)} has steps, which {self.kind} does not know: only "
+                                  f"{PHYSICAL} joins it", source=script.source)  # fmt: skip
+            for first, needed in ((True, i > 0), (False, i + 1 < len(actions.names))):
+                times = clip.times[clip.support.home]
+                late, early = latest_part(clip.duration), earliest_part(clip.duration)
+                free = (times <= early) if first else (times >= late)
+                if needed and not free.any():
+                    word = "lead to" if first else "follow"
+                    said = f"nothing can {word} {shown(name)}: {joins.away(clip, first)}"
+                    raise ConfigError(said, source=script.source)  # fmt: skip
+
     def _by_hand(self, actions: Actions, i: int, script: Script) -> Transition:
         """The transition of the arrow after action `i`; an error says where the arrow stands."""
         arrow = actions.arrows[i]
         said = f"no transition {shown(arrow.kind)} here" if arrow.kind not in self.kinds else ""
         duration = dict(arrow.options).get("duration")
         made = self.stage.by_hand(actions.names[i], actions.names[i + 1], duration)
+        steps = [name for name in actions.names[i : i + 2] if self.stage.clips[name].support]
+        if steps and arrow.kind != PHYSICAL and not said:
+            said = f"{shown(steps[0])} has steps: only {PHYSICAL} joins it"
         if arrow.kind == PHYSICAL and not said:
             said = self._refusal(made, through=True)
             if duration is not None:
@@ -177,7 +213,7 @@ class Synthesis:
                        transition.coefficient, physics),
                 Played(step.clip, begins, begins + part.duration, *step[1:4]),
             ]  # fmt: skip
-        whole = _together([*done, last])
+        whole = together([*done, last])
         if whole.duration > LONGEST:
             raise self._too_long()
         return replace(whole, name=plan.actions.names[0]), played
@@ -223,11 +259,4 @@ class Synthesis:
 
 def _split(clip: Clip, frame: int) -> tuple[Clip, Clip]:
     """The frames before one, and those from it on."""
-    head = replace(clip, root=clip.root[:frame], rotations=clip.rotations[:frame])
-    return head, replace(clip, root=clip.root[frame:], rotations=clip.rotations[frame:])
-
-
-def _together(clips: list[Clip]) -> Clip:
-    root, rotations = (np.concatenate([getattr(clip, name) for clip in clips])
-                       for name in ("root", "rotations"))  # fmt: skip
-    return replace(clips[0], root=root, rotations=rotations)
+    return clip.part(slice(0, frame)), clip.part(slice(frame, None))

@@ -14,11 +14,13 @@ from .appearance import looks
 from .camera import Camera, find_camera, point
 from .offscreen import OffScreen
 from .overlays import draw, marks
+from .quantities import REFERENCE
 from .window import Viewer
 
 MAX_GEOMS = 10_000
 XRAY = 0.55  # how strongly an overlay shines through what hides it
 LOOK_AT = 0.92  # height above the ground that the camera looks at, over the CoM height
+GHOST = 0.4  # opacity of a reference motion
 FOLLOW = 0.4  # [s] time constant with which the camera follows
 
 
@@ -56,6 +58,7 @@ class SceneRenderer:
         own = self.camera if isinstance(self.camera, Camera) else Camera()
         self.model = looks(simulation.robot, width, height, own.azimuth)
         self.data = mujoco.MjData(self.model)
+        self._ghost: mujoco.MjData | None = None
         self.shown = np.inf  # simulation time of the last picture [s]
         self.due = 0.0  # wall clock at which the next one is shown [s]
         self.scene = mujoco.MjvScene(self.model, MAX_GEOMS)
@@ -70,11 +73,14 @@ class SceneRenderer:
         watched = self.viewer is not None and self.viewer.handle.is_running()
         return self.screen is not None or watched
 
-    def render(self) -> np.ndarray | None:
-        """A frame (height, width, 3) uint8; None where a viewer shows it, or when not open."""
+    def render(self, ghost: np.ndarray | None = None) -> np.ndarray | None:
+        """A frame (height, width, 3) uint8; None where a viewer shows it, or when not open.
+
+        A frame has the robot once more, yellow and translucent, in a posture `ghost` (nq,).
+        """
         if self.screen is not None:
             self._update()
-            return self._frame(self.screen)
+            return self._frame(self.screen, ghost)
         if self.viewer is not None and self.viewer.handle.is_running():
             self._wait()
             handle = self.viewer.handle
@@ -109,13 +115,15 @@ class SceneRenderer:
             fraction = 1.0 - np.exp(-elapsed / FOLLOW)
             self.view.lookat = self.view.lookat + fraction * (target - self.view.lookat)
 
-    def _frame(self, screen: OffScreen) -> np.ndarray:
+    def _frame(self, screen: OffScreen, ghost: np.ndarray | None) -> np.ndarray:
         """The scene, with the marks that it hides shining through."""
         found, scene = marks(self.simulation), self.scene
         mujoco.mjv_updateScene(
             self.model, self.data, mujoco.MjvOption(), None, self.view,
             mujoco.mjtCatBit.mjCAT_ALL, scene,
         )  # fmt: skip
+        if ghost is not None:
+            self._add_ghost(ghost)
         draw(scene, found)
         frame = screen.draw(scene)
         scene.ngeom = 0
@@ -126,6 +134,21 @@ class SceneRenderer:
         covered = alone.max(axis=2) > 0
         frame[covered] = (1.0 - XRAY) * frame[covered] + XRAY * alone[covered]
         return frame
+
+    def _add_ghost(self, posture: np.ndarray) -> None:
+        """Append the robot in a posture to the scene, in the colour of references."""
+        if self._ghost is None:
+            self._ghost = mujoco.MjData(self.model)
+        self._ghost.qpos[:] = posture
+        mujoco.mj_kinematics(self.model, self._ghost)
+        first = self.scene.ngeom
+        mujoco.mjv_addGeoms(
+            self.model, self._ghost, mujoco.MjvOption(), mujoco.MjvPerturb(),
+            mujoco.mjtCatBit.mjCAT_DYNAMIC, self.scene,
+        )  # fmt: skip
+        for geom in self.scene.geoms[first : self.scene.ngeom]:
+            geom.matid = -1
+            geom.rgba[:] = (*REFERENCE.colour, GHOST)
 
     def _wait(self) -> None:
         """Sleep until the wall clock has caught up with the simulation."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from poise.baselines.feasibility.trajectory import PlantedRobot
+from poise.baselines.motions.foot_steps import FootStep, Waypoint, plan_steps
+from poise.baselines.motions.footwork import perform_plan
 from poise.baselines.motions.legs import PlantedLegs
 from poise.baselines.motions.motion import load_motion
 from poise.baselines.motions.robot_clip import About, RobotClip
@@ -36,3 +39,21 @@ def com_clip(
         frames.append(qpos)
         q = qpos[7:]
     return RobotClip(About(robot.name, robot.fingerprint, "moved"), dt, np.array(frames))
+
+
+def steps_clip(robot: Robot, name: str, steps: Sequence[FootStep], duration: float) -> RobotClip:
+    """Standing but for some steps, the arms at rest."""
+    frames = round(duration / RATE) + 1
+    joints = np.tile(robot.standing_qpos[7:], (frames, 1))
+    plan = plan_steps(steps, joints, np.zeros((frames, 3)), robot, name)
+    about = About(robot.name, robot.fingerprint, name)
+    return RobotClip(about, RATE, perform_plan(robot, plan, name), plan.planted)
+
+
+@functools.cache
+def ahead_clip(robot: Robot, length: float = 0.1) -> RobotClip:
+    """A step ahead with the left foot, in h, and the right foot beside it."""
+    ways = [(Waypoint(lift + 0.3, length / 2.0, up=0.05),) for lift in (1.3, 2.3)]
+    steps = [FootStep("left", 1.3, 1.9, ways[0], ahead=length),
+             FootStep("right", 2.3, 2.9, ways[1], ahead=length)]  # fmt: skip
+    return steps_clip(robot, "ahead", steps, 4.3)

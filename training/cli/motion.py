@@ -186,13 +186,13 @@ def play(
         planted: take the feet as planted though they move in the clip.
     """
     from poise.baselines.motions.robot_clip import read_robot_clip, reference_from
-    from poise.baselines.retargeting.retarget import LEAD, retarget
-    from poise.training.figures.playback import beside_of, check_video, write_playback
+    from poise.baselines.retargeting.paces import clip_heading
+    from poise.baselines.retargeting.retarget import retarget
+    from poise.training.figures.playback import beside_of, check_size, check_video, write_playback
 
     check_video(video)
     check_out_file(video)
-    if any(edge < 16 or edge > 4096 or edge % 2 for edge in size):
-        raise ConfigError(f"must be two even numbers from 16 to 4096, not {size}", field="size")
+    check_size(size)
     body, skeleton = load_robot(robot), None
     if file.suffix == ".npz":
         clip = read_robot_clip(file)
@@ -200,7 +200,8 @@ def play(
     else:
         source = read_bvh(find_bvh(file), unit, up, forward).clip
         made = retarget(source, body, planted=planted)
-        clip, skeleton = made.clip, beside_of(body, source, made.scale, LEAD)
+        clip, heading = made.clip, None if made.clip.planted is None else clip_heading(source)
+        skeleton = beside_of(body, source, made.scale, made.begins, heading, made.stride)
     frames = write_playback(video, body, clip.qpos, clip.dt, skeleton, size)
     print(f"{frames} frames")
     print(video)

@@ -1,6 +1,7 @@
 """`poise motion check` and `follow`: what a robot can do of a motion, and what it then does."""
 
 import json
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -91,6 +92,8 @@ def follow(
     seed: int = 0,
     out: Path | None = None,
     report: Path | None = None,
+    video: Path | None = None,
+    size: tuple[int, int] = (640, 480),
     allow: Allow = (),
 ) -> None:
     """Perform a motion, pushed or not, and say how near the robot stayed to it.
@@ -111,33 +114,43 @@ def follow(
         out: a JSON file to write the trials to.
         report: a .html file for pictures of the trial with the largest error: ZMP and centre of
             pressure, errors, tempo, and the timeline of a script's motion.
+        video: a .mp4 or .webp file for the first trial, with the motion as a yellow ghost.
+        size: of the video, width and height [pixels], even.
     """
     from poise.baselines.allowance import allowing
     from poise.training.trials.names import check_names
 
     check_names([controller], robot=robot, motion=motion)
     from poise.baselines.motions.tempo import Tempo
+    from poise.training.figures.playback import check_size, check_video
     from poise.training.following.fastest import STARTS, find_fastest
     from poise.training.following.follow import follow as perform
     from poise.training.following.tables import print_followed
+    from poise.training.motion_report.film import Film
     from poise.training.motion_report.page import check_page
     from poise.training.motion_report.performance import Watched, write_performance
 
-    if fastest and (push or share or tempo != 1.0 or waits or out or report):
+    if fastest and (push or share or tempo != 1.0 or waits or out or report or video):
         raise ConfigError("goes with --controller, --robot, --starts and --seed alone",
                           field="fastest")  # fmt: skip
     if out is not None:
         check_out_file(out)
     if report is not None:
         check_page(report)
-    with allowing([*named(controller), *allow]):
+    if video is not None:
+        check_video(video)
+        check_out_file(video)
+        check_size(size)
+    with allowing([*named(controller), *allow]), ExitStack() as stack:
         if fastest:
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
             return
         watched = Watched() if report is not None else None
+        film = None if video is None else stack.enter_context(Film(video, size, watched))
+        waits_so = Tempo(waits=True) if waits else None
         trials = perform(motion, controller, robot=robot, starts=20 if starts is None else starts,
                          impulse=push, share=share, directions=directions, seed=seed, speed=tempo,
-                         tempo=Tempo(waits=True) if waits else None, watch=watched)  # fmt: skip
+                         tempo=waits_so, watch=film or watched)  # fmt: skip
     pushed = f"pushed by {push:g} N s" if push else "not pushed"
     pushed = f"pushed by {share:g} of J50" if share else pushed
     faster = f", {tempo:g} times as fast" if tempo != 1.0 else ""
@@ -146,6 +159,8 @@ def follow(
     if out is not None:
         write_atomic(out, json.dumps([asdict(trial) for trial in trials], indent=1) + "\n")
         print(out)
+    if video is not None:
+        print(video)
     if report is not None and watched is not None:
         write_performance(report, title, motion, robot, tempo, trials, watched)
         print(report)

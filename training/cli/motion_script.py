@@ -58,7 +58,8 @@ def graph(
     """Find out which clips may follow which, and where: a motion graph as YAML.
 
     Args:
-        files: .bvh files or names of packaged clips, all of one skeleton; with a robot .npz too.
+        files: .bvh files or names of packaged clips, all of one skeleton; with a robot a .npz, or
+            a motion with steps by its name or .yaml, too.
         out: the .yaml file to write.
         robot: whose motions the clips become.
         coefficient: largest K of a transition.
@@ -121,7 +122,7 @@ def plan(
     from poise.training.following.script_tables import print_plan
 
     tree = find_script(script)
-    synthesis = open_synthesis(graph, robot, kind)
+    synthesis = open_synthesis(graph, robot, kind, script=tree)
     print_plan(synthesis.plan(tree, k), sequence_text(tree.sequence), terminal())
     if table:
         print(to_csv(tree), end="")
@@ -160,7 +161,7 @@ def synth(
     if report is not None:
         check_page(report)
     tree = between(find_script(script), start, goal)
-    synthesis = open_synthesis(graph, robot, kind, least)
+    synthesis = open_synthesis(graph, robot, kind, least, tree)
     begin = time.monotonic()
     clip, record = synthesis.make(tree)
     if robot is None:

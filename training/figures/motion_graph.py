@@ -12,7 +12,7 @@ from poise.baselines.motion_graphs.motion_graph import MotionGraph
 
 from .style import BLUE, GREY, INK, PALE, saved_figure
 
-LABEL = 14  # characters of a clip's name
+LABEL = 17  # characters of a clip's name
 REASONS = {"K": "////", "other": "....", "never": "xxxx"}  # by their first word; else a turn
 MEANING = {"////": "K too large", "....": "other feet planted", "xxxx": "never, by the expert",
            "\\\\\\\\": "a joint turns too far"}  # fmt: skip
@@ -62,7 +62,7 @@ def _hatch(axes: Axes, graph: MotionGraph, table: np.ndarray) -> None:
             axes.text(j, i, f"{value:.2g}", ha="center", va="center", fontsize=8,
                       color="white" if dark else INK)  # fmt: skip
     if used:
-        axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.3), ncols=2)
+        axes.figure.legend(loc="outside lower left", ncols=2)
 
 
 def _name_axes(axes: Axes, graph: MotionGraph) -> None:
@@ -80,20 +80,22 @@ def _circle(axes: Axes, graph: MotionGraph, table: np.ndarray) -> None:
     for (i, j), value in np.ndenumerate(table):
         if i != j and np.isfinite(value):
             axes.add_patch(FancyArrowPatch(
-                tuple(places[i]), tuple(places[j]), connectionstyle="arc3,rad=0.12", shrinkA=16,
-                shrinkB=16, arrowstyle="-|>", mutation_scale=9, color=BLUE,
+                tuple(places[i]), tuple(places[j]), connectionstyle="arc3,rad=0.12", shrinkA=6,
+                shrinkB=6, arrowstyle="-|>", mutation_scale=9, color=BLUE,
                 alpha=float(1.0 - 0.85 * value / most) if most > 0.0 else 1.0))  # fmt: skip
+    axes.plot(*places.T, "o", color=INK, markersize=6, markerfacecolor="white")
     for place, name in zip(places, graph.names, strict=True):
+        beside = abs(place[0]) > 0.3
         axes.text(
-            1.04 * place[0],
-            1.04 * place[1],
+            1.09 * place[0],
+            1.09 * place[1],
             _short(name),
-            ha="center",
-            va="center",
+            ha=("left" if place[0] > 0.0 else "right") if beside else "center",
+            va="center" if beside else ("bottom" if place[1] > 0.0 else "top"),
             fontsize=9,
             color=INK,
         )
-    axes.set(xlim=(-1.4, 1.4), ylim=(-1.3, 1.3), aspect="equal")
+    axes.set(xlim=(-1.9, 1.9), ylim=(-1.25, 1.25), aspect="equal")
     axes.axis("off")
     axes.set_title("Who may follow whom")
 

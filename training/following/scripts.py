@@ -10,9 +10,11 @@ from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import packaged_clips
 from poise.baselines.motion_graphs.adjacency import make_graph
 from poise.baselines.motion_graphs.motion_graph import GraphClip, Thresholds, read_graph
+from poise.baselines.motions.motion import motions_with_steps
 from poise.baselines.motions.robot_clip import write_robot_clip
 from poise.baselines.retargeting.performed import load_clip, robot_clip_of
 from poise.baselines.retargeting.robot_bvh import clip_of_robot
+from poise.baselines.scripts.tree import Script, clip_names
 from poise.baselines.synthesis.plan import PHYSICAL
 from poise.baselines.synthesis.robot_joins import RobotJoins
 from poise.baselines.synthesis.synthesis import Synthesis
@@ -23,9 +25,16 @@ from poise.envs.robots.robot import Robot, load_robot
 
 
 def open_synthesis(
-    file: Path | None, robot: str | None, kind: str | None = None, least: float | None = None
+    file: Path | None,
+    robot: str | None,
+    kind: str | None = None,
+    least: float | None = None,
+    script: Script | None = None,
 ) -> Synthesis:
     """The clips of a graph, or the packaged ones, ready for scripts.
+
+    For a robot packaged motions with steps are loaded where the script names them: in the ways of
+    others they have no place.
 
     Args:
         file: of the graph; None for the packaged clips.
@@ -33,6 +42,7 @@ def open_synthesis(
         kind: of transitions that scripts leave open; None for `physical` with a robot, else
             `insert`.
         least: shortest transition of the packaged clips [s].
+        script: that is to be played.
 
     Raises:
         ConfigError: a graph of another robot, a clip that changed, `physical` without a robot; as
@@ -55,16 +65,24 @@ def open_synthesis(
         return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind,
                          robot_joins=joins)  # fmt: skip
     names = [name for name in packaged_clips() if _fits(name, robot)]
+    steps = [] if robot is None else [*_walks(), *motions_with_steps()]
+    said = set() if script is None else clip_names(script)
+    names += [name for name in steps if any(name == n or name.endswith(f"_{n}") for n in said)]
     limits = Thresholds() if least is None else build(Thresholds, {"least": least}, "synth")
     loaded = load_clips(names, body)
     return Synthesis(make_graph(loaded, limits, robot=robot or ""),
                      {entry.name: clip for entry, clip in loaded}, kind,
-                     robot_joins=joins)  # fmt: skip
+                     robot_joins=joins, others=[n for n in steps if n not in names])  # fmt: skip
+
+
+def _walks() -> list[str]:
+    """The packaged clips whose feet move."""
+    return [name for name in packaged_clips() if name.endswith("walk")]
 
 
 def _fits(name: str, robot: str | None) -> bool:
     """Without a robot the clips of one skeleton; with one those whose feet stay."""
-    return name.startswith("cmu02") if robot is None else not name.endswith("walk")
+    return name.startswith("cmu02") if robot is None else name not in _walks()
 
 
 def load_clips(

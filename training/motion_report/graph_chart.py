@@ -11,9 +11,10 @@ from poise.training.report.svg import Svg
 
 from .page import Picture
 
-NAME = 15  # characters of a clip's name
-CELL, LEFT, TOP = 30.0, 132.0, 108.0  # of the matrix
-SIDE, RADIUS = 500.0, 148.0  # of the circle
+NAME = 17  # characters of a clip's name
+CELL, LEFT, TOP = 30.0, 146.0, 118.0  # of the matrix
+SIDE, RADIUS = 500.0, 138.0  # of the circle
+HEIGHT = 2.0 * RADIUS + 64.0  # of its picture
 FAINT = 0.3  # opacity of the dearest transition
 #: first word of a reason → class, what it means
 REASONS = {
@@ -83,8 +84,8 @@ def matrix_chart(graph: MotionGraph) -> Markup:
 def circle_chart(graph: MotionGraph) -> Markup:
     """The clips on a circle with their names, and an arrow for every pair with a transition."""
     names, table = graph.names, best_transitions(graph)
-    svg = Svg(SIDE, SIDE - 40.0, f"Graph of {len(names)} clips.")
-    centre = np.array([0.5 * SIDE, 0.5 * (SIDE - 40.0)])
+    svg = Svg(SIDE, HEIGHT, f"Graph of {len(names)} clips.")
+    centre = np.array([0.5 * SIDE, 0.5 * HEIGHT])
     angles = 2.0 * np.pi * np.arange(len(names)) / len(names) - 0.5 * np.pi
     outward = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     places = centre + RADIUS * outward

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from markupsafe import Markup
 
@@ -13,6 +15,7 @@ from .trace import Trace
 
 WIDTH, LEFT, RIGHT, TOP = 440.0, 46.0, 432.0, 24.0
 PANEL, GAP = 110.0, 48.0
+CHANGE = 0.01  # [m] by which the reach of the soles changes from one sample to the next in a step
 OUTSIDE = 0.06  # [m] beyond the soles that is still shown
 
 
@@ -43,17 +46,15 @@ def errors_picture(trace: Trace) -> Picture:
 
 def _zmp(judged: Feasibility, trace: Trace | None) -> Markup:
     middle = judged.support.mean(axis=0)
-    hull, points = judged.support - middle, judged.zmp - middle
+    reach, points = judged.reach - middle, judged.zmp - middle
     end = float(judged.times[-1])
     svg = Svg(WIDTH, TOP + 2.0 * PANEL + GAP + 42.0, "ZMP of the motion inside the soles.")
     for axis, title in enumerate(("forward [m]", "left [m]")):
         top = TOP + axis * (PANEL + GAP)
-        low, high = float(hull[:, axis].min()), float(hull[:, axis].max())
+        low, high = (reach[:, side, axis] for side in range(2))
         chart = Chart(svg, (LEFT, top, RIGHT, top + PANEL), (0.0, end),
-                      (low - OUTSIDE, high + OUTSIDE))  # fmt: skip
-        edges = chart.y(np.array([high, low]))
-        svg.add("rect", x=LEFT, y=edges[0], width=RIGHT - LEFT, height=edges[1] - edges[0],
-                class_="support")  # fmt: skip
+                      (low.min() - OUTSIDE, high.max() + OUTSIDE))  # fmt: skip
+        _band(chart, judged.times, low, high)
         chart.y_axis(ticks(*chart.y_range, 5))
         svg.text(LEFT, top - 8.0, title, "axis")
         if trace is not None:
@@ -93,6 +94,17 @@ def _pushes(chart: Chart, trace: Trace) -> None:
         left, right = chart.x(np.minimum([start, start + length], chart.x_range[1]))
         chart.svg.add("rect", x=left, y=top, width=max(right - left, 1.5), height=bottom - top,
                       class_="push")  # fmt: skip
+
+
+def _band(chart: Chart, times: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    """What the planted soles reach: a box for each time between two steps."""
+    changes = np.abs(np.diff(np.stack([low, high]), axis=1)).max(axis=0) > CHANGE
+    edges = [0, *(np.flatnonzero(changes) + 1), len(times)]
+    for a, b in pairwise(edges):
+        left, right = chart.x(np.array([times[a], times[min(b, len(times) - 1)]]))
+        top, bottom = chart.y(np.array([np.median(high[a:b]), np.median(low[a:b])]))
+        chart.svg.add("rect", x=left, y=top, width=right - left, height=bottom - top,
+                      class_="support")  # fmt: skip
 
 
 def _inside(chart: Chart, values: np.ndarray) -> np.ndarray:

@@ -54,7 +54,7 @@ def _timeline(played: Sequence[Part], duration: float, trace: Trace | None) -> M
     count = max([1, *(len(row) for row in rows)])
     end = max(duration, 0.0 if trace is None else float(trace.motion_time[-1]), 1e-3)
     bottom = TOP + ROW * count + 18.0
-    height = bottom + (GAP + LANE if trace is not None else 0.0) + 44.0
+    height = bottom + (GAP + LANE + 14.0 if trace is not None else 0.0) + 44.0
     svg = Svg(WIDTH, height, f"Timeline of {duration:.1f} s, {len(played)} parts.")
     chart = Chart(svg, (LEFT, TOP, RIGHT, bottom), (0.0, end), (0.0, 1.0))
     for k in range(count):

@@ -11,7 +11,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.motions.tempo import Tempo
 from poise.envs.balance.base import BalanceEnv
 from poise.training.tracking.record import Footing, tracking_errors
-from poise.training.tracking.reference import ReferenceBodies
+from poise.training.tracking.reference import ReferenceBodies, Stance
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Trace:
         joints: (n,) root mean square of the joints' errors [rad].
         bodies, com: (n,) mean distance of the bodies, and that of the CoM, from the motion [m].
         cop: (n, 2) the measured centre of pressure, in the heading frame of the soles from their
-            middle [m].
+            middle [m]; of a motion with steps from where that is at its begin.
         contacts: (n, nc) whether each sole bears load.
         pushes: (start, duration) of each push [s].
         fallen: whether the robot fell.
@@ -61,14 +61,17 @@ class Tracer:
             self._footing = Footing(state)
         self._footing.update(state)
         self._fallen = bool(env.fallen)
-        stance = self._footing.stance
+        steps = env.motion.footing
+        stance = self._footing.stance if steps is None else Stance.of(state)
         joints, bodies, _, com = tracking_errors(env, self._reference, stance)
         away = state.com - self._reference.com
         scale = Tempo().distance * env.robot.height_com
         if env.tempo.waits:
             scale = env.tempo.distance * env.robot.height_com
         beta = np.exp(-float(away[:2] @ away[:2]) / scale**2)
-        point = (state.cop - stance.origin[:2]) @ stance.turn[:2, :2]
+        point = (state.cop - self._reference.origin[:2]) @ self._reference.turn[:2, :2]
+        if steps is not None:
+            point = point - steps.sample(0.0).places[:, 0, :2].mean(axis=0)
         now = [env.simulation.time, env.motion_time, beta, np.sqrt(joints), bodies, com, *point]
         self._rows.append(np.concatenate([now, state.contacts > 0.5]))
 

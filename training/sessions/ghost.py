@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from poise.baselines.motions.reference_motion import ReferenceMotion
 from poise.envs.balance.base import BalanceEnv
@@ -19,15 +20,35 @@ class Poses(NamedTuple):
 
 
 class Ghost:
-    """The bodies of a reference motion, whose soles are where the robot stood at its reset."""
+    """The bodies of a reference motion, whose soles are where the robot stood at its reset.
+
+    The soles of a motion with steps go on from there as the motion has them.
+    """
 
     def __init__(self, motion: ReferenceMotion, env: BalanceEnv):
         self._bodies = ReferenceBodies(motion, env.robot)
-        self._stance = Stance.of(env.simulation.state)
+        self._stance, self._footing = Stance.of(env.simulation.state), motion.footing
+        self._bodies.at(0.0, self._stance)
+        self._frame = self._bodies.origin.copy(), self._bodies.turn.copy()
 
     def __call__(self, time: float) -> Poses:
-        """Where it is at a time [s] after the reset."""
-        return Poses(*self._bodies.poses(time, self._stance))
+        """Where it is at a time [s] of the motion."""
+        return Poses(*self._bodies.poses(time, self._soles(time)))
+
+    def posture(self, time: float) -> np.ndarray:
+        """(nq,) its posture at a time [s] of the motion."""
+        self._bodies.at(time, self._soles(time))
+        return self._bodies.posture
+
+    def _soles(self, time: float) -> Stance:
+        """Where its soles are."""
+        if self._footing is None:
+            return self._stance
+        (origin, turn), sample = self._frame, self._footing.sample(time)
+        points = origin + sample.places[:, 0] @ turn.T
+        turns = Rotation.from_rotvec(sample.turns[:, 0]).as_matrix()
+        axes = turn @ turns  # of standing they are the world's
+        return self._stance._replace(points=points, axes=axes)
 
 
 def ghost_of(env: BalanceEnv) -> Ghost | None:

@@ -48,6 +48,8 @@ class ReferenceBodies:
     Attributes:
         bodies: (n,) bodies that are compared: the robot's own, which move.
         com: (3,) where the CoM is to be, at the last time that was asked for [m].
+        origin, turn: (3,), (3, 3) of the motion's frame then: that of the soles as they stand, or
+            the one that a motion with steps has of its own.
     """
 
     def __init__(self, motion: ReferenceMotion, robot: Robot):
@@ -59,7 +61,7 @@ class ReferenceBodies:
         self.bodies = np.flatnonzero(moving)
         self._legs = _leg_dofs(robot)
         self._correction = np.zeros(len(self._legs))  # where the last search ended
-        self.com = np.zeros(3)
+        self.com, self.origin, self.turn = np.zeros(3), np.zeros(3), np.eye(3)
 
     def at(self, time: float, stance: Stance) -> tuple[np.ndarray, np.ndarray]:
         """Joints (nj,) [rad] as the motion has them and places of the bodies (n, 3) [m].
@@ -74,6 +76,7 @@ class ReferenceBodies:
         sample, data = self.motion.sample(time), self._data
         posture = self._kinematics.posture(sample.q_ref)
         turn, free = stance.turn, np.array([0, 1, 2, *self._legs])
+        self.origin, self.turn = stance.origin, turn
         data.qpos[7:] = sample.q_ref
         data.qpos[self._legs + 1] += self._correction
         mujoco.mju_mat2Quat(data.qpos[3:7], np.ascontiguousarray(turn @ posture.root_axes).ravel())
@@ -104,6 +107,7 @@ class ReferenceBodies:
         mujoco.mju_mat2Quat(data.qpos[3:7], np.ascontiguousarray(axes).ravel())
         places = turn.apply(sample.places[down][:, 0])
         origin = (stance.points[down] - places).mean(axis=0)
+        self.origin, self.turn = origin, turn.as_matrix()
         self.com = origin + turn.apply(sample.com[0])
         data.qpos[:3], data.qpos[7:] = self.com, joints
         for _ in range(2):  # the second time the bodies are there
@@ -111,6 +115,11 @@ class ReferenceBodies:
             mujoco.mj_comPos(self.robot.model, data)
             data.qpos[:3] += self.com - data.subtree_com[self.robot.root_body_id]
         return joints, data.xpos[self.bodies].copy()
+
+    @property
+    def posture(self) -> np.ndarray:
+        """(nq,) the posture at the last time that was asked for."""
+        return self._data.qpos.copy()
 
     def poses(self, time: float, stance: Stance) -> tuple[np.ndarray, np.ndarray]:
         """Where all bodies are at a time [s], about soles that stand as in `stance`.

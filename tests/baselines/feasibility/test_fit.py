@@ -1,5 +1,7 @@
 """Repairs: slower where that helps, the CoM elsewhere where it does not, else refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from poise.baselines.feasibility.fit import NotFitted, fit_motion, zmp_offset
 from poise.baselines.feasibility.trajectory import PlantedRobot, joints_of, sample_trajectory
 from poise.baselines.motions.motion import load_motion
 from tests.support.physics import robot_named
-from tests.support.robot_clips import com_clip
+from tests.support.robot_clips import ahead_clip, com_clip
 
 
 def bump(t: float, begin: float, length: float) -> float:
@@ -68,3 +70,18 @@ def test_what_nothing_helps_names_the_worst_sample() -> None:
     limits = FeasibilityLimits(torque=0.2)
     with pytest.raises(NotFitted, match=r"moved: no tempo .*torque.* at \d\.\d\d s.* is needed"):
         fit_motion(clip, robot, limits)
+
+
+def test_hasty_steps_are_slowed_down_and_planned_again() -> None:
+    """Twice as fast the weight cannot get from foot to foot in time."""
+    robot = robot_named("humanoid")
+    clip = ahead_clip(robot)
+    hasty = replace(clip, dt=clip.dt / 1.8)
+    assert not check_motion(hasty, robot).feasible
+    fitted = fit_motion(hasty, robot)
+    assert fitted.clip.planted is clip.planted and fitted.moved > 0.0
+    assert fitted.clip.duration == pytest.approx(hasty.duration / fitted.tempo)
+    assert check_motion(fitted.clip, robot).feasible
+    assert fit_motion(clip, robot).clip is clip
+    with pytest.raises(NotFitted, match=r"ahead: no tempo .* with the centre of mass planned ag"):
+        fit_motion(hasty, robot, FeasibilityLimits(torque=0.2))

@@ -11,7 +11,7 @@ import pytest
 from poise.baselines.scripts.parser import parse, read_script
 from poise.baselines.scripts.printer import text_of
 from poise.baselines.scripts.table import from_csv, plain, script_of, table_of, to_csv
-from poise.baselines.scripts.tree import Arrow, ClipName, Define, Modifier, Script, Term
+from poise.baselines.scripts.tree import Arrow, ClipName, Define, Modifier, Script, Term, clip_names
 from poise.configs.errors import ConfigError
 from tests.support.scripts import SEED, damaged, random_script
 
@@ -251,3 +251,8 @@ def test_scripts_in_files(tmp_path) -> None:
     path.write_bytes(b"\xff")
     with pytest.raises(ConfigError, match="cannot be read"):
         read_script(path)
+
+
+def test_the_clips_of_a_script_are_known_by_name() -> None:
+    script = parse('both = (kick | "a b" on arms) * 2; <up> -> both -> (walk[0:1] -> stand) @ 2')
+    assert clip_names(script) == {"kick", "a b", "both", "walk", "stand"}

@@ -12,7 +12,7 @@ from poise.baselines.motions.robot_clip import read_robot_clip, write_robot_clip
 from poise.training.cli.entry import main
 from tests.support.motion_files import small_bvh
 from tests.support.physics import robot_named
-from tests.support.robot_clips import packaged_clip
+from tests.support.robot_clips import ahead_clip, packaged_clip
 
 
 def test_info_convert_and_import(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -80,6 +80,30 @@ def test_check_and_physical_join(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main([*joined, "--leave", "0.8", "--enter", "0.4"]) == 0
     assert "physical, 0." in capsys.readouterr().out
     assert read_robot_clip(both).duration < 2.0 * clip.duration
+
+
+def test_steps_are_joined_and_put_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By hand and by a script of a graph; what is cut in a step is one line."""
+    monkeypatch.chdir(tmp_path)
+    robot = robot_named("humanoid")
+    write_robot_clip(ahead_clip(robot), "ahead.npz")
+    write_robot_clip(packaged_clip(robot, "arm_swing"), "swing.npz")
+    joined = ["motion", "join", "ahead.npz", "swing.npz", "both.npz", "--kind", "physical"]
+    assert main([*joined, "--leave", "3.8"]) == 0
+    planted = read_robot_clip("both.npz").planted
+    assert planted is not None and (~planted).sum() == (~ahead_clip(robot).planted).sum()
+    assert main([*joined, "--leave", "1.6"]) == 2
+    assert "leave: at 1.60 s a sole is in the air" in capsys.readouterr().err
+    of_robot = ["--robot", "humanoid"]
+    assert main(["motion", "graph", "ahead.npz", "swing.npz", "--out", "g.yaml", *of_robot]) == 0
+    synth = ["motion", "synth", "swing -> ahead", "--graph", "g.yaml", "--out", "made.npz"]
+    assert main([*synth, *of_robot]) == 0
+    made = read_robot_clip("made.npz").planted
+    assert made is not None and (~made).sum() == (~ahead_clip(robot).planted).sum()
+    assert main(["motion", "graph", "ahead.npz", "cmu02_stand", "--out", "g.yaml"]) == 2
+    assert "say which robot's (--robot)" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ from poise.training.motion_report.page import check_page, write_page
 from poise.training.motion_report.performance import Watched
 from poise.training.motion_report.timeline import layers_of, timeline_picture
 from tests.support.physics import robot_named
+from tests.support.robot_clips import ahead_clip
 
 NAMES = ("stand", "squat <deep>", "walk")
 GRAPH = MotionGraph(
@@ -119,6 +120,22 @@ def test_a_performance_is_seen_with_its_push(tmp_path: Path) -> None:
     text = path.read_text()
     assert "a &lt;title&gt;" in text and text.count("<svg") == 2 and "prefers-color-scheme" in text
     assert not re.search(r"(src|href)=", text)
+
+
+def test_the_soles_of_steps_are_those_that_are_planted() -> None:
+    """Both, one, both, the other one, both: to the side five boxes. Ahead one sole beside the other
+    reaches as far as both, so there are three, the last one further up than the first."""
+    robot = robot_named("humanoid")
+    judged = check_motion(ahead_clip(robot), robot)
+    drawing = ElementTree.fromstring(str(zmp_picture(judged).svg))
+    boxes = [e for e in drawing.iter("rect") if e.get("class") == "support"]
+    assert len(boxes) == 8
+    first, apart, last = ([float(box.get(name, 0)) for name in ("y", "height")]
+                          for box in boxes[:3])  # fmt: skip
+    assert last[0] < first[0] - 10.0 and last[1] == pytest.approx(first[1], abs=1.0)
+    assert apart[0] == pytest.approx(last[0], abs=1.0) and apart[1] > first[1] + 10.0
+    sides = [float(box.get("height", 0)) for box in boxes[3:]]
+    assert max(sides[1], sides[3]) < 0.6 * min(sides[0], sides[2], sides[4])
 
 
 def test_the_page_is_html() -> None:
