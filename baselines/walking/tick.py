@@ -143,10 +143,11 @@ def transfer_tick(t: WalkTick) -> bool:
 @compiled
 def stands_higher(t: WalkTick) -> bool:
     """Return whether the foot stands on ground that is higher than was believed: late in its swing
-    it touches, not on an edge of its sole, and does not come down where it is led."""
+    it touches, not on an edge of its sole, and does not come down where it is led. Asked only
+    by gaits for rough ground."""
     c, w, foot = t.walk, t.walk.swing, t.walk.memory.foot[0]
     late = w.time[0] > LANDING * w.duration[0]
-    if footholds_given(t) or not late or c.state.contacts[foot] < 0.5:
+    if t.gait.lower <= 0.0 or footholds_given(t) or not late or c.state.contacts[foot] < 0.5:
         return False
     above = c.state.sole_point[foot, 2] - w.reference[0, 2]
     return above > HELD_UP * c.robot.height_com and c.state.sole_axes[foot, 2, 2] > FLAT

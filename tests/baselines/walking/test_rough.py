@@ -62,7 +62,7 @@ def test_uneven_tiles_that_are_not_seen_are_walked_over_where_toes_caught_before
 
 
 def test_a_foot_that_higher_ground_holds_up_has_landed():
-    env = walking("walk", seconds=3.0)
+    env = walking("walk-rough", seconds=3.0)
     tick = env.controller._walk_tick
     memory, state, swing = tick.walk.memory, tick.walk.state, tick.walk.swing
     while not memory.swinging[0] or swing.time[0] < 0.7 * swing.duration[0]:
