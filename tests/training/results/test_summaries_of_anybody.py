@@ -65,6 +65,8 @@ def test_wrong_entries_are_refused_in_one_line(tmp_path: Path) -> None:
     }  # fmt: skip
     refused = accepted = 0
     for place in places(summary):
+        if place[:2] == ("controllers", "abe07") and len(place) > 2:
+            continue  # its entries are those of the other
         for value in (GONE, *WRONG):
             path.write_text(json.dumps(changed(summary, place, value)))
             try:
