@@ -83,12 +83,13 @@ def _draw_curve(
 ) -> list[Path]:
     """Draw mean J50 over environment steps, if a run has kept more policies than one."""
     runs: dict[str, list[Point]] = {}
-    kept = {name: Path(name).parent for name in fits if Path(name).parent.name == KEPT}
-    for name, parent in kept.items():
-        fit, learned_from = fits[name], timesteps.get(name)
-        assert learned_from is not None  # what is kept is a policy
-        point = (learned_from, fit.j50_mean, *fit.j50_mean_ci)
-        runs.setdefault(str(parent.parent), []).append(point)
+    kept = []
+    for name, fit in fits.items():
+        parent, learned_from = Path(name).parent, timesteps.get(name)
+        if parent.name == KEPT and learned_from is not None:
+            kept.append(name)
+            point = (learned_from, fit.j50_mean, *fit.j50_mean_ci)
+            runs.setdefault(str(parent.parent), []).append(point)
     if not any(len(points) > 1 for points in runs.values()):
         return []
     bounded = any(fits[name].bounded for name in kept)

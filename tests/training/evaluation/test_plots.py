@@ -41,7 +41,9 @@ def test_sectors_of_few_trials_are_no_results_and_bounds_are_marked(
     assert drawn["note"] == "Nothing is drawn: no direction has 5 trials."
 
 
-@pytest.mark.parametrize("names", [("r/kept/10", "r/kept/20", "qp"), ("r/kept/10", "qp", "s/last")])
+@pytest.mark.parametrize(
+    "names", [("r/kept/10", "r/kept/20", "kept/qp.yaml"), ("r/kept/10", "qp", "s/last")]
+)
 def test_what_a_run_has_kept_is_drawn_over_its_steps(
     names: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -59,5 +61,9 @@ def test_what_a_run_has_kept_is_drawn_over_its_steps(
         return
     assert found == [path]
     (given, note), *rest = drawn
-    assert given == (path, {"r": [(10, 10.0, 9.0, 12.0), (20, 11.0, 10.0, 13.0)]}, {"qp": 12.0})
+    assert given == (
+        path,
+        {"r": [(10, 10.0, 9.0, 12.0), (20, 11.0, 10.0, 13.0)]},
+        {"kept/qp.yaml": 12.0},
+    )
     assert note == {"note": "In some directions J50 is only a bound."} and not rest
