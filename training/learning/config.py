@@ -53,6 +53,10 @@ class PPOConfig:
     activation: Literal["tanh", "elu"] = field(default="tanh", metadata={"omit": "default"})
     log_std_init: float = -1.5
     log_std_final: float | None = None  # linear in time from log_std_init; None: learned
+    # of the exploration's noise in successive steps, see `exploration.py`; 0: white
+    noise_correlation: float = field(
+        default=0.0, metadata={"min": 0.0, "max": 0.99, "omit": "default"}
+    )
     use_sde: bool = False  # exploration that is smooth in the state
     sde_sample_freq: int = field(default=16, metadata={"min": -1})  # [steps]
     symmetric: bool = False  # the policy is its own mirror image, see `symmetry.py`
@@ -60,6 +64,8 @@ class PPOConfig:
     def __post_init__(self):
         if self.symmetric and self.use_sde:
             raise ValueError("symmetric: not with use_sde")
+        if self.noise_correlation > 0.0 and self.use_sde:
+            raise ValueError("noise_correlation: not with use_sde, whose noise lasts already")
         if self.n_envs * self.n_steps < 2:
             raise ValueError("n_envs × n_steps must be at least 2")
         if self.n_envs * self.n_steps > MOST_STEPS:

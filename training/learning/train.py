@@ -31,9 +31,10 @@ from poise.training.running.stopping import keeps
 from .callbacks import Checkpoints, Progress, Throughput
 from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
+from .curriculum import CurriculumCallback
+from .exploration import ExplorationCallback, correlate_exploration
 from .imported import import_policy
 from .policy import locate_policy
-from .schedules import CurriculumCallback, ExplorationCallback
 from .seeds import KEPT
 from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
@@ -165,6 +166,8 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
     )
     if ppo.actor_rate < 1.0:
         slow_actor(model.policy, ppo.actor_rate)
+    if ppo.noise_correlation > 0.0:
+        correlate_exploration(model.policy, ppo.noise_correlation)
     head = model.policy.action_net
     assert isinstance(head, torch.nn.Linear)
     with torch.no_grad():
