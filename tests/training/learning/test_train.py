@@ -22,7 +22,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.schema import build, read_yaml
 from poise.envs.pushes.sampler import PushSampler
 from poise.envs.vector.batch import EnvBatch
-from poise.training.learning import callbacks, schedules
+from poise.training.learning import callbacks, curriculum
 from poise.training.learning.checkpoints import FILES, POLICY, STATE
 from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, train_config
 from poise.training.learning.policy import load_policy
@@ -302,13 +302,13 @@ def test_a_damaged_run_is_not_resumed(run, spoil):
 def test_the_curriculum_grows_the_pushes(tmp_path, monkeypatch):
     """The largest push starts small and reaches its size after its fraction of the run."""
     largest = []
-    start = schedules.CurriculumCallback._on_rollout_start
+    start = curriculum.CurriculumCallback._on_rollout_start
 
     def spy(self):
         start(self)
         largest.append(self.training_env.get_attr("push_sampler")[0].magnitude)
 
-    monkeypatch.setattr(schedules.CurriculumCallback, "_on_rollout_start", spy)
+    monkeypatch.setattr(curriculum.CurriculumCallback, "_on_rollout_start", spy)
     config = tiny_config(steps=256, curriculum=Curriculum(start=0.1, share=0.5))
     config = replace(config, evaluation=replace(config.evaluation, trials=1))
     train(config, tmp_path, progress=False)
@@ -330,6 +330,8 @@ def test_the_progress_bar_shows_steps_and_success(tmp_path, capsys):
         ({"ppo": {"net_arch": [64, 0]}}, "ppo: net_arch"),
         ({"ppo": {"gamma": 1.5}}, "ppo.gamma"),
         ({"ppo": {"lr": 1e-3}}, "ppo.lr.*learning_rate"),
+        ({"ppo": {"noise_correlation": 1.0}}, "ppo.noise_correlation"),
+        ({"ppo": {"noise_correlation": 0.5, "use_sde": True}}, "ppo: noise_correlation"),
         ({"steps": 0}, "steps"),
         ({"seed": 1.5}, "seed"),
         ({"evaluation": {"trials": 0}}, "evaluation.trials"),
@@ -353,23 +355,6 @@ def test_pushes_that_do_not_fit_the_robot_are_refused_before_anything_is_written
     with pytest.raises(ConfigError, match=named):
         train_seeds(config, [0, 1], tmp_path / "run")
     assert not (tmp_path / "run").exists()
-
-
-def test_exploration_narrows_on_a_schedule(tmp_path, monkeypatch):
-    """With log_std_final, the noise of each rollout lies on a line in time."""
-    seen = []
-    start = schedules.ExplorationCallback._on_rollout_start
-
-    def spy(self):
-        start(self)
-        seen.append(self.model.policy.log_std.detach().numpy().copy())
-
-    monkeypatch.setattr(schedules.ExplorationCallback, "_on_rollout_start", spy)
-    ppo = replace(tiny_config().ppo, log_std_init=-1.0, log_std_final=-3.0)
-    config = tiny_config(steps=128, ppo=ppo)
-    train(replace(config, evaluation=replace(config.evaluation, trials=1)), tmp_path, False, False)
-    np.testing.assert_allclose([values.mean() for values in seen], [-1.0, -2.0], atol=1e-6)
-    assert all(np.ptp(values) == 0.0 for values in seen)
 
 
 def test_steps_are_trained_by_a_word_in_the_configuration(tmp_path):
