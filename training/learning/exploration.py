@@ -40,8 +40,8 @@ class CorrelatedGaussian(DiagGaussianDistribution):
 
     a = μ + σ ε with ε' = ρ ε + √(1 − ρ²) w for each environment, w white and of variance 1, ρ the
     `correlation`. ε has a variance of 1 at every step, and the density that PPO's ratio is made of
-    stays that of N(μ, σ²). White noise at 50 Hz is averaged by a body before it moves; noise that
-    lasts pushes it where it has not been.
+    stays that of N(μ, σ²), as there, where the noise is coloured instead. White noise at 50 Hz is
+    averaged by a body before it moves; noise that lasts pushes it where it has not been.
     """
 
     def __init__(self, action_dim: int, correlation: float):
