@@ -8,8 +8,9 @@ policy's actions,
     a(t) = clip(π(o(t)) + δ(t), −1, 1),    δ linear between knots every 0.1 s for a second
 
 from the push on, with which the robot recovers. Levels are a `--step` [N·s] apart; each begins with
-what was found for the one below. A sample that falls is worth how long it stood, others more the
-slower and the more upright they are 1.9 s after the push began.
+what was found for the one below, and the first one that is lost ends it. A sample that falls is
+worth how long it stood, others more the slower and the more upright they are 1.9 s after the push
+began.
 
 The search knows the push and the start, and may try as often as `--samples` says; a policy has one
 try and has to find out. So a policy through the same actions has less than what a perfect search
@@ -91,7 +92,11 @@ class Trials:
 def searched_limit(
     direction: float, policy: str, body: str, first: float, step: float, samples: int
 ) -> tuple[float, float]:
-    """The largest impulses [N·s] that the policy alone and the search recover from; 0 is none."""
+    """The last level [N·s] before the first one that is lost, alone and searched; 0: the first is.
+
+    What is recovered from above a lost level does not count. The search goes on from where the
+    policy alone is lost.
+    """
     trials, alone = Trials(policy), 0.0
     push = partial(Push, body, START, DURATION, direction=direction)
     none = np.zeros((KNOTS, trials.size))

@@ -41,6 +41,7 @@ def learning_curve(
             style = look(k)
             ax.fill_between(steps, low, high, color=style.colour, alpha=0.2, lw=0)
             ax.plot(steps, j50, color=style.colour, ls=style.line, marker=style.marker, label=name)
+            ax.lines[-1].set_clip_on(False)  # its last marker lies on the frame
         for k, (name, level) in enumerate((others or {}).items()):
             ax.axhline(level, color=GREY, lw=1.3, ls=DASHES[k % len(DASHES)], label=name)
         ax.set_xlim(left=0)
