@@ -31,11 +31,11 @@ PYTHON := .venv/bin/python
 STAMP := .venv/.poise-setup
 DOCS := .venv/.poise-docs
 
-.PHONY: setup test weekly test-processors demo check docs format build release bench fuzz lock audit clean types-tree
+.PHONY: setup test weekly test-processors demo check docs format build release bench fuzz lock audit clean
 
 setup: $(STAMP)
 
-$(STAMP): pyproject.toml setup.py constraints.txt
+$(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m pip --version >/dev/null 2>&1 || $(PYTHON311) -m venv .venv
 	$(if $(LOCKED),$(PYTHON) -m pip install -q $(PIP_ARGS) --require-hashes -r requirements.lock)
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt setuptools
@@ -63,7 +63,7 @@ test-processors: setup
 demo: setup
 	.venv/bin/poise demo
 
-check: setup types-tree
+check: setup
 	.venv/bin/ruff format --check .
 	.venv/bin/ruff check .
 	$(PYTHON) -m mypy
@@ -72,7 +72,7 @@ $(DOCS): $(STAMP)
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt --no-build-isolation -e ".[docs]"
 	touch $@
 
-docs: $(DOCS) types-tree
+docs: $(DOCS)
 	NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build -q
 
 format: setup
@@ -95,13 +95,6 @@ lock: build/audit
 
 audit: build/audit
 	build/audit/bin/pip-audit -r requirements.lock --disable-pip
-
-# mypy cannot follow the map of folders to packages, so it gets the map as links.
-types-tree:
-	mkdir -p build/types/poise
-	for folder in envs baselines training configs; do \
-		ln -sfn ../../../$$folder build/types/poise/$$folder; done
-	ln -sf ../../../src/poise/__init__.py ../../../src/poise/lazy.py ../../../src/poise/py.typed build/types/poise/
 
 # The second environment holds the wheel alone; its dependencies are those of .venv, by a path
 # file, which does not bring the editable install with it.
