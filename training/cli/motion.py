@@ -10,9 +10,11 @@ import tyro
 from poise.baselines.clips.bvh import read_bvh, write_bvh
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import find_bvh
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
+from poise.training.options.pages import print_commands
+from poise.training.options.parsing import parsed
 from poise.training.running.terminal import terminal
 
 from .arguments import Switch
@@ -20,6 +22,10 @@ from .motion_check import check, follow
 from .motion_join import join, match
 from .motion_script import graph, plan, synth
 
+USAGE = """usage: poise motion COMMAND [OPTIONS]
+
+Motion capture: what files hold, a robot's motion of them, and performing it.
+"""
 Solver = Literal["frame", "spacetime", "grid"]
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
@@ -224,14 +230,15 @@ MOTION: dict[str, Callable[..., object]] = {
 
 def run(args: Sequence[str]) -> int:
     """Run a sub-command of `poise motion`; returns 0, or 1 (see `check`)."""
-    if args and not args[0].startswith("-") and args[0] not in MOTION:
-        raise ConfigError(f"no such command: motion {args[0]}", choices=MOTION)
-    code = tyro.extras.subcommand_cli_from_dict(
-        MOTION,
-        prog="poise motion",
-        description="Motion capture: what files hold, a robot's motion of them, and performing it.",
-        args=list(args),
-    )
+    if not args or args[0] in ("-h", "--help", "--help-all"):
+        print_commands(USAGE, MOTION, terminal())
+        return 0
+    name = args[0]
+    if name not in MOTION:
+        raise ConfigError(f"no such command: motion {shown(name)}{meant(name, MOTION)}",
+                          choices=MOTION)  # fmt: skip
+    given = ["--help" if arg == "--help-all" else arg for arg in args[1:]]
+    code = parsed(MOTION[name], given, f"poise motion {name}")()
     return code if isinstance(code, int) else 0
 
 

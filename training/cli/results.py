@@ -8,7 +8,7 @@ import tyro
 from poise.configs.errors import ConfigError
 from poise.training.running.terminal import terminal
 
-from .arguments import Allow, Folder, check_folders
+from .arguments import Allow, Folder, Json, check_folders, print_json
 
 if TYPE_CHECKING:
     from poise.training.results.replay import Replay
@@ -18,6 +18,8 @@ def compare(
     a: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_A")],
     b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_B")],
     /,
+    *,
+    json: Json = False,
 ) -> None:
     """Say what changed from one result to another, with intervals.
 
@@ -28,7 +30,10 @@ def compare(
     check_folders(a, b)
     from poise.training.results.compare import compare, print_comparison
 
-    print_comparison(compare(a, b), a, b, terminal())
+    found = compare(a, b)
+    print_comparison(found, a, b, terminal(stderr=json))
+    if json:
+        print_json(found)
 
 
 def leaderboard(
@@ -62,7 +67,7 @@ def replay(
     /,
     *,
     trial: int,
-    controller: tuple[str, ...] = (),
+    controllers: tuple[str, ...] = (),
     video: Path | None = None,
     plot: Path | None = None,
     allow: Allow = (),
@@ -72,8 +77,8 @@ def replay(
     Args:
         folder: written by poise evaluate or poise benchmark.
         trial: its number in trials.csv.
-        controller: which of the evaluated ones; the last if not given. A video shows several side
-            by side.
+        controllers: which of the evaluated ones; the last if not given. A video shows several
+            side by side.
         video: an MP4 or WebP file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
     """
@@ -90,9 +95,11 @@ def replay(
     for file, field in ((video, "video"), (plot, "plot")):
         if file is not None:
             check_out_file(file, field)
-    if plot is not None and len(controller) > 1:
+    if plot is not None and len(controllers) > 1:
         raise ConfigError("of one controller alone", field="plot")
-    played = [replay(folder, trial, name, plot=plot, allow=allow) for name in controller or (None,)]
+    played = [
+        replay(folder, trial, name, plot=plot, allow=allow) for name in controllers or (None,)
+    ]
     for done in played:
         _print_replay(done)
     if video is not None:
@@ -103,10 +110,15 @@ def replay(
 
 
 def _print_replay(done: "Replay") -> None:
-    """How a trial ended that was played again, and in what it differs from its record."""
+    """How a trial ended that was played again, why, and in what it differs from its record."""
+    from poise.training.diagnosis.words import push_told, why
+
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
     print(f"trial {done.trial.number}, {done.controller}: {end}")
-    print(done.trial.push or "no push")
+    events = sorted((*done.trial.pushes, *done.trial.kicks), key=lambda each: each.start)
+    print("; ".join(map(push_told, events)) or "no push")
+    if reason := why(done.outcome.diagnosis, done.outcome.fall_time):
+        print(reason)
     for name, (recorded, now) in done.differences.items():
         print(f"{name}: recorded {recorded or 'nothing'}, now {now or 'nothing'}")
     print("differs from the record" if done.differences else "exactly as recorded")

@@ -139,9 +139,8 @@ class Run:
             rows.sort(key=lambda row: row[0].number)  # of one number, in the order of the names
             folder.finish([trial_row(*row) for row in rows], summary)
         print_summary(summary, self.console)
-        print_lost(
-            {name: lost(played[name]) for name in summary["ranking"]}, self.out, self.console
-        )
+        numbers = {name: lost(played[name]) for name in summary["ranking"]}
+        print_lost(numbers, summary["controllers"], self.out, self.console)
         print_paths([*drawn, self.out / TRIALS, self.out / SUMMARY], self.console)
         return summary
 

@@ -168,6 +168,23 @@ def _against(results: Results, baseline: str) -> dict[str, tuple[int, int, float
     return found
 
 
+def losses(results: Results, order: Sequence[str]) -> Table | None:
+    """How often what was the cause of a loss; None in older results, and where nothing was lost."""
+    columns = [
+        Column("controller", "Controller"),
+        Column("trials", "Losses"),
+        Column("cause", "Cause"),
+    ]
+    rows = [
+        [name_cell(name, results.controllers.index(name)), cell(loss["trials"], "d"),
+         Cell(loss["cause"], loss["cause"])]
+        for name in order
+        for loss in results.summary["controllers"][name].get("losses", [])
+    ]  # fmt: skip
+    caption = "Causes of lost trials, the most frequent one of each controller first."
+    return Table("losses", caption, columns, rows) if rows else None
+
+
 def smallest(results: Results, order: Sequence[str]) -> Table:
     """The smallest pushes that each controller did not recover."""
     columns = [
@@ -179,6 +196,7 @@ def smallest(results: Results, order: Sequence[str]) -> Table:
         Column("duration", "Duration [s]"),
         Column("body", "Body"),
         Column("fall_time", "Fell at [s]", "after the reset; none: stood, but not quiet"),
+        Column("why", "Why"),
     ]
     rows = []
     for name in order:
@@ -193,6 +211,7 @@ def smallest(results: Results, order: Sequence[str]) -> Table:
                 _number_cell(record.duration, ".2f"),
                 Cell(body or None, body or "–"),
                 _number_cell(record.fall_time, ".2f"),
+                Cell(record.why or None, record.why or "–"),
             ])  # fmt: skip
     caption = f"The {SMALLEST} smallest pushes that each controller did not recover."
     return Table("smallest_lost", caption, columns, rows).without_empty()

@@ -28,10 +28,10 @@ class Terminal(Console):
         raise  # what Rich has just caught
 
 
-def terminal() -> Console:
-    """The console that a command prints to."""
-    console = Terminal(emoji=False)  # a controller may be called mine.py:B
-    return console if console.is_terminal else Terminal(width=WIDTH, emoji=False)
+def terminal(stderr: bool = False) -> Console:
+    """The console that a command prints to; the other stream where a result is to be piped."""
+    console = Terminal(emoji=False, stderr=stderr)  # a controller may be called mine.py:B
+    return console if console.is_terminal else Terminal(width=WIDTH, emoji=False, stderr=stderr)
 
 
 class ProgressLines(Progress):

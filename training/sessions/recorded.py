@@ -9,6 +9,7 @@ import numpy as np
 
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
+from poise.training.diagnosis.words import why
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.trials.trial import Outcome
@@ -62,6 +63,8 @@ def recorded_trial(
         done = replay(results, trial, name, watch=recorder, allow=allow)
         differs = "differs from the record" if done.differences else "exactly as recorded"
         lines.append(f"trial {trial}, {name}: {_end(done.outcome)}, {differs}")
+        if reason := why(done.outcome.diagnosis, done.outcome.fall_time):
+            lines.append(f"  {reason}")
     envs = [recorder.env for recorder in recorders if recorder.env is not None]
     period = min(env.config.policy_period for env in envs)
 
