@@ -26,11 +26,13 @@ __all__ = [
     "train",
     "train_seeds",
     "tune",
+    "write_dataset",
     "write_report",
 ]
 
 if TYPE_CHECKING:
     from poise.training.evaluation.evaluate import benchmark, evaluate
+    from poise.training.export.dataset import write_dataset
     from poise.training.export.export import export_policy
     from poise.training.figures.video import frame_strip, record
     from poise.training.learning.config import TrainConfig
@@ -50,6 +52,7 @@ else:
         __name__,
         {
             "evaluation.evaluate": ("benchmark", "evaluate"),
+            "export.dataset": ("write_dataset",),
             "export.export": ("export_policy",),
             "figures.video": ("frame_strip", "record"),
             "learning.config": ("TrainConfig",),

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from poise.configs.errors import ConfigError, shown
+from poise.configs.extras import how_to_install
 from poise.configs.files import write_atomic
 from poise.configs.reading import parsing
 
@@ -102,7 +103,7 @@ def _library():  # a module
     try:
         import pybvh
     except ImportError:
-        raise ConfigError("needs the package pybvh: pip install 'poise[motion]'",
+        raise ConfigError(f"needs the package pybvh: {how_to_install('motion')}",
                           source="motion") from None  # fmt: skip
     return pybvh
 

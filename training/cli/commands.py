@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Json, Names, RobotName, Switch, print_json
-from .export import export
+from .export import dataset, export
 from .results import compare, leaderboard, replay, report
 from .view import view
 from .walk import gait, walk
@@ -350,6 +350,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "tune": tune,
     "qp-set": qp_set,
     "export": export,
+    "dataset": dataset,
     "robot": robot,
     "motion": motion,
     "list": list_names,

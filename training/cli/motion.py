@@ -122,7 +122,8 @@ def bring(
     """Retarget a BVH file to a robot, its soles planted where the clip's are; see docs/motions.md.
 
     The .npz file is taken wherever a motion is named. A clip whose feet move by 12 cm becomes a
-    motion with steps, which motion-step performs. Needs pip install 'poise[motion]'.
+    motion with steps, which motion-step performs. Needs pip install -e '.[motion]' in a
+    checkout.
 
     Args:
         file: a .bvh file, or the name of a packaged clip.

@@ -1,5 +1,6 @@
 """The sub-commands that read finished results: compare, leaderboard, replay and report."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,7 +34,7 @@ def compare(
     found = compare(a, b)
     print_comparison(found, a, b, terminal(stderr=json))
     if json:
-        print_json(found)
+        print_json(asdict(found))
 
 
 def leaderboard(

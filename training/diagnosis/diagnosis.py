@@ -9,6 +9,7 @@ import numpy as np
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.termination import has_diverged, uprightness
+from poise.envs.robots.robot import Robot
 
 from .record import Course
 
@@ -28,8 +29,9 @@ class Diagnosis:
             quiet" (on its feet, but not upright and at rest at the end), "off command" (a walk that
             did not go on as commanded), "motion" (a fall from a motion), "error".
         loss_body: body that touched the ground, where that is the criterion.
-        full_motor: motor that was first at its limit after the first push, for 2 policy steps or
-            more in a row.
+        full_motor: motor between root and soles that was first at its limit after the first push,
+            for 2 policy steps or more in a row. Arms are swung as hard as they can be, which is no
+            reason to fall.
         full_from: when that began.
         full_time: how long it lasted then.
         capture_left: when the capture point left the support for the last time.
@@ -106,7 +108,7 @@ def touching_body(env: BalanceEnv) -> str | None:
 
 def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, object]:
     """The motor that was first full, from when and for how long."""
-    full = (course.load > FULL) & (course.time > start)[:, None]
+    full = (course.load > FULL) & (course.time > start)[:, None] & bearing(env.robot)
     runs = np.zeros(full.shape, dtype=int)  # rows in a row, the last one's included
     for k in range(1, len(full)):
         runs[k] = np.where(full[k], runs[k - 1] + 1, 0)
@@ -123,6 +125,19 @@ def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, object]:
         "full_from": _time(course, row - FULL_STEPS + 1),
         "full_time": round((lengths[motor] + FULL_STEPS - 1) * period, 6),
     }
+
+
+def bearing(robot: Robot) -> np.ndarray:
+    """(nu,) whether a motor is between the root and a sole."""
+    model = robot.model
+    between = set()
+    for sole in robot.soles:
+        body = sole.body_id
+        while body not in (0, robot.root_body_id):
+            between.add(body)
+            body = int(model.body_parentid[body])
+    bodies = model.dof_bodyid[np.array(robot.motor_dofs)]
+    return np.isin(bodies, list(between))
 
 
 def _length(full: np.ndarray) -> int:

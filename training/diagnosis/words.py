@@ -66,7 +66,7 @@ def cause(d: Diagnosis, steps: int) -> str:
     """The cause of a loss in a few words, without numbers and sides, to count by."""
     if d.loss in ("diverged", "error"):
         return LOSSES[d.loss]
-    first = "no motor at its limit"
+    first = "no motor of the legs at its limit"
     if d.hardware is not None:
         first = d.hardware
     elif d.full_motor is not None:
@@ -74,7 +74,8 @@ def cause(d: Diagnosis, steps: int) -> str:
     if d.failures_from is not None and d.failures_from <= (d.full_from or float("inf")):
         first = "QP without a solution"
     then = {0: "no step", 1: "one step was not enough"}.get(steps, "its steps were not enough")
-    if d.foothold is not None:
+    slipped = d.foothold == "slipped" and (d.foothold_time or 0.0) <= (d.capture_left or 0.0)
+    if slipped or d.foothold == "missed":  # a sole that slips later is one of a robot that falls
         then = f"a foothold {d.foothold}"
     if d.loss == "not quiet":
         then = "did not come to rest"

@@ -10,6 +10,7 @@ import pytest
 
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.pushes.push import Kick, Push
+from poise.training.diagnosis import diagnosis
 from poise.training.diagnosis.diagnosis import (
     Diagnosis,
     _capture,
@@ -30,6 +31,15 @@ SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 ENV = SimpleNamespace(
     config=SimpleNamespace(policy_period=0.02), robot=SimpleNamespace(motor_names=("hip", "ankle"))
 )
+
+
+@pytest.fixture(autouse=True)
+def legs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both motors of `ENV` are of legs."""
+    real = diagnosis.bearing
+    monkeypatch.setattr(
+        diagnosis, "bearing", lambda body: True if body is ENV.robot else real(body)
+    )
 
 
 def course(rows: int = 10) -> Course:
@@ -111,6 +121,7 @@ def test_a_trial_that_is_lost_says_why() -> None:
     line = {name: "" if v is None else str(v) for name, v in outcome_cells(outcome).items()}
     assert diagnosis_of(line) == found
     assert why(found, outcome.fall_time).startswith("fell: ")
+    assert not diagnosis.bearing(robot())[robot().motor_names.index("right_shoulder1")]
     if found.loss == "contact":
         assert touching_body(agent.env) == found.loss_body
 
@@ -136,6 +147,8 @@ def test_words() -> None:
         "good from 0.84 s, by 0.21 m at most; foothold missed by 0.08 m at 1.12 s."
     )
     assert cause(found, 2) == "ankle_y at its limit, then a foothold missed"
+    assert cause(replace(found, foothold="slipped"), 2).endswith("its steps were not enough")
+    assert cause(replace(found, foothold="slipped", foothold_time=0.7), 2).endswith("d slipped")
     plain = replace(found, foothold=None, failures_from=None)
     assert cause(plain, 0) == "ankle_y at its limit, then no step"
     assert cause(replace(plain, failures_from=0.5), 1).startswith("QP without a solution, then one")
