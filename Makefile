@@ -6,7 +6,7 @@
 # make clean   remove what was built (not .venv)
 # make release   the wheel and the sdist, checked, and tried alone on each of PYTHONS; notes, and
 #                the leaderboard's data for an archive such as Zenodo (.zenodo.json)
-# make weekly  the examples that need TorchRL, RLlib, RL Zoo or MoviePy, each in a fresh environment;
+# make weekly  the examples that need TorchRL, RLlib, RL Zoo, MoviePy, Optuna or Minari, each in a fresh environment;
 #              EXTRAS="zoo video" some of them alone
 # make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
@@ -19,7 +19,7 @@
 PYTHON311 ?= $(shell command -v python3.11 || command -v python3)
 PIP_ARGS ?=
 PYTHONS ?= python3.11 python3.12 python3.13
-EXTRAS ?= torchrl rllib zoo video
+EXTRAS ?= torchrl rllib zoo video optuna dataset
 LOCKED ?=
 PYTEST_ARGS ?=
 PYTEST_WORKERS ?= -n auto --maxprocesses 4 --dist worksteal

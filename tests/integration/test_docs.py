@@ -24,7 +24,7 @@ from poise.training.cli import entry, motion, train
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 LANGUAGES = {"python", "bash", "yaml", ""}  # "" is a figure: an equation, a tree, a listing
-SCRIPTS = ("git ", "tensorboard ", "pip install ")  # commands of others
+SCRIPTS = ("git ", "tensorboard ", "pip install ", "docker ")  # commands of others
 INLINE = re.compile(r"`(poise\s[^`]+)`")
 FOLDERS = "envs|baselines|training|configs|tests|examples"
 PLACES = {"N": "1", "K": "1", "…": "", "CONTROLLER…": "momentum-qp"}  # where a page names no value
