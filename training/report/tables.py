@@ -123,7 +123,7 @@ def directions(results: Results) -> Table | None:
         columns.append(Column(f"step_share_{name}", "of it", "fraction of that limit that J50 is"))
     rows: list[list[Cell]] = []
     for name, index, entry in per_direction(results):
-        bound = BOUNDS[_bound(entry)]
+        bound = BOUNDS[bound_of(entry)]
         rows.append([
             name_cell(name, index),
             *(figure_cell(entry, key, "g") for key in ("direction", "trials", "recovered")),
@@ -150,7 +150,8 @@ def per_direction(results: Results) -> list[tuple[str, int, Direction | Sector]]
     ]
 
 
-def _bound(entry: Direction | Sector) -> Bound:
+def bound_of(entry: Direction | Sector) -> Bound:
+    """What a figure is only a bound of, if so."""
     bound = entry.get("j50_bound") or entry.get("fraction50_bound")
     return cast(Bound, bound)
 
