@@ -68,12 +68,8 @@ def test_a_bound_is_a_hollow_mark_with_a_line_to_where_the_value_is() -> None:
         radii = [np.hypot(*(np.array(end) - np.array(MIDDLE))) for end in (starts, ends)]
         assert bool(radii[1] > radii[0]) is longer and mark.get("class") == "mark"
     told = [element.text or "" for element in root.iter() if element.tag.endswith("title")]
-    assert [text.split(": ")[1][:8] for text in told] == [
-        "at least",
-        "2 [1.8, ",
-        "at most ",
-        "2 [1.8, ",
-    ]
+    first = [text.split(": ")[1].split(" (")[0] for text in told]
+    assert first == ["at least 1", "2", "at most 1", "2"]
 
 
 def test_one_of_many_stands_out() -> None:
