@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -231,8 +231,11 @@ class Panel:
         return callback
 
 
-def status(play: Play, paused: bool, pace: Pace) -> str:
-    """What stands above the controls: time, how near to real time it is, who has fallen."""
+def status(play: Play, paused: bool, pace: Pace, pulled: Mapping[str, object] | None = None) -> str:
+    """What stands above the controls: time, how near to real time it is, who has fallen, and why.
+
+    While a body is dragged, `pulled` are the fields of the push that it would be.
+    """
     frames = play.history[play.at]
     factor = "paused" if paused else f"**{pace.factor:.2f} × real time**"
     if pace.speed != 1.0:
@@ -241,6 +244,10 @@ def status(play: Play, paused: bool, pace: Pace) -> str:
     for name, frame in zip(play.names, frames, strict=True):
         fell = None if frame.fall_time is None else f"fell at {frame.fall_time:.2f} s"
         lines.append(f"`{name}`: {fell or 'on its feet'}")
+        if play.ended and name in play.reasons:
+            lines.append(f"*{play.reasons[name]}*")
+    if pulled is not None:
+        lines.append(f"**{pulled['impulse']} N·s** towards {pulled['direction']}°")
     return "  \n".join(lines)
 
 
