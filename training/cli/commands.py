@@ -273,6 +273,7 @@ def robot(
     *,
     out: Path | None = None,
     picture: Path | None = None,
+    json: Json = False,
 ) -> None:
     """Check a robot before anything is tried on it: what it can hold, what will go wrong.
 
@@ -284,7 +285,7 @@ def robot(
         out: a JSON file to write the figures to.
         picture: a PNG file to write: the robot standing, and its soles.
     """
-    import json
+    from json import dumps
 
     from poise.configs.files import write_atomic
     from poise.configs.outputs import check_out_file
@@ -302,10 +303,12 @@ def robot(
 
     loaded = load_robot(name)
     check = check_robot(loaded)
-    print_check(check, terminal())
+    print_check(check, terminal(stderr=json))
+    if json:
+        print_json(check.to_json())
     if out is not None:
-        write_atomic(out, json.dumps(check.to_json(), indent=2, ensure_ascii=False) + "\n")
-        print(out)
+        write_atomic(out, dumps(check.to_json(), indent=2, ensure_ascii=False) + "\n")
+        terminal(stderr=json).print(str(out), soft_wrap=True)
     if picture is not None:
         from poise.training.robot_check.picture import draw_robot
 

@@ -349,7 +349,10 @@ def test_evaluate_and_replay(
     assert InProcess.played == 2 and f"{out}/summary.json" in shown
     command = f"poise view {out} --trial 0 --controllers zero"
     assert f"lost trials of zero: 0, 1 ({command})\n" in shown
-    assert main(args) == 0 and InProcess.played == 2
+    assert main([*args, "--json"]) == 0 and InProcess.played == 2
+    told = capsys.readouterr()
+    assert json.loads(told.out)["controllers"]["zero"]["recovered"] == 0
+    assert "lost trials of zero" in told.err
     other = [*args[:-1], "4"]
     assert main(other) == 2
     assert "holds a result with seed 3, not 4" in capsys.readouterr().err
