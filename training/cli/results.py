@@ -12,6 +12,7 @@ from poise.training.running.terminal import terminal
 from .arguments import Allow, Folder, Json, check_folders, print_json
 
 if TYPE_CHECKING:
+    from poise.envs.pushes.push import Kick, Push
     from poise.training.results.replay import Replay
 
 
@@ -116,7 +117,8 @@ def _print_replay(done: "Replay") -> None:
 
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
     print(f"trial {done.trial.number}, {done.controller}: {end}")
-    events = sorted((*done.trial.pushes, *done.trial.kicks), key=lambda each: each.start)
+    events: list[Push | Kick] = [*done.trial.pushes, *done.trial.kicks]
+    events.sort(key=lambda each: each.start)
     print("; ".join(map(push_told, events)) or "no push")
     if reason := why(done.outcome.diagnosis, done.outcome.fall_time):
         print(reason)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -106,7 +107,7 @@ def touching_body(env: BalanceEnv) -> str | None:
     return None
 
 
-def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, object]:
+def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
     """The motor that was first full, from when and for how long."""
     full = (course.load > FULL) & (course.time > start)[:, None] & bearing(env.robot)
     runs = np.zeros(full.shape, dtype=int)  # rows in a row, the last one's included
@@ -146,7 +147,7 @@ def _length(full: np.ndarray) -> int:
     return int(ends[0]) if len(ends) else len(full)
 
 
-def _capture(course: Course) -> dict[str, object]:
+def _capture(course: Course) -> dict[str, Any]:
     """When the capture point left the support for the last time, and how far it came."""
     pairs = zip(course.supports, course.capture_point, strict=True)
     outside = np.array([distance_outside(polygon, point) for polygon, point in pairs])
@@ -174,7 +175,7 @@ def distance_outside(polygon: np.ndarray, point: np.ndarray) -> float:
     return float(np.linalg.norm(away - along[:, None] * edges, axis=1).min())
 
 
-def _foothold(course: Course, start: float) -> dict[str, object]:
+def _foothold(course: Course, start: float) -> dict[str, Any]:
     """The first sole after the first push that slipped, or that landed where it should not."""
     for row in range(1, len(course.time)):
         if course.time[row] <= start:

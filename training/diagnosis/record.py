@@ -54,7 +54,8 @@ class CourseRecord:
     def __call__(self, env: BalanceEnv) -> None:
         s = env.simulation.state_arrays
         if not self._rows:
-            inner = env.controller.unwrapped if isinstance(env, ResidualBalanceEnv) else None
+            inner = env.controller if isinstance(env, ResidualBalanceEnv) else None
+            inner = getattr(inner, "unwrapped", inner)  # one from outside may be a bare object
             self._steps = inner if isinstance(inner, SteppingController) else None
             self._limit = np.array(env.robot.torque_limit)
         foot, x, y = -1, np.nan, np.nan

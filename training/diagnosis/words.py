@@ -31,10 +31,9 @@ def diagnosis_of(line: Mapping[str, str]) -> Diagnosis:
     """The diagnosis in a line of trials.csv; empty where older results have none."""
     numbers = {name for name, hint in Diagnosis.__annotations__.items() if "float" in hint}
     given: dict[str, Any] = {name: line.get(name) or None for name in COLUMNS}
-    return Diagnosis(**{
-        name: float(text) if text is not None and name in numbers else text
-        for name, text in given.items()
-    })  # fmt: skip
+    for name in numbers:
+        given[name] = None if given[name] is None else float(given[name])
+    return Diagnosis(**given)
 
 
 def why(d: Diagnosis, fall_time: float | None = None) -> str:

@@ -94,7 +94,10 @@ def _episode(agent: Agent, trial: Trial, buffer: Any) -> Any:
     if agent.begin is not None:
         agent.begin()
     push = push_arrays(info["push"], env)
-    seen, done, earned, ends, success = [observation], [], [], [], [info["is_success"]]
+    seen, success = [observation], [info["is_success"]]
+    done: list[np.ndarray] = []
+    earned: list[float] = []
+    ends: list[tuple[bool, bool]] = []
     while not (ends and any(ends[-1])):
         action = np.asarray(agent.act(observation), dtype=np.float32)
         observation, reward, fell, ended, info = env.step(action)

@@ -39,7 +39,7 @@ def parsed(function: Callable[..., T], args: Sequence[str], prog: str) -> Callab
         return functools.partial(function, *given, **named)
 
     with one_line_errors(prog, option_names(function), args):
-        return tyro.cli(later, prog=prog, args=list(args))  # type: ignore[return-value]
+        return tyro.cli(later, prog=prog, args=list(args))
 
 
 def option_names(function: Callable[..., object]) -> list[str]:

@@ -138,15 +138,15 @@ def polar(
                              "band", close=True)  # fmt: skip
             svg.path(x, y, "line", close=True, dash=dash(s.index))
             for k in range(len(x) if marked is None else 0):
-                side = int(s.sides[k])
-                tip = f"{s.name}, {s.x[k]:g}°: {BOUNDS[side]}{_with_ends(s, k, '.3g')} {unit}"
-                if not side:
+                which = int(s.sides[k])
+                tip = f"{s.name}, {s.x[k]:g}°: {BOUNDS[which]}{_with_ends(s, k, '.3g')} {unit}"
+                if not which:
                     svg.marker(x[k], y[k], s.index, tip)
                     continue
                 ray = np.array([x[k], y[k]]) - middle
-                end = (x[k], y[k]) + side * ARROW * ray / max(float(np.hypot(*ray)), 1e-9)
+                end = (x[k], y[k]) + which * ARROW * ray / max(float(np.hypot(*ray)), 1e-9)
                 with svg.group(class_="bound"):
-                    svg.line(x[k], y[k], *map(float, end), "whisker")
+                    svg.line(x[k], y[k], float(end[0]), float(end[1]), "whisker")
                     svg.marker(x[k], y[k], s.index, tip)
     for ring in rings if marked is None else ():
         x, y = place(22.5, ring)

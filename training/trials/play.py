@@ -13,6 +13,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.motions.feet import foot_signs
 from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.pushes.push import Kick, Push
 from poise.training.diagnosis.diagnosis import diagnose
 from poise.training.diagnosis.record import CourseRecord
 from poise.training.tracking.record import Tracking
@@ -90,7 +91,8 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
 
 def first_start(trial: Trial) -> float:
     """When the first push or kick begins [s]; 0 without one."""
-    return min((each.start for each in (*trial.pushes, *trial.kicks)), default=0.0)
+    events: list[Push | Kick] = [*trial.pushes, *trial.kicks]
+    return min((each.start for each in events), default=0.0)
 
 
 def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
