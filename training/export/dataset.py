@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,7 @@ from poise.training.trials.trial import Trial
 from .libraries import library
 
 MODULES = ("minari", "minari.data_collector.episode_buffer")
+PLACE = "MINARI_DATASETS_PATH"
 NAME = re.compile(r"[\w.-]+/[\w./-]+-v\d+")
 
 
@@ -71,20 +74,28 @@ def write_dataset(
         plan = Plan(chosen, load_limits(known), seed, [controller])
         episodes = [_episode(agent, trial, buffers.EpisodeBuffer) for trial in plan.first]
     won = sum(bool(each.infos["is_success"][-1]) for each in episodes)
-    with new_folder(out) as folder:
-        before = os.environ.get("MINARI_DATASETS_PATH")
-        os.environ["MINARI_DATASETS_PATH"] = str(folder)
-        try:
-            minari.create_dataset_from_buffers(
-                dataset_id=name, buffer=episodes, algorithm_name=controller,
-                action_space=agent.env.action_space, observation_space=agent.env.observation_space,
-                description=f"{controller} on {known.name}, suite {suite}, seed {seed}; Poise",
-            )  # fmt: skip
-        finally:
-            os.environ.pop("MINARI_DATASETS_PATH")
-            if before is not None:
-                os.environ["MINARI_DATASETS_PATH"] = before
+    with new_folder(out) as folder, _minari_writes_to(folder):
+        minari.create_dataset_from_buffers(
+            dataset_id=name, buffer=episodes, algorithm_name=controller,
+            action_space=agent.env.action_space, observation_space=agent.env.observation_space,
+            description=f"{controller} on {known.name}, suite {suite}, seed {seed}; Poise",
+        )  # fmt: skip
     return {"episodes": len(episodes), "steps": sum(map(len, episodes)), "recovered": won}
+
+
+@contextlib.contextmanager
+def _minari_writes_to(folder: Path) -> Iterator[None]:
+    """Within it Minari's data sets are in this folder, and it gives no advice to publishers."""
+    before = os.environ.get(PLACE)
+    os.environ[PLACE] = str(folder.resolve())
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            yield
+    finally:
+        os.environ.pop(PLACE)
+        if before is not None:
+            os.environ[PLACE] = before
 
 
 def _episode(agent: Agent, trial: Trial, buffer: Any) -> Any:
