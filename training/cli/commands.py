@@ -268,13 +268,15 @@ def robot(
 ) -> None:
     """Check a robot before anything is tried on it: what it can hold, what will go wrong.
 
-    Mass, soles, margins, torques to stand on both feet and on one, self-contacts, posture, which
-    controllers take it, and the pushes that a pendulum of its size stops.
+    Mass, soles, margins, torques to stand on both feet and on one, self-contacts, posture, two
+    seconds at rest, which controllers take it, and the pushes that a pendulum of its size stops.
+
+    Of a model alone, .xml or .urdf, it guesses the description and writes it to the current folder.
 
     Args:
-        name: a packaged robot (see poise list) or a .yaml description.
+        name: a packaged robot (see poise list), a .yaml description, or a model.
         out: a JSON file to write the figures to.
-        picture: a PNG file to write: the robot standing, and its soles.
+        picture: a PNG file to write: the robot standing, its CoM, and its soles.
     """
     import json
 
@@ -291,8 +293,13 @@ def robot(
     from poise.envs.robots.robot import load_robot
     from poise.training.robot_check.check import check_robot
     from poise.training.robot_check.tables import print_check
+    from poise.training.robot_check.written import is_guessed, write_description
 
     loaded = load_robot(name)
+    written = Path(f"{loaded.name}.yaml") if is_guessed(loaded) else None
+    if written is not None and not written.exists():
+        write_description(loaded, written)
+        print(written)
     check = check_robot(loaded)
     print_check(check, terminal())
     if out is not None:

@@ -1,4 +1,4 @@
-"""envs/robots/urdf.py: robots from URDF files, and what is refused of them."""
+"""envs/robots/models/urdf.py: robots from URDF files, and what is refused of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot, load_robot
-from poise.envs.robots.urdf import PACKAGES, find_file
+from poise.envs.robots.models.urdf import PACKAGES, find_file
 from tests.support.small_urdf import BOX_SOLE, INERTIAL, JOINTS, LIMIT, mesh, write_stl, write_urdf
 
 MASS = 12.0 + 2 * (3 * 2.0 + 2 * 0.1)  # of the links as the file says

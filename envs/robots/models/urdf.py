@@ -53,7 +53,7 @@ def read_urdf(path: Path, source: str, srdf: Path | None = None) -> mujoco.MjSpe
     except Exception as error:  # of MuJoCo, of the text in the file
         raise _wrong(f"{path} is not valid URDF: {error}", source) from None
     _take_meshes(spec, files, path, source)
-    check_spec(spec, path.parent, source, FIELD)
+    check_spec(spec, {path.parent}, source, FIELD)
     for geom in spec.geoms:
         geom.mass = geom.density = 0.0
         geom.group = HIDDEN if geom.contype or geom.conaffinity else geom.group
