@@ -178,7 +178,7 @@ def _raised(summary: "Summary", out: Path) -> int:
     """The exit code: 1, with a line that tells the first error, if a controller raised."""
     if failed := sum(entry["errors"] for entry in summary["controllers"].values()):
         table = out / "trials.csv"
-        with table.open(newline="") as file:
+        with table.open(newline="", encoding="utf-8") as file:
             first = next(filter(None, (row["error"] for row in csv.DictReader(file))), "unknown")
         print(f"poise: a controller raised an error in {failed} trials, see the column error of "
               f"{table}; the first one: {first}", file=sys.stderr)  # fmt: skip

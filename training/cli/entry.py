@@ -19,6 +19,7 @@ from poise.training.running.stopping import (
     stop_message,
     stoppable,
 )
+from poise.training.running.terminal import speak_plainly
 
 from .arguments import check_flags
 from .commands import COMMANDS
@@ -34,6 +35,7 @@ def main(args: Sequence[str] | None = None) -> int:
     # Small matrices lose time to threads, and sums may change their order. Read at import.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    speak_plainly()
     try:
         try:
             return _stoppable(args)
