@@ -92,8 +92,8 @@ def _chain(joint: int, parents: np.ndarray, offsets: np.ndarray) -> list[int]:
 def _mirrored(first: list[int], second: list[int], offsets: np.ndarray) -> bool:
     if len(first) != len(second):
         return False
-    lengths = [np.linalg.norm(offsets[chain], axis=1) for chain in (first, second)]
-    return bool(np.allclose(*lengths, rtol=0.0, atol=ALIKE * lengths[0].max()))
+    one, other = (np.linalg.norm(offsets[chain], axis=1) for chain in (first, second))
+    return bool(np.abs(one - other).max() <= ALIKE * one.max())
 
 
 def _bones(chain: list[int], offsets: np.ndarray, count: int) -> list[int]:

@@ -85,7 +85,7 @@ class _Guess:
         bent = self._bent_joints()
         plain = RobotDescription(
             name=re.sub(r"[^\w.-]+", "-", path.stem),
-            source=SourceDescription(**{"urdf" if urdf else "mjcf": path.name}),
+            source=SourceDescription(urdf=path.name) if urdf else SourceDescription(mjcf=path.name),
             root=self.model.body(self.root).name,
             feet=tuple(FootDescription(name, self.model.body(body).name)
                        for name, body in zip(("left", "right"), self.feet, strict=True)),

@@ -6,13 +6,14 @@ import re
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError, PoiseWarning
 
-Asset = mujoco.MjsMesh | mujoco.MjsTexture | mujoco.MjsHField | mujoco.MjsSkin
+Asset = Any  # MuJoCo's mesh, texture, height field or skin of a spec
 TETRAHEDRON = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 _UNOPENED = re.compile(r"Error opening file '(.*)'")
 
