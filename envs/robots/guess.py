@@ -66,6 +66,13 @@ def guess(path: Path) -> RobotDescription:
     return found.description(path, urdf)
 
 
+def robot_name(path: Path) -> str:
+    """The name of a model's file, or of its folder where the file is called as many are."""
+    own = path.absolute()
+    name = own.parent.name if own.stem.lower() in ("model", "robot", "scene") else own.stem
+    return re.sub(r"[^\w.-]+", "-", name) or "robot"
+
+
 class _Guess:
     """A model, and what is found of it in its zero posture."""
 
@@ -84,7 +91,7 @@ class _Guess:
         """The first posture that stands, without bodies in each other if there is one."""
         bent = self._bent_joints()
         plain = RobotDescription(
-            name=re.sub(r"[^\w.-]+", "-", path.stem),
+            name=robot_name(path),
             source=SourceDescription(urdf=path.name) if urdf else SourceDescription(mjcf=path.name),
             root=self.model.body(self.root).name,
             feet=tuple(FootDescription(name, self.model.body(body).name)

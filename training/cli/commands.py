@@ -290,16 +290,13 @@ def robot(
 
         check_out_file(picture, "picture")
         choose_gl_backend()
-    from poise.envs.robots.robot import load_robot
     from poise.training.robot_check.check import check_robot
     from poise.training.robot_check.tables import print_check
-    from poise.training.robot_check.written import is_guessed, write_description
+    from poise.training.robot_check.written import load_and_write
 
-    loaded = load_robot(name)
-    written = Path(f"{loaded.name}.yaml") if is_guessed(loaded) else None
-    if written is not None and not written.exists():
-        write_description(loaded, written)
-        print(written)
+    loaded, written = load_and_write(name)
+    if written is not None:
+        print(f"{written}: a guessed description, to correct and to name from now on")
     check = check_robot(loaded)
     print_check(check, terminal())
     if out is not None:
