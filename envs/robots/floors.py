@@ -153,12 +153,16 @@ def check_scenery(model: mujoco.MjModel, data: mujoco.MjData, ground: int, sourc
     for contact in data.contact[: data.ncon]:
         fixed = [g for g in contact.geom if model.body_weldid[model.geom_bodyid[g]] == 0]
         if fixed and fixed[0] != ground and contact.dist < TOUCHED:
-            geom = model.geom(fixed[0])
+            geom, kind = model.geom(fixed[0]), mujoco.mjtGeom(int(model.geom_type[fixed[0]]))
+            floor = kind == PLANE or kind in FLAT
+            advice = "name that one as the ground if it is level" if floor else (
+                "take a scene with a plane"
+            )  # fmt: skip
             raise ConfigError(
                 f"standing on {model.geom(ground).name!r}, the robot touches "
                 f"{geom.name or 'a geom without a name'!r} ({_kind(model, fixed[0])}), "
-                f"{-1000.0 * contact.dist:.0f} mm deep: name that one as the ground if it is a "
-                "plane or a level box, or name the robot's own file instead of a scene",
+                f"{-1000.0 * contact.dist:.0f} mm deep: {advice}, or name the robot's own file "
+                "instead of a scene",
                 source=source,
                 field="ground",
             )

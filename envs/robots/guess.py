@@ -59,7 +59,9 @@ def guess(path: Path) -> RobotDescription:
         ground, _ = install_ground(spec, model, None, source)
         model = spec.compile()
     except ValueError as error:
-        raise _unsure(f"the model does not compile: {error}", "source", source) from None
+        raise ConfigError(
+            f"the model does not compile: {error}", source=source, field="source"
+        ) from None
     check_ground(model, model.geom(ground).id, source)
     with pointing_to_scenes(path, "pair"):
         found = _Guess(model, model.geom(ground).id, keyframes, source)

@@ -13,6 +13,7 @@ with `--write`.
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 import time
@@ -27,6 +28,7 @@ from poise.configs.errors import PoiseError, one_line
 from poise.configs.files import packaged
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
+from poise.envs.robots.models.urdf import PACKAGES, WHEELS
 from poise.envs.robots.robot import Robot, load_robot
 from poise.training.robot_check.check import RobotCheck, check_robot
 from poise.training.running.processes import WorkerPool, single_threaded
@@ -172,6 +174,8 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="the table to docs/robots.md")
     given = parser.parse_args()
     site = Path(np.__file__).parents[1]
+    shares = [str(folder.absolute() / WHEELS) for folder in given.folders]
+    os.environ[PACKAGES] = os.pathsep.join([*shares, os.environ.get(PACKAGES, "")])
     chosen = [model for model in models([site, *given.folders]) if given.only in model]
     with single_threaded():
         pool = WorkerPool(given.workers)

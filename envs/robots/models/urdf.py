@@ -160,7 +160,7 @@ def _take_meshes(spec: mujoco.MjSpec, files: dict[str, str], path: Path, source:
 def _unread(name: str, link: str, path: Path, source: str) -> ConfigError:
     """A mesh with which a link collides, and that there is not, or not in a form for MuJoCo."""
     if find_file(name, path) is not None:
-        reason = f"is not of a form that MuJoCo reads ({', '.join(MESHES)})"
+        reason = f"is not of a form that MuJoCo reads ({', '.join(MESHES)}): convert it to one"
     elif name.startswith(PACKAGE):
         reason = f"is missing: its package is looked for above {path.parent} and in {PACKAGES}"
     else:
