@@ -10,6 +10,7 @@
 #              EXTRAS="zoo video" some of them alone
 # make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
+# make fleet   public humanoids of wheels: read, checked, stood and pushed; an hour; the table: docs/robots.md
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
 #
 # PYTHON311 names another interpreter; PIP_ARGS and PYTEST_ARGS are passed on, as in
@@ -29,9 +30,10 @@ SEED ?=
 FUZZ_ARGS ?=
 PYTHON := .venv/bin/python
 STAMP := .venv/.poise-setup
+FLEET := dm-control example-robot-data fourier-robot-descriptions gb-robot-models icub-models
 DOCS := .venv/.poise-docs
 
-.PHONY: setup test weekly test-processors demo check docs format build release bench fuzz lock audit clean
+.PHONY: setup test weekly test-processors demo check docs format build release bench fleet fuzz lock audit clean
 
 setup: $(STAMP)
 
@@ -129,6 +131,13 @@ release: build build/twine
 
 bench: setup
 	$(PYTHON) -m tests.performance
+
+# Not in .venv, and without what they need: only their models are read.
+build/fleet:
+	$(PYTHON) -m pip install -q $(PIP_ARGS) --no-deps --only-binary :all: --target $@ $(FLEET)
+
+fleet: setup build/fleet
+	$(PYTHON) -m tests.performance.fleet build/fleet --workers $(WORKERS) --write
 
 fuzz: setup
 	$(PYTHON) -m tests.fuzz --minutes $(MINUTES) --workers $(WORKERS) \
