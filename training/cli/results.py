@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from poise.configs.errors import ConfigError
+from poise.configs.texts import printable
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Folder, check_folders
@@ -108,7 +109,8 @@ def _print_replay(done: "Replay") -> None:
     print(f"trial {done.trial.number}, {done.controller}: {end}")
     print(done.trial.push or "no push")
     for name, (recorded, now) in done.differences.items():
-        print(f"{name}: recorded {recorded or 'nothing'}, now {now or 'nothing'}")
+        print(f"{name}: recorded {printable(recorded) or 'nothing'}, "
+              f"now {printable(now) or 'nothing'}")  # fmt: skip
     print("differs from the record" if done.differences else "exactly as recorded")
 
 
