@@ -4,11 +4,11 @@ import codecs
 import sys
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -17,6 +17,9 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
+from rich.segment import Segment
+
+from poise.configs.texts import printable
 
 from poise.configs.errors import PoiseWarning
 
@@ -57,7 +60,17 @@ def _plain(error: UnicodeError) -> tuple[str, int]:
 
 
 class Terminal(Console):
-    """A console that leaves a pipe that nobody reads to `cli.main`; Rich would exit with 1."""
+    """A console that leaves a pipe that nobody reads to `cli.main`; Rich would exit with 1.
+
+    Texts that it is given hold no commands to the terminal, whoever has written them.
+    """
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """As of `Console`."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else printable(text), style, control)
 
     def on_broken_pipe(self) -> None:
         raise  # what Rich has just caught
