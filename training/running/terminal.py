@@ -19,9 +19,8 @@ from rich.progress import (
 )
 from rich.segment import Segment
 
-from poise.configs.texts import printable
-
 from poise.configs.errors import PoiseWarning
+from poise.configs.texts import printable
 
 #: what a terminal prints whose encoding lacks the sign; "?" for any other
 PLAIN = {"°": "deg", "·": "*", "×": "x", "≤": "<=", "≥": ">=", "–": "-", "−": "-", "…": "...",
