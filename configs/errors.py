@@ -67,6 +67,10 @@ class PoiseError(Exception):
         super().__init__(one_line(str(text), 4 * LONGEST_TEXT))
 
 
+class PoiseWarning(UserWarning):
+    """Something of a user's file is not used as it is written; the text says what instead."""
+
+
 class ConfigError(PoiseError):
     """A file, a field or a value given by the user is not valid.
 

@@ -47,12 +47,14 @@ def test_a_controller_outside_of_environments_stands(tmp_path):
     assert len((EXAMPLES / "plain_mujoco.py").read_text().splitlines()) <= 40
 
 
+@pytest.mark.weekly
 def test_ppo_in_a_single_file(tmp_path):
     """The loop collects and updates, and reports as it goes."""
     lines = run("ppo_single_file.py", tmp_path).splitlines()
     assert [int(re.sub(r"\D", "", line.split("steps")[0])) for line in lines] == [64, 128]
 
 
+@pytest.mark.weekly
 def test_stable_baselines3_in_ten_lines(tmp_path):
     """It learns and saves."""
     assert "fps" in run("sb3_train.py", tmp_path)
@@ -112,6 +114,7 @@ def test_video(tmp_path, can_render):
     assert run("record_video.py", tmp_path).count("frames") == 2
 
 
+@pytest.mark.weekly
 def test_the_picture_of_the_readme(tmp_path, can_render):
     """Frames of a push are drawn into one picture."""
     run("push_strip.py", tmp_path)

@@ -23,7 +23,7 @@ MOST = 14  # files in a room
 FLOORS = """
  1 configs, training/statistics
  2 envs/compiled, baselines/allowance, baselines/scripts
- 3 envs/maths, envs/terrain, baselines/solvers, baselines/warmup
+ 3 envs/maths, envs/robots/models, envs/terrain, baselines/solvers, baselines/warmup
  3 training/options, training/running
  4 envs/robots, baselines/clips
  5 envs/pushes, baselines/joining

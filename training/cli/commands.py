@@ -186,7 +186,7 @@ def _raised(summary: "Summary", out: Path) -> int:
     """The exit code: 1, with a line that tells the first error, if a controller raised."""
     if failed := sum(entry["errors"] for entry in summary["controllers"].values()):
         table = out / "trials.csv"
-        with table.open(newline="") as file:
+        with table.open(newline="", encoding="utf-8") as file:
             first = next(filter(None, (row["error"] for row in csv.DictReader(file))), "unknown")
         print(f"poise: a controller raised an error in {failed} trials, see the column error of "
               f"{table}; the first one: {first}", file=sys.stderr)  # fmt: skip
@@ -277,13 +277,15 @@ def robot(
 ) -> None:
     """Check a robot before anything is tried on it: what it can hold, what will go wrong.
 
-    Mass, soles, margins, torques to stand on both feet and on one, self-contacts, posture, which
-    controllers take it, and the pushes that a pendulum of its size stops.
+    Mass, soles, margins, torques to stand on both feet and on one, self-contacts, posture, two
+    seconds at rest, which controllers take it, and the pushes that a pendulum of its size stops.
+
+    Of a model alone, .xml or .urdf, it guesses the description and writes it to the current folder.
 
     Args:
-        name: a packaged robot (see poise list) or a .yaml description.
+        name: a packaged robot (see poise list), a .yaml description, or a model.
         out: a JSON file to write the figures to.
-        picture: a PNG file to write: the robot standing, and its soles.
+        picture: a PNG file to write: the robot standing, its CoM, and its soles.
     """
     from json import dumps
 
@@ -297,11 +299,13 @@ def robot(
 
         check_out_file(picture, "picture")
         choose_gl_backend()
-    from poise.envs.robots.robot import load_robot
     from poise.training.robot_check.check import check_robot
     from poise.training.robot_check.tables import print_check
+    from poise.training.robot_check.written import load_and_write
 
-    loaded = load_robot(name)
+    loaded, written = load_and_write(name)
+    if written is not None:
+        print(f"{written}: a guessed description, to correct and to name from now on")
     check = check_robot(loaded)
     print_check(check, terminal(stderr=json))
     if json:

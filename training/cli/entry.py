@@ -23,7 +23,7 @@ from poise.training.running.stopping import (
     stop_message,
     stoppable,
 )
-from poise.training.running.terminal import terminal
+from poise.training.running.terminal import speak_plainly, terminal
 
 from .arguments import check_flags
 from .commands import COMMANDS
@@ -46,6 +46,7 @@ def main(args: Sequence[str] | None = None) -> int:
     # Small matrices lose time to threads, and sums may change their order. Read at import.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    speak_plainly()
     try:
         try:
             return _stoppable(args)

@@ -10,6 +10,7 @@ import tyro
 from poise.baselines.clips.bvh import read_bvh, write_bvh
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import find_bvh
+from poise.baselines.clips.names import ROLES
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
@@ -27,10 +28,19 @@ USAGE = """usage: poise motion COMMAND [OPTIONS]
 Motion capture: what files hold, a robot's motion of them, and performing it.
 """
 Solver = Literal["frame", "spacetime", "grid"]
+Joints = tuple[str, ...]
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
 
-def info(file: File, /, *, unit: str = "auto", up: str = "auto", forward: str = "auto") -> None:
+def info(
+    file: File,
+    /,
+    *,
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    joints: Joints = (),
+) -> None:
     """What a BVH file holds: joints, unit, axes, rate, planted feet, skating.
 
     Args:
@@ -38,10 +48,11 @@ def info(file: File, /, *, unit: str = "auto", up: str = "auto", forward: str = 
         unit: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
         up: the file's axis that is up, such as y or -z, or auto.
         forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
     """
     from poise.training.following.tables import print_clip
 
-    clip, axes = read_bvh(find_bvh(file), unit, up, forward)
+    clip, axes = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints))
     print_clip(clip, axes, terminal())
 
 
@@ -53,6 +64,7 @@ def convert(
     unit: str = "auto",
     up: str = "auto",
     forward: str = "auto",
+    joints: Joints = (),
     cut: tuple[float, float] | None = None,
     speed: float = 1.0,
     mirror: Switch = False,
@@ -74,6 +86,7 @@ def convert(
         unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
         up: the file's axis that is up, such as y or -z, or auto.
         forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
         cut: two times [s]; what lies between is kept.
         speed: how many times as fast.
         mirror: exchange left and right.
@@ -84,7 +97,7 @@ def convert(
         rate: frames a second.
         robot: whose .npz it is.
     """
-    clip = _clip(file, unit, up, forward, robot)
+    clip = _clip(file, unit, up, forward, robot, joints)
     if cut is not None:
         clip = clip.cut(*cut)
     clip = clip.at_speed(speed) if speed != 1.0 else clip
@@ -110,6 +123,7 @@ def bring(
     unit: str = "auto",
     up: str = "auto",
     forward: str = "auto",
+    joints: Joints = (),
     cut: tuple[float, float] | None = None,
     speed: float = 1.0,
     mirror: Switch = False,
@@ -132,6 +146,7 @@ def bring(
         unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
         up: the file's axis that is up, such as y or -z, or auto.
         forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
         cut: two times [s]; what lies between is kept.
         speed: how many times as fast.
         mirror: exchange left and right.
@@ -147,7 +162,7 @@ def bring(
     from poise.training.following.tables import print_retargeted
 
     check_out_file(out)
-    clip = read_bvh(find_bvh(file), unit, up, forward).clip
+    clip = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
     clip = clip.cut(*cut) if cut is not None else clip
     clip = clip.at_speed(speed) if speed != 1.0 else clip
     clip = clip.mirrored() if mirror else clip
@@ -177,6 +192,7 @@ def play(
     unit: str = "auto",
     up: str = "auto",
     forward: str = "auto",
+    joints: Joints = (),
     size: tuple[int, int] = (640, 480),
     planted: Switch = False,
 ) -> None:
@@ -189,6 +205,7 @@ def play(
         unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
         up: the file's axis that is up, such as y or -z, or auto.
         forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
         size: width and height [pixels], even.
         planted: take the feet as planted though they move in the clip.
     """
@@ -205,7 +222,7 @@ def play(
         clip = read_robot_clip(file)
         reference_from(clip, body, str(file))  # of this robot
     else:
-        source = read_bvh(find_bvh(file), unit, up, forward).clip
+        source = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
         made = retarget(source, body, planted=planted)
         clip, heading = made.clip, None if made.clip.planted is None else clip_heading(source)
         skeleton = beside_of(body, source, made.scale, made.begins, heading, made.stride)
@@ -243,10 +260,20 @@ def run(args: Sequence[str]) -> int:
     return code if isinstance(code, int) else 0
 
 
-def _clip(file: Path, unit: str, up: str, forward: str, robot: str) -> Clip:
+def named_joints(joints: Sequence[str]) -> dict[str, str]:
+    """Role → name of the joint; raises ConfigError for what is not ``role=JOINT``."""
+    pairs = dict(each.partition("=")[::2] for each in joints)
+    for role, name in pairs.items():
+        if not name:
+            raise ConfigError(f"must be role=JOINT, not {shown(role)}", field="joints",
+                              choices=ROLES)  # fmt: skip
+    return pairs
+
+
+def _clip(file: Path, unit: str, up: str, forward: str, robot: str, joints: Sequence[str]) -> Clip:
     """The clip of a BVH file, or of a robot's .npz."""
     if file.suffix != ".npz":
-        return read_bvh(find_bvh(file), unit, up, forward).clip
+        return read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
     from poise.baselines.motions.robot_clip import read_robot_clip
     from poise.baselines.retargeting.robot_bvh import clip_of_robot
 

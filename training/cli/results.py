@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from poise.configs.errors import ConfigError
+from poise.configs.texts import printable
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Folder, Json, check_folders, print_json
@@ -123,7 +124,8 @@ def _print_replay(done: "Replay") -> None:
     if reason := why(done.outcome.diagnosis, done.outcome.fall_time):
         print(reason)
     for name, (recorded, now) in done.differences.items():
-        print(f"{name}: recorded {recorded or 'nothing'}, now {now or 'nothing'}")
+        print(f"{name}: recorded {printable(recorded) or 'nothing'}, "
+              f"now {printable(now) or 'nothing'}")  # fmt: skip
     print("differs from the record" if done.differences else "exactly as recorded")
 
 

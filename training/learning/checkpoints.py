@@ -45,8 +45,8 @@ def save_checkpoint(
         plain(model).save(new / POLICY, exclude=LEFT_OUT)
         arrays: dict[str, Any] = statistics(normalize)
         np.savez(new / STATISTICS, **arrays)
-        (new / CONFIG).write_text(to_yaml(config))
-        (new / STATE).write_text(json.dumps(state, indent=1) + "\n")
+        (new / CONFIG).write_text(to_yaml(config), "utf-8")
+        (new / STATE).write_text(json.dumps(state, indent=1) + "\n", "utf-8")
         if folder.exists():
             shutil.rmtree(old, ignore_errors=True)
             os.replace(folder, old)

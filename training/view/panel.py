@@ -11,6 +11,7 @@ from typing import Any
 import viser
 
 from poise.baselines.walking.command import GaitCommand
+from poise.configs.texts import code, plain
 from poise.envs.pushes.options import body_names
 from poise.envs.viewing.quantities import Quantity
 from poise.training.sessions.choices import NOBODY, Choices
@@ -117,7 +118,7 @@ class Panel:
 
     def tell_how(self, spec: Spec, gait: GaitCommand | None) -> None:
         """Bring the command line, the link and, with a `gait`, its sliders up to date."""
-        self.command.content = f"`{spec.command}`"
+        self.command.content = code(spec.command)
         self.link.content = LINK.format(link=html.escape(spec.link))
         if gait is not None:
             self.walk.tell(gait)
@@ -243,9 +244,9 @@ def status(play: Play, paused: bool, pace: Pace, pulled: Mapping[str, object] | 
     lines = [f"{frames[0].time:.2f} s, {factor}"]
     for name, frame in zip(play.names, frames, strict=True):
         fell = None if frame.fall_time is None else f"fell at {frame.fall_time:.2f} s"
-        lines.append(f"`{name}`: {fell or 'on its feet'}")
+        lines.append(f"{code(name)}: {fell or 'on its feet'}")
         if play.ended and name in play.reasons:
-            lines.append(f"*{play.reasons[name]}*")
+            lines.append(f"*{plain(play.reasons[name])}*")
     if pulled is not None:
         lines.append(f"**{pulled['impulse']} N·s** towards {pulled['direction']}°")
     return "  \n".join(lines)

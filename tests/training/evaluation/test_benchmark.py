@@ -284,7 +284,9 @@ def test_everyone_takes_part_by_default() -> None:
     assert {"pd", "macchietto09", "moskalev24", "lip-mpc"} <= set(names)
 
 
-@pytest.mark.parametrize("backend", ["local", "joblib", "ray"])
+@pytest.mark.parametrize(
+    "backend", ["local", pytest.param("joblib", marks=pytest.mark.weekly), "ray"]
+)
 def test_every_backend_gives_the_same_trials(
     backend: str, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
