@@ -9,6 +9,7 @@ import pytest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ARGUMENTS = {
+    "optuna_search.py": ["1", "64"],
     "own_controller.py": [],
     "plain_mujoco.py": ["feedback-step"],
     "ppo_single_file.py": ["--steps", "128", "--envs", "2", "--rollout", "32"],
@@ -84,6 +85,27 @@ def test_zoo(tmp_path):
     )
     assert result.returncode == 0, result.stderr
     assert list(tmp_path.glob("logs/ppo/**/*.zip"))
+
+
+def test_optuna(tmp_path):
+    """A trial of a few steps."""
+    pytest.importorskip("optuna", reason="make weekly has it")
+    assert "learning_rate" in run("optuna_search.py", tmp_path)
+
+
+def test_dataset(tmp_path, monkeypatch):
+    """Two trials that Minari reads back, with their pushes."""
+    minari = pytest.importorskip("minari", reason="make weekly has it")
+    from poise.training.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    assert main(["dataset", "zero", "--trials", "2", "--out", "data"]) == 0
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "data"))
+    data = minari.load_dataset("poise/pushes-v0")
+    assert data.total_episodes == 2
+    first = data[0]
+    assert len(first.observations) == len(first.actions) + 1 == len(first.rewards) + 1
+    assert first.infos["push"]["impulse"].shape == (len(first.observations), 1)
 
 
 def test_video(tmp_path, can_render):

@@ -166,7 +166,7 @@ def test_a_missing_library_is_one_line(
     monkeypatch.setitem(sys.modules, name, None)
     assert main(["export", "residual", "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
-    assert f"needs the package {name}: pip install 'poise[export]'" in error
+    assert f"needs the package {name}: pip install -e '.[export]'" in error
     assert error.count("\n") == 1 and not (tmp_path / "out").exists()
 
 

@@ -76,7 +76,7 @@ def test_without_the_extra_it_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, missing, None)
     assert main(["view", "zero"]) == 2
     err = capsys.readouterr().err
-    assert "pip install 'poise[view]'" in err and err.count("\n") == 1
+    assert "pip install -e '.[view]'" in err and err.count("\n") == 1
 
 
 def test_a_busy_port_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,5 @@
 """Models larger than a robot's are refused before MuJoCo builds them;
-envs/robots/mjcf_bounds.py.
+envs/robots/models/mjcf_bounds.py.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import mujoco
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.envs.robots.mjcf import read_mjcf
-from poise.envs.robots.mjcf_bounds import ASSET_BYTES, MJCF_BYTES
+from poise.envs.robots.models.mjcf import read_mjcf
+from poise.envs.robots.models.mjcf_bounds import ASSET_BYTES, MJCF_BYTES
 from tests.support.hangs import no_hang
 
 BODY = '<body><joint/><geom size="1"/></body>'
