@@ -53,13 +53,16 @@ LOADERS: dict[str, Callable[[Path], Any]] = {
 }
 
 
+HEAVY = ("apptronik_apollo.yaml",)  # one of its meshes takes MuJoCo 1.4 GiB, whatever the file says
+
+
 def contents(kind: str) -> list[bytes]:
     """The packaged files of a kind."""
     if kind == "envs":  # of which none is packaged
         return [to_yaml(EnvConfig()).encode()]
     folder = packaged_folder(kind)
     found = sorted([*folder.glob("*.yaml"), *folder.glob("*/config.yaml")])
-    return [path.read_bytes() for path in found]
+    return [path.read_bytes() for path in found if path.name not in HEAVY]
 
 
 @st.composite
