@@ -92,7 +92,7 @@ def play(job: tuple[str, bool]) -> Line:
     """Load, check and stand one robot, by its model, and push it where that is asked for."""
     model, pushed = job
     started = time.monotonic()
-    name = "/".join(Path(model).parts[-2:]) if "/" in model else model
+    name = "/".join(Path(model).parts[-3:]) if "/" in model else model
     warnings.simplefilter("ignore")
     try:
         robot = load_robot(model)
