@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
+from poise.configs.extras import how_to_install
 from poise.configs.files import write_atomic
 
 from .axes import FileAxes, axes_of, named_unit, nearest_axis, unit_from_legs
@@ -118,7 +119,7 @@ def _library():  # a module
     try:
         import pybvh
     except ImportError:
-        raise ConfigError("needs the package pybvh: pip install 'poise[motion]'",
+        raise ConfigError(f"needs the package pybvh: {how_to_install('motion')}",
                           source="motion") from None  # fmt: skip
     return pybvh
 

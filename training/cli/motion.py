@@ -11,9 +11,11 @@ from poise.baselines.clips.bvh import read_bvh, write_bvh
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import find_bvh
 from poise.baselines.clips.names import ROLES
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
+from poise.training.options.pages import print_commands
+from poise.training.options.parsing import parsed
 from poise.training.running.terminal import terminal
 
 from .arguments import Switch
@@ -21,6 +23,10 @@ from .motion_check import check, follow
 from .motion_join import join, match
 from .motion_script import graph, plan, synth
 
+USAGE = """usage: poise motion COMMAND [OPTIONS]
+
+Motion capture: what files hold, a robot's motion of them, and performing it.
+"""
 Solver = Literal["frame", "spacetime", "grid"]
 Joints = tuple[str, ...]
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
@@ -130,7 +136,8 @@ def bring(
     """Retarget a BVH file to a robot, its soles planted where the clip's are; see docs/motions.md.
 
     The .npz file is taken wherever a motion is named. A clip whose feet move by 12 cm becomes a
-    motion with steps, which motion-step performs. Needs pip install 'poise[motion]'.
+    motion with steps, which motion-step performs. Needs pip install -e '.[motion]' in a
+    checkout.
 
     Args:
         file: a .bvh file, or the name of a packaged clip.
@@ -241,14 +248,15 @@ MOTION: dict[str, Callable[..., object]] = {
 
 def run(args: Sequence[str]) -> int:
     """Run a sub-command of `poise motion`; returns 0, or 1 (see `check`)."""
-    if args and not args[0].startswith("-") and args[0] not in MOTION:
-        raise ConfigError(f"no such command: motion {args[0]}", choices=MOTION)
-    code = tyro.extras.subcommand_cli_from_dict(
-        MOTION,
-        prog="poise motion",
-        description="Motion capture: what files hold, a robot's motion of them, and performing it.",
-        args=list(args),
-    )
+    if not args or args[0] in ("-h", "--help", "--help-all"):
+        print_commands(USAGE, MOTION, terminal())
+        return 0
+    name = args[0]
+    if name not in MOTION:
+        raise ConfigError(f"no such command: motion {shown(name)}{meant(name, MOTION)}",
+                          choices=MOTION)  # fmt: skip
+    given = ["--help" if arg == "--help-all" else arg for arg in args[1:]]
+    code = parsed(MOTION[name], given, f"poise motion {name}")()
     return code if isinstance(code, int) else 0
 
 

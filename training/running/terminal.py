@@ -4,11 +4,11 @@ import codecs
 import sys
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -17,8 +17,10 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
+from rich.segment import Segment
 
 from poise.configs.errors import PoiseWarning
+from poise.configs.texts import printable
 
 #: what a terminal prints whose encoding lacks the sign; "?" for any other
 PLAIN = {"°": "deg", "·": "*", "×": "x", "≤": "<=", "≥": ">=", "–": "-", "−": "-", "…": "...",
@@ -57,16 +59,26 @@ def _plain(error: UnicodeError) -> tuple[str, int]:
 
 
 class Terminal(Console):
-    """A console that leaves a pipe that nobody reads to `cli.main`; Rich would exit with 1."""
+    """A console that leaves a pipe that nobody reads to `cli.main`; Rich would exit with 1.
+
+    Texts that it is given hold no commands to the terminal, whoever has written them.
+    """
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """As of `Console`."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else printable(text), style, control)
 
     def on_broken_pipe(self) -> None:
         raise  # what Rich has just caught
 
 
-def terminal() -> Console:
-    """The console that a command prints to."""
-    console = Terminal(emoji=False)  # a controller may be called mine.py:B
-    return console if console.is_terminal else Terminal(width=WIDTH, emoji=False)
+def terminal(stderr: bool = False) -> Console:
+    """The console that a command prints to; the other stream where a result is to be piped."""
+    console = Terminal(emoji=False, stderr=stderr)  # a controller may be called mine.py:B
+    return console if console.is_terminal else Terminal(width=WIDTH, emoji=False, stderr=stderr)
 
 
 class ProgressLines(Progress):

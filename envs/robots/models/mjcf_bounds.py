@@ -6,16 +6,19 @@ import html
 import math
 import re
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import mujoco
 
 from poise.configs.errors import ConfigError
-from poise.configs.reading import MIB, is_file, read_text
+from poise.configs.reading import MIB, exists, is_file, is_folder, read_text
 
 MJCF_BYTES = 4 * MIB  # of all files of a model together
 ELEMENTS = 20_000  # of the XML, copies counted
 NESTED = 8  # files that include each other
+DIRS = ("assetdir", "meshdir", "texturedir")  # in which files may be
+NAMED = 100_000  # places where the files may be that a model names
 #: copies that an element may make; MuJoCo's time for the last two grows faster than the square
 COPIES = {"replicate": ELEMENTS, "composite": 200, "flexcomp": 1000}
 BUILTIN = 200.0  # resolution of a mesh that MuJoCo makes
@@ -37,6 +40,8 @@ _ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 class MjcfText:
     """Counts the elements of MJCF files, with what replicate, include and attach make of them.
 
+    Of the files that they name, none is a pipe or a device: MuJoCo would wait for it for ever.
+
     Attributes:
         folders: in which MuJoCo may look for the files of meshes and textures.
 
@@ -50,7 +55,10 @@ class MjcfText:
         self._main, self._source, self._field = path.parent, source, field
         self.folders: set[Path] = set()
         self._elements = self._attached = self._models = self._size = 0
+        self._folders = {path.parent, path.parent.resolve()}
+        self._within, self._names = {""}, set[str]()
         self._walk(path, 1, 0)
+        self._check_regular()
         if self._elements + self._attached * self._models > ELEMENTS:
             raise self._wrong(f"the model has more than {ELEMENTS} elements, with their copies")
 
@@ -62,11 +70,13 @@ class MjcfText:
         self._size += len(text)
         if self._size > MJCF_BYTES:
             raise self._wrong(f"its files are together larger than {MJCF_BYTES / MIB:g} MiB")
+        self._folders.add(path.parent)
         factors = [factor]
         self.folders.add(path.parent)
         for closing, name, attributes, empty in tags(text):
             if not closing:
                 self._count(name, attributes, factors, depth, path.parent)
+                self._note_files(attributes)
                 if name == "replicate" and not empty:
                     factors.append(factors[-1] * _whole(attributes.get("count", "1")))
             elif name == "replicate":
@@ -97,6 +107,20 @@ class MjcfText:
                     self._walk(file, factor, depth + 1)
                     break
             self._models += self._elements - before if name == "model" else 0
+
+    def _note_files(self, attributes: dict[str, str]) -> None:
+        """Remember what an element names as a file, and as a folder of such."""
+        self._names.update(value for key, value in attributes.items() if key.startswith("file"))
+        self._within.update(attributes[key] for key in DIRS if key in attributes)
+
+    def _check_regular(self) -> None:
+        """Raise ConfigError where a name may be that of what is no regular file."""
+        names = self._names | {name.replace("\\", "/").rpartition("/")[2] for name in self._names}
+        if len(self._folders) * len(self._within) * len(names) > NAMED:
+            raise self._wrong("it names too many files in too many folders")
+        for parts in product(self._folders, self._within, names):
+            if exists(path := Path(*parts)) and not (is_file(path) or is_folder(path)):
+                raise self._wrong(f"{path} is not a regular file")
 
     def _wrong(self, problem: str) -> ConfigError:
         return _wrong(problem, self._source, self._field)
