@@ -54,9 +54,12 @@ def unrooted(text: BvhText) -> Posed:
         for axis in placed:
             shifts[:, joint, "XYZ".index(axis)] = values[f"{axis}position"]
         moving += [joint] if placed else []
-    _add_offsets(text, shifts, [joint for joint in moving if joint])
-    skeleton = Skeleton(text.names, text.parents, shifts.mean(axis=0), text.end_parents,
-                        text.end_offsets, tuple(orders))  # fmt: skip
+    moving = [joint for joint in moving if joint]
+    _add_offsets(text, shifts, moving)
+    offsets = text.offsets.copy()
+    offsets[moving] = shifts[:, moving].mean(axis=0)
+    skeleton = Skeleton(text.names, text.parents, offsets, text.end_parents, text.end_offsets,
+                        tuple(orders))  # fmt: skip
     return Posed(skeleton, shifts[:, 0].copy(), turns, shifts)
 
 
@@ -98,11 +101,13 @@ def _kept(
     """The part of a skeleton whose joints are `kept`, the first of them its root."""
     old, index = posed.skeleton, {int(joint): i for i, joint in enumerate(kept)}
     ends = [i for i, joint in enumerate(old.end_parents) if int(joint) in index]
+    own = offsets[kept]
+    own[0] *= kept[0] == 0  # that of a root that hung on another counts nothing
     tips = old.end_offsets[ends] if rest is None else rotate(rest, old.end_offsets[ends])
     skeleton = Skeleton(
         tuple(old.names[joint] for joint in kept),
         np.array([index.get(int(old.parents[joint]), -1) for joint in kept]),
-        offsets[kept],
+        own,
         np.array([index[int(old.end_parents[end])] for end in ends], int),
         tips,
         tuple(old.orders[joint] for joint in kept),
@@ -115,7 +120,7 @@ def rigid(posed: Posed, source: str) -> Posed:
     """The same; raises ConfigError where a joint moves on its parent."""
     size = np.linalg.norm(np.ptp(posed.skeleton.rest, axis=0))
     ways = np.abs(posed.shifts - posed.skeleton.offsets).max(axis=(0, 2))
-    ways[0] = 0.0
+    ways[0] = 0.0  # the root does
     worst = int(np.argmax(ways))
     if ways[worst] > RIGID * size:
         raise ConfigError(

@@ -13,7 +13,13 @@ import numpy as np
 from poise.configs.errors import ConfigError
 
 from .actuators import SIMPLE_JOINTS, model_torque_limits, proposed_armature
-from .description import FootDescription, PostureDescription, RobotDescription, SourceDescription
+from .description import (
+    FootDescription,
+    OptionDescription,
+    PostureDescription,
+    RobotDescription,
+    SourceDescription,
+)
 from .floors import check_ground, install_ground
 from .ground import can_touch
 from .models.mjcf import pointing_to_scenes, read_mjcf
@@ -31,6 +37,7 @@ STRAIGHT = 10.0  # [deg] a knee that is bent less is bent
 SIDE = re.compile(
     r"(left|right)|(?:^|[_.\- ])([lr])(?:[_.\- ]|$)|^([lr])(?=[A-Z_])|(?<=[a-z])([LR])$"
 )
+FIRM = OptionDescription(cone="elliptic", impratio=100.0)  # feet that press apart do not creep
 ROLES = ("hips_pitch", "knees", "ankles_pitch")
 
 
@@ -101,6 +108,7 @@ class _Guess:
             forward=self.forward,
             roles=dict(zip(ROLES, bent, strict=False)),
             armature=self._armature(),
+            options=FIRM if urdf else OptionDescription(),
         )  # fmt: skip
         stand, reasons = [], []
         for posture in self._postures(bent):

@@ -1,7 +1,7 @@
 """Every public humanoid that an installed wheel or a folder gives: read, checked, stood and pushed.
 
     make fleet [WORKERS=2]
-    python -m tests.performance.fleet FOLDER… [--workers 2] [--only TEXT] [--write]
+    python -m tests.performance.fleet FOLDER… [--workers 2] [--only TEXT] [--stand] [--write]
 
 Robots with a packaged description are loaded by name, all others from their model alone
 (`poise.envs.robots.guess`). Each is refused in one line, or stands 20 s from an ordinary start with
@@ -88,28 +88,29 @@ def models(folders: list[Path]) -> Iterator[str]:
             yield from (str(path) for path in found if "_hand" not in path.name)
 
 
-def play(model: str) -> Line:
-    """Load, check, stand and push one robot."""
+def play(job: tuple[str, bool]) -> Line:
+    """Load, check and stand one robot, by its model, and push it where that is asked for."""
+    model, pushed = job
     started = time.monotonic()
-    name = "/".join(Path(model).parts[-2:]) if "/" in model else model
+    name = "/".join(Path(model).parts[-3:]) if "/" in model else model
     warnings.simplefilter("ignore")
     try:
         robot = load_robot(model)
         check = check_robot(robot)
-        line = _pushed(name, robot, check)
+        line = _played(name, robot, check, pushed)
     except PoiseError as error:
         line = Line(name, one_line(str(error).replace(model, "").strip(": ")))
     print(f"{time.monotonic() - started:5.0f} s {line}", file=sys.stderr, flush=True)
     return line
 
 
-def _pushed(name: str, robot: Robot, check: RobotCheck) -> Line:
+def _played(name: str, robot: Robot, check: RobotCheck, pushed: bool) -> Line:
     faults = tuple(dict.fromkeys(fault.kind for fault in check.faults))
     agent = load_agent(IN_PLACE, robot, pushes=None, duration=QUIET)
     outcome = run_trial(agent, Trial(0, seed=1))
     stood = QUIET if outcome.fall_time is None else outcome.fall_time
     found: dict[str, float | None] = {IN_PLACE: None, STEPS: None}
-    if not outcome.fallen:
+    if pushed and not outcome.fallen:
         for controller in found:
             try:
                 found[controller] = _median_impulse(robot, controller) / robot.mass
@@ -170,18 +171,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="*", type=Path)
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--only", default="", help="of models whose path has this text")
+    parser.add_argument("--only", default="", help="of models whose path matches it (re)")
+    parser.add_argument("--stand", action="store_true", help="without pushes: minutes")
     parser.add_argument("--write", action="store_true", help="the table to docs/robots.md")
     given = parser.parse_args()
     site = Path(np.__file__).parents[1]
     shares = [str(folder.absolute() / WHEELS) for folder in given.folders]
     os.environ[PACKAGES] = os.pathsep.join([*shares, os.environ.get(PACKAGES, "")])
-    chosen = [model for model in models([site, *given.folders]) if given.only in model]
+    chosen = [model for model in models([site, *given.folders]) if re.search(given.only, model)]
     with single_threaded():
         pool = WorkerPool(given.workers)
-        done = dict(pool.each(play, chosen))
+        jobs = [(model, not given.stand) for model in chosen]
+        done = dict(pool.each(play, jobs))
         pool.end()
-    lines = [done[model] for model in chosen]
+    lines = [done[job] for job in jobs]
     print(table(lines))
     stood = [line for line in lines if not line.refused]
     silent = [line.name for line in stood if line.stood < QUIET and not line.faults]

@@ -78,6 +78,8 @@ def _stoppable(args: list[str]) -> int:
         if isinstance(error, OSError) and error.errno in FULL:
             place = "" if error.filename is None else f"{error.filename}: "
             raise PoiseError(f"{place}cannot be written ({error.strerror})") from None
+        if isinstance(error, FileNotFoundError) and "temporary directory" in str(error):
+            raise PoiseError("no folder takes temporary files: set TMPDIR to one") from None
         raise
 
 

@@ -58,7 +58,7 @@ def _rows(check: RobotCheck) -> Iterator[tuple[str, str]]:
     for leg in check.legs:
         yield f"leg {escape(leg.foot)}", _leg(leg)
     posture = check.posture
-    yield "posture", (f"from {posture.keyframe or 'the zero posture of the model'}, soles levelled "
+    yield "posture", (f"from {posture.keyframe or 'the zero posture of the model'}, legs adjusted "
                       f"by {_difference(posture.levelling)}")  # fmt: skip
     for name, difference in posture.differences.items():
         yield f"against {escape(name)}", f"at most {_difference(difference)}"

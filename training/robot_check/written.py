@@ -46,9 +46,9 @@ def write_description(description: RobotDescription, model: Path, path: Path) ->
     kept = {name: value for name, value in fields.items() if value != plain.get(name)}
     kept["source"] = {kind: str(model.absolute()) for kind, file in fields["source"].items()
                       if kind in ("mjcf", "urdf") and file}  # fmt: skip
-    posture = {name: value for name, value in fields["posture"].items()
-               if value != plain["posture"][name]}  # fmt: skip
-    kept["posture"] = posture
+    for part in ("posture", "options"):
+        own = {name: value for name, value in fields[part].items() if value != plain[part][name]}
+        kept |= {part: own} if own else {}
     build(RobotDescription, kept, path)
     text = yaml.safe_dump(kept, sort_keys=False, default_flow_style=None, width=100,
                           allow_unicode=True)  # fmt: skip

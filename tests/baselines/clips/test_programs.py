@@ -17,7 +17,7 @@ PLAIN = CONVENTIONS["humanik"]
 
 def read(folder: Path, text: str, name: str = "clip.bvh", **how: object) -> Clip:
     (folder / name).write_text(text, encoding="utf-8")
-    return read_bvh(folder / name, **how).clip  # type: ignore[arg-type]
+    return read_bvh(folder / name, **how).clip
 
 
 @pytest.mark.parametrize("name", CONVENTIONS)

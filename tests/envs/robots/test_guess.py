@@ -77,7 +77,7 @@ def test_public_robots_are_guessed_as_they_are_described(file: str) -> None:
     wheel = importlib.util.find_spec(WHEEL)
     if wheel is None:
         pytest.skip("its model is not installed: pip install 'poise[robots]'")
-    found = guess(Path(wheel.submodule_search_locations[0]) / IN_WHEEL / file)  # type: ignore[index]
+    found = guess(Path(wheel.submodule_search_locations[0]) / IN_WHEEL / file)
     described = load_robot(file.partition("/")[0]).description
     assert found.root == described.root and found.forward == described.forward
     assert [foot.body for foot in found.feet] == [foot.body for foot in described.feet]

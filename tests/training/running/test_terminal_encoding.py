@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from poise.configs.errors import PoiseError
+from poise.training.cli import entry
 from poise.training.running import folder_lock
 from poise.training.running.folder_lock import ARRAY, FolderLock
 
@@ -70,3 +71,18 @@ def test_a_job_array_is_told_how_to_share(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setenv(ARRAY, "7")
     with FolderLock(tmp_path), pytest.raises(PoiseError, match=r"run 7 .*--out DIR/\$SLURM_ARRAY"):
         FolderLock(tmp_path)
+
+
+def test_a_machine_without_temporary_files(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Is told so in one line."""
+
+    def nothing(args: list[str]) -> int:
+        raise FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/tmp']")
+
+    monkeypatch.setattr(entry, "_run", nothing)
+    assert entry.main([]) == 2
+    assert capsys.readouterr().err == (
+        "poise: no folder takes temporary files: set TMPDIR to one\n"
+    )
