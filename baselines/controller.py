@@ -23,6 +23,7 @@ class Outputs(NamedTuple):
     root_wrench: np.ndarray  # (6,) of a soft root
     failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
     soft_root: bool
+    vdot: np.ndarray | None = None  # (nv,) accelerations that the torques are to bring, if known
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +139,13 @@ class BaseController(Copyable):
     period: float  #: seconds between two calls of `torques`
     config: Any = None  #: that it was made from
     com_offset: float = 0.0  #: forward, of the CoM that it stands with from the motion's [m]
+    #: True of one that brings an estimator of its own: it gets what is measured, late and noisy
+    raw_measurements: bool = False
+
+    @property
+    def vdot(self) -> np.ndarray | None:
+        """(nv,) accelerations that the last torques are to bring, or None where it has none."""
+        return None
 
     @property
     def failures(self) -> int:
@@ -223,6 +231,11 @@ class WrappedController(BaseController):
     def failures(self) -> int:
         """See `BaseController`."""
         return self._base.failures
+
+    @property
+    def vdot(self) -> np.ndarray | None:
+        """See `BaseController`."""
+        return self._base.vdot
 
     @property
     def root_wrench(self) -> np.ndarray:

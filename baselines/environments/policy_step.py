@@ -129,12 +129,21 @@ class PolicyStep(Block):
     root_wrench: np.ndarray  # (6,) of a soft root
     failures: np.ndarray  # (1,) int: ticks that it could not solve
     soft_root: bool
+    vdot: np.ndarray  # (nv,) accelerations that they are to bring; (0,): not known
+    promise: np.ndarray  # (nv,) where the state source reads them; (0,): it does not
     world: World
     estimate: Program  # of the state source
     ticks: int
     substeps: int  # physics steps of each
     episode: EpisodeArrays
     end: StepEnd
+
+
+@compiled
+def promise_motion(step: PolicyStep):
+    """Tell the state source which accelerations the controller's torques are to bring."""
+    if step.promise.shape[0] == step.vdot.shape[0]:
+        copy_into(step.vdot, step.promise)
 
 
 @compiled
@@ -146,6 +155,7 @@ def policy_tick(step: PolicyStep):
         set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
     set_targets(a)
     call(step.kernel, step.tick)
+    promise_motion(step)
     for i in range(views.ctrl.shape[0]):
         views.ctrl[i] = step.tau[robot.motor_dofs[i] - 6]
     add_torques(a.residual, robot.torque_limit, views.ctrl)

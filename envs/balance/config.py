@@ -8,6 +8,8 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml, to_dict
 from poise.envs.pushes.sampler import PushSampler
+from poise.envs.sensing.estimator import EstimatorConfig
+from poise.envs.sensing.realism import Realism, load_realism
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.terrain import Terrain
 
@@ -32,13 +34,6 @@ class ObservationConfig:
 
 
 @dataclass(frozen=True)
-class SensorConfig:
-    """The sensors through which controller and policy know the robot's state."""
-
-    delay: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0})  # whole physics steps [s]
-
-
-@dataclass(frozen=True)
 class EnvConfig:
     """Everything about an environment that is not its robot or its controller.
 
@@ -57,14 +52,18 @@ class EnvConfig:
     observation: ObservationConfig = field(
         default_factory=ObservationConfig, metadata={"omit": "default"}
     )
-    sensors: SensorConfig = field(default_factory=SensorConfig, metadata={"omit": "default"})
+    realism: Realism = field(default_factory=Realism, metadata={"omit": "default"})
+    estimator: EstimatorConfig = field(
+        default_factory=EstimatorConfig, metadata={"omit": "default"}
+    )
     terrain: Terrain = field(default_factory=Flat, metadata={"omit": "default"})
 
 
 def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: object) -> EnvConfig:
     """An EnvConfig from a .yaml file, a mapping or an object; `overrides` win.
 
-    `terrain` may be the name of a kind alone.
+    `terrain` may be the name of a kind alone, `realism` that of a level, `estimator` that of a
+    kind.
 
     Raises ConfigError naming the file, the field and the choices, UnknownArgument for an override
     that is no field.
@@ -90,6 +89,10 @@ def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: obj
         )
     overrides = {name: to_dict(value) for name, value in overrides.items()}
     merged = {**fields, **overrides}
+    if "realism" in merged:
+        merged["realism"] = to_dict(load_realism(merged["realism"]))
+    if isinstance(merged.get("estimator"), str):
+        merged["estimator"] = {"kind": merged["estimator"]}
     if isinstance(merged.get("terrain"), str):
         merged["terrain"] = {"kind": merged["terrain"]}
     return build(EnvConfig, merged, source)

@@ -9,7 +9,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.physics.arrays import SimViews
+from poise.envs.physics.simulation import World
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 
@@ -67,14 +67,24 @@ def aim(servos: Servos, action: np.ndarray):
 
 
 @compiled
-def drive(servos: Servos, views: SimViews):
-    """The servos' torques in `views.ctrl`, by the true positions and velocities of the joints."""
+def servo_torque(servos: Servos, world: World, i: int) -> float:
+    """The torque of the servo of motor i, by what its own encoder reads [N·m]."""
+    dof = servos.dofs[i]
+    if world.motor_q.shape[0] > 0:
+        position, velocity = world.motor_q[dof - 6], world.motor_dq[dof - 6]
+    else:
+        position, velocity = world.views.qpos[dof + 1], world.views.qvel[dof]
+    return pd_torque(
+        servos.stiffness[i], servos.damping[i], servos.limit[i],
+        servos.target[i] - position, velocity,
+    )  # fmt: skip
+
+
+@compiled
+def drive(servos: Servos, world: World):
+    """The servos' torques in `views.ctrl`."""
     for i in range(servos.target.shape[0]):
-        dof = servos.dofs[i]
-        views.ctrl[i] = pd_torque(
-            servos.stiffness[i], servos.damping[i], servos.limit[i],
-            servos.target[i] - views.qpos[dof + 1], views.qvel[dof],
-        )  # fmt: skip
+        world.views.ctrl[i] = servo_torque(servos, world, i)
 
 
 def make_servos(robot: Robot, config: ServoConfig) -> Servos:

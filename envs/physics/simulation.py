@@ -49,16 +49,26 @@ class World(Block):
     state: StateArrays
     clock: np.ndarray  # (1,) int: physics steps since the reset
     pushes: np.ndarray  # see `apply_pushes`
+    motors: Program  # what comes of the controls, before each physics step
     sensors: Program  # what measures, after each physics step
+    motor_q: np.ndarray  # (nj,) joint positions that the motors read; (0,): those of `views`
+    motor_dq: np.ndarray  # (nj,) joint velocities likewise
     count: np.ndarray  # (1,) int: physics steps of `advance_world`
+
+
+@compiled
+def physics_step(world: World):
+    """Take one physics step with the controls in `views.ctrl`, by motors and sensors."""
+    run(world.motors)
+    advance(world.robot, world.views, world.pushes, world.clock)
+    run(world.sensors)
 
 
 @compiled
 def simulate(world: World, count: int):
     """`count` physics steps with the controls in `views.ctrl`, then the state."""
     for _ in range(count):
-        advance(world.robot, world.views, world.pushes, world.clock)
-        run(world.sensors)
+        physics_step(world)
     update_state(world.robot, world.views, world.state)
 
 
@@ -83,21 +93,20 @@ class Simulation(Copyable):
         self.pushes: tuple[Push | Kick, ...] = ()
         self.start_yaw = 0.0  #: of the heading frame at the reset [rad]
         self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
-        self._world: World | None = None
-        self.sensors = Program.of(())
+        self.equip(Program.of(()), Program.of(()), (guarded_zeros(0), guarded_zeros(0)))
         self.reset()
 
-    @property
-    def sensors(self) -> Program:
-        """The kernels that compiled code calls after every physics step; none by default."""
-        return self._sensors
+    def equip(
+        self, motors: Program, sensors: Program, encoders: tuple[np.ndarray, np.ndarray]
+    ) -> None:
+        """Have compiled code call these kernels before and after every physics step.
 
-    @sensors.setter
-    def sensors(self, sensors: Program) -> None:
-        self._sensors, self._world = sensors, None
+        `encoders` are joint positions and velocities (nj,) that servos go by; (0,): the true ones.
+        """
+        self.motors, self.sensors, self.encoders, self._world = motors, sensors, encoders, None
 
     def world(self) -> World:
-        """The block of this simulation; the same object until `sensors` or `push_table` changes."""
+        """The block of this simulation; the same object until `equip`, or a longer `push_table`."""
         if self._world is None or self._world.pushes is not self.push_table:
             self._world = World(
                 robot=self.arrays,
@@ -105,7 +114,10 @@ class Simulation(Copyable):
                 state=self.state_arrays,
                 clock=self.clock,
                 pushes=self.push_table,
+                motors=self.motors,
                 sensors=self.sensors,
+                motor_q=self.encoders[0],
+                motor_dq=self.encoders[1],
                 count=self._count,
             )
         return self._world

@@ -1,0 +1,256 @@
+"""The state that is believed of a robot whose sensors and motors are real."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import mujoco
+import numpy as np
+
+from poise.configs.errors import ConfigError
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program
+from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.mujoco_calls import mj_step1
+from poise.envs.maths.vectors import axes_of, copy_into, quaternion_of
+from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.kinematics import StateArrays, update_state
+from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.robot import Robot, on_terrain
+
+from .drawn import DrawnRobot
+from .measurement import RING, Rings, Sensors, allocate_sensors, begin_sensors, measure
+from .motors import allocate_motors, begin_motors, drive_motors
+from .odometry import (
+    LEGS,
+    MOST_VARIANCE,
+    RATE_GAIN,
+    ROLL,
+    STIR,
+    Odometry,
+    allocate_odometry,
+    copy_axes,
+    filter_gains,
+    follow_measurements,
+    rate_gain,
+)
+from .plant import Plant
+from .prediction import allocate_promises, keep_promises, predict
+from .realism import Realism
+from .source import StateSource
+
+POSITIVE = {"above": 0.0}
+SENSE, EARLIER, HORIZON, EXACT = range(4)  # entries of `Belief.steps`
+SINK = 0.05  # of the height error of the soles that a tick takes away
+
+
+@dataclass(frozen=True)
+class EstimatorConfig:
+    """How the state is estimated.
+
+    Attributes:
+        kind: `odometry` integrates the accelerometer and is corrected by legs that stand;
+            `exact` is the true state, as late as the sensors are.
+        predictor: `promised` leads the state on by the accelerations that the QP has promised, to
+            when the torques of this tick will act; `none` leaves it as late as it is.
+        filtered: whether joint velocities are filtered.
+        joint_acceleration: of joints, that nobody knows of, from step to step [rad/s²].
+        turn_acceleration: likewise of the root [rad/s²].
+        acceleration: the error of the accelerometer, with that of the attitude [m/s²].
+        leg_speed: the error of a velocity that one leg tells [m/s].
+        roll_radius: of it for each rad/s that the sole turns by [m].
+    """
+
+    kind: Literal["odometry", "exact"] = "odometry"
+    predictor: Literal["promised", "none"] = "promised"
+    filtered: bool = True
+    joint_acceleration: float = field(default=40.0, metadata=POSITIVE)
+    turn_acceleration: float = field(default=20.0, metadata=POSITIVE)
+    acceleration: float = field(default=1.0, metadata=POSITIVE)
+    leg_speed: float = field(default=0.1, metadata=POSITIVE)
+    roll_radius: float = field(default=0.1, metadata=POSITIVE)
+
+
+#: of a controller that brings an estimator of its own: what is measured, as late and as noisy
+RAW = EstimatorConfig(predictor="none", filtered=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Belief(Block):
+    """All that `believe` works on."""
+
+    rings: Rings
+    odometry: Odometry
+    robot: RobotArrays  # that is believed in
+    views: SimViews  # of its simulation
+    state: StateArrays
+    steps: np.ndarray  # (4,) int: physics steps, see SENSE and its like
+    axes: np.ndarray  # (3, 3) of the root, led on
+    q: np.ndarray  # (nj,) likewise
+    v: np.ndarray  # (nv,)
+    position: np.ndarray  # (3,)
+
+
+@compiled
+def believe(b: Belief):
+    """The state that the known robot would have, from what has been measured until now."""
+    r, o, n = b.rings, b.odometry, b.rings.q.shape[0]
+    now = r.count[0] - 1
+    keep_promises(o.promises, now)
+    known = max(now - b.steps[SENSE], 0)
+    row = (r.next[0] - 1 - min(b.steps[SENSE], n - 1) + n) % n
+    if b.steps[EXACT]:
+        copy_into(r.truth_qpos[row, :3], b.position)
+        axes_of(r.truth_qpos[row, 3:7], b.axes)
+        copy_into(r.truth_qpos[row, 7:], b.q)
+        copy_into(r.truth_qvel[row], b.v)
+    else:
+        follow_measurements(o, known + 1, b.steps[EARLIER])
+        copy_into(o.position, b.position)
+        copy_axes(o.axes, b.axes)
+        copy_into(o.q, b.q)
+        copy_into(o.v, b.v)
+    if b.steps[HORIZON] > 0:
+        predict(
+            o.promises, known, b.steps[HORIZON], b.steps[EARLIER], b.robot.timestep,
+            b.position, b.axes, b.q, b.v,
+        )  # fmt: skip
+    _write_state(b, row)
+    if not b.steps[EXACT]:
+        _stand_on_ground(b)
+
+
+@compiled
+def _write_state(b: Belief, row: int):
+    """Fill `b.state` from the pose, the velocity and the forces of the soles that are believed."""
+    v, r, robot = b.views, b.rings, b.robot
+    copy_into(b.position, v.qpos[:3])
+    quaternion_of(b.axes, v.qpos[3:7])
+    copy_into(b.q, v.qpos[7:])
+    copy_into(b.v, v.qvel)
+    mj_step1(v.model_address, v.data_address)
+    for i in range(robot.sole_sensor.shape[0]):
+        v.sensordata[robot.sole_sensor[i]] = r.found[row, i]
+    v.sensordata[robot.ground_sensor] = r.found[row, robot.sole_sensor.shape[0]]
+    for a in range(3):
+        v.qfrc_constraint[a] = 0.0
+        for c in range(3):
+            v.qfrc_constraint[a] += b.axes[a, c] * r.wrench[row, c]
+        v.qfrc_constraint[3 + a] = r.wrench[row, 3 + a]
+    update_state(robot, v, b.state)
+
+
+@compiled
+def _stand_on_ground(b: Belief):
+    """Lead the root's height to where the soles that touch the ground are on it."""
+    s, total, feet = b.state, 0.0, 0
+    for i in range(s.contacts.shape[0]):
+        if s.contacts[i] > 0.5:
+            total += s.sole_point[i, 2] - s.ground[i]
+            feet += 1
+    if feet > 0:
+        b.odometry.position[2] -= SINK * total / feet
+
+
+class EstimatedState(StateSource, Copyable):
+    """The believed state of a `Plant`, whose sensors and motors are those of the drawn robot.
+
+    Args:
+        plant: the true robot in its world.
+        robot: the one that is known.
+        config: how its state is estimated.
+
+    Attributes:
+        promise: (nv,) where the controller writes the accelerations that it promises.
+    """
+
+    def __init__(self, plant: Plant, robot: Robot, config: EstimatorConfig):
+        super().__init__(plant.simulation)
+        self.plant, self.config = plant, config
+        self.known = Simulation(without_contacts(on_terrain(robot, plant.simulation.robot.terrain)))
+        self.motors = allocate_motors(plant.simulation)
+        self.sensors: Sensors = allocate_sensors(plant.simulation)
+        self.known.state_arrays = replace(
+            self.known.state_arrays, motor_q=self.sensors.joint_q, motor_dq=self.sensors.joint_dq
+        )
+        self.arrays, self.state_arrays = self.known.arrays, self.known.state_arrays
+        promises = allocate_promises(RING, plant.simulation.model.nv)
+        self.promise = promises.last
+        rings = self.sensors.rings
+        self.odometry = allocate_odometry(self.arrays, self.state_arrays, rings, promises)
+        nv, zeros = plant.simulation.model.nv, guarded_zeros
+        self.belief = Belief(
+            rings, self.odometry, self.arrays, self.known.views, self.state_arrays,
+            zeros(4, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
+        )  # fmt: skip
+        self.encoders = self.sensors.joint_q, self.sensors.joint_dq
+        self.drive = Program.of([(drive_motors, self.motors)])
+        self.sense = Program.of([(measure, self.sensors)])
+        self.estimate = Program.of([(believe, self.belief)])
+
+    def begin(self, drawn: DrawnRobot, holding: np.ndarray) -> None:
+        """Start an episode with the robot that was drawn.
+
+        The simulation has just been reset, and motors were asked for `holding` (nu,) [N·m].
+        """
+        self.drawn = drawn
+        begin_motors(self.motors, drawn, holding)
+        begin_sensors(self.sensors, drawn, self.simulation.model)
+        dt, c = self.arrays.timestep, self.config
+        predicted = c.predictor != "none"
+        earlier = max(round((drawn.command * dt + drawn.lag + drawn.misjudged) / dt), 0)
+        horizon = drawn.sense + earlier if predicted else 0
+        self.belief.steps[:] = drawn.sense, earlier, horizon, c.kind == "exact"
+        self._begin_odometry()
+        self.update()
+
+    def _begin_odometry(self) -> None:
+        """The robot was at its start for long: what was measured there is averaged."""
+        o, r, d, c = self.odometry, self.sensors.rings, self.drawn.noise, self.config
+        o.promises.last[:], o.promises.rows[:], o.promises.written[0] = 0.0, 0.0, 0
+        o.seen[0] = 1
+        o.position[:] = r.truth_qpos[0, :3]
+        o.axes[:] = r.attitude[r.next[0] - 1]
+        o.q[:], o.v[:] = r.q.mean(axis=0), 0.0
+        o.v[3:6], o.v[6:] = r.gyro.mean(axis=0), r.dq.mean(axis=0)
+        o.variance[0] = MOST_VARIANCE
+        dt = self.arrays.timestep
+        o.numbers[STIR], o.numbers[LEGS] = c.acceleration, c.leg_speed
+        o.numbers[ROLL] = c.roll_radius
+        if c.filtered:
+            gains = filter_gains(dt, c.joint_acceleration, d["encoder_noise"], d["velocity_noise"])
+            o.gains[:] = gains
+            o.numbers[RATE_GAIN] = rate_gain(dt, c.turn_acceleration, d["gyro_noise"])
+        else:
+            o.gains[:], o.numbers[RATE_GAIN] = np.eye(2), 1.0
+
+    def reset(self) -> None:
+        """Nothing: `begin` says who the robot is."""
+
+
+def check_latency(level: Realism, timestep: float) -> None:
+    """Raise ConfigError where a level's delays and lag are longer than what can be led on."""
+    most = (RING - 2) * timestep
+    parts = {
+        "latency.sense": level.latency.sense,
+        "latency.command": level.latency.command,
+        "motors.lag": level.motors.lag,
+        "latency.misjudged": level.latency.misjudged,
+    }
+    longest = {name: x[1] if isinstance(x, tuple) else x for name, x in parts.items()}
+    if sum(longest.values()) > most:
+        told = ", ".join(f"{name} {value:g}" for name, value in longest.items() if value)
+        raise ConfigError(f"together at most {most:g} s can be led on: {told}",
+                          source=level.name, field="latency")  # fmt: skip
+
+
+def without_contacts(robot: Robot) -> Robot:
+    """A copy of `robot` whose model has no contacts and no constraints to look for."""
+    model = copy.copy(robot.model)
+    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    model.opt.disableflags |= int(off)
+    return replace(robot, model=model)
