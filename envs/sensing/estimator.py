@@ -26,11 +26,14 @@ from .drawn import DrawnRobot
 from .measurement import RING, Rings, Sensors, allocate_sensors, begin_sensors, measure
 from .motors import allocate_motors, begin_motors, drive_motors
 from .odometry import (
-    LEGS,
-    MOST_VARIANCE,
+    BB,
+    JOINT_NOISE,
     RATE_GAIN,
     ROLL,
+    SLIP,
     STIR,
+    VV,
+    WANDER,
     Odometry,
     allocate_odometry,
     copy_axes,
@@ -45,6 +48,7 @@ from .source import StateSource
 
 POSITIVE = {"above": 0.0}
 SENSE, EARLIER, HORIZON, EXACT = range(4)  # entries of `Belief.steps`
+START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 SINK = 0.05  # of the height error of the soles that a tick takes away
 
 
@@ -60,19 +64,23 @@ class EstimatorConfig:
         filtered: whether joint velocities are filtered.
         joint_acceleration: of joints, that nobody knows of, from step to step [rad/s²].
         turn_acceleration: likewise of the root [rad/s²].
-        acceleration: the error of the accelerometer, with that of the attitude [m/s²].
-        leg_speed: the error of a velocity that one leg tells [m/s].
+        acceleration: the error of the accelerometer besides its noise, from step to step [m/s²].
+        bias: of the accelerometer, with that of the attitude, at the start [m/s²].
+        bias_walk: by which that changes in a second [m/s²].
+        slip: the error of a velocity that one leg tells, besides the joints' noise [m/s].
         roll_radius: of it for each rad/s that the sole turns by [m].
     """
 
     kind: Literal["odometry", "exact"] = "odometry"
     predictor: Literal["promised", "none"] = "promised"
     filtered: bool = True
-    joint_acceleration: float = field(default=40.0, metadata=POSITIVE)
-    turn_acceleration: float = field(default=20.0, metadata=POSITIVE)
-    acceleration: float = field(default=1.0, metadata=POSITIVE)
-    leg_speed: float = field(default=0.1, metadata=POSITIVE)
-    roll_radius: float = field(default=0.1, metadata=POSITIVE)
+    joint_acceleration: float = field(default=5.0, metadata=POSITIVE)
+    turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
+    acceleration: float = field(default=0.05, metadata=POSITIVE)
+    bias: float = field(default=0.2, metadata=POSITIVE)
+    bias_walk: float = field(default=0.03, metadata=POSITIVE)
+    slip: float = field(default=0.3, metadata=POSITIVE)
+    roll_radius: float = field(default=3.0, metadata=POSITIVE)
 
 
 #: of a controller that brings an estimator of its own: what is measured, as late and as noisy
@@ -217,10 +225,12 @@ class EstimatedState(StateSource, Copyable):
         o.axes[:] = r.attitude[r.next[0] - 1]
         o.q[:], o.v[:] = r.q.mean(axis=0), 0.0
         o.v[3:6], o.v[6:] = r.gyro.mean(axis=0), r.dq.mean(axis=0)
-        o.variance[0] = MOST_VARIANCE
-        dt = self.arrays.timestep
-        o.numbers[STIR], o.numbers[LEGS] = c.acceleration, c.leg_speed
-        o.numbers[ROLL] = c.roll_radius
+        o.bias[:] = o.variance[:] = 0.0
+        o.variance[VV], o.variance[BB] = START_SPEED**2, c.bias**2
+        dt, noise = self.arrays.timestep, o.numbers
+        noise[STIR] = np.hypot(c.acceleration, d["accelerometer_noise"])
+        noise[WANDER], noise[SLIP], noise[ROLL] = c.bias_walk, c.slip, c.roll_radius
+        noise[JOINT_NOISE] = d["velocity_noise"]
         if c.filtered:
             gains = filter_gains(dt, c.joint_acceleration, d["encoder_noise"], d["velocity_noise"])
             o.gains[:] = gains

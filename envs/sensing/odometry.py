@@ -1,4 +1,4 @@
-"""The state of a robot from an IMU, encoders and soles: legs and accelerometer tell its velocity."""
+"""The state of a robot from an IMU, encoders and soles, by its legs and its accelerometer."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from .measurement import Rings
 from .prediction import Promises
 
 FROM_Q, FROM_DQ = 0, 1  # columns of `Odometry.gains`
-STIR, LEGS, ROLL, RATE_GAIN = range(4)  # entries of `Odometry.numbers`
-MOST_VARIANCE = 1.0  # [m²/s²]
+STIR, WANDER, SLIP, ROLL, JOINT_NOISE, RATE_GAIN = range(6)  # entries of `Odometry.numbers`
+LOAD = 2  # column of `Odometry.pressed`
+VV, VB, BB = range(3)  # entries of `Odometry.variance`
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +36,12 @@ class Odometry(Block):
     axes: np.ndarray  # (3, 3) of the root
     q: np.ndarray  # (nj,) [rad]
     v: np.ndarray  # (nv,) velocity: of the root in world axes, its angular one, the joints'
-    variance: np.ndarray  # (1,) of each component of the root's velocity [m²/s²]
+    bias: np.ndarray  # (3,) of the accelerometer and the attitude, world axes [m/s²]
+    variance: np.ndarray  # (3,) of each component of the root's velocity, with the bias, of that
+    pressed: np.ndarray  # (nc, 3) of each sole: where it is pressed [m], its part of the load
+    told: np.ndarray  # (6,) how a sole moves against a resting root [m/s, rad/s]
     gains: np.ndarray  # (2, 2) rows q, q̇: corrections by errors of q and q̇
-    numbers: np.ndarray  # (4,) see STIR and its like
+    numbers: np.ndarray  # (6,) see STIR and its like
 
 
 def allocate_odometry(
@@ -47,7 +51,7 @@ def allocate_odometry(
     zeros, nv = guarded_zeros, len(state.qvel)
     return Odometry(
         robot, state, rings, promises, zeros(1, np.int64), zeros(3), zeros((3, 3)), zeros(nv - 6),
-        zeros(nv), zeros(1), zeros((2, 2)), zeros(4),
+        zeros(nv), zeros(3), zeros(3), zeros((len(state.contacts), 3)), zeros(6), zeros((2, 2)), zeros(6),
     )  # fmt: skip
 
 
@@ -106,42 +110,100 @@ def keep_joints(o: Odometry, row: int, asked: int):
 
 @compiled
 def keep_velocity(o: Odometry, row: int):
-    """The root's velocity: ċ ← ċ + (R f + g) dt of the accelerometer, corrected by the legs.
+    """The root's velocity and the accelerometer's bias b, by a Kalman filter of each component.
 
-    A sole that touches the ground rests, so it tells v = −J_ω ω − J_q q̇ of the rest of its Jacobian
-    J = [1 J_ω J_q]. It is believed the less the faster the sole turns: then it rolls on an edge.
+    The accelerometer leads on, v ← v + (R f + g + b) dt, and the legs correct, see `correct`.
     """
-    r, s, dt = o.rings, o.state, o.robot.timestep
-    nv = o.v.shape[0]
+    r, dt, P = o.rings, o.robot.timestep, o.variance
     copy_axes(r.attitude[row], o.axes)
     for a in range(3):
-        accel = -o.robot.gravity if a == 2 else 0.0
+        accel = o.bias[a] - (o.robot.gravity if a == 2 else 0.0)
         for b in range(3):
             accel += o.axes[a, b] * r.force[row, b]
         o.v[a] += dt * accel
         o.position[a] += dt * o.v[a]
-    o.variance[0] = min(o.variance[0] + (o.numbers[STIR] * dt) ** 2, MOST_VARIANCE)
-    for i in range(s.contacts.shape[0]):
-        if r.found[row, i] <= 0.0:
-            continue
-        turning = 0.0
-        for a in range(3):
-            rate = 0.0
-            for b in range(3):
-                rate += s.J[6 * i + 3 + a, 3 + b] * r.gyro[row, b]
-            for j in range(6, nv):
-                rate += s.J[6 * i + 3 + a, j] * r.dq[row, j - 6]
-            turning += rate * rate
-        doubt = o.numbers[LEGS] ** 2 + o.numbers[ROLL] ** 2 * turning
-        gain = o.variance[0] / (o.variance[0] + doubt)
-        o.variance[0] *= 1.0 - gain
-        for a in range(3):
-            told = 0.0
-            for b in range(3):
-                told -= s.J[6 * i + a, 3 + b] * r.gyro[row, b]
-            for j in range(6, nv):
-                told -= s.J[6 * i + a, j] * r.dq[row, j - 6]
-            o.v[a] += gain * (told - o.v[a])
+    P[VV] += dt * (2.0 * P[VB] + dt * P[BB]) + (o.numbers[STIR] * dt) ** 2
+    P[VB] += dt * P[BB]
+    P[BB] += dt * o.numbers[WANDER] ** 2
+    place_pressure(o, row)
+    for i in range(o.state.contacts.shape[0]):
+        if r.found[row, i] > 0.0 and o.pressed[i, LOAD] > 0.0:
+            correct(o, row, i)
+
+
+@compiled
+def place_pressure(o: Odometry, row: int):
+    """Where each sole is pressed, relative to its middle, and its part of the load.
+
+    The centre of pressure of the whole ground's wrench, moved into a sole, is the point at which
+    that sole rests though it rolls on an edge. Two soles share the load as it lies between them.
+    """
+    r, s, w = o.rings, o.state, o.rings.wrench[row]
+    nc = s.contacts.shape[0]
+    fx, fy, fz, mx, my = 0.0, 0.0, 0.0, 0.0, 0.0
+    for b in range(3):
+        fx, fy, fz = fx + o.axes[0, b] * w[b], fy + o.axes[1, b] * w[b], fz + o.axes[2, b] * w[b]
+        mx, my = mx + o.axes[0, b] * w[3 + b], my + o.axes[1, b] * w[3 + b]
+    borne = fz > 0.1 * o.robot.mass * o.robot.gravity
+    first, second = s.sole_point[0], s.sole_point[nc - 1]
+    height = s.qpos[2] - 0.5 * (first[2] + second[2])
+    x = s.qpos[0] - (my + height * fx) / fz if borne else 0.5 * (first[0] + second[0])
+    y = s.qpos[1] + (mx - height * fy) / fz if borne else 0.5 * (first[1] + second[1])
+    dx, dy = second[0] - first[0], second[1] - first[1]
+    between = ((x - first[0]) * dx + (y - first[1]) * dy) / max(dx * dx + dy * dy, 1e-6)
+    between = min(max(between, 0.0), 1.0)
+    for i in range(nc):
+        alone = nc != 2 or r.found[row, 1 - i] <= 0.0
+        load = 1.0 if alone else (between if i == 1 else 1.0 - between)
+        o.pressed[i, LOAD] = load if borne else 0.0
+        axes, px, py = s.sole_axes[i], x - s.sole_point[i, 0], y - s.sole_point[i, 1]
+        for a in range(2):
+            along = axes[0, a] * px + axes[1, a] * py
+            low, high = np.inf, -np.inf
+            for k in range(o.robot.sole_vertices[i]):
+                low = min(low, o.robot.sole_polygon[i, k, a])
+                high = max(high, o.robot.sole_polygon[i, k, a])
+            o.pressed[i, a] = min(max(along, low), high)
+
+
+@compiled
+def correct(o: Odometry, row: int, i: int):
+    """Correct the velocity by sole i, whose pressed point rests: v = −(J_ω ω + J_q q̇) − ω_i × r.
+
+    [1 J_ω J_q] is the Jacobian of the sole's middle, ω_i its angular velocity and r the pressed
+    point from there. What it tells is believed the less the noisier the joints' velocities are, the
+    less the sole bears, and the faster it turns.
+    """
+    s, P, dq, told, axes = o.state, o.variance, o.rings.dq[row], o.told, o.state.sole_axes[i]
+    for a in range(6):
+        total = 0.0
+        for b in range(3):
+            total += s.J[6 * i + a, 3 + b] * o.rings.gyro[row, b]
+        for j in range(dq.shape[0]):
+            total += s.J[6 * i + a, 6 + j] * dq[j]
+        told[a] = total
+    rx = axes[0, 0] * o.pressed[i, 0] + axes[0, 1] * o.pressed[i, 1]
+    ry = axes[1, 0] * o.pressed[i, 0] + axes[1, 1] * o.pressed[i, 1]
+    rz = axes[2, 0] * o.pressed[i, 0] + axes[2, 1] * o.pressed[i, 1]
+    told[0] += told[4] * rz - told[5] * ry
+    told[1] += told[5] * rx - told[3] * rz
+    told[2] += told[3] * ry - told[4] * rx
+    turning = told[3] ** 2 + told[4] ** 2 + told[5] ** 2
+    reach = 0.0
+    for a in range(3):
+        for j in range(dq.shape[0]):
+            reach += s.J[6 * i + a, 6 + j] ** 2 / 3.0
+    doubt = o.numbers[SLIP] ** 2 + o.numbers[ROLL] ** 2 * turning
+    doubt += o.numbers[JOINT_NOISE] ** 2 * reach
+    doubt /= o.pressed[i, LOAD] ** 2
+    gain, gain_bias = P[VV] / (P[VV] + doubt), P[VB] / (P[VV] + doubt)
+    P[BB] -= gain_bias * P[VB]
+    P[VV] *= 1.0 - gain
+    P[VB] *= 1.0 - gain
+    for a in range(3):
+        error = -told[a] - o.v[a]
+        o.v[a] += gain * error
+        o.bias[a] += gain_bias * error
 
 
 @compiled
