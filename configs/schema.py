@@ -61,15 +61,15 @@ def on_base(
             f"{shown(data['base'])} leads back to itself", source=source, field="base"
         )
     base = on_base(read_yaml(path), kind, path, (*above, path), parts)
-    return merged(base, {key: value for key, value in data.items() if key != "base"})
+    return overlay(base, {key: value for key, value in data.items() if key != "base"})
 
 
-def merged(base: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
+def overlay(base: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
     """`base` with the entries of `data` in their places."""
     merged = dict(base)
     for key, value in data.items():
         both = isinstance(value, dict) and isinstance(base.get(key), dict)
-        merged[key] = merged(base[key], value) if both else value
+        merged[key] = overlay(base[key], value) if both else value
     return merged
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
-from poise.configs.schema import build, merged, on_base, read_yaml, to_dict
+from poise.configs.schema import build, on_base, overlay, read_yaml, to_dict
 
 Spread = float | tuple[float, float]  # a number, or a range that an episode draws from
 IDEAL = "ideal"
@@ -176,7 +176,7 @@ def overlaid(level: Realism, given: object, source: str) -> Realism:
     """
     if not isinstance(given, Mapping):
         raise ConfigError(f"must be a mapping, not {shown(given)}", source=source, choices=PARTS)
-    return build(Realism, merged(to_dict(level), to_dict(dict(given))), source)
+    return build(Realism, overlay(to_dict(level), to_dict(dict(given))), source)
 
 
 def load_realism(given: str | Path | Mapping | Realism | None, source: str = "realism") -> Realism:
