@@ -78,8 +78,8 @@ class EstimatorConfig:
     turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
     acceleration: float = field(default=0.05, metadata=POSITIVE)
     bias: float = field(default=0.2, metadata=POSITIVE)
-    bias_walk: float = field(default=0.03, metadata=POSITIVE)
-    slip: float = field(default=0.3, metadata=POSITIVE)
+    bias_walk: float = field(default=0.1, metadata=POSITIVE)
+    slip: float = field(default=0.15, metadata=POSITIVE)
     roll_radius: float = field(default=3.0, metadata=POSITIVE)
 
 

@@ -185,10 +185,15 @@ def correct(o: Odometry, row: int, i: int):
     rx = axes[0, 0] * o.pressed[i, 0] + axes[0, 1] * o.pressed[i, 1]
     ry = axes[1, 0] * o.pressed[i, 0] + axes[1, 1] * o.pressed[i, 1]
     rz = axes[2, 0] * o.pressed[i, 0] + axes[2, 1] * o.pressed[i, 1]
+    turning = 0.0  # of the filtered velocities: noise of the joints is no rolling
+    for a in range(3, 6):
+        rate = 0.0
+        for j in range(3, o.v.shape[0]):
+            rate += s.J[6 * i + a, j] * o.v[j]
+        turning += rate * rate
     told[0] += told[4] * rz - told[5] * ry
     told[1] += told[5] * rx - told[3] * rz
     told[2] += told[3] * ry - told[4] * rx
-    turning = told[3] ** 2 + told[4] ** 2 + told[5] ** 2
     reach = 0.0
     for a in range(3):
         for j in range(dq.shape[0]):
