@@ -1,1 +1,1 @@
-"""What lies between a robot and its controller: sensors, motors, estimators, and how real they are."""
+"""Between a robot and its controller: sensors, motors, estimators, and how real they are."""

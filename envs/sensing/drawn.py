@@ -51,8 +51,14 @@ class DrawnRobot:
     slope: np.ndarray
     seed: int  #: of the noise within the episode
 
+    @property
+    def measured(self) -> bool:
+        """True where a sensor errs, so that the state is known by measurements alone."""
+        biases = self.encoder_bias, self.gyro_bias, self.accelerometer_bias, self.tilt_bias
+        return any(self.noise.values()) or self.backlash > 0.0 or any(b.any() for b in biases)
+
     def summary(self, timestep: float) -> dict[str, float]:
-        """The numbers that tell most of it, for `info` and tables; SI units, the slope in degrees."""
+        """The numbers that tell most of it, for `info` and tables: SI units, degrees."""
         told = {
             "sense_delay": self.sense * timestep,
             "command_delay": self.command * timestep,

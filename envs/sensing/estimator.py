@@ -58,7 +58,8 @@ class EstimatorConfig:
 
     Attributes:
         kind: `odometry` integrates the accelerometer and is corrected by legs that stand;
-            `exact` is the true state, as late as the sensors are.
+            `exact` is the true state, as late as the sensors are; `auto` is `exact` at a level
+            whose sensors have no errors, and else `odometry`.
         predictor: `promised` leads the state on by the accelerations that the QP has promised, to
             when the torques of this tick will act; `none` leaves it as late as it is.
         filtered: whether joint velocities are filtered.
@@ -71,10 +72,10 @@ class EstimatorConfig:
         roll_radius: of it for each rad/s that the sole turns by [m].
     """
 
-    kind: Literal["odometry", "exact"] = "odometry"
+    kind: Literal["auto", "odometry", "exact"] = "auto"
     predictor: Literal["promised", "none"] = "promised"
     filtered: bool = True
-    joint_acceleration: float = field(default=5.0, metadata=POSITIVE)
+    joint_acceleration: float = field(default=15.0, metadata=POSITIVE)
     turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
     acceleration: float = field(default=0.05, metadata=POSITIVE)
     bias: float = field(default=0.2, metadata=POSITIVE)
@@ -84,7 +85,7 @@ class EstimatorConfig:
 
 
 #: of a controller that brings an estimator of its own: what is measured, as late and as noisy
-RAW = EstimatorConfig(predictor="none", filtered=False)
+RAW = EstimatorConfig("odometry", predictor="none", filtered=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +213,8 @@ class EstimatedState(StateSource, Copyable):
         predicted = c.predictor != "none"
         earlier = max(round((drawn.command * dt + drawn.lag + drawn.misjudged) / dt), 0)
         horizon = drawn.sense + earlier if predicted else 0
-        self.belief.steps[:] = drawn.sense, earlier, horizon, c.kind == "exact"
+        exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
+        self.belief.steps[:] = drawn.sense, earlier, horizon, exact
         self._begin_odometry()
         self.update()
 

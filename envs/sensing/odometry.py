@@ -51,7 +51,8 @@ def allocate_odometry(
     zeros, nv = guarded_zeros, len(state.qvel)
     return Odometry(
         robot, state, rings, promises, zeros(1, np.int64), zeros(3), zeros((3, 3)), zeros(nv - 6),
-        zeros(nv), zeros(3), zeros(3), zeros((len(state.contacts), 3)), zeros(6), zeros((2, 2)), zeros(6),
+        zeros(nv), zeros(3), zeros(3), zeros((len(state.contacts), 3)), zeros(6), zeros((2, 2)),
+        zeros(6),
     )  # fmt: skip
 
 

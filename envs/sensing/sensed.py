@@ -59,6 +59,12 @@ class SensedRobot:
             self._simulation = plant.simulation
             self._take(EstimatedState(plant, self.robot, self._estimator()))
 
+    @property
+    def known_robot(self) -> Robot:
+        """The robot in its world as its model has it, whatever an episode draws."""
+        source = self._state_source
+        return source.plant.robot if isinstance(source, EstimatedState) else self._simulation.robot
+
     def _estimator(self) -> EstimatorConfig:
         return RAW if self._raw else self.estimator
 
