@@ -44,11 +44,14 @@ from .odometry import (
 from .plant import Plant
 from .prediction import allocate_promises, keep_promises, predict
 from .realism import Realism
+from .rollout import Rollout, make_rollout, roll_out
 from .source import StateSource
 
 POSITIVE = {"above": 0.0}
-SENSE, EARLIER, HORIZON, EXACT = range(4)  # entries of `Belief.steps`
+SENSE, EARLIER, HORIZON, EXACT, SIMULATED = range(5)  # entries of `Belief.steps`
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
+#: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
+SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
 SINK = 0.05  # of the height error of the soles that a tick takes away
 
 
@@ -61,7 +64,9 @@ class EstimatorConfig:
             `exact` is the true state, as late as the sensors are; `auto` is `exact` at a level
             whose sensors have no errors, and else `odometry`.
         predictor: `promised` leads the state on by the accelerations that the QP has promised, to
-            when the torques of this tick will act; `none` leaves it as late as it is.
+            when the torques of this tick will act; `rollout` by a simulation of the known robot
+            with what its motors were asked for; `none` leaves it as late as it is. `auto` is
+            `rollout` while motors run servos, whose accelerations nobody promises, else `promised`.
         filtered: whether joint velocities are filtered.
         joint_acceleration: of joints, that nobody knows of, from step to step [rad/s²].
         turn_acceleration: likewise of the root [rad/s²].
@@ -73,7 +78,7 @@ class EstimatorConfig:
     """
 
     kind: Literal["auto", "odometry", "exact"] = "auto"
-    predictor: Literal["promised", "none"] = "promised"
+    predictor: Literal["auto", "promised", "rollout", "none"] = "auto"
     filtered: bool = True
     joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
     turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
@@ -97,7 +102,8 @@ class Belief(Block):
     robot: RobotArrays  # that is believed in
     views: SimViews  # of its simulation
     state: StateArrays
-    steps: np.ndarray  # (4,) int: physics steps, see SENSE and its like
+    rollout: Rollout
+    steps: np.ndarray  # (5,) int: physics steps, see SENSE and its like
     axes: np.ndarray  # (3, 3) of the root, led on
     q: np.ndarray  # (nj,) likewise
     v: np.ndarray  # (nv,)
@@ -123,7 +129,9 @@ def believe(b: Belief):
         copy_axes(o.axes, b.axes)
         copy_into(o.q, b.q)
         copy_into(o.v, b.v)
-    if b.steps[HORIZON] > 0:
+    if b.steps[HORIZON] > 0 and b.steps[SIMULATED] + b.rollout.motors.bus.servoed[0] > 1:
+        roll_out(b.rollout, known, b.steps[HORIZON], b.steps[EARLIER], b.position, b.axes, b.q, b.v)
+    elif b.steps[HORIZON] > 0:
         predict(
             o.promises, known, b.steps[HORIZON], b.steps[EARLIER], b.robot.timestep,
             b.position, b.axes, b.q, b.v,
@@ -195,7 +203,8 @@ class EstimatedState(StateSource, Copyable):
         nv, zeros = plant.simulation.model.nv, guarded_zeros
         self.belief = Belief(
             rings, self.odometry, self.arrays, self.known.views, self.state_arrays,
-            zeros(4, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
+            make_rollout(robot, plant.simulation.robot.terrain, self.motors),
+            zeros(5, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
         self.drive = Program.of([(drive_motors, self.motors)])
         self.sense = Program.of([(measure, self.sensors)])
@@ -214,7 +223,7 @@ class EstimatedState(StateSource, Copyable):
         earlier = max(round((drawn.command * dt + drawn.lag + drawn.misjudged) / dt), 0)
         horizon = drawn.sense + earlier if predicted else 0
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
-        self.belief.steps[:] = drawn.sense, earlier, horizon, exact
+        self.belief.steps[:] = drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor]
         self._begin_odometry()
         self.update()
 
