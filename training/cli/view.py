@@ -92,7 +92,8 @@ def view(
                               field="controllers")  # fmt: skip
         view(
             shown, robot=robot, motion=motion, host=host, port=port, seed=seed, pushes=push,
-            commands=command, realism=realism, native=native, seconds=seconds, dark=dark, allow=allow,
+            commands=command, realism=realism, native=native, seconds=seconds, dark=dark,
+            allow=allow,
         )  # fmt: skip
         return
     if len(shown) != 1:

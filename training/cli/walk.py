@@ -69,8 +69,9 @@ def walk(
 
     walk(speed, left=left, turn=math.radians(turn), step_time=step_time,
          step_length=step_length, width=width, clearance=clearance, arm_swing=arm_swing,
-         duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain), realism=realism,
-         push=push, push_at=push_at, seed=seed, video=video, say=_say, allow=allow)  # fmt: skip
+         duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
+         realism=realism, push=push, push_at=push_at, seed=seed, video=video, say=_say,
+         allow=allow)  # fmt: skip
 
 
 def _terrain(text: str) -> str | dict[str, object]:

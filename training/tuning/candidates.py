@@ -106,8 +106,9 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
 
 def worth(agent: Agent, trial: Trial, in_place: bool, chatter: float = 0.0) -> float:
     """1 for a recovery, 0.6 for one that does not come to rest, at most 0.3 for a fall, by the time
-    until then; less `chatter` times |Δτ|/τ_max a tick, see `TuneConfig`. With `in_place` one whose foot moved
-    (`Outcome.foot_displaced`) is no recovery.
+    until then; less `chatter` times |Δτ|/τ_max a tick, see `TuneConfig`.
+
+    With `in_place` one whose foot moved (`Outcome.foot_displaced`) is no recovery.
     """
     outcome, env = run_trial(agent, trial), agent.env
     period = env.controller.period if isinstance(env, ResidualBalanceEnv) else env.arrays.timestep
