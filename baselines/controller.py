@@ -16,6 +16,14 @@ from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 
+class ServoOutputs(NamedTuple):
+    """Servos that give the torques: τ = K (q* − q) − D q̇ of each joint, within the limits."""
+
+    target: np.ndarray  # (nj,) q* [rad]
+    stiffness: np.ndarray  # (nj,) K [N·m/rad]
+    damping: np.ndarray  # (nj,) D [N·m·s/rad]
+
+
 class Outputs(NamedTuple):
     """The arrays in which compiled code finds what a controller's tick gave."""
 
@@ -24,6 +32,7 @@ class Outputs(NamedTuple):
     failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
     soft_root: bool
     vdot: np.ndarray | None = None  # (nv,) accelerations that the torques are to bring, if known
+    servos: ServoOutputs | None = None  # which motors run themselves where they are real
 
 
 @dataclass(frozen=True, eq=False)

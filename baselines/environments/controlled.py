@@ -6,7 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.controller import CompiledController, Controller, Targets, as_base_controller
+from poise.baselines.controller import (
+    CompiledController,
+    Controller,
+    ServoOutputs,
+    Targets,
+    as_base_controller,
+)
 from poise.baselines.walking.schedule import follow_timetable
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_steps
@@ -102,6 +108,7 @@ class ControlledEnv(CommandedEnv):
         controller = self._controller
         assert isinstance(controller, CompiledController)  # only they have ticks
         found = controller.outputs()
+        servos = found.servos or ServoOutputs(*(guarded_zeros(0) for _ in range(3)))
         return PolicyStep(
             inputs=self._target_inputs(),
             kernel=kernel,
@@ -112,6 +119,9 @@ class ControlledEnv(CommandedEnv):
             soft_root=found.soft_root,
             vdot=guarded_zeros(0) if found.vdot is None else found.vdot,
             promise=self.state_source.promise,
+            target=servos.target,
+            stiffness=servos.stiffness,
+            damping=servos.damping,
             world=self.simulation.world(),
             estimate=self.state_source.estimate,
             ticks=self.ticks,
@@ -162,6 +172,7 @@ class ControlledEnv(CommandedEnv):
         if len(source.promise) and (promised := self._base.vdot) is not None:
             source.promise[:] = promised
         add_torques(a.residual, self.arrays.torque_limit, ctrl)
+        sim.bus.servoed[0] = 0
         wrench[:] = self._base.root_wrench
         self._push_root(wrench)
         account_tick(self._account())

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from poise.envs.balance.episode import record_tick
-from poise.envs.balance.servos import Servos, aim, servo_torque
+from poise.envs.balance.servos import Servos, aim, hand_to_motors, servo_torque
 from poise.envs.balance.termination import uprightness
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.callbacks import CallbackAddress, call_back
@@ -120,6 +120,7 @@ def blend_torques(step: WholeStep):
         views.ctrl[i] = w * servo_torque(servos, base.world, i)
         if w < 1.0:
             views.ctrl[i] += (1.0 - w) * base.tau[servos.dofs[i] - 6]
+    hand_to_motors(servos, base.world, w, base.tau)
 
 
 @compiled

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from poise.baselines.controller import CompiledController, Outputs, Targets
+from poise.baselines.controller import CompiledController, Outputs, ServoOutputs, Targets
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.numbers import whole_steps
 from poise.envs.balance.servos import pd_torque
@@ -181,7 +181,9 @@ class PolicyFile(CompiledController):
 
     def outputs(self) -> Outputs:
         """See `Outputs`."""
-        return Outputs(self._servos.tau, self._no_wrench, self._failures, False)
+        s = self._servos
+        servos = ServoOutputs(s.target, s.stiffness, s.damping)
+        return Outputs(s.tau, self._no_wrench, self._failures, False, servos=servos)
 
     def gains(self) -> Servos:
         """See `CompiledController`; raises what went wrong in the step before."""

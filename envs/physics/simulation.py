@@ -18,6 +18,7 @@ from poise.envs.robots.robot import Robot
 
 from .arrays import RobotArrays, SimViews, robot_arrays, sim_views
 from .kinematics import StateArrays, allocate_state, update_state
+from .motor_bus import MotorBus, motor_bus
 from .state import RobotState
 
 SOME_PUSHES = 4  # rows of a table that may grow
@@ -51,8 +52,7 @@ class World(Block):
     pushes: np.ndarray  # see `apply_pushes`
     motors: Program  # what comes of the controls, before each physics step
     sensors: Program  # what measures, after each physics step
-    motor_q: np.ndarray  # (nj,) joint positions that the motors read; (0,): those of `views`
-    motor_dq: np.ndarray  # (nj,) joint velocities likewise
+    bus: MotorBus  # between the computer and the motors
     count: np.ndarray  # (1,) int: physics steps of `advance_world`
 
 
@@ -93,17 +93,13 @@ class Simulation(Copyable):
         self.pushes: tuple[Push | Kick, ...] = ()
         self.start_yaw = 0.0  #: of the heading frame at the reset [rad]
         self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
-        self.equip(Program.of(()), Program.of(()), (guarded_zeros(0), guarded_zeros(0)))
+        self.equip(Program.of(()), Program.of(()), motor_bus())
         self.reset()
 
-    def equip(
-        self, motors: Program, sensors: Program, encoders: tuple[np.ndarray, np.ndarray]
-    ) -> None:
-        """Have compiled code call these kernels before and after every physics step.
-
-        `encoders` are joint positions and velocities (nj,) that servos go by; (0,): the true ones.
-        """
-        self.motors, self.sensors, self.encoders, self._world = motors, sensors, encoders, None
+    def equip(self, motors: Program, sensors: Program, bus: MotorBus) -> None:
+        """Have compiled code call these kernels before and after every physics step."""
+        self.motors, self.sensors, self.bus = motors, sensors, bus
+        self._world: World | None = None
 
     def world(self) -> World:
         """The block of this simulation; the same object until `equip`, or a longer `push_table`."""
@@ -116,8 +112,7 @@ class Simulation(Copyable):
                 pushes=self.push_table,
                 motors=self.motors,
                 sensors=self.sensors,
-                motor_q=self.encoders[0],
-                motor_dq=self.encoders[1],
+                bus=self.bus,
                 count=self._count,
             )
         return self._world

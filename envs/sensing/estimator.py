@@ -94,7 +94,7 @@ class EstimatorConfig:
     kind: Literal["auto", "odometry", "inekf", "exact"] = "auto"
     predictor: Literal["promised", "none"] = "promised"
     filtered: bool = True
-    joint_acceleration: float = field(default=15.0, metadata=POSITIVE)
+    joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
     turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
     acceleration: float = field(default=0.05, metadata=POSITIVE)
     bias: float = field(default=0.2, metadata=POSITIVE)
@@ -211,10 +211,11 @@ class EstimatedState(StateSource, Copyable):
         super().__init__(plant.simulation)
         self.plant, self.config = plant, config
         self.known = Simulation(without_contacts(on_terrain(robot, plant.simulation.robot.terrain)))
-        self.motors = allocate_motors(plant.simulation)
         self.sensors: Sensors = allocate_sensors(plant.simulation)
+        self.bus = self.sensors.bus
+        self.motors = allocate_motors(plant.simulation, self.bus)
         self.known.state_arrays = replace(
-            self.known.state_arrays, motor_q=self.sensors.joint_q, motor_dq=self.sensors.joint_dq
+            self.known.state_arrays, motor_q=self.bus.q, motor_dq=self.bus.dq
         )
         self.arrays, self.state_arrays = self.known.arrays, self.known.state_arrays
         promises = allocate_promises(RING, plant.simulation.model.nv)
@@ -227,7 +228,6 @@ class EstimatedState(StateSource, Copyable):
             rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
             zeros(5, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
-        self.encoders = self.sensors.joint_q, self.sensors.joint_dq
         self.drive = Program.of([(drive_motors, self.motors)])
         self.sense = Program.of([(measure, self.sensors)])
         self.estimate = Program.of([(believe, self.belief)])

@@ -17,6 +17,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.motor_bus import MotorBus, motor_bus
 from poise.envs.physics.simulation import Simulation
 
 from .drawn import DrawnRobot
@@ -66,8 +67,7 @@ class Sensors(Block):
     play: np.ndarray  # (nj,) motor's position over the joint's, within the backlash [rad]
     last_q: np.ndarray  # (nj,) joint positions at the last measurement
     last_velocity: np.ndarray  # (3,) of the root, at the last measurement
-    joint_q: np.ndarray  # (nj,) what the encoders read now: motors have it at once
-    joint_dq: np.ndarray  # (nj,)
+    bus: MotorBus  # has what the encoders read now: motors have it at once
 
 
 def allocate_sensors(simulation: Simulation) -> Sensors:
@@ -103,8 +103,7 @@ def allocate_sensors(simulation: Simulation) -> Sensors:
         play=zeros(nj),
         last_q=zeros(nj),
         last_velocity=zeros(3),
-        joint_q=zeros(nj),
-        joint_dq=zeros(nj),
+        bus=motor_bus(nj, simulation.model.nu),
     )
 
 
@@ -204,7 +203,7 @@ def _measure_root(s: Sensors, k: int):
 @compiled
 def _measure_joints(s: Sensors, k: int):
     """Positions at the motor's side of the play, and velocities; the motors have them at once."""
-    v, q, dq = s.views, s.joint_q, s.joint_dq
+    v, q, dq = s.views, s.bus.q, s.bus.dq
     half = 0.5 * s.noise[BACKLASH]
     for j in range(q.shape[0]):
         now = v.qpos[7 + j]

@@ -10,11 +10,13 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.motor_bus import MotorBus
 from poise.envs.physics.simulation import Simulation
 
 from .drawn import DrawnRobot
 
 RING = 64  # physics steps that are remembered
+TORQUE, TARGET, STIFFNESS, DAMPING = range(4)  # rows of `Motors.asked`
 BLEND, NO_LOAD = range(2)  # entries of `Motors.numbers`
 
 
@@ -24,7 +26,8 @@ class Motors(Block):
 
     robot: RobotArrays
     views: SimViews
-    asked: np.ndarray  # (RING, nu) torques that were asked for [N·m]
+    bus: MotorBus
+    asked: np.ndarray  # (RING, 4, nu) what was asked for: torque, target, stiffness, damping
     next: np.ndarray  # (1,) int: the row of the next ones
     late: np.ndarray  # (1,) int: physics steps
     torque: np.ndarray  # (nu,) that act [N·m]
@@ -32,13 +35,14 @@ class Motors(Block):
     numbers: np.ndarray  # (2,) 1 − exp(−dt/lag); the no-load speed [rad/s], 0: none
 
 
-def allocate_motors(simulation: Simulation) -> Motors:
+def allocate_motors(simulation: Simulation, bus: MotorBus) -> Motors:
     """Motors that have been asked for nothing."""
     nu = simulation.model.nu
     return Motors(
         robot=simulation.arrays,
         views=simulation.views,
-        asked=guarded_zeros((RING, nu)),
+        bus=bus,
+        asked=guarded_zeros((RING, 4, nu)),
         next=guarded_zeros(1, dtype=np.int64),
         late=guarded_zeros(1, dtype=np.int64),
         torque=guarded_zeros(nu),
@@ -49,7 +53,8 @@ def allocate_motors(simulation: Simulation) -> Motors:
 
 def begin_motors(m: Motors, drawn: DrawnRobot, holding: np.ndarray) -> None:
     """Start an episode, before which torques `holding` (nu,) [N·m] were asked for all the time."""
-    m.asked[:], m.torque[:], m.gain[:] = holding, drawn.gain * holding, drawn.gain
+    m.asked[:], m.torque[:], m.gain[:] = 0.0, drawn.gain * holding, drawn.gain
+    m.asked[:, TORQUE], m.bus.servoed[0] = holding, 0
     m.next[0], m.late[0] = 0, drawn.command
     m.numbers[BLEND] = -np.expm1(-m.robot.timestep / drawn.lag) if drawn.lag > 0.0 else 1.0
     m.numbers[NO_LOAD] = drawn.no_load_speed
@@ -71,20 +76,39 @@ def fraction_at(speed: float, torque: float, no_load: float) -> float:
 def drive_motors(m: Motors):
     """Apply the torques that the motors have now, in addition to what `views.ctrl` does.
 
-    The motor i is asked for u = ctrl of `late` physics steps ago, and follows it as
+    A motor is asked for u, q*, K, D; a torque alone is u = ctrl. It has them `late` physics steps
+    later, and its own encoder at once:
 
-        τ ← τ + (1 − exp(−dt/lag)) (gain · u − τ),    |τ| ≤ τ_max · fraction_at(q̇)
+        τ ← τ + (1 − exp(−dt/lag)) (gain (u + K (q* − q) − D q̇) − τ)
+        |τ| ≤ τ_max · fraction_at(q̇)
 
     `views.ctrl` stays what is asked for: the difference is a generalised force.
     """
     k, n = m.next[0], m.asked.shape[0]
     m.next[0] = (k + 1) % n
-    then = (k - m.late[0] + n) % n
+    remember(m, m.asked[k])
+    then = m.asked[(k - m.late[0] + n) % n]
     for i in range(m.torque.shape[0]):
         dof = m.robot.motor_dofs[i]
-        m.asked[k, i] = m.views.ctrl[i]
+        asked = then[TORQUE, i]
+        if then[STIFFNESS, i] != 0.0 or then[DAMPING, i] != 0.0:
+            asked += then[STIFFNESS, i] * (then[TARGET, i] - m.bus.q[dof - 6])
+            asked -= then[DAMPING, i] * m.bus.dq[dof - 6]
+        most = m.robot.torque_limit[i]
+        asked = m.gain[i] * min(max(asked, -most), most)
         torque = m.torque[i]
-        torque += m.numbers[BLEND] * (m.gain[i] * m.asked[then, i] - torque)
-        limit = m.robot.torque_limit[i] * fraction_at(m.views.qvel[dof], torque, m.numbers[NO_LOAD])
+        torque += m.numbers[BLEND] * (asked - torque)
+        limit = most * fraction_at(m.views.qvel[dof], torque, m.numbers[NO_LOAD])
         m.torque[i] = min(max(torque, -limit), limit)
         m.views.qfrc_applied[dof] = m.torque[i] - m.views.ctrl[i]
+
+
+@compiled
+def remember(m: Motors, row: np.ndarray):
+    """Write what the motors are asked for now into `row` (4, nu)."""
+    servoed, bus = m.bus.servoed[0], m.bus
+    for i in range(row.shape[1]):
+        row[TORQUE, i] = bus.torque[i] if servoed else m.views.ctrl[i]
+        row[TARGET, i] = bus.target[i] if servoed else 0.0
+        row[STIFFNESS, i] = bus.stiffness[i] if servoed else 0.0
+        row[DAMPING, i] = bus.damping[i] if servoed else 0.0

@@ -106,7 +106,7 @@ class SensedRobot:
 
     def _take(self, source: StateSource) -> None:
         self._state_source = source
-        source.simulation.equip(source.drive, source.sense, source.encoders)
+        source.simulation.equip(source.drive, source.sense, source.bus)
         self._unbind()
 
     def _draw(self, given: object, rng: np.random.Generator) -> None:
