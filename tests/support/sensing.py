@@ -27,7 +27,7 @@ def estimated(level: Level, seed: int = 0, **estimator: object) -> EstimatedStat
     """A source whose simulation is measured and driven by `Simulation.step`."""
     config = EstimatorConfig(**estimator)  # type: ignore[arg-type]
     source = EstimatedState(Plant(robot()), robot(), config)
-    source.simulation.equip(source.drive, source.sense, source.encoders)
+    source.simulation.equip(source.drive, source.sense, source.bus)
     start(source, level, seed)
     return source
 

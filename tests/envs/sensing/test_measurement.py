@@ -135,7 +135,7 @@ def test_backlash_is_a_play(source):
         views.qpos[7:] = q
         run(source.sense)
         y = np.minimum(np.maximum(y, q - 0.5 * width), q + 0.5 * width)
-        np.testing.assert_allclose(source.sensors.joint_q, y, atol=1e-12)
+        np.testing.assert_allclose(source.bus.q, y, atol=1e-12)
         assert (abs(y - q) <= 0.5 * width + 1e-12).all()
         read.append(np.array_equal(y, was))
         was = y

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from poise.envs.compiled.calls import run
+from poise.envs.physics.motor_bus import ask_servo
 from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.motors import fraction_at
 from tests.support.sensing import PLAIN, estimated, start
@@ -71,3 +72,23 @@ def test_motors_begin_with_what_held_the_robot(source):
     for _ in range(2):
         np.testing.assert_allclose(asked(source, 0.0 * holding), drawn.gain * holding)
     assert not np.any(asked(source, 0.0 * holding))
+
+
+def test_servos_run_in_the_motors(source):
+    """Targets are late, the motor's own encoder is not, and errs by its bias."""
+    drawn = start(source, {"latency": {"command": 0.006}, "sensors": {"encoder_bias": 0.05}})
+    rng, bus, state = np.random.default_rng(1), source.bus, source.simulation.state
+    nu, joints, limit = robot().model.nu, robot().motor_dofs - 6, robot().torque_limit
+    targets, zero = state.q[joints] + rng.uniform(-0.2, 0.2, (8, nu)), np.zeros(nu)
+    for k, target in enumerate(targets):
+        for i in range(nu):
+            ask_servo(bus, i, 1.0, target[i], 50.0, 2.0)
+        read = state.q[joints] + drawn.encoder_bias[joints]
+        torque = 1.0 + 50.0 * (targets[max(k - 3, 0)] - read) - 2.0 * state.qvel[joints + 6]
+        acted = asked(source, zero)
+        if k >= 3:
+            np.testing.assert_allclose(acted, np.clip(torque, -limit, limit), atol=1e-9)
+        else:
+            assert not np.any(acted)
+    start(source, PLAIN)
+    assert not np.any(asked(source, zero))  # nobody asks for servos any more
