@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from poise.configs.schema import build
 from poise.envs.compiled.calls import run
 from poise.envs.sensing.drawn import DrawnRobot, draw_robot
 from poise.envs.sensing.estimator import EstimatedState, EstimatorConfig
@@ -25,7 +26,7 @@ def drawn_of(level: Level, seed: int = 0) -> DrawnRobot:
 
 def estimated(level: Level, seed: int = 0, **estimator: object) -> EstimatedState:
     """A source whose simulation is measured and driven by `Simulation.step`."""
-    config = EstimatorConfig(**estimator)  # type: ignore[arg-type]
+    config = build(EstimatorConfig, estimator, "tests")
     source = EstimatedState(Plant(robot()), robot(), config)
     source.simulation.equip(source.drive, source.sense, source.bus)
     start(source, level, seed)
