@@ -23,7 +23,24 @@ from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot, on_terrain
 
 from .drawn import DrawnRobot
-from .measurement import RING, Rings, Sensors, allocate_sensors, begin_sensors, measure
+from .inekf import (
+    ATTITUDE,
+    ENCODER,
+    FORCE,
+    FORCE_WALK,
+    GYRO,
+    GYRO_WALK,
+    KINEMATICS,
+    LIFT,
+    SLIDE,
+    Invariant,
+    InvariantConfig,
+    allocate_invariant,
+    begin_invariant,
+    follow_invariant,
+)
+from .inekf import ROLL as FOOT_ROLL
+from .measurement import DRIFT_TIME, RING, Rings, Sensors, allocate_sensors, begin_sensors, measure
 from .motors import allocate_motors, begin_motors, drive_motors
 from .odometry import (
     BB,
@@ -48,7 +65,7 @@ from .rollout import Rollout, make_rollout, roll_out
 from .source import StateSource
 
 POSITIVE = {"above": 0.0}
-SENSE, EARLIER, HORIZON, EXACT, SIMULATED = range(5)  # entries of `Belief.steps`
+SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT = range(6)  # entries of `Belief.steps`
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 #: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
@@ -61,6 +78,7 @@ class EstimatorConfig:
 
     Attributes:
         kind: `odometry` integrates the accelerometer and is corrected by legs that stand;
+            `inekf` is the invariant Kalman filter of the same measurements;
             `exact` is the true state, as late as the sensors are; `auto` is `exact` at a level
             whose sensors have no errors, and else `odometry`.
         predictor: `promised` leads the state on by the accelerations that the QP has promised, to
@@ -75,9 +93,10 @@ class EstimatorConfig:
         bias_walk: by which that changes in a second [m/s²].
         slip: the error of a velocity that one leg tells, besides the joints' noise [m/s].
         roll_radius: of it for each rad/s that the sole turns by [m].
+        invariant: what only `inekf` goes by.
     """
 
-    kind: Literal["auto", "odometry", "exact"] = "auto"
+    kind: Literal["auto", "odometry", "inekf", "exact"] = "auto"
     predictor: Literal["auto", "promised", "rollout", "none"] = "auto"
     filtered: bool = True
     joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
@@ -87,6 +106,7 @@ class EstimatorConfig:
     bias_walk: float = field(default=0.1, metadata=POSITIVE)
     slip: float = field(default=0.15, metadata=POSITIVE)
     roll_radius: float = field(default=3.0, metadata=POSITIVE)
+    invariant: InvariantConfig = field(default_factory=InvariantConfig)
 
 
 #: of a controller that brings an estimator of its own: what is measured, as late and as noisy
@@ -99,11 +119,12 @@ class Belief(Block):
 
     rings: Rings
     odometry: Odometry
+    invariant: Invariant
     robot: RobotArrays  # that is believed in
     views: SimViews  # of its simulation
     state: StateArrays
     rollout: Rollout
-    steps: np.ndarray  # (5,) int: physics steps, see SENSE and its like
+    steps: np.ndarray  # (6,) int: physics steps, see SENSE and its like
     axes: np.ndarray  # (3, 3) of the root, led on
     q: np.ndarray  # (nj,) likewise
     v: np.ndarray  # (nv,)
@@ -124,16 +145,23 @@ def believe(b: Belief):
         copy_into(r.truth_qpos[row, 7:], b.q)
         copy_into(r.truth_qvel[row], b.v)
     else:
-        follow_measurements(o, known + 1, b.steps[EARLIER])
+        if b.steps[INVARIANT]:
+            follow_invariant(b.invariant, known + 1, b.steps[EARLIER])
+        else:
+            follow_measurements(o, known + 1, b.steps[EARLIER])
         copy_into(o.position, b.position)
         copy_axes(o.axes, b.axes)
         copy_into(o.q, b.q)
         copy_into(o.v, b.v)
+        if b.steps[INVARIANT]:
+            for a in range(3):
+                b.v[3 + a] -= b.invariant.gyro_bias[a]
+    ahead = b.steps[HORIZON] - b.steps[SENSE] + now - known  # at an episode's start less is late
     if b.steps[HORIZON] > 0 and b.steps[SIMULATED] + b.rollout.motors.bus.servoed[0] > 1:
-        roll_out(b.rollout, known, b.steps[HORIZON], b.steps[EARLIER], b.position, b.axes, b.q, b.v)
+        roll_out(b.rollout, known, ahead, b.steps[EARLIER], b.position, b.axes, b.q, b.v)
     elif b.steps[HORIZON] > 0:
         predict(
-            o.promises, known, b.steps[HORIZON], b.steps[EARLIER], b.robot.timestep,
+            o.promises, known, ahead, b.steps[EARLIER], b.robot.timestep,
             b.position, b.axes, b.q, b.v,
         )  # fmt: skip
     _write_state(b, row)
@@ -171,6 +199,8 @@ def _stand_on_ground(b: Belief):
             feet += 1
     if feet > 0:
         b.odometry.position[2] -= SINK * total / feet
+        for i in range(1, b.invariant.place.shape[0]):  # the position there, and the soles
+            b.invariant.place[i, 2] -= SINK * total / feet
 
 
 class EstimatedState(StateSource, Copyable):
@@ -200,11 +230,12 @@ class EstimatedState(StateSource, Copyable):
         self.promise = promises.last
         rings = self.sensors.rings
         self.odometry = allocate_odometry(self.arrays, self.state_arrays, rings, promises)
+        self.invariant = allocate_invariant(self.odometry)
         nv, zeros = plant.simulation.model.nv, guarded_zeros
         self.belief = Belief(
-            rings, self.odometry, self.arrays, self.known.views, self.state_arrays,
+            rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
             make_rollout(robot, plant.simulation.robot.terrain, self.motors),
-            zeros(5, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
+            zeros(6, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
         self.drive = Program.of([(drive_motors, self.motors)])
         self.sense = Program.of([(measure, self.sensors)])
@@ -223,8 +254,11 @@ class EstimatedState(StateSource, Copyable):
         earlier = max(round((drawn.command * dt + drawn.lag + drawn.misjudged) / dt), 0)
         horizon = drawn.sense + earlier if predicted else 0
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
-        self.belief.steps[:] = drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor]
+        self.belief.steps[:] = (
+            drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf"
+        )  # fmt: skip
         self._begin_odometry()
+        self._begin_invariant()
         self.update()
 
     def _begin_odometry(self) -> None:
@@ -248,6 +282,23 @@ class EstimatedState(StateSource, Copyable):
             o.numbers[RATE_GAIN] = rate_gain(dt, c.turn_acceleration, d["gyro_noise"])
         else:
             o.gains[:], o.numbers[RATE_GAIN] = np.eye(2), 1.0
+
+    def _begin_invariant(self) -> None:
+        """Start at the odometry's state, with what the sensors' noises are thought to be."""
+        f, d, c = self.invariant, self.drawn.noise, self.config
+        own, noise, dt = c.invariant, self.invariant.numbers, self.arrays.timestep
+        drift = np.hypot(own.attitude, d["tilt_drift"] * np.sqrt(2.0 * DRIFT_TIME / dt))
+        noise[GYRO], noise[FORCE] = (
+            d["gyro_noise"],
+            np.hypot(c.acceleration, d["accelerometer_noise"]),
+        )
+        noise[GYRO_WALK], noise[FORCE_WALK] = own.gyro_bias_walk, c.bias_walk
+        noise[ATTITUDE], noise[ENCODER] = drift, d["encoder_noise"]
+        noise[KINEMATICS], noise[SLIDE] = own.kinematics, own.slide
+        noise[FOOT_ROLL], noise[LIFT] = own.roll, own.lift
+        begin_invariant(
+            f, np.hypot(own.attitude, d["tilt_drift"]), START_SPEED, own.gyro_bias, c.bias
+        )
 
     def reset(self) -> None:
         """Nothing: `begin` says who the robot is."""
