@@ -19,7 +19,6 @@ from poise.training.trials.push_limits import PushLimits
 
 from .played import Played, part, pushes, rate, won
 
-
 NAMED = ("body", "realism")  # factors whose levels are names, not numbers
 
 
