@@ -53,7 +53,8 @@ class EnvConfig:
         fall: When the robot has fallen, and when it is quiet.
         reward: Weights of the reward's terms.
         observation: What the observation is made of.
-        sensors: How the state becomes known.
+        realism: How real sensors, motors, body and ground are: a level by name, file or fields.
+        estimator: How the state is estimated where it is not known exactly.
         terrain: What the robot stands on.
         clip_action: Take actions beyond [-1, 1] as 1 or -1, instead of refusing them.
     """

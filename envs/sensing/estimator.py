@@ -77,23 +77,23 @@ class EstimatorConfig:
     """How the state is estimated.
 
     Attributes:
-        kind: `odometry` integrates the accelerometer and is corrected by legs that stand;
-            `inekf` is the invariant Kalman filter of the same measurements;
+        kind: Estimator of the state: `odometry` integrates the accelerometer and is corrected by
+            legs that stand; `inekf` is the invariant Kalman filter of the same measurements;
             `exact` is the true state, as late as the sensors are; `auto` is `exact` at a level
             whose sensors have no errors, and else `odometry`.
-        predictor: `promised` leads the state on by the accelerations that the QP has promised, to
-            when the torques of this tick will act; `rollout` by a simulation of the known robot
-            with what its motors were asked for; `none` leaves it as late as it is. `auto` is
+        predictor: Way in which the state is led on to when the torques of this tick will act:
+            `promised` by the accelerations that the QP has promised, `rollout` by a simulation of
+            the known robot with what its motors were asked for, `none` not at all; `auto` is
             `rollout` while motors run servos, whose accelerations nobody promises, else `promised`.
-        filtered: whether joint velocities are filtered.
-        joint_acceleration: of joints, that nobody knows of, from step to step [rad/s²].
-        turn_acceleration: likewise of the root [rad/s²].
-        acceleration: the error of the accelerometer besides its noise, from step to step [m/s²].
-        bias: of the accelerometer, with that of the attitude, at the start [m/s²].
-        bias_walk: by which that changes in a second [m/s²].
-        slip: the error of a velocity that one leg tells, besides the joints' noise [m/s].
-        roll_radius: of it for each rad/s that the sole turns by [m].
-        invariant: what only `inekf` goes by.
+        filtered: Whether joint velocities are filtered.
+        joint_acceleration: Acceleration of joints that nobody knows of, step to step [rad/s²].
+        turn_acceleration: Angular acceleration of the root that nobody knows of [rad/s²].
+        acceleration: Error of the accelerometer besides its noise, from step to step [m/s²].
+        bias: Error of accelerometer and attitude together at the start [m/s²].
+        bias_walk: Change of that error in a second [m/s²].
+        slip: Error of a velocity that one leg tells, besides the joints' noise [m/s].
+        roll_radius: Error of that velocity for each rad/s that the sole turns by [m].
+        invariant: What only `inekf` goes by.
     """
 
     kind: Literal["auto", "odometry", "inekf", "exact"] = "auto"
