@@ -105,8 +105,8 @@ def test_kept_promises_undo_all_delays(source):
 
 
 def test_a_constant_acceleration_is_led_on_exactly():
-    """A robot without springs that falls freely is where the promise of g has it, 10 steps late; at once from the
-    start: what is late is not led on beyond now."""
+    """A robot without springs that falls freely is where the promise of g has it, 10 steps late;
+    from the start on, when less is late."""
     level = {"latency": {"sense": 0.02}}
     source = estimated(level)
     source.simulation.model.jnt_stiffness[:] = 0.0
