@@ -27,7 +27,7 @@ class DrawnRobot:
         mass_factor: (nb,) of each body's mass and inertia.
         payload: on the loaded body, over the robot's mass.
         friction, softness: of the ground, or None: as in the model.
-        slope: (2,) tangent of the ground's rise along x and y.
+        slope: (2,) tangent of the ground's fall along x and y.
     """
 
     sense: int

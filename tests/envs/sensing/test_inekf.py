@@ -244,8 +244,7 @@ def test_the_covariance_stays_symmetric_and_positive():
 
 
 def test_biases_are_found_by_a_robot_in_the_air():
-    """Free fall with rigid joints has no force: what the accelerometer reads is its bias, and the
-    attitude tells the gyro's."""
+    """The attitude tells the gyro's."""
     level = {"sensors": {"gyro_bias": 0.02, "tilt_drift": 0.0001, "gyro_noise": 0.001}}
     source = estimated(PLAIN, kind="inekf", invariant={"attitude": 0.001})
     qpos = robot().standing_qpos.copy()

@@ -32,7 +32,7 @@ def test_torques_are_late_by_whole_steps(source):
     rng = np.random.default_rng(0)
     torques = 0.2 * robot().torque_limit * rng.uniform(-1.0, 1.0, (8, robot().model.nu))
     acted = [asked(source, torque) for torque in torques]
-    np.testing.assert_allclose(acted[3:], torques[:-3], rtol=1e-12)  # by the rounding of the lag
+    np.testing.assert_allclose(acted[3:], torques[:-3], rtol=1e-12)
     assert not np.any(acted[:3])
     start(source, {"latency": {"command": 0.005}})
     assert source.motors.late[0] == 2

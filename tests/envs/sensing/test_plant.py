@@ -62,12 +62,12 @@ def test_joints_and_ground(plant):
 
 
 def test_a_slope_tilts_gravity(plant):
-    """Down the rise of the ground, by its angle, as strong as ever."""
+    """To where the ground falls, by its angle, as strong as ever."""
     drawn = drawn_of({"ground": {"slope": 10.0}})
     plant.become(drawn)
     g = plant.simulation.model.opt.gravity
     assert np.linalg.norm(g) == pytest.approx(9.81)
-    np.testing.assert_allclose(g[:2] / g[2], drawn.slope, atol=1e-12)
+    np.testing.assert_allclose(-g[:2] / g[2], drawn.slope, atol=1e-12)
     assert np.degrees(np.arccos(-g[2] / 9.81)) == pytest.approx(10.0)
 
 
