@@ -58,7 +58,9 @@ def test_stable_baselines3_finds_nothing_to_say(name):
 def test_make_gives_the_documented_class(name):
     """`unwrapped` is the class, and no wrapper ends episodes before the configuration does."""
     env = gymnasium.make(name)
-    assert type(env.unwrapped) is IDS[name] and env.spec.max_episode_steps is None
+    assert (
+        type(env.unwrapped) is IDS[name] and env.spec.max_episode_steps == env.unwrapped.max_steps
+    )
     assert env.observation_space == env.unwrapped.observation_space
     assert env.action_space.low.min() == -1.0 and env.action_space.high.max() == 1.0
 

@@ -58,7 +58,7 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
     if d.hardware is not None:
         told.append((float("inf"), d.hardware))
     before = "; ".join(text for _, text in sorted(told))
-    return f"{end}. {before[0].upper()}{before[1:]}." if before else f"{end}."
+    return f"{end}. Before: {before}." if before else f"{end}."
 
 
 def cause(d: Diagnosis, steps: int) -> str:

@@ -457,6 +457,14 @@ def test_train_without_flags_is_the_packaged_configuration() -> None:
     assert not command.resume
 
 
+def test_a_quick_training_needs_no_folder() -> None:
+    """The packaged configuration of that name; flags replace its fields. It stays small."""
+    command = parse(["--quick", "--seed", "3"])
+    assert command.settings == replace(train_config("quick"), seed=3)
+    assert command.out == Path("runs/quick") and command.settings.steps <= 500_000
+    assert parse(["--quick", "--out", "run"]).out == Path("run")
+
+
 def test_another_robot_is_trained_by_a_configuration_that_fits_it() -> None:
     """The packaged default names bodies of the humanoid."""
     settings = parse(["--out", "run", "--robot", "tall"]).settings

@@ -142,9 +142,9 @@ def test_words() -> None:
     found = Diagnosis("contact", "pelvis", "left_ankle_y", 0.62, 0.34, 0.84, 0.21, "missed", 1.12,
                       0.08, 0.7)  # fmt: skip
     assert why(found, 1.94) == (
-        "fell: pelvis touched the ground at 1.94 s. Left_ankle_y at its limit from 0.62 s, for "
-        "0.34 s; no solution of its QP from 0.70 s on; capture point outside of the support for "
-        "good from 0.84 s, by 0.21 m at most; foothold missed by 0.08 m at 1.12 s."
+        "fell: pelvis touched the ground at 1.94 s. Before: left_ankle_y at its limit from "
+        "0.62 s, for 0.34 s; no solution of its QP from 0.70 s on; capture point outside of the "
+        "support for good from 0.84 s, by 0.21 m at most; foothold missed by 0.08 m at 1.12 s."
     )
     assert cause(found, 2) == "ankle_y at its limit, then a foothold missed"
     assert cause(replace(found, foothold="slipped"), 2).endswith("its steps were not enough")
