@@ -60,7 +60,7 @@ class Plant:
             for solref in (model.geom_solref, model.pair_solref):
                 soft = solref[:, 0] > 0.0  # a negative number is a stiffness of the model's own
                 solref[soft, 0] = np.maximum(solref[soft, 0], drawn.softness)
-        up = np.array([*drawn.slope, 1.0])  # against gravity, seen from the ground
+        up = np.array([-drawn.slope[0], -drawn.slope[1], 1.0])  # of gravity, seen from the ground
         model.opt.gravity[:] = -self._gravity * up / np.linalg.norm(up)
         mujoco.mj_setConst(model, self._scratch)
         self.simulation.arrays.replace_number("mass", float(model.body_subtreemass[self._root]))
