@@ -16,6 +16,14 @@ from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 
+class ServoOutputs(NamedTuple):
+    """Servos that give the torques: τ = K (q* − q) − D q̇ of each joint, within the limits."""
+
+    target: np.ndarray  # (nj,) q* [rad]
+    stiffness: np.ndarray  # (nj,) K [N·m/rad]
+    damping: np.ndarray  # (nj,) D [N·m·s/rad]
+
+
 class Outputs(NamedTuple):
     """The arrays in which compiled code finds what a controller's tick gave."""
 
@@ -23,6 +31,8 @@ class Outputs(NamedTuple):
     root_wrench: np.ndarray  # (6,) of a soft root
     failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
     soft_root: bool
+    vdot: np.ndarray | None = None  # (nv,) accelerations that the torques are to bring, if known
+    servos: ServoOutputs | None = None  # which motors run themselves where they are real
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +148,13 @@ class BaseController(Copyable):
     period: float  #: seconds between two calls of `torques`
     config: Any = None  #: that it was made from
     com_offset: float = 0.0  #: forward, of the CoM that it stands with from the motion's [m]
+    #: True of one that brings an estimator of its own: it gets what is measured, late and noisy
+    raw_measurements: bool = False
+
+    @property
+    def vdot(self) -> np.ndarray | None:
+        """(nv,) accelerations that the last torques are to bring, or None where it has none."""
+        return None
 
     @property
     def failures(self) -> int:
@@ -223,6 +240,11 @@ class WrappedController(BaseController):
     def failures(self) -> int:
         """See `BaseController`."""
         return self._base.failures
+
+    @property
+    def vdot(self) -> np.ndarray | None:
+        """See `BaseController`."""
+        return self._base.vdot
 
     @property
     def root_wrench(self) -> np.ndarray:

@@ -12,15 +12,17 @@ __all__ = [
     "BalanceEnv",
     "BalanceVectorEnv",
     "Camera",
-    "DelayedState",
     "EnvBatch",
     "EnvConfig",
+    "EstimatedState",
+    "EstimatorConfig",
     "FallLimits",
     "Kick",
     "PlainInfo",
     "PositionBalanceEnv",
     "Push",
     "PushSampler",
+    "Realism",
     "RewardWeights",
     "Robot",
     "RobotState",
@@ -57,8 +59,9 @@ if TYPE_CHECKING:
     from poise.envs.pushes.push import Kick, Push
     from poise.envs.pushes.sampler import PushSampler
     from poise.envs.robots.robot import Robot, load_robot, on_terrain
-    from poise.envs.sensors.delayed import DelayedState
-    from poise.envs.sensors.source import StateSource
+    from poise.envs.sensing.estimator import EstimatedState, EstimatorConfig
+    from poise.envs.sensing.realism import Realism
+    from poise.envs.sensing.source import StateSource
     from poise.envs.terrain.terrain import Terrain, make_terrain
     from poise.envs.vector.batch import EnvBatch, replicate
     from poise.envs.vector.vector_env import BalanceVectorEnv
@@ -84,8 +87,9 @@ else:
             "pushes.push": ("Kick", "Push"),
             "pushes.sampler": ("PushSampler",),
             "robots.robot": ("Robot", "load_robot", "on_terrain"),
-            "sensors.delayed": ("DelayedState",),
-            "sensors.source": ("StateSource",),
+            "sensing.estimator": ("EstimatedState", "EstimatorConfig"),
+            "sensing.realism": ("Realism",),
+            "sensing.source": ("StateSource",),
             "terrain.terrain": ("Terrain", "make_terrain"),
             "vector.batch": ("EnvBatch", "replicate"),
             "vector.vector_env": ("BalanceVectorEnv",),

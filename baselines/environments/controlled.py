@@ -6,13 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.controller import CompiledController, Controller, Targets, as_base_controller
+from poise.baselines.controller import (
+    CompiledController,
+    Controller,
+    ServoOutputs,
+    Targets,
+    as_base_controller,
+)
 from poise.baselines.walking.schedule import follow_timetable
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import whole_steps
 from poise.envs.balance.episode import FAILURES, ROOT_FORCE, ROOT_MOMENT, StepEnd, judge_step
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Erased, Kernel, Program, address_of
+from poise.envs.compiled.memory import guarded_zeros
 
 from .commanded import CommandedEnv
 from .policy_step import (
@@ -63,6 +70,7 @@ class ControlledEnv(CommandedEnv):
         # all others are called from Python, tick by tick
         self._compiled = isinstance(controller, CompiledController) and controller.compiled
         self._com_offset = float(base.com_offset)
+        self.believe_raw(base.raw_measurements)
         self._unbind()
 
     def _unbind(self) -> None:
@@ -100,6 +108,7 @@ class ControlledEnv(CommandedEnv):
         controller = self._controller
         assert isinstance(controller, CompiledController)  # only they have ticks
         found = controller.outputs()
+        servos = found.servos or ServoOutputs(*(guarded_zeros(0) for _ in range(3)))
         return PolicyStep(
             inputs=self._target_inputs(),
             kernel=kernel,
@@ -108,6 +117,11 @@ class ControlledEnv(CommandedEnv):
             root_wrench=found.root_wrench,
             failures=found.failures,
             soft_root=found.soft_root,
+            vdot=guarded_zeros(0) if found.vdot is None else found.vdot,
+            promise=self.state_source.promise,
+            target=servos.target,
+            stiffness=servos.stiffness,
+            damping=servos.damping,
             world=self.simulation.world(),
             estimate=self.state_source.estimate,
             ticks=self.ticks,
@@ -153,13 +167,17 @@ class ControlledEnv(CommandedEnv):
         if e.ticks[0] == 0:
             set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
         set_targets(a)
-        ctrl[:] = self.controller.torques(self.state_source.state, self.targets)
+        source = self.state_source
+        ctrl[:] = self.controller.torques(source.state, self.targets)
+        if len(source.promise) and (promised := self._base.vdot) is not None:
+            source.promise[:] = promised
         add_torques(a.residual, self.arrays.torque_limit, ctrl)
+        sim.bus.servoed[0] = 0
         wrench[:] = self._base.root_wrench
         self._push_root(wrench)
         account_tick(self._account())
         sim.step(ctrl, self.control_substeps)
-        self.state_source.update()
+        source.update()
         e.ticks[0] += 1
         if e.ticks[0] == self.ticks:
             self._end_in_python()

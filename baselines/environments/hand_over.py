@@ -5,16 +5,24 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from poise.envs.balance.episode import record_tick
-from poise.envs.balance.servos import Servos, aim, pd_torque
+from poise.envs.balance.servos import Servos, aim, hand_to_motors, servo_torque
 from poise.envs.balance.termination import uprightness
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.callbacks import CallbackAddress, call_back
 from poise.envs.compiled.calls import call, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.kinematics import update_state
-from poise.envs.physics.simulation import advance
+from poise.envs.physics.simulation import physics_step
 
-from .policy_step import PolicyStep, capture_error, end_tick, policy_tick, set_offsets, set_targets
+from .policy_step import (
+    PolicyStep,
+    capture_error,
+    end_tick,
+    policy_tick,
+    promise_motion,
+    set_offsets,
+    set_targets,
+)
 
 OPEN, CALM, AUTHORITY, TOOK = range(4)  # entries of `HandOver.memory`
 
@@ -118,14 +126,10 @@ def blend_torques(step: WholeStep):
     base, servos, w = step.base, step.servos, step.hand.memory[AUTHORITY]
     views = base.world.views
     for i in range(views.ctrl.shape[0]):
-        dof = servos.dofs[i]
-        torque = pd_torque(
-            servos.stiffness[i], servos.damping[i], servos.limit[i],
-            servos.target[i] - views.qpos[dof + 1], views.qvel[dof],
-        )  # fmt: skip
-        views.ctrl[i] = w * torque
+        views.ctrl[i] = w * servo_torque(servos, base.world, i)
         if w < 1.0:
-            views.ctrl[i] += (1.0 - w) * base.tau[dof - 6]
+            views.ctrl[i] += (1.0 - w) * base.tau[servos.dofs[i] - 6]
+    hand_to_motors(servos, base.world, w, base.tau)
 
 
 @compiled
@@ -145,11 +149,11 @@ def whole_tick(step: WholeStep):
     if hand.memory[AUTHORITY] < 1.0:
         set_targets(a)
         call(base.kernel, base.tick)
+        promise_motion(base)
     for _ in range(base.substeps):
         blend_torques(step)
         record_tick(world.robot, world.views.qvel, world.views.ctrl, world.robot.timestep, e)
-        advance(world.robot, world.views, world.pushes, world.clock)
-        run(world.sensors)
+        physics_step(world)
     update_state(world.robot, world.views, world.state)
     run(base.estimate)
     end_tick(base)

@@ -22,6 +22,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.motor_bus import ask_servo
 from poise.envs.physics.simulation import World, simulate
 
 
@@ -129,12 +130,36 @@ class PolicyStep(Block):
     root_wrench: np.ndarray  # (6,) of a soft root
     failures: np.ndarray  # (1,) int: ticks that it could not solve
     soft_root: bool
+    vdot: np.ndarray  # (nv,) accelerations that they are to bring; (0,): not known
+    promise: np.ndarray  # (nv,) where the state source reads them; (0,): it does not
+    target: np.ndarray  # (nj,) q* of servos that give the torques; (0,): none do
+    stiffness: np.ndarray  # (nj,) of them
+    damping: np.ndarray  # (nj,)
     world: World
     estimate: Program  # of the state source
     ticks: int
     substeps: int  # physics steps of each
     episode: EpisodeArrays
     end: StepEnd
+
+
+@compiled
+def promise_motion(step: PolicyStep):
+    """Tell the state source which accelerations the controller's torques are to bring."""
+    if step.promise.shape[0] == step.vdot.shape[0]:
+        copy_into(step.vdot, step.promise)
+
+
+@compiled
+def ask_motors(step: PolicyStep):
+    """Where the motors are real, let them run the controller's servos, if it has any."""
+    bus, world = step.world.bus, step.world
+    bus.servoed[0] = 0
+    if bus.q.shape[0] > 0 and step.target.shape[0] > 0:
+        for i in range(world.views.ctrl.shape[0]):
+            j = world.robot.motor_dofs[i] - 6
+            besides = world.views.ctrl[i] - step.tau[j]
+            ask_servo(bus, i, besides, step.target[j], step.stiffness[j], step.damping[j])
 
 
 @compiled
@@ -146,9 +171,11 @@ def policy_tick(step: PolicyStep):
         set_offsets(a.residual, a.state, a.motion, a.com_offset, e)
     set_targets(a)
     call(step.kernel, step.tick)
+    promise_motion(step)
     for i in range(views.ctrl.shape[0]):
         views.ctrl[i] = step.tau[robot.motor_dofs[i] - 6]
     add_torques(a.residual, robot.torque_limit, views.ctrl)
+    ask_motors(step)
     if step.soft_root:
         soft_root_force(s, w, views.qfrc_applied)
         m = e.metrics

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from poise.baselines.controller import CompiledController, Outputs, Targets
+from poise.baselines.controller import CompiledController, Outputs, ServoOutputs, Targets
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.numbers import whole_steps
 from poise.envs.balance.servos import pd_torque
@@ -51,7 +51,10 @@ class PolicyTick(Block):
 
 @compiled
 def policy_tick(t: PolicyTick):
-    """τ = K (q* − q) − D q̇ within the limits; q* is new at the first tick of a policy step."""
+    """τ = K (q* − q) − D q̇ within the limits; q* is new at the first tick of a policy step.
+
+    q and q̇ are what the motors' own encoders read: they are not late where the state is.
+    """
     servos, s = t.servos, t.state
     if servos.ticks[0] % servos.every == 0:
         call_back(t.ask)
@@ -59,7 +62,7 @@ def policy_tick(t: PolicyTick):
     for a in range(servos.tau.shape[0]):
         servos.tau[a] = pd_torque(
             servos.stiffness[a], servos.damping[a], servos.limit[a],
-            servos.target[a] - s.qpos[7 + a], s.qvel[6 + a],
+            servos.target[a] - s.motor_q[a], s.motor_dq[a],
         )  # fmt: skip
 
 
@@ -72,6 +75,8 @@ class PolicyFile(CompiledController):
     steps, joints that the robot lacks, lists of other sizes than the joints, terms that do not add
     up to what the network takes. A policy whose action is not finite raises PoiseError.
     """
+
+    raw_measurements = True
 
     def __init__(self, robot: Robot, config: PolicyFileConfig):
         self.robot, self.config = robot, config
@@ -176,7 +181,9 @@ class PolicyFile(CompiledController):
 
     def outputs(self) -> Outputs:
         """See `Outputs`."""
-        return Outputs(self._servos.tau, self._no_wrench, self._failures, False)
+        s = self._servos
+        servos = ServoOutputs(s.target, s.stiffness, s.damping)
+        return Outputs(s.tau, self._no_wrench, self._failures, False, servos=servos)
 
     def gains(self) -> Servos:
         """See `CompiledController`; raises what went wrong in the step before."""

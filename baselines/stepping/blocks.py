@@ -190,6 +190,7 @@ class CaptureTick(Block):
     on_both: ContactTick  # QP with both soles in contact
     standing: Tick  # QP with the feet in place, before the first step
     tau: np.ndarray  # (nv−6,) torques of the tick [N·m]
+    vdot: np.ndarray  # (nv,) accelerations that they are to bring
     failures: np.ndarray  # (1,) int: ticks since the reset that could not be solved
     to_python: np.ndarray  # (1,) int: 1 where Python has to solve `standing`
     corners: np.ndarray  # (k, 2) scratch

@@ -143,6 +143,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
         self.tau = guarded_zeros(
             len(self.qp.parameters.torque_limit)
         )  #: (nv−6,) of the last tick [N·m]
+        self._vdot = guarded_zeros(robot.model.nv)
         self._failures = guarded_zeros(1, dtype=np.int64)
         self._motors = self.qp.arrays.motor_dofs - 6
         self._reference_out: Targets | None = None
@@ -157,6 +158,12 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     def failures(self) -> int:
         """The ticks since the reset at which a QP was not solved."""
         return self.qp.failures + self.sets.failures
+
+    @property
+    def vdot(self) -> np.ndarray:
+        """(nv,) accelerations that the last torques are to bring."""
+        asked = self._tick is not None and self._tick.to_python[0]
+        return self.qp.vdot if asked else self._vdot.copy()
 
     @property
     def solver(self) -> Solver | None:
@@ -185,7 +192,8 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
     def outputs(self) -> Outputs:
         """See `Outputs`."""
         qp = self.qp
-        return Outputs(self.tau, qp.workspace.root_wrench, self._failures, qp.parameters.soft_root)
+        wrench, soft = qp.workspace.root_wrench, qp.parameters.soft_root
+        return Outputs(self.tau, wrench, self._failures, soft, self._vdot)
 
     def reset(self, state: RobotState | None = None) -> None:
         """Forget the last trial."""
@@ -276,6 +284,7 @@ class CaptureStep(AroundQP, CompiledController, SteppingController):
             on_both=on_both,
             standing=self.qp.tick(state, targets),
             tau=self.tau,
+            vdot=self._vdot,
             failures=self._failures,
             to_python=guarded_zeros(1, dtype=np.int64),
             corners=guarded_zeros(region.alone.shape[1:]),

@@ -123,6 +123,7 @@ def solve_contacts(t: CaptureTick, contacts: ContactTick) -> None:
     """Torques with these soles in contact."""
     call(t.contact_kernel, contacts)
     copy_into(contacts.problem.workspace.tau, t.tau)
+    copy_into(contacts.problem.workspace.vdot, t.vdot)
 
 
 @compiled
@@ -196,6 +197,7 @@ def standing_tick(t: CaptureTick) -> None:
         return
     call(t.standing_kernel, t.standing)
     copy_into(t.standing.problem.workspace.tau, t.tau)
+    copy_into(t.standing.problem.workspace.vdot, t.vdot)
     t.failures[0] = t.standing.memory.failures[0]
 
 

@@ -175,7 +175,7 @@ class MomentumQP(CompiledController):
     def outputs(self) -> Outputs:
         """The arrays in which a tick leaves its results."""
         ws, p = self.workspace, self.parameters
-        return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root)
+        return Outputs(ws.tau, ws.root_wrench, self.memory.failures, p.soft_root, ws.vdot)
 
     def assembly(self, state: RobotState, targets: Targets) -> Assembly:
         """The block that `assemble` fills the workspace from."""
@@ -254,6 +254,11 @@ class AroundQP(BaseController):
     def failures(self) -> int:
         """Ticks since the reset at which the QP was not solved."""
         return self.qp.failures
+
+    @property
+    def vdot(self) -> np.ndarray:
+        """(nv,) accelerations of the QP's last solution."""
+        return self.qp.vdot
 
     @property
     def root_wrench(self) -> np.ndarray:

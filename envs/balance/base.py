@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -19,7 +20,7 @@ from poise.envs.physics.simulation import Simulation, World
 from poise.envs.pushes.push import PushInfo, push_info
 from poise.envs.robots.mirror import Mirror, mirror_robot
 from poise.envs.robots.robot import Robot, load_robot, on_terrain
-from poise.envs.sensors.sensed import SensedRobot
+from poise.envs.sensing.sensed import SensedRobot
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.rendered import RenderedEnv
 
@@ -40,6 +41,7 @@ from .episode import (
 from .info import step_info
 from .observation import Term, Terms, View, mirror_terms, observer, scales
 from .reward import REWARD_TERMS
+from .servos import holding_torques
 from .start import RESET_OPTIONS, chosen_pushes, chosen_start, reset_options
 from .termination import episode_limits
 from .terms import TERMS
@@ -74,10 +76,11 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         self.robot = on_terrain(known, self.config.terrain)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.policy_period)}
         self._set_up_rendering(self.robot.model, render_mode, width, height, camera)
-        self.sensor_delay = self.config.sensors.delay
+        self.estimator = self.config.estimator
         self.push_sampler = self.config.pushes  #: may be replaced between episodes
         self.simulation = Simulation(self.robot)
         self.arrays: RobotArrays = self.simulation.arrays  #: of `robot`
+        self.realism = self.config.realism
         period = self.config.policy_period
         timestep = self.arrays.timestep
         self.substeps = whole_steps(period, timestep, "policy_period", "environment")
@@ -111,6 +114,10 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     def episode(self, episode: EpisodeArrays) -> None:
         self._episode = episode
         self._unbind()
+
+    @cached_property
+    def _holding(self) -> np.ndarray:
+        return holding_torques(self.robot)
 
     def _unbind(self) -> None:
         """Forget the blocks that compiled code works on: what they are made of has changed."""
@@ -233,7 +240,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
         `options`: "push" sets the pushes exactly (a mapping, a list of mappings, [] for none; see
         `parse_pushes`), "noise" scales the start noise, "qpos" (nq,) and "qvel" (nv,) are the
-        start itself.
+        start itself; "realism" fixes fields of the level, a mapping.
 
         Raises ConfigError naming the option that is unknown or wrong, and what it may be.
         """
@@ -241,12 +248,13 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         options = reset_options(options, self.option_names)
         super().reset(seed=seed_number(seed))
         rng = self.np_random
+        self._draw(options.get("realism"), rng)
         qpos, qvel = chosen_start(self.simulation, self.config.noise, options, rng)
         state = self.simulation.reset(qpos, qvel)
         pushes = chosen_pushes(options.get("push"), self.push_sampler, self.robot, state, rng)
         self.simulation.set_pushes(pushes)
         begin_episode(self.simulation.state_arrays, self.episode)
-        self.state_source.reset()
+        self._begin_sensing()
         self._begin(options)
         self._observe()
         if self.render_mode == "human":

@@ -8,6 +8,8 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml, to_dict
 from poise.envs.pushes.sampler import PushSampler
+from poise.envs.sensing.estimator import EstimatorConfig
+from poise.envs.sensing.realism import Realism, load_realism
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.terrain import Terrain
 
@@ -37,17 +39,6 @@ class ObservationConfig:
 
 
 @dataclass(frozen=True)
-class SensorConfig:
-    """The sensors through which controller and policy know the robot's state.
-
-    Attributes:
-        delay: Delay of the state that controller and policy know, whole physics steps [s].
-    """
-
-    delay: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0})
-
-
-@dataclass(frozen=True)
 class EnvConfig:
     """Everything about an environment that is not its robot or its controller.
 
@@ -62,7 +53,8 @@ class EnvConfig:
         fall: When the robot has fallen, and when it is quiet.
         reward: Weights of the reward's terms.
         observation: What the observation is made of.
-        sensors: How the state becomes known.
+        realism: How real sensors, motors, body and ground are: a level by name, file or fields.
+        estimator: How the state is estimated where it is not known exactly.
         terrain: What the robot stands on.
         clip_action: Take actions beyond [-1, 1] as 1 or -1, instead of refusing them.
     """
@@ -78,7 +70,10 @@ class EnvConfig:
     observation: ObservationConfig = field(
         default_factory=ObservationConfig, metadata={"omit": "default"}
     )
-    sensors: SensorConfig = field(default_factory=SensorConfig, metadata={"omit": "default"})
+    realism: Realism = field(default_factory=Realism, metadata={"omit": "default"})
+    estimator: EstimatorConfig = field(
+        default_factory=EstimatorConfig, metadata={"omit": "default"}
+    )
     terrain: Terrain = field(default_factory=Flat, metadata={"omit": "default"})
     clip_action: bool = field(default=False, metadata={"omit": "default"})
 
@@ -86,7 +81,8 @@ class EnvConfig:
 def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: object) -> EnvConfig:
     """An EnvConfig from a .yaml file, a mapping or an object; `overrides` win.
 
-    `terrain` may be the name of a kind alone.
+    `terrain` may be the name of a kind alone, `realism` that of a level, `estimator` that of a
+    kind.
 
     Raises ConfigError naming the file, the field and the choices, UnknownArgument for an override
     that is no field.
@@ -112,6 +108,10 @@ def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: obj
         )
     overrides = {name: to_dict(value) for name, value in overrides.items()}
     merged = {**fields, **overrides}
+    if "realism" in merged:
+        merged["realism"] = to_dict(load_realism(merged["realism"]))
+    if isinstance(merged.get("estimator"), str):
+        merged["estimator"] = {"kind": merged["estimator"]}
     if isinstance(merged.get("terrain"), str):
         merged["terrain"] = {"kind": merged["terrain"]}
     return build(EnvConfig, merged, source)

@@ -27,7 +27,15 @@ def step_info(env: BalanceEnv) -> dict[str, Any]:
         "solver_failures": int(metrics[FAILURES]),
         "torque_saturation": metrics[SATURATED] / max(metrics[TICKS], 1.0),
         "root_wrench": env.episode.root_wrench.copy(),
+        **drawn_info(env),
     }
+
+
+def drawn_info(env: BalanceEnv) -> dict[str, Any]:
+    """What is told of the episode's robot where that is drawn, see `DrawnRobot.summary`."""
+    if env.drawn is None:
+        return {}
+    return {"realism": {"level": env.realism.name, **env.drawn.summary(env.arrays.timestep)}}
 
 
 class InfoArrays(TypedDict):

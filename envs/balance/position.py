@@ -11,7 +11,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Program, address_of, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.kinematics import update_state
-from poise.envs.physics.simulation import World, advance
+from poise.envs.physics.simulation import World, physics_step
 from poise.envs.robots.robot import Robot
 
 from .base import EnvConfig
@@ -38,10 +38,9 @@ def position_step(step: PositionStep):
     world, e, views = step.world, step.episode, step.world.views
     aim(step.servos, e.action)
     for _ in range(step.substeps):
-        drive(step.servos, views)
+        drive(step.servos, world)
         record_tick(world.robot, views.qvel, views.ctrl, world.robot.timestep, e)
-        advance(world.robot, views, world.pushes, world.clock)
-        run(world.sensors)
+        physics_step(world)
     update_state(world.robot, views, world.state)
     run(step.estimate)
     end_step(step.end)

@@ -9,7 +9,8 @@ from poise.configs.errors import ConfigError
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.physics.arrays import SimViews
+from poise.envs.physics.motor_bus import ask_servo
+from poise.envs.physics.simulation import World
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 
@@ -75,14 +76,38 @@ def aim(servos: Servos, action: np.ndarray):
 
 
 @compiled
-def drive(servos: Servos, views: SimViews):
-    """The servos' torques in `views.ctrl`, by the true positions and velocities of the joints."""
+def servo_torque(servos: Servos, world: World, i: int) -> float:
+    """The torque of the servo of motor i, by what its own encoder reads [N·m]."""
+    dof = servos.dofs[i]
+    if world.bus.q.shape[0] > 0:
+        position, velocity = world.bus.q[dof - 6], world.bus.dq[dof - 6]
+    else:
+        position, velocity = world.views.qpos[dof + 1], world.views.qvel[dof]
+    return pd_torque(
+        servos.stiffness[i], servos.damping[i], servos.limit[i],
+        servos.target[i] - position, velocity,
+    )  # fmt: skip
+
+
+@compiled
+def drive(servos: Servos, world: World):
+    """The servos' torques in `views.ctrl`."""
     for i in range(servos.target.shape[0]):
-        dof = servos.dofs[i]
-        views.ctrl[i] = pd_torque(
-            servos.stiffness[i], servos.damping[i], servos.limit[i],
-            servos.target[i] - views.qpos[dof + 1], views.qvel[dof],
-        )  # fmt: skip
+        world.views.ctrl[i] = servo_torque(servos, world, i)
+    hand_to_motors(servos, world, 1.0, servos.target)
+
+
+@compiled
+def hand_to_motors(servos: Servos, world: World, part: float, torques: np.ndarray):
+    """Where the motors are real, let them run the servos: `part` of these, and the rest of the
+    torques (nj,) [N·m]."""
+    if world.bus.q.shape[0] > 0:
+        for i in range(servos.target.shape[0]):
+            torque = (1.0 - part) * torques[servos.dofs[i] - 6] if part < 1.0 else 0.0
+            ask_servo(
+                world.bus, i, torque, servos.target[i],
+                part * servos.stiffness[i], part * servos.damping[i],
+            )  # fmt: skip
 
 
 def make_servos(robot: Robot, config: ServoConfig) -> Servos:

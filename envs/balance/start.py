@@ -15,7 +15,7 @@ from poise.envs.pushes.push import Kick, Push
 from poise.envs.pushes.sampler import PushSampler
 from poise.envs.robots.robot import Robot
 
-RESET_OPTIONS = ("push", "noise", "qpos", "qvel")
+RESET_OPTIONS = ("push", "noise", "qpos", "qvel", "realism")
 
 
 @dataclass(frozen=True)

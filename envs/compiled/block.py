@@ -58,6 +58,13 @@ class Block:
         """Numba's type: two blocks of one type are read by the same code."""
         return self._type  # type: ignore[attr-defined]
 
+    def replace_number(self, name: str, value: float) -> None:
+        """Exchange a number between two calls of compiled code, in place."""
+        kind, word = self.numba_type.members[name]
+        assert kind == types.float64, name  # arrays and blocks stay what they are
+        object.__setattr__(self, name, value)
+        self._memory[word] = np.float64(value).view(np.int64)  # type: ignore[attr-defined]
+
     def members(self) -> tuple[Any, ...]:
         """The fields' values, in order."""
         return tuple(getattr(self, field.name) for field in fields(self))

@@ -114,3 +114,50 @@ def turn(yaw: float) -> np.ndarray:
     """(2, 2) rotation by `yaw` in the plane."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, -s], [s, c]])
+
+
+@compiled
+def quaternion_of(R: np.ndarray, out: np.ndarray) -> None:
+    """The unit quaternion (w, x, y, z) of axes R (3, 3) into `out` (4,) [Shepperd78]."""
+    trace = R[0, 0] + R[1, 1] + R[2, 2]
+    k, largest = -1, trace
+    for a in range(3):
+        if R[a, a] > largest:
+            k, largest = a, R[a, a]
+    if k < 0:
+        w = 0.5 * np.sqrt(1.0 + trace)
+        out[0] = w
+        for a in range(3):
+            i, j = (a + 1) % 3, (a + 2) % 3
+            out[1 + a] = (R[j, i] - R[i, j]) / (4.0 * w)
+    else:
+        i, j = (k + 1) % 3, (k + 2) % 3
+        x = 0.5 * np.sqrt(max(1.0 + 2.0 * R[k, k] - trace, 1e-12))
+        out[0] = (R[j, i] - R[i, j]) / (4.0 * x)
+        out[1 + k] = x
+        out[1 + i] = (R[i, k] + R[k, i]) / (4.0 * x)
+        out[1 + j] = (R[j, k] + R[k, j]) / (4.0 * x)
+    norm = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
+    for a in range(4):
+        out[a] /= norm
+
+
+@compiled
+def axes_of(quaternion: np.ndarray, out: np.ndarray) -> None:
+    """The axes (3, 3) of a unit quaternion (w, x, y, z) into `out`."""
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    out[0, 0], out[0, 1], out[0, 2] = (
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - w * z),
+        2 * (x * z + w * y),
+    )
+    out[1, 0], out[1, 1], out[1, 2] = (
+        2 * (x * y + w * z),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - w * x),
+    )
+    out[2, 0], out[2, 1], out[2, 2] = (
+        2 * (x * z - w * y),
+        2 * (y * z + w * x),
+        1 - 2 * (x * x + y * y),
+    )

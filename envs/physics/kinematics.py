@@ -63,14 +63,17 @@ class StateArrays(Block):
     tree_com: np.ndarray  # (3,)
     ground: np.ndarray  # (nc,)
     edges: np.ndarray  # (nc,)
+    motor_q: np.ndarray  # (nv − 6,) joint positions and velocities as the motors read them now:
+    motor_dq: np.ndarray  # (nv − 6,) those of qpos and qvel, or what encoders give
 
 
 def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
     """Zeroed storage for `nv` degrees of freedom, `nc` soles and `nb` bodies, the world's too."""
     zeros = guarded_zeros
+    qpos, qvel = zeros(nv + 1), zeros(nv)
     return StateArrays(
-        qpos=zeros(nv + 1),
-        qvel=zeros(nv),
+        qpos=qpos,
+        qvel=qvel,
         M=zeros((nv, nv)),
         h=zeros(nv),
         root_axes=zeros((3, 3)),
@@ -101,6 +104,8 @@ def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
         tree_com=zeros(3),
         ground=zeros(nc),
         edges=zeros(nc),
+        motor_q=qpos[7:],
+        motor_dq=qvel[6:],
     )
 
 

@@ -18,6 +18,7 @@ from poise.envs.robots.robot import Robot
 
 from .arrays import RobotArrays, SimViews, robot_arrays, sim_views
 from .kinematics import StateArrays, allocate_state, update_state
+from .motor_bus import MotorBus, motor_bus
 from .state import RobotState
 
 SOME_PUSHES = 4  # rows of a table that may grow
@@ -49,16 +50,25 @@ class World(Block):
     state: StateArrays
     clock: np.ndarray  # (1,) int: physics steps since the reset
     pushes: np.ndarray  # see `apply_pushes`
+    motors: Program  # what comes of the controls, before each physics step
     sensors: Program  # what measures, after each physics step
+    bus: MotorBus  # between the computer and the motors
     count: np.ndarray  # (1,) int: physics steps of `advance_world`
+
+
+@compiled
+def physics_step(world: World):
+    """Take one physics step with the controls in `views.ctrl`, by motors and sensors."""
+    run(world.motors)
+    advance(world.robot, world.views, world.pushes, world.clock)
+    run(world.sensors)
 
 
 @compiled
 def simulate(world: World, count: int):
     """`count` physics steps with the controls in `views.ctrl`, then the state."""
     for _ in range(count):
-        advance(world.robot, world.views, world.pushes, world.clock)
-        run(world.sensors)
+        physics_step(world)
     update_state(world.robot, world.views, world.state)
 
 
@@ -83,21 +93,16 @@ class Simulation(Copyable):
         self.pushes: tuple[Push | Kick, ...] = ()
         self.start_yaw = 0.0  #: of the heading frame at the reset [rad]
         self.push_table = guarded_zeros((SOME_PUSHES, TABLE_COLUMNS))
-        self._world: World | None = None
-        self.sensors = Program.of(())
+        self.equip(Program.of(()), Program.of(()), motor_bus())
         self.reset()
 
-    @property
-    def sensors(self) -> Program:
-        """The kernels that compiled code calls after every physics step; none by default."""
-        return self._sensors
-
-    @sensors.setter
-    def sensors(self, sensors: Program) -> None:
-        self._sensors, self._world = sensors, None
+    def equip(self, motors: Program, sensors: Program, bus: MotorBus) -> None:
+        """Have compiled code call these kernels before and after every physics step."""
+        self.motors, self.sensors, self.bus = motors, sensors, bus
+        self._world: World | None = None
 
     def world(self) -> World:
-        """The block of this simulation; the same object until `sensors` or `push_table` changes."""
+        """The block of this simulation; the same object until `equip`, or a longer `push_table`."""
         if self._world is None or self._world.pushes is not self.push_table:
             self._world = World(
                 robot=self.arrays,
@@ -105,7 +110,9 @@ class Simulation(Copyable):
                 state=self.state_arrays,
                 clock=self.clock,
                 pushes=self.push_table,
+                motors=self.motors,
                 sensors=self.sensors,
+                bus=self.bus,
                 count=self._count,
             )
         return self._world

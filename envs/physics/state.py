@@ -45,6 +45,16 @@ class RobotState(Copyable):
         return self.qpos[7:]
 
     @property
+    def motor_q(self) -> np.ndarray:
+        """(nv−6,) joint positions as the motors' own encoders read them now, never late [rad]."""
+        return _frozen(self.arrays.motor_q)
+
+    @property
+    def motor_dq(self) -> np.ndarray:
+        """(nv−6,) joint velocities likewise [rad/s]."""
+        return _frozen(self.arrays.motor_dq)
+
+    @property
     def M(self) -> np.ndarray:
         """(nv, nv) joint-space inertia."""
         return _frozen(self.arrays.M)

@@ -28,7 +28,7 @@ FLOORS = """
  4 envs/robots, baselines/clips
  5 envs/pushes, baselines/joining
  6 envs/physics, baselines/inverse_kinematics, baselines/matching, baselines/motion_graphs
- 7 envs/sensors, envs/viewing, baselines/controller
+ 7 envs/sensing, envs/viewing, baselines/controller
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
  9 envs/plain_info, envs/vector, baselines/feasibility, baselines/in_place, baselines/policy_files

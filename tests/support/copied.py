@@ -23,12 +23,13 @@ from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
-from poise.envs.sensors.delayed import DelayedState
+from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.vector.batch import EnvBatch, replicate
 from poise.envs.vector.vector_env import BalanceVectorEnv
 from poise.training.learning.policy import load_policy
 from poise.training.learning.vec_env import ThreadedVecEnv
 from tests.support.limits import described as limits_described
+from tests.support.sensing import estimated
 from tests.support.shared import robot
 from tests.support.tasks import described
 
@@ -144,11 +145,6 @@ def env_of(kind: type[BalanceEnv], **arguments: Any) -> BalanceEnv:
     return kind(robot(), pushes=PUSHES, **arguments)
 
 
-def _late(env: BalanceEnv) -> BalanceEnv:
-    env.state_source = DelayedState(env.simulation, robot(), 0.01)
-    return _begin(env)
-
-
 def _several(kind: type[BalanceEnv], **arguments: Any) -> list[BalanceEnv]:
     return replicate(env_of(kind, duration=0.3, **arguments), 3)
 
@@ -178,10 +174,8 @@ def _state() -> RobotState:
     return _begin(env_of(TorqueBalanceEnv)).simulation.state
 
 
-def _source() -> DelayedState:
-    simulation = Simulation(robot())
-    source = DelayedState(simulation, robot(), 0.01)
-    simulation.sensors = source.sense
+def _source() -> EstimatedState:
+    source = estimated("field")
     play_source(source)
     return source
 
@@ -198,9 +192,9 @@ KINDS: dict[str, tuple[Callable[[], Any], Callable[[Any], list[Any]]]] = {
     "step": (lambda: _begin(env_of(ResidualStepEnv, smoothing=0.1)), play_env),
     "whole": (lambda: _begin(env_of(ResidualWholeEnv, hand_over=AT_ONCE)), play_env),
     "position": (lambda: _begin(env_of(PositionBalanceEnv)), play_env),
-    "late torque": (lambda: _late(env_of(TorqueBalanceEnv)), play_env),
-    "late residual": (lambda: _late(env_of(ResidualBalanceEnv)), play_env),
-    "late step": (lambda: _late(env_of(ResidualStepEnv)), play_env),
+    "real torque": (lambda: _begin(env_of(TorqueBalanceEnv, realism="field")), play_env),
+    "real residual": (lambda: _begin(env_of(ResidualBalanceEnv, realism="field")), play_env),
+    "real step": (lambda: _begin(env_of(ResidualStepEnv, realism="field")), play_env),
     "wrapped": (_wrapped, play_env),
     "one of many": (lambda: _vector(ResidualBalanceEnv).envs[2], play_env),
     "vector": (lambda: _vector(ResidualBalanceEnv), play_many),

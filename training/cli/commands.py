@@ -67,6 +67,7 @@ def evaluate(
     limits: str | None = None,
     write_limits: Path | None = None,
     motions: tuple[str, ...] = (),
+    realism: str | None = None,
     overwrite: Switch = False,
     json: Json = False,
     allow: Allow = (),
@@ -97,12 +98,14 @@ def evaluate(
         write_limits: write the first controller's J50s to this file, for --limits.
         motions: what is performed in the suite follow: packaged clips or motions, .bvh, .npz or
             .yaml files; its own if not given.
+        realism: how real the robot is: ideal (its state is known exactly and at once), lab, field,
+            or a .yaml file of a level; that of the suite if not given.
         overwrite: replace what the folder holds.
     """
     from poise.configs.outputs import check_out_file
     from poise.training.trials.names import check_names
 
-    check_names(controllers, robot=robot, suite=suite)
+    check_names(controllers, robot=robot, suite=suite, realism=realism)
     from poise.training.evaluation.evaluate import evaluate, measured_limits
 
     if write_limits is not None:
@@ -110,7 +113,7 @@ def evaluate(
     folder = Path("out") / Path(suite).stem if out is None else out
     summary = evaluate(
         controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, limits=limits, motions=motions, overwrite=overwrite,
+        trials=trials, limits=limits, motions=motions, realism=realism, overwrite=overwrite,
         console=terminal(stderr=json), allow=allow,
     )  # fmt: skip
     if write_limits is not None:
@@ -132,6 +135,7 @@ def benchmark(
     workers: int | None = None,
     backend: Literal["local", "joblib", "ray"] = "local",
     trials: int | None = None,
+    realism: str | None = None,
     overwrite: Switch = False,
     report: bool = True,
     json: Json = False,
@@ -156,6 +160,7 @@ def benchmark(
         backend: local (processes of this machine), joblib (the same by joblib), ray (a cluster).
         trials: at most as many in every cell of the suite, to try things out; of a suite of one
             part, its number.
+        realism: ideal, lab, field or a .yaml file of a level; that of the suite if not given.
         overwrite: replace what the folder holds.
         report: write report.html at the end, as poise report does.
     """
@@ -165,12 +170,13 @@ def benchmark(
     from poise.baselines.allowance import named
     from poise.training.trials.names import check_names
 
-    check_names(controllers, robot=robot, suite=suite)
+    check_names(controllers, robot=robot, suite=suite, realism=realism)
     from poise.training.evaluation.evaluate import benchmark
 
     summary = benchmark(
         controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, overwrite=overwrite, console=terminal(stderr=json), allow=allow,
+        trials=trials, realism=realism, overwrite=overwrite, console=terminal(stderr=json),
+        allow=allow,
     )  # fmt: skip
     code = _raised(summary, out)
     if json:

@@ -36,6 +36,7 @@ def evaluate(
     trials: int | None = None,
     limits: str | Path | None = None,
     motions: Sequence[str] = (),
+    realism: str | None = None,
     overwrite: bool = False,
     console: Console | None = None,
     allow: str | Iterable[str] = (),
@@ -60,6 +61,7 @@ def evaluate(
             stage); of a suite of several parts, at most as many in every cell.
         limits: what pushes are measured by, see `load_limits`.
         motions: names and files of motions, for a suite that performs some, instead of its own.
+        realism: a packaged level of realism or a path to one, instead of the suite's.
         overwrite: replace what `out` holds.
         console: where progress and tables are printed; None: nowhere.
         allow: controllers from outside (``module:Class``) that may run though they are not among
@@ -74,6 +76,7 @@ def evaluate(
     run = Run(
         controllers, suite, out, robot, seed, workers, backend, trials, overwrite, console,
         reference=None, measured=lambda loaded: load_limits(loaded, limits), motions=motions,
+        realism=realism,
     )  # fmt: skip
     return run.play(plots=True)
 
@@ -89,6 +92,7 @@ def benchmark(
     workers: int | None = None,
     backend: str = "local",
     trials: int | None = None,
+    realism: str | None = None,
     overwrite: bool = False,
     console: Console | None = None,
     allow: str | Iterable[str] = (),
@@ -101,7 +105,7 @@ def benchmark(
 
     Args:
         controllers: as of `evaluate`; none: `default_controllers`.
-        suite, out, robot, seed, workers, backend, trials, overwrite, console, allow: as of
+        suite, out, robot, seed, workers, backend, trials, realism, overwrite, console, allow: as of
             `evaluate`.
 
     Raises:
@@ -110,7 +114,7 @@ def benchmark(
     chosen = controllers or default_controllers(load_robot(robot).name)
     run = Run(
         chosen, suite, out, robot, seed, workers, backend, trials,
-        overwrite, console, reference=REFERENCE, measured=PushLimits,
+        overwrite, console, reference=REFERENCE, measured=PushLimits, realism=realism,
     )  # fmt: skip
     return run.play(timed=True)
 

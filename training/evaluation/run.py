@@ -6,6 +6,7 @@ import contextlib
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_folder
 from poise.configs.schema import to_dict
 from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.sensing.realism import load_realism
 from poise.training.learning.seeds import expand_seeds
 from poise.training.metrics.entry import controller_entry, robot_figures
 from poise.training.metrics.motions import suite_repertoire, suite_stage
@@ -56,6 +58,7 @@ class Run:
         motions: that are performed instead of the suite's; none: its own.
         reference: whom others are compared with, if it takes part; None: the first.
         measured: what pushes on the robot are measured by.
+        realism: name or file of a level, instead of the suite's.
     """
 
     def __init__(
@@ -63,6 +66,7 @@ class Run:
         workers: int | None, backend: str, trials: int | None, overwrite: bool,
         console: Console | None, *, reference: str | None,
         measured: Callable[[Robot], PushLimits], motions: Sequence[str] = (),
+        realism: str | None = None,
     ):  # fmt: skip
         self.started, self.console = time.perf_counter(), console or Console(quiet=True)
         names = expand_seeds(controllers)
@@ -73,6 +77,9 @@ class Run:
             self.suite = self.suite.performing(motions)
         if trials is not None:
             self.suite = self.suite.resized(trials)
+        if realism is not None:
+            self.suite = replace(self.suite, realism=realism)
+        load_realism(self.suite.realism)
         self.out, self.overwrite, self.executor = Path(out), overwrite, Executor(backend, workers)
         check_out_folder(out)
         self.robot = load_robot(robot)

@@ -24,6 +24,8 @@ TITLES = {
     "friction": "friction",
     "delay": "delay of the sensors [s]",
     "mass_error": "error of the masses",
+    "velocity_noise": "noise of joint velocities [rad/s]",
+    "realism": "realism",
     "pushes": "number of pushes",
 }
 

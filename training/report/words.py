@@ -62,6 +62,10 @@ def _world(trial: Trial) -> list[str]:
         said.append(f"sensors {1000.0 * conditions.delay:.0f}\u00a0ms late")
     if conditions.mass_error:
         said.append(number_text(conditions.mass_error, "+.0%") + " mass")
+    if conditions.velocity_noise:
+        said.append(f"joint velocities with {conditions.velocity_noise:g}\u00a0rad/s of noise")
+    if conditions.realism:
+        said.append(f"realism {conditions.realism}")
     if trial.terrain is not None:
         said.append(type(trial.terrain).__name__.lower())
     if len(trial.pushes) > 1:

@@ -152,7 +152,7 @@ class Live:
             raise PoiseError("nothing has been played that a video could show")
         if time > LONGEST_FILM:
             raise PoiseError(f"a video is of at most {LONGEST_FILM:g} s, begin anew by Reset")
-        agent = load_player(name, self.robot, self._motion, time)
+        agent = load_player(name, self.robot, self._motion, time, self.spec.realism)
         trial = self.session.sides[self.names.index(name)].own(self.session.trial)
         if agent.begin is not None:
             agent.begin()

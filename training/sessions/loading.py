@@ -35,8 +35,9 @@ def load_live(spec: SessionSpec, say: Callable[[str], object] = lambda line: Non
     motion = None if spec.motion == STANDING else load_motion(spec.motion, robot)
     say(f"loading {', '.join(spec.controllers)}")
     session = load_session(
-        spec.controllers, robot, spec.seed, pushes, commands=commands, motion=motion
-    )
+        spec.controllers, robot, spec.seed, pushes, commands=commands, motion=motion,
+        realism=spec.realism,
+    )  # fmt: skip
     return Live(session, spec, motion)
 
 

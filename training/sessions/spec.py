@@ -9,6 +9,7 @@ from urllib.parse import parse_qs, urlencode
 
 from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError, shown
+from poise.envs.sensing.realism import IDEAL
 
 STANDING = "standing"  # the motion of a session that names none
 MOST = 3  # controllers side by side
@@ -21,6 +22,7 @@ class SessionSpec:
     Attributes:
         controllers, robot, motion: names and paths, as a user writes them.
         seed: of the disturbed start.
+        realism: a packaged level or a path to one.
         pushes, commands: YAML mappings, as `parse_pushes` and `parse_commands` take them.
     """
 
@@ -30,6 +32,7 @@ class SessionSpec:
     seed: int = 0
     pushes: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
+    realism: str = IDEAL
 
     @property
     def command(self) -> str:
@@ -37,6 +40,8 @@ class SessionSpec:
         words = ["poise", "view", *self.controllers, "--robot", self.robot]
         if self.motion != STANDING:
             words += ["--motion", self.motion]
+        if self.realism != IDEAL:
+            words += ["--realism", self.realism]
         words += ["--seed", str(self.seed)]
         words += [word for text in self.pushes for word in ("--push", text)]
         return shlex.join(words + [word for text in self.commands for word in ("--command", text)])

@@ -20,6 +20,7 @@ from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.sensing.realism import load_realism
 from poise.envs.terrain.terrain import Terrain, make_terrain
 from poise.envs.viewing.camera import Camera, beside
 from poise.training.figures.encoder import FORMS
@@ -50,6 +51,7 @@ def walk(
     controller: str = "walk",
     robot: str = "humanoid",
     terrain: str | Mapping[str, object] = "flat",
+    realism: str | Path | None = None,
     push: str | None = None,
     push_at: float = 6.0,
     seed: int = 0,
@@ -67,6 +69,7 @@ def walk(
         controller: one that walks, as `load_agent` takes it.
         robot: a packaged robot or a path to its description.
         terrain: a kind of terrain, or a mapping with its `kind`, see `make_terrain`.
+        realism: a packaged level of realism or a path to one; None: ideal.
         push: impulse [N·s] and direction [deg], such as "20@90", of a push of 0.1 s; None: none.
         push_at: the start of the push [s].
         seed: of the start, which is a little disturbed.
@@ -92,7 +95,10 @@ def walk(
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
     ground = make_terrain(terrain, "walk")
     check_asked(controller, loaded, commands, ground)  # a controller takes long to be made
-    agent = load_agent(controller, loaded, duration=duration, pushes=None, terrain=ground)
+    agent = load_agent(
+        controller, loaded, duration=duration, pushes=None, terrain=ground,
+        realism=load_realism(realism),
+    )  # fmt: skip
     check_walks(controller, agent, "walk")
     trial = Trial(0, seed, pushes, commands=commands)
     command = commands[0]

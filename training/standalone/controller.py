@@ -20,7 +20,7 @@ from poise.envs.balance.servos import drive
 from poise.envs.compiled.calls import run
 from poise.envs.physics.kinematics import update_state
 from poise.envs.robots.robot import Robot, load_robot
-from poise.envs.sensors.source import StateSource
+from poise.envs.sensing.source import StateSource
 from poise.training.trials.agents import Agent, load_agent
 
 from .readings import Readings
@@ -150,7 +150,7 @@ def _check(name: str, env: BalanceEnv) -> None:
 def _servos(env: BalanceEnv) -> Callable[[], object] | None:
     """What gives the torques between two control ticks, from `views`; None where they are held."""
     if isinstance(env, PositionBalanceEnv):
-        return lambda: drive(env.servos, env.simulation.views)
+        return lambda: drive(env.servos, env.simulation.world())
     if isinstance(env, ResidualWholeEnv):
         return lambda: _blend(env)
     return None

@@ -15,6 +15,7 @@ from poise.envs.balance.config import StartNoise
 from poise.envs.pushes.options import check_body
 from poise.envs.pushes.push import Kick, Push
 from poise.envs.pushes.sampler import Range, push_bodies
+from poise.envs.sensing.realism import IDEAL
 from poise.envs.terrain.terrain import Terrain
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.trial import Conditions, Trial
@@ -35,6 +36,7 @@ class Standard:
     push_duration: float = field(default=0.1, metadata={"above": 0.0})  # [s]
     interval: float = field(default=1.0, metadata={"above": 0.0})  # between repeated pushes [s]
     body: str | None = None  # the robot's first push body
+    realism: str = field(default=IDEAL, metadata={"omit": "default"})  # a level or a file of one
     noise: StartNoise = field(default_factory=StartNoise)
 
 

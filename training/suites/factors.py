@@ -9,6 +9,7 @@ import numpy as np
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import Range
 from poise.envs.robots.ground import contact_friction
+from poise.envs.sensing.realism import IDEAL
 from poise.training.trials.trial import STANDARD_CONDITIONS, Conditions, Trial
 
 from .draw import MOST_TRIALS, Draw, Part, check_rising, generator, start_seed
@@ -26,6 +27,8 @@ class Levels:
     friction: tuple[float, ...] = field(default=(), metadata={"above": 0.0})
     delay: tuple[float, ...] = field(default=(), metadata={"min": 0.0, "max": 0.1})  # [s]
     mass_error: tuple[float, ...] = field(default=(), metadata={"above": -1.0, "max": 1.0})
+    velocity_noise: tuple[float, ...] = field(default=(), metadata={"min": 0.0})  # [rad/s]
+    realism: tuple[str, ...] = ()  # names or files of levels
     pushes: tuple[int, ...] = field(default=(), metadata={"min": 2, "max": 1000})
 
 
@@ -85,6 +88,9 @@ class Factors(Part):
         cells += [Cell("delay", f"{d:g}", conditions=Conditions(delay=d)) for d in levels.delay]
         cells += [Cell("mass_error", f"{e:g}", conditions=Conditions(mass_error=e))
                   for e in levels.mass_error]  # fmt: skip
+        cells += [Cell("velocity_noise", f"{v:g}", conditions=Conditions(velocity_noise=v))
+                  for v in levels.velocity_noise]  # fmt: skip
+        cells += [Cell("realism", r, conditions=Conditions(realism=r)) for r in levels.realism]
         cells += [Cell("pushes", f"{n:g}", count=n) for n in levels.pushes]
         others = [cell for cell in cells if standard[cell.factor] != cell.level]
         return [Cell(STANDARD, STANDARD), *others]
@@ -150,5 +156,7 @@ def standard_levels(draw: Draw) -> dict[str, str]:
         "friction": f"{contact_friction(robot.model, robot.ground_geom_id, soles):g}",
         "delay": "0",
         "mass_error": "0",
+        "velocity_noise": "0",
+        "realism": IDEAL,
         "pushes": "1",
     }

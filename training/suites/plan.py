@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
+from poise.envs.sensing.realism import IDEAL
 from poise.training.trials.push_limits import PushLimits
 from poise.training.trials.trial import Outcome, Trial
 
@@ -41,12 +43,23 @@ class Plan:
         self.standard = standard_levels(self._draw) if suite.factors else {}
         number = 0
         for part in suite.parts.values():
-            first = part.first(self._draw, number)
+            first = self._real(part.first(self._draw, number))
             second = number + len(first)
             self._parts.append((part, first, second))
             number = second + part.second_count(len(self.names))
         self.first = [trial for _, first, _ in self._parts for trial in first]
         self.count = number * len(self.names)
+
+    def _real(self, trials: list[Trial]) -> list[Trial]:
+        """The trials at the suite's level of realism, where they have none of their own."""
+        level = self.suite.realism
+        if level == IDEAL:
+            return trials
+        return [
+            replace(trial, conditions=replace(trial.conditions, realism=level))
+            if trial.conditions.realism is None else trial
+            for trial in trials
+        ]  # fmt: skip
 
     def second(self, finished: Finished) -> dict[str, list[Trial]]:
         """controller → its trials of the second stage; `finished` must hold all of the first."""
@@ -57,7 +70,7 @@ class Plan:
                 for name in self.names
             }
             for name, trials in part.second(self._draw, number, first, recovered).items():
-                chosen[name] += trials
+                chosen[name] += self._real(trials)
         return chosen
 
     def trials(self, finished: Finished) -> dict[str, list[Trial]]:

@@ -19,11 +19,13 @@ def check_names(
     robot: str | None = None,
     suite: str | None = None,
     motion: str | None = None,
+    realism: str | None = None,
 ) -> None:
     """Raise ConfigError, which lists what there is, for a name of nothing; see `check_name`."""
     if motion is not None and Path(motion).suffix == ".npz":  # a robot's motion
         motion = None
-    for kind, name in (("robots", robot), ("suites", suite), ("motions", motion)):
+    given = {"robots": robot, "suites": suite, "motions": motion, "realism": realism}
+    for kind, name in given.items():
         if name is not None:
             resolve(kind, name)
     for name in controllers:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
@@ -173,7 +174,13 @@ def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -
         root_force=_finite(m[episode.ROOT_FORCE]),
         edge_contacts=int(m[episode.EDGE_CONTACTS]),
         surfaces_passed=surfaces_passed(env),
+        drawn=drawn_robot(env),
     )
+
+
+def drawn_robot(env: BalanceEnv) -> str | None:
+    """What the episode's robot was drawn as, as JSON; None where it is the one that is known."""
+    return None if env.drawn is None else json.dumps(env.drawn.summary(env.arrays.timestep))
 
 
 def surfaces_passed(env: BalanceEnv) -> int | None:

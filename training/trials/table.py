@@ -97,6 +97,8 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
                 friction=_number(line["friction"]),
                 delay=float(line["delay"]),
                 mass_error=float(line["mass_error"]),
+                velocity_noise=float(line.get("velocity_noise") or 0.0),
+                realism=line.get("realism") or None,
             ),
             limit_fraction=_number(line["limit_fraction"]),
             part=line["part"],

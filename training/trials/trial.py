@@ -18,13 +18,17 @@ class Conditions:
 
     Attributes:
         friction: of floor and soles; None: the robot's own.
-        delay: of the sensors, besides that of the environment itself [s].
+        delay: of the sensors [s].
         mass_error: by which all masses differ from those that the controller knows.
+        velocity_noise: standard deviation of measured joint velocities [rad/s].
+        realism: name or file of a level, in which the other fields have the last word; None: ideal.
     """
 
     friction: float | None = None
     delay: float = 0.0
     mass_error: float = 0.0
+    velocity_noise: float = 0.0
+    realism: str | None = None
 
 
 STANDARD_CONDITIONS = Conditions()  # the robot as its controller knows it
@@ -145,6 +149,7 @@ class Outcome:
         joint_rms, body_error, body_error_root, body_error_last, com_error, sole_slide,
             motion_delay, swing_error, placement_error, support_slide, interruptions: of a motion
             that is performed, see `TrackingFigures`.
+        drawn: of a robot that is drawn, its numbers as JSON, see `DrawnRobot.summary`.
         error: what the controller raised, on one line; the trial then counts as not recovered.
         loss … hardware: why it was lost, see `Diagnosis`; None of a trial that was recovered.
     """
@@ -206,6 +211,7 @@ class Outcome:
     placement_error: float | None = None
     support_slide: float | None = None
     interruptions: float | None = None
+    drawn: str | None = None
     error: str | None = None
     loss: str | None = None
     loss_body: str | None = None

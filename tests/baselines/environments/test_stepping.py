@@ -11,9 +11,9 @@ from poise.baselines.environments.scales import StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.stepping.guidance import copy_reference, guide_com
 from poise.configs.errors import ConfigError
-from poise.envs.sensors.delayed import DelayedState
-from poise.envs.sensors.source import StateSource
+from poise.envs.sensing.realism import Realism, load_realism
 from poise.envs.vector.batch import EnvBatch, replicate
+from tests.support.sensing import PLAIN
 from tests.support.shared import robot
 
 PUSH = {"impulse": 24.0, "direction": 20.0, "start": 0.1, "body": "torso"}
@@ -215,11 +215,11 @@ def test_a_replica_acts_alike(env):
 def test_perfect_sensors_change_no_step(env):
     """With perfect sensors of the same robot the trial is the same."""
     ends = []
-    for sensors in (StateSource, lambda simulation: DelayedState(simulation, robot(), 0.0)):
-        env.state_source = sensors(env.simulation)
+    for level in (Realism(), load_realism(PLAIN)):
+        env.realism = level
         play(env, {"foothold_x": 0.5})
         ends.append(env.episode.observation.copy())
-    env.state_source = StateSource(env.simulation)
+    env.realism = Realism()
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-6)
 
 

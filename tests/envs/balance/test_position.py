@@ -64,7 +64,7 @@ def test_action_zero_stands(name, timestep):
 def test_a_late_state_does_not_delay_the_servos():
     """With late sensors and the same actions the robot moves as before; it is seen later."""
     now = PositionBalanceEnv(robot(), pushes=None)
-    late = PositionBalanceEnv(robot(), pushes=None, sensors={"delay": 0.02})
+    late = PositionBalanceEnv(robot(), pushes=None, realism={"latency": {"sense": 0.02}})
     actions = np.random.default_rng(4).uniform(-0.1, 0.1, (10, *now.action_space.shape))
     first, _ = now.reset(seed=0)
     late.reset(seed=0)

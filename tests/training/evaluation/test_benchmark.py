@@ -16,7 +16,7 @@ import poise
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import StartNoise
 from poise.envs.pushes.push import Push
-from poise.envs.sensors.delayed import DelayedState
+from poise.envs.sensing.estimator import EstimatedState
 from poise.training.cli.entry import main
 from poise.training.evaluation import run
 from poise.training.evaluation.evaluate import benchmark, default_controllers, packaged_policies
@@ -82,17 +82,20 @@ def test_the_standard_case_is_that_of_an_evaluation() -> None:
     assert all(outcome != expected for outcome in outcomes[1:-1])
 
 
-def test_delays_of_world_and_environment_add_up() -> None:
-    """Whichever else the conditions change; an own delay stays where it has none."""
-    agent = load_agent("momentum-qp", robot(), duration=1.6, sensors={"delay": 0.01})
-    variants = AgentVariants(agent)
-    for conditions, late in (
-        (Conditions(delay=0.02), 0.03), (Conditions(mass_error=0.1), 0.01),
-        (Conditions(friction=0.4), 0.01),
-        (Conditions(delay=0.02, mass_error=0.1), 0.03), (Conditions(), 0.01),
+def test_the_realism_is_that_of_the_conditions() -> None:
+    """Whatever the environment had before; single factors are fields of it."""
+    variants = AgentVariants(load_agent("momentum-qp", robot(), realism={"motors": {"lag": 0.01}}))
+    for changes, late, heavier in (
+        ({"delay": 0.02}, 0.02, 0.0), ({"mass_error": 0.1}, 0.0, 0.1),
+        ({"friction": 0.4}, 0.0, 0.0),
+        ({"delay": 0.02, "mass_error": 0.1}, 0.02, 0.1), ({}, 0.0, 0.0),
     ):  # fmt: skip
-        source = variants.under(conditions).env.state_source
-        assert isinstance(source, DelayedState) and source.delay == pytest.approx(late)
+        env = variants.under(Conditions(**changes)).env
+        assert env.realism.latency.sense == late and env.realism.body.scale == heavier
+        assert env.realism.motors.lag == 0.0 and env.realism.ground.friction == changes.get(
+            "friction"
+        )
+        assert isinstance(env.state_source, EstimatedState) == bool(changes)
 
 
 def test_the_summary_has_what_readers_rely_on(finished: Path) -> None:

@@ -247,7 +247,7 @@ def test_what_is_no_use_outside_is_refused() -> None:
 def test_late_sensors_of_a_training_are_the_robots_own() -> None:
     """The delay that a policy learned with is not added to that of the robot."""
     agents = [
-        with_action(ResidualBalanceEnv(robot(), sensors={"delay": delay}), 0.0)
+        with_action(ResidualBalanceEnv(robot(), realism={"latency": {"sense": delay}}), 0.0)
         for delay in (0.0, 0.02)
     ]
     start = readings(velocity=[0.1, 0.0, 0.0])

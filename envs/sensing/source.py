@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.motor_bus import motor_bus
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 
@@ -20,8 +24,12 @@ class StateSource(Copyable):
 
     Attributes:
         simulation: whose state it is about.
+        promise: (nv,) where a controller writes the accelerations that it promises; (0,) where
+            nobody reads them.
         arrays: the constants of the robot that is believed in.
         state_arrays: the believed state; the same arrays for as long as the source exists.
+        bus: between the computer and the motors.
+        drive: the program before every physics step, of motors that do not do what they are asked.
         sense: the program after every physics step.
         estimate: the program before the state is read.
     """
@@ -32,6 +40,9 @@ class StateSource(Copyable):
     def __init__(self, simulation: Simulation):
         self.simulation = simulation
         self.arrays, self.state_arrays = simulation.arrays, simulation.state_arrays
+        self.bus = motor_bus()
+        self.promise: np.ndarray = guarded_zeros(0)
+        self.drive = Program.of(())
         self.sense, self.estimate = Program.of(()), Program.of(())
 
     @property

@@ -1,0 +1,1 @@
+"""Between a robot and its controller: sensors, motors, estimators, and how real they are."""

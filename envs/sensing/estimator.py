@@ -1,0 +1,328 @@
+"""The state that is believed of a robot whose sensors and motors are real."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import mujoco
+import numpy as np
+
+from poise.configs.errors import ConfigError
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program
+from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.compiled.mujoco_calls import mj_step1
+from poise.envs.maths.vectors import axes_of, copy_into, quaternion_of
+from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.kinematics import StateArrays, update_state
+from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.robot import Robot, on_terrain
+
+from .drawn import DrawnRobot
+from .inekf import (
+    ATTITUDE,
+    ENCODER,
+    FORCE,
+    FORCE_WALK,
+    GYRO,
+    GYRO_WALK,
+    KINEMATICS,
+    LIFT,
+    SLIDE,
+    Invariant,
+    InvariantConfig,
+    allocate_invariant,
+    begin_invariant,
+    follow_invariant,
+)
+from .inekf import ROLL as FOOT_ROLL
+from .measurement import DRIFT_TIME, RING, Rings, Sensors, allocate_sensors, begin_sensors, measure
+from .motors import allocate_motors, begin_motors, drive_motors
+from .odometry import (
+    BB,
+    JOINT_NOISE,
+    RATE_GAIN,
+    ROLL,
+    SLIP,
+    STIR,
+    VV,
+    WANDER,
+    Odometry,
+    allocate_odometry,
+    copy_axes,
+    filter_gains,
+    follow_measurements,
+    rate_gain,
+)
+from .plant import Plant
+from .prediction import allocate_promises, keep_promises, predict
+from .realism import Realism
+from .rollout import Rollout, make_rollout, roll_out
+from .source import StateSource
+
+POSITIVE = {"above": 0.0}
+SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT = range(6)  # entries of `Belief.steps`
+START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
+#: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
+SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
+SINK = 0.05  # of the height error of the soles that a tick takes away
+
+
+@dataclass(frozen=True)
+class EstimatorConfig:
+    """How the state is estimated.
+
+    Attributes:
+        kind: Estimator of the state: `odometry` integrates the accelerometer and is corrected by
+            legs that stand; `inekf` is the invariant Kalman filter of the same measurements;
+            `exact` is the true state, as late as the sensors are; `auto` is `exact` at a level
+            whose sensors have no errors, and else `odometry`.
+        predictor: Way in which the state is led on to when the torques of this tick will act:
+            `promised` by the accelerations that the QP has promised, `rollout` by a simulation of
+            the known robot with what its motors were asked for, `none` not at all; `auto` is
+            `rollout` while motors run servos, whose accelerations nobody promises, else `promised`.
+        filtered: Whether joint velocities are filtered.
+        joint_acceleration: Acceleration of joints that nobody knows of, step to step [rad/s²].
+        turn_acceleration: Angular acceleration of the root that nobody knows of [rad/s²].
+        acceleration: Error of the accelerometer besides its noise, from step to step [m/s²].
+        bias: Error of accelerometer and attitude together at the start [m/s²].
+        bias_walk: Change of that error in a second [m/s²].
+        slip: Error of a velocity that one leg tells, besides the joints' noise [m/s].
+        roll_radius: Error of that velocity for each rad/s that the sole turns by [m].
+        invariant: What only `inekf` goes by.
+    """
+
+    kind: Literal["auto", "odometry", "inekf", "exact"] = "auto"
+    predictor: Literal["auto", "promised", "rollout", "none"] = "auto"
+    filtered: bool = True
+    joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
+    turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
+    acceleration: float = field(default=0.05, metadata=POSITIVE)
+    bias: float = field(default=0.2, metadata=POSITIVE)
+    bias_walk: float = field(default=0.1, metadata=POSITIVE)
+    slip: float = field(default=0.15, metadata=POSITIVE)
+    roll_radius: float = field(default=3.0, metadata=POSITIVE)
+    invariant: InvariantConfig = field(default_factory=InvariantConfig)
+
+
+#: of a controller that brings an estimator of its own: what is measured, as late and as noisy
+RAW = EstimatorConfig("odometry", predictor="none", filtered=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Belief(Block):
+    """All that `believe` works on."""
+
+    rings: Rings
+    odometry: Odometry
+    invariant: Invariant
+    robot: RobotArrays  # that is believed in
+    views: SimViews  # of its simulation
+    state: StateArrays
+    rollout: Rollout
+    steps: np.ndarray  # (6,) int: physics steps, see SENSE and its like
+    axes: np.ndarray  # (3, 3) of the root, led on
+    q: np.ndarray  # (nj,) likewise
+    v: np.ndarray  # (nv,)
+    position: np.ndarray  # (3,)
+
+
+@compiled
+def believe(b: Belief):
+    """The state that the known robot would have, from what has been measured until now."""
+    r, o, n = b.rings, b.odometry, b.rings.q.shape[0]
+    now = r.count[0] - 1
+    keep_promises(o.promises, now)
+    known = max(now - b.steps[SENSE], 0)
+    row = (r.next[0] - 1 - min(b.steps[SENSE], n - 1) + n) % n
+    if b.steps[EXACT]:
+        copy_into(r.truth_qpos[row, :3], b.position)
+        axes_of(r.truth_qpos[row, 3:7], b.axes)
+        copy_into(r.truth_qpos[row, 7:], b.q)
+        copy_into(r.truth_qvel[row], b.v)
+    else:
+        if b.steps[INVARIANT]:
+            follow_invariant(b.invariant, known + 1, b.steps[EARLIER])
+        else:
+            follow_measurements(o, known + 1, b.steps[EARLIER])
+        copy_into(o.position, b.position)
+        copy_axes(o.axes, b.axes)
+        copy_into(o.q, b.q)
+        copy_into(o.v, b.v)
+        if b.steps[INVARIANT]:
+            for a in range(3):
+                b.v[3 + a] -= b.invariant.gyro_bias[a]
+    ahead = b.steps[HORIZON] - b.steps[SENSE] + now - known  # at an episode's start less is late
+    if b.steps[HORIZON] > 0 and b.steps[SIMULATED] + b.rollout.motors.bus.servoed[0] > 1:
+        roll_out(b.rollout, known, ahead, b.steps[EARLIER], b.position, b.axes, b.q, b.v)
+    elif b.steps[HORIZON] > 0:
+        predict(
+            o.promises, known, ahead, b.steps[EARLIER], b.robot.timestep,
+            b.position, b.axes, b.q, b.v,
+        )  # fmt: skip
+    _write_state(b, row)
+    if not b.steps[EXACT]:
+        _stand_on_ground(b)
+
+
+@compiled
+def _write_state(b: Belief, row: int):
+    """Fill `b.state` from the pose, the velocity and the forces of the soles that are believed."""
+    v, r, robot = b.views, b.rings, b.robot
+    copy_into(b.position, v.qpos[:3])
+    quaternion_of(b.axes, v.qpos[3:7])
+    copy_into(b.q, v.qpos[7:])
+    copy_into(b.v, v.qvel)
+    mj_step1(v.model_address, v.data_address)
+    for i in range(robot.sole_sensor.shape[0]):
+        v.sensordata[robot.sole_sensor[i]] = r.found[row, i]
+    v.sensordata[robot.ground_sensor] = r.found[row, robot.sole_sensor.shape[0]]
+    for a in range(3):
+        v.qfrc_constraint[a] = 0.0
+        for c in range(3):
+            v.qfrc_constraint[a] += b.axes[a, c] * r.wrench[row, c]
+        v.qfrc_constraint[3 + a] = r.wrench[row, 3 + a]
+    update_state(robot, v, b.state)
+
+
+@compiled
+def _stand_on_ground(b: Belief):
+    """Lead the root's height to where the soles that touch the ground are on it."""
+    s, total, feet = b.state, 0.0, 0
+    for i in range(s.contacts.shape[0]):
+        if s.contacts[i] > 0.5:
+            total += s.sole_point[i, 2] - s.ground[i]
+            feet += 1
+    if feet > 0:
+        b.odometry.position[2] -= SINK * total / feet
+        for i in range(1, b.invariant.place.shape[0]):  # the position there, and the soles
+            b.invariant.place[i, 2] -= SINK * total / feet
+
+
+class EstimatedState(StateSource, Copyable):
+    """The believed state of a `Plant`, whose sensors and motors are those of the drawn robot.
+
+    Args:
+        plant: the true robot in its world.
+        robot: the one that is known.
+        config: how its state is estimated.
+
+    Attributes:
+        promise: (nv,) where the controller writes the accelerations that it promises.
+    """
+
+    def __init__(self, plant: Plant, robot: Robot, config: EstimatorConfig):
+        super().__init__(plant.simulation)
+        self.plant, self.config = plant, config
+        self.known = Simulation(without_contacts(on_terrain(robot, plant.simulation.robot.terrain)))
+        self.sensors: Sensors = allocate_sensors(plant.simulation)
+        self.bus = self.sensors.bus
+        self.motors = allocate_motors(plant.simulation, self.bus)
+        self.known.state_arrays = replace(
+            self.known.state_arrays, motor_q=self.bus.q, motor_dq=self.bus.dq
+        )
+        self.arrays, self.state_arrays = self.known.arrays, self.known.state_arrays
+        promises = allocate_promises(RING, plant.simulation.model.nv)
+        self.promise = promises.last
+        rings = self.sensors.rings
+        self.odometry = allocate_odometry(self.arrays, self.state_arrays, rings, promises)
+        self.invariant = allocate_invariant(self.odometry)
+        nv, zeros = plant.simulation.model.nv, guarded_zeros
+        self.belief = Belief(
+            rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
+            make_rollout(robot, plant.simulation.robot.terrain, self.motors),
+            zeros(6, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
+        )  # fmt: skip
+        self.drive = Program.of([(drive_motors, self.motors)])
+        self.sense = Program.of([(measure, self.sensors)])
+        self.estimate = Program.of([(believe, self.belief)])
+
+    def begin(self, drawn: DrawnRobot, holding: np.ndarray) -> None:
+        """Start an episode with the robot that was drawn.
+
+        The simulation has just been reset, and motors were asked for `holding` (nu,) [N·m].
+        """
+        self.drawn = drawn
+        begin_motors(self.motors, drawn, holding)
+        begin_sensors(self.sensors, drawn, self.simulation.model)
+        dt, c = self.arrays.timestep, self.config
+        predicted = c.predictor != "none"
+        earlier = max(round((drawn.command * dt + drawn.lag + drawn.misjudged) / dt), 0)
+        horizon = drawn.sense + earlier if predicted else 0
+        exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
+        self.belief.steps[:] = (
+            drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf"
+        )  # fmt: skip
+        self._begin_odometry()
+        self._begin_invariant()
+        self.update()
+
+    def _begin_odometry(self) -> None:
+        """The robot was at its start for long: what was measured there is averaged."""
+        o, r, d, c = self.odometry, self.sensors.rings, self.drawn.noise, self.config
+        o.promises.last[:], o.promises.rows[:], o.promises.written[0] = 0.0, 0.0, 0
+        o.seen[0] = 1
+        o.position[:] = r.truth_qpos[0, :3]
+        o.axes[:] = r.attitude[r.next[0] - 1]
+        o.q[:], o.v[:] = r.q.mean(axis=0), 0.0
+        o.v[3:6], o.v[6:] = r.gyro.mean(axis=0), r.dq.mean(axis=0)
+        o.bias[:] = o.variance[:] = 0.0
+        o.variance[VV], o.variance[BB] = START_SPEED**2, c.bias**2
+        dt, noise = self.arrays.timestep, o.numbers
+        noise[STIR] = np.hypot(c.acceleration, d["accelerometer_noise"])
+        noise[WANDER], noise[SLIP], noise[ROLL] = c.bias_walk, c.slip, c.roll_radius
+        noise[JOINT_NOISE] = d["velocity_noise"]
+        if c.filtered:
+            gains = filter_gains(dt, c.joint_acceleration, d["encoder_noise"], d["velocity_noise"])
+            o.gains[:] = gains
+            o.numbers[RATE_GAIN] = rate_gain(dt, c.turn_acceleration, d["gyro_noise"])
+        else:
+            o.gains[:], o.numbers[RATE_GAIN] = np.eye(2), 1.0
+
+    def _begin_invariant(self) -> None:
+        """Start at the odometry's state, with what the sensors' noises are thought to be."""
+        f, d, c = self.invariant, self.drawn.noise, self.config
+        own, noise, dt = c.invariant, self.invariant.numbers, self.arrays.timestep
+        drift = np.hypot(own.attitude, d["tilt_drift"] * np.sqrt(2.0 * DRIFT_TIME / dt))
+        noise[GYRO], noise[FORCE] = (
+            d["gyro_noise"],
+            np.hypot(c.acceleration, d["accelerometer_noise"]),
+        )
+        noise[GYRO_WALK], noise[FORCE_WALK] = own.gyro_bias_walk, c.bias_walk
+        noise[ATTITUDE], noise[ENCODER] = drift, d["encoder_noise"]
+        noise[KINEMATICS], noise[SLIDE] = own.kinematics, own.slide
+        noise[FOOT_ROLL], noise[LIFT] = own.roll, own.lift
+        begin_invariant(
+            f, np.hypot(own.attitude, d["tilt_drift"]), START_SPEED, own.gyro_bias, c.bias
+        )
+
+    def reset(self) -> None:
+        """Nothing: `begin` says who the robot is."""
+
+
+def check_latency(level: Realism, timestep: float) -> None:
+    """Raise ConfigError where a level's delays and lag are longer than what can be led on."""
+    most = (RING - 2) * timestep
+    parts = {
+        "latency.sense": level.latency.sense,
+        "latency.command": level.latency.command,
+        "motors.lag": level.motors.lag,
+        "latency.misjudged": level.latency.misjudged,
+    }
+    longest = {name: x[1] if isinstance(x, tuple) else x for name, x in parts.items()}
+    if sum(longest.values()) > most:
+        told = ", ".join(f"{name} {value:g}" for name, value in longest.items() if value)
+        raise ConfigError(f"together at most {most:g} s can be led on: {told}",
+                          source=level.name, field="latency")  # fmt: skip
+
+
+def without_contacts(robot: Robot) -> Robot:
+    """A copy of `robot` whose model has no contacts and no constraints to look for."""
+    model = copy.copy(robot.model)
+    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    model.opt.disableflags |= int(off)
+    return replace(robot, model=model)

@@ -1,0 +1,238 @@
+"""Sensors: what is measured of a robot after each physics step, with their errors.
+
+An IMU on the root gives attitude, angular velocity and specific force; encoders give joint
+positions and velocities; the soles give the ground's wrench and which of them touches it. All of it
+is in the root's frame or without one: no sensor tells where the root is, nor how fast.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.maths.vectors import copy_into
+from poise.envs.physics.arrays import RobotArrays, SimViews
+from poise.envs.physics.motor_bus import MotorBus, motor_bus
+from poise.envs.physics.simulation import Simulation
+
+from .drawn import DrawnRobot
+from .noise import add_noise, normal
+
+RING = 64  # physics steps that are remembered
+DRIFT_TIME = 1.0  # [s] correlation time of the attitude's drift
+ENCODER, VELOCITY, GYRO, ACCELEROMETER, DRIFT, FORCE, COP, BACKLASH = range(8)
+
+
+@dataclass(frozen=True, eq=False)
+class Rings(Block):
+    """The measurements of the last `RING` physics steps; nj joints, nc soles.
+
+    `truth_qpos`, `truth_qvel` are what no sensor gives: only the estimator `exact` reads them.
+    """
+
+    next: np.ndarray  # (1,) int: the row of the next measurement
+    count: np.ndarray  # (1,) int: measurements since the reset
+    attitude: np.ndarray  # (RING, 3, 3) axes of the IMU in a frame whose z is up
+    gyro: np.ndarray  # (RING, 3) angular velocity, root axes [rad/s]
+    force: np.ndarray  # (RING, 3) specific force Rᵀ(a − g), root axes [m/s²]
+    q: np.ndarray  # (RING, nj) [rad]
+    dq: np.ndarray  # (RING, nj) [rad/s]
+    wrench: np.ndarray  # (RING, 6) of the ground: force, and moment about the root; root axes
+    found: np.ndarray  # (RING, nc + 1) contacts with the ground: of each foot, of anything
+    truth_qpos: np.ndarray  # (RING, nq)
+    truth_qvel: np.ndarray  # (RING, nv)
+
+
+@dataclass(frozen=True, eq=False)
+class Sensors(Block):
+    """The sensors of an episode's robot, and what they measure."""
+
+    robot: RobotArrays
+    views: SimViews
+    rings: Rings
+    seed: np.ndarray  # (1,) uint64, see `uniform`
+    noise: np.ndarray  # (8,) deviations; play of the joints [rad]
+    encoder_bias: np.ndarray  # (nj,)
+    gyro_bias: np.ndarray  # (3,)
+    force_bias: np.ndarray  # (3,) of the accelerometer
+    mount: np.ndarray  # (3, 3) axes of the IMU in the root's frame
+    level: np.ndarray  # (3, 3) from the simulation's axes to those whose z is up
+    gravity: np.ndarray  # (3,) in the simulation's axes [m/s²]
+    drift: np.ndarray  # (3,) rotation vector of the attitude's error now [rad]
+    play: np.ndarray  # (nj,) motor's position over the joint's, within the backlash [rad]
+    last_q: np.ndarray  # (nj,) joint positions at the last measurement
+    last_velocity: np.ndarray  # (3,) of the root, at the last measurement
+    bus: MotorBus  # has what the encoders read now: motors have it at once
+
+
+def allocate_sensors(simulation: Simulation) -> Sensors:
+    """Sensors that have measured nothing."""
+    nv, nc = simulation.model.nv, len(simulation.robot.soles)
+    zeros, nj = guarded_zeros, simulation.model.nv - 6
+    rings = Rings(
+        next=zeros(1, np.int64),
+        count=zeros(1, np.int64),
+        attitude=zeros((RING, 3, 3)),
+        gyro=zeros((RING, 3)),
+        force=zeros((RING, 3)),
+        q=zeros((RING, nj)),
+        dq=zeros((RING, nj)),
+        wrench=zeros((RING, 6)),
+        found=zeros((RING, nc + 1)),
+        truth_qpos=zeros((RING, nv + 1)),
+        truth_qvel=zeros((RING, nv)),
+    )
+    return Sensors(
+        robot=simulation.arrays,
+        views=simulation.views,
+        rings=rings,
+        seed=zeros(1, np.uint64),
+        noise=zeros(8),
+        encoder_bias=zeros(nj),
+        gyro_bias=zeros(3),
+        force_bias=zeros(3),
+        mount=zeros((3, 3)),
+        level=zeros((3, 3)),
+        gravity=zeros(3),
+        drift=zeros(3),
+        play=zeros(nj),
+        last_q=zeros(nj),
+        last_velocity=zeros(3),
+        bus=motor_bus(nj, simulation.model.nu),
+    )
+
+
+def begin_sensors(s: Sensors, drawn: DrawnRobot, model: mujoco.MjModel) -> None:
+    """Start an episode; all that would have been measured before it is its start."""
+    d = drawn.noise
+    s.noise[:] = (
+        d["encoder_noise"], d["velocity_noise"], d["gyro_noise"], d["accelerometer_noise"],
+        d["tilt_drift"], d["force_noise"], d["cop_noise"], drawn.backlash,
+    )  # fmt: skip
+    s.seed[0] = drawn.seed
+    s.encoder_bias[:], s.gyro_bias[:] = drawn.encoder_bias, drawn.gyro_bias
+    s.force_bias[:] = drawn.accelerometer_bias
+    s.mount[:] = rotation(drawn.tilt_bias)
+    s.gravity[:] = model.opt.gravity
+    s.level[:] = levelling(model.opt.gravity)
+    s.drift[:] = 0.0
+    s.play[:] = 0.0
+    s.last_q[:], s.last_velocity[:] = s.views.qpos[7:], s.views.qvel[:3]
+    add_noise(s.seed, s.noise[DRIFT], s.drift)
+    s.rings.next[0] = 0
+    for _ in range(RING):
+        measure(s)
+    s.rings.count[0] = 1
+
+
+def rotation(vector: np.ndarray) -> np.ndarray:
+    """(3, 3) exp(skew(φ)) of a rotation vector φ (3,) [rad]."""
+    quaternion, axes = np.zeros(4), np.zeros(9)
+    angle = float(np.linalg.norm(vector))
+    mujoco.mju_axisAngle2Quat(quaternion, vector / angle if angle > 0.0 else vector, angle)
+    mujoco.mju_quat2Mat(axes, quaternion)
+    return axes.reshape(3, 3)
+
+
+def levelling(gravity: np.ndarray) -> np.ndarray:
+    """(3, 3) the least rotation that turns the direction against `gravity` (3,) into z."""
+    up = -gravity / np.linalg.norm(gravity)
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    if sine == 0.0:
+        return np.eye(3)
+    return rotation(axis / sine * np.arctan2(sine, up[2]))
+
+
+@compiled
+def measure(s: Sensors):
+    """Write what the sensors read now over the oldest measurement."""
+    r, k = s.rings, s.rings.next[0]
+    r.next[0] = (k + 1) % r.q.shape[0]
+    r.count[0] += 1
+    _measure_root(s, k)
+    _measure_joints(s, k)
+    _measure_soles(s, k)
+    copy_into(s.views.qpos, r.truth_qpos[k])
+    copy_into(s.views.qvel, r.truth_qvel[k])
+
+
+@compiled
+def _measure_root(s: Sensors, k: int):
+    """Attitude (1 + skew(drift)) level R mount, gyro mountᵀ ω, specific force mountᵀ Rᵀ(a − g).
+
+    a is the difference of the root's velocities over the physics step.
+    """
+    r, v, dt = s.rings, s.views, s.robot.timestep
+    xmat = v.xmat[s.robot.root_body]
+    remain = np.exp(-dt / DRIFT_TIME)
+    stir = s.noise[DRIFT] * np.sqrt(1.0 - remain * remain)
+    for a in range(3):
+        s.drift[a] *= remain
+    add_noise(s.seed, stir, s.drift)
+    for a in range(3):
+        for b in range(3):
+            total = 0.0
+            for c in range(3):
+                for d in range(3):
+                    total += s.level[a, c] * xmat[3 * c + d] * s.mount[d, b]
+            r.attitude[k, a, b] = total
+    for b in range(3):
+        x, y, z = r.attitude[k, 0, b], r.attitude[k, 1, b], r.attitude[k, 2, b]
+        r.attitude[k, 0, b] = x + s.drift[1] * z - s.drift[2] * y
+        r.attitude[k, 1, b] = y + s.drift[2] * x - s.drift[0] * z
+        r.attitude[k, 2, b] = z + s.drift[0] * y - s.drift[1] * x
+    for b in range(3):
+        rate, force = s.gyro_bias[b], s.force_bias[b]
+        for d in range(3):
+            rate += s.mount[d, b] * v.qvel[3 + d]
+            for c in range(3):
+                accel = (v.qvel[c] - s.last_velocity[c]) / dt - s.gravity[c]
+                force += s.mount[d, b] * xmat[3 * c + d] * accel
+        r.gyro[k, b], r.force[k, b] = rate, force
+    add_noise(s.seed, s.noise[GYRO], r.gyro[k])
+    add_noise(s.seed, s.noise[ACCELEROMETER], r.force[k])
+    copy_into(v.qvel[:3], s.last_velocity)
+
+
+@compiled
+def _measure_joints(s: Sensors, k: int):
+    """Positions at the motor's side of the play, and velocities; the motors have them at once."""
+    v, q, dq = s.views, s.bus.q, s.bus.dq
+    half = 0.5 * s.noise[BACKLASH]
+    for j in range(q.shape[0]):
+        now = v.qpos[7 + j]
+        s.play[j] = min(max(s.play[j] - (now - s.last_q[j]), -half), half)
+        s.last_q[j] = now
+        q[j] = now + s.play[j] + s.encoder_bias[j]
+        dq[j] = v.qvel[6 + j]
+    add_noise(s.seed, s.noise[ENCODER], q)
+    add_noise(s.seed, s.noise[VELOCITY], dq)
+    copy_into(q, s.rings.q[k])
+    copy_into(dq, s.rings.dq[k])
+
+
+@compiled
+def _measure_soles(s: Sensors, k: int):
+    """The ground's wrench on the root's axes, and contacts, as of the last step."""
+    v, w, f = s.views, s.rings.wrench[k], s.views.qfrc_constraint
+    xmat = v.xmat[s.robot.root_body]
+    weight = s.robot.mass * s.robot.gravity
+    for a in range(3):
+        w[a], w[3 + a] = 0.0, f[3 + a]
+        for b in range(3):
+            w[a] += xmat[3 * b + a] * f[b]
+    if f[2] > 0.0:
+        add_noise(s.seed, s.noise[FORCE] * weight, w[:3])
+        deviation = s.noise[COP] * f[2]
+        if deviation > 0.0:
+            w[3] += deviation * normal(s.seed)
+            w[4] += deviation * normal(s.seed)
+    for i in range(s.robot.sole_sensor.shape[0]):
+        s.rings.found[k, i] = v.sensordata[s.robot.sole_sensor[i]]
+    s.rings.found[k, s.robot.sole_sensor.shape[0]] = v.sensordata[s.robot.ground_sensor]

@@ -1,0 +1,221 @@
+"""The state of a robot from an IMU, encoders and soles, by its legs and its accelerometer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.maths.vectors import copy_into
+from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.kinematics import StateArrays
+
+from .measurement import Rings
+from .prediction import Promises
+
+FROM_Q, FROM_DQ = 0, 1  # columns of `Odometry.gains`
+STIR, WANDER, SLIP, ROLL, JOINT_NOISE, RATE_GAIN = range(6)  # entries of `Odometry.numbers`
+LEAST = 1e-5, 1e-2  # noises of a joint's position and velocity [rad, rad/s]
+LOAD = 2  # column of `Odometry.pressed`
+VV, VB, BB = range(3)  # entries of `Odometry.variance`
+
+
+@dataclass(frozen=True, eq=False)
+class Odometry(Block):
+    """What is remembered of a robot (nj joints, nc soles), as of the last measurement."""
+
+    robot: RobotArrays
+    state: StateArrays  # the state believed in the tick before: its Jacobians serve here
+    rings: Rings
+    promises: Promises
+    seen: np.ndarray  # (1,) int: measurements that have been used
+    position: np.ndarray  # (3,) of the root [m]
+    axes: np.ndarray  # (3, 3) of the root
+    q: np.ndarray  # (nj,) [rad]
+    v: np.ndarray  # (nv,) velocity: of the root in world axes, its angular one, the joints'
+    bias: np.ndarray  # (3,) of the accelerometer and the attitude, world axes [m/s²]
+    variance: np.ndarray  # (3,) of each component of the root's velocity, with the bias, of that
+    pressed: np.ndarray  # (nc, 3) of each sole: where it is pressed [m], its part of the load
+    told: np.ndarray  # (6,) how a sole moves against a resting root [m/s, rad/s]
+    gains: np.ndarray  # (2, 2) rows q, q̇: corrections by errors of q and q̇
+    numbers: np.ndarray  # (6,) see STIR and its like
+
+
+def allocate_odometry(
+    robot: RobotArrays, state: StateArrays, rings: Rings, promises: Promises
+) -> Odometry:
+    """An estimator that has seen nothing."""
+    zeros, nv = guarded_zeros, len(state.qvel)
+    return Odometry(
+        robot, state, rings, promises, zeros(1, np.int64), zeros(3), zeros((3, 3)), zeros(nv - 6),
+        zeros(nv), zeros(3), zeros(3), zeros((len(state.contacts), 3)), zeros(6), zeros((2, 2)),
+        zeros(6),
+    )  # fmt: skip
+
+
+def filter_gains(dt: float, acceleration: float, noise_q: float, noise_v: float) -> np.ndarray:
+    """(2, 2) gains of the stationary Kalman filter of a joint, whose state is (q, q̇).
+
+    An acceleration that nobody knows, of this standard deviation [rad/s²] and new in every step of
+    `dt` [s], moves the joint; position and velocity are measured with noises [rad, rad/s], of which
+    neither is taken for less than `LEAST`.
+    """
+    A = np.array([[1.0, dt], [0.0, 1.0]])
+    B = np.array([[0.5 * dt * dt], [dt]])
+    R = np.diag([max(noise_q, LEAST[0]) ** 2, max(noise_v, LEAST[1]) ** 2])
+    P = solve_discrete_are(A.T, np.eye(2), acceleration**2 * B @ B.T + 1e-18 * np.eye(2), R)
+    return P @ np.linalg.inv(P + R)
+
+
+def rate_gain(dt: float, acceleration: float, noise: float) -> float:
+    """The gain of the stationary Kalman filter of a number that is measured with `noise`."""
+    q, r = (acceleration * dt) ** 2, max(noise, 1e-6) ** 2
+    prior = 0.5 * q + np.sqrt(0.25 * q * q + q * r)
+    return float(prior / (prior + r))
+
+
+@compiled
+def follow_measurements(o: Odometry, last: int, earlier: int):
+    """Take in all measurements up to the number `last`; see `keep_joints`, `keep_velocity`.
+
+    `earlier`: physics steps by which what acts was asked for before.
+    """
+    n = o.rings.q.shape[0]
+    for number in range(max(o.seen[0], last - n + 1), last):
+        row = (o.rings.next[0] - o.rings.count[0] + number + n) % n
+        keep_joints(o, row, number - 1 - earlier)
+        keep_velocity(o, row)
+    o.seen[0] = max(last, o.seen[0])
+
+
+@compiled
+def keep_joints(o: Odometry, row: int, asked: int):
+    """Joint positions, velocities and the root's angular one: promised ones, then corrected."""
+    r, p, dt = o.rings, o.promises, o.robot.timestep
+    n = p.rows.shape[0]
+    promised = asked >= 0 and asked < p.written[0]
+    for a in range(3):
+        if promised:
+            o.v[3 + a] += dt * p.rows[asked % n, 3 + a]
+        o.v[3 + a] += o.numbers[RATE_GAIN] * (r.gyro[row, a] - o.v[3 + a])
+    for j in range(o.q.shape[0]):
+        accel = p.rows[asked % n, 6 + j] if promised else 0.0
+        o.q[j] += dt * (o.v[6 + j] + 0.5 * dt * accel)
+        o.v[6 + j] += dt * accel
+        error_q, error_v = r.q[row, j] - o.q[j], r.dq[row, j] - o.v[6 + j]
+        o.q[j] += o.gains[0, FROM_Q] * error_q + o.gains[0, FROM_DQ] * error_v
+        o.v[6 + j] += o.gains[1, FROM_Q] * error_q + o.gains[1, FROM_DQ] * error_v
+
+
+@compiled
+def keep_velocity(o: Odometry, row: int):
+    """The root's velocity and the accelerometer's bias b, by a Kalman filter of each component.
+
+    The accelerometer leads on, v ← v + (R f + g + b) dt, and the legs correct, see `correct`.
+    """
+    r, dt, P = o.rings, o.robot.timestep, o.variance
+    copy_axes(r.attitude[row], o.axes)
+    for a in range(3):
+        accel = o.bias[a] - (o.robot.gravity if a == 2 else 0.0)
+        for b in range(3):
+            accel += o.axes[a, b] * r.force[row, b]
+        o.v[a] += dt * accel
+        o.position[a] += dt * o.v[a]
+    P[VV] += dt * (2.0 * P[VB] + dt * P[BB]) + (o.numbers[STIR] * dt) ** 2
+    P[VB] += dt * P[BB]
+    P[BB] += dt * o.numbers[WANDER] ** 2
+    place_pressure(o, row)
+    for i in range(o.state.contacts.shape[0]):
+        if r.found[row, i] > 0.0 and o.pressed[i, LOAD] > 0.0:
+            correct(o, row, i)
+
+
+@compiled
+def place_pressure(o: Odometry, row: int):
+    """Where each sole is pressed, relative to its middle, and its part of the load.
+
+    The centre of pressure of the whole ground's wrench, moved into a sole, is the point at which
+    that sole rests though it rolls on an edge. Two soles share the load as it lies between them.
+    """
+    r, s, w = o.rings, o.state, o.rings.wrench[row]
+    nc = s.contacts.shape[0]
+    fx, fy, fz, mx, my = 0.0, 0.0, 0.0, 0.0, 0.0
+    for b in range(3):
+        fx, fy, fz = fx + o.axes[0, b] * w[b], fy + o.axes[1, b] * w[b], fz + o.axes[2, b] * w[b]
+        mx, my = mx + o.axes[0, b] * w[3 + b], my + o.axes[1, b] * w[3 + b]
+    borne = fz > 0.1 * o.robot.mass * o.robot.gravity
+    first, second = s.sole_point[0], s.sole_point[nc - 1]
+    height = s.qpos[2] - 0.5 * (first[2] + second[2])
+    x = s.qpos[0] - (my + height * fx) / fz if borne else 0.5 * (first[0] + second[0])
+    y = s.qpos[1] + (mx - height * fy) / fz if borne else 0.5 * (first[1] + second[1])
+    dx, dy = second[0] - first[0], second[1] - first[1]
+    between = ((x - first[0]) * dx + (y - first[1]) * dy) / max(dx * dx + dy * dy, 1e-6)
+    between = min(max(between, 0.0), 1.0)
+    for i in range(nc):
+        alone = nc != 2 or r.found[row, 1 - i] <= 0.0
+        load = 1.0 if alone else (between if i == 1 else 1.0 - between)
+        o.pressed[i, LOAD] = load if borne else 0.0
+        axes, px, py = s.sole_axes[i], x - s.sole_point[i, 0], y - s.sole_point[i, 1]
+        for a in range(2):
+            along = axes[0, a] * px + axes[1, a] * py
+            low, high = np.inf, -np.inf
+            for k in range(o.robot.sole_vertices[i]):
+                low = min(low, o.robot.sole_polygon[i, k, a])
+                high = max(high, o.robot.sole_polygon[i, k, a])
+            o.pressed[i, a] = min(max(along, low), high)
+
+
+@compiled
+def correct(o: Odometry, row: int, i: int):
+    """Correct the velocity by sole i, whose pressed point rests: v = −(J_ω ω + J_q q̇) − ω_i × r.
+
+    [1 J_ω J_q] is the Jacobian of the sole's middle, ω_i its angular velocity and r the pressed
+    point from there. What it tells is believed the less the noisier the joints' velocities are, the
+    less the sole bears, and the faster it turns.
+    """
+    s, P, dq, told, axes = o.state, o.variance, o.rings.dq[row], o.told, o.state.sole_axes[i]
+    for a in range(6):
+        total = 0.0
+        for b in range(3):
+            total += s.J[6 * i + a, 3 + b] * o.rings.gyro[row, b]
+        for j in range(dq.shape[0]):
+            total += s.J[6 * i + a, 6 + j] * dq[j]
+        told[a] = total
+    rx = axes[0, 0] * o.pressed[i, 0] + axes[0, 1] * o.pressed[i, 1]
+    ry = axes[1, 0] * o.pressed[i, 0] + axes[1, 1] * o.pressed[i, 1]
+    rz = axes[2, 0] * o.pressed[i, 0] + axes[2, 1] * o.pressed[i, 1]
+    turning = 0.0  # of the filtered velocities: noise of the joints is no rolling
+    for a in range(3, 6):
+        rate = 0.0
+        for j in range(3, o.v.shape[0]):
+            rate += s.J[6 * i + a, j] * o.v[j]
+        turning += rate * rate
+    told[0] += told[4] * rz - told[5] * ry
+    told[1] += told[5] * rx - told[3] * rz
+    told[2] += told[3] * ry - told[4] * rx
+    reach = 0.0
+    for a in range(3):
+        for j in range(dq.shape[0]):
+            reach += s.J[6 * i + a, 6 + j] ** 2 / 3.0
+    doubt = o.numbers[SLIP] ** 2 + o.numbers[ROLL] ** 2 * turning
+    doubt += o.numbers[JOINT_NOISE] ** 2 * reach
+    doubt /= o.pressed[i, LOAD] ** 2
+    gain, gain_bias = P[VV] / (P[VV] + doubt), P[VB] / (P[VV] + doubt)
+    P[BB] -= gain_bias * P[VB]
+    P[VV] *= 1.0 - gain
+    P[VB] *= 1.0 - gain
+    for a in range(3):
+        error = -told[a] - o.v[a]
+        o.v[a] += gain * error
+        o.bias[a] += gain_bias * error
+
+
+@compiled
+def copy_axes(source: np.ndarray, out: np.ndarray):
+    """`out[:] = source` of two frames (3, 3)."""
+    for a in range(3):
+        copy_into(source[a], out[a])

@@ -1,0 +1,66 @@
+"""The simulated robot that an episode draws: one model, changed in place at every reset."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from poise.envs.physics.simulation import Simulation
+from poise.envs.pushes.sampler import push_bodies
+from poise.envs.robots.robot import Robot
+
+from .drawn import DrawnRobot
+
+#: what an episode changes of a model
+CHANGED = (
+    *("body_mass", "body_inertia", "body_ipos", "dof_frictionloss"),
+    *("geom_friction", "pair_friction", "geom_solref", "pair_solref"),
+)
+
+
+class Plant:
+    """The simulation of a robot whose body and ground differ from those of `robot`.
+
+    Attributes:
+        robot: that it differs from.
+        simulation: of a model of its own. Sizes, names and motors are those of `robot`, so that a
+            controller made for that fits; its arrays have the true mass.
+    """
+
+    def __init__(self, robot: Robot):
+        model = copy.copy(robot.model)
+        self.robot = robot
+        self._nominal = {name: getattr(model, name).copy() for name in CHANGED}
+        self._gravity = float(np.linalg.norm(model.opt.gravity))
+        self._scratch = mujoco.MjData(model)
+        self._loaded = model.body(push_bodies(robot)[0]).id
+        self._limit = np.zeros(model.nv)
+        self._limit[robot.motor_dofs] = robot.torque_limit
+        self._mass = robot.mass
+        self._root = robot.root_body_id
+        self.simulation = Simulation(replace(robot, model=model))
+
+    def become(self, drawn: DrawnRobot) -> None:
+        """Change the model to the robot that was drawn; the simulation must be reset next."""
+        model, nominal = self.simulation.model, self._nominal
+        for name, value in nominal.items():
+            getattr(model, name)[:] = value
+        model.body_mass[:] *= drawn.mass_factor
+        model.body_inertia[:] *= drawn.mass_factor[:, None]
+        model.body_mass[self._loaded] += drawn.payload * self._mass
+        model.body_ipos[self._loaded] += drawn.com_shift
+        model.dof_frictionloss[6:] += drawn.joint_friction * self._limit[6:]
+        if drawn.friction is not None:
+            model.geom_friction[:, 0] = drawn.friction
+            model.pair_friction[:, :2] = drawn.friction
+        if drawn.softness is not None:
+            for solref in (model.geom_solref, model.pair_solref):
+                soft = solref[:, 0] > 0.0  # a negative number is a stiffness of the model's own
+                solref[soft, 0] = np.maximum(solref[soft, 0], drawn.softness)
+        up = np.array([-drawn.slope[0], -drawn.slope[1], 1.0])  # of gravity, seen from the ground
+        model.opt.gravity[:] = -self._gravity * up / np.linalg.norm(up)
+        mujoco.mj_setConst(model, self._scratch)
+        self.simulation.arrays.replace_number("mass", float(model.body_subtreemass[self._root]))

@@ -1,0 +1,146 @@
+"""A robot in a simulation, how real it is, and the source of what is believed of its state."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from poise.configs.errors import ConfigError
+from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.robot import Robot
+
+from .drawn import DrawnRobot, draw_robot
+from .estimator import RAW, EstimatedState, EstimatorConfig, check_latency
+from .plant import Plant
+from .realism import Realism, overlaid
+from .source import StateSource
+
+
+class SensedRobot:
+    """The base of what has a simulation, a level of realism and a `StateSource`.
+
+    Attributes:
+        robot: the robot that is known; the simulated one may differ, see `Realism`.
+        estimator: how the state is estimated where it is not known exactly.
+        drawn: the robot of the running episode; None where it is the one that is known.
+    """
+
+    robot: Robot
+    estimator: EstimatorConfig
+    drawn: DrawnRobot | None
+    _raw = False  # whether the controller brings an estimator of its own
+
+    def _unbind(self) -> None:
+        """Forget what was made of the simulation or the source: there is another one."""
+
+    @property
+    def _holding(self) -> np.ndarray:
+        """(nu,) torques that hold the robot before an episode [N·m]."""
+        raise NotImplementedError
+
+    @property
+    def realism(self) -> Realism:
+        """What the robot of an episode is drawn from; may be replaced between episodes.
+
+        Raises ConfigError for delays that are longer than what can be led on.
+        """
+        return self._realism
+
+    @realism.setter
+    def realism(self, level: Realism) -> None:
+        check_latency(level, self.robot.model.opt.timestep)
+        self._realism, self.drawn = level, None
+        source = self._state_source
+        if level.ideal:
+            if isinstance(source, EstimatedState):
+                self.simulation = Simulation(source.plant.robot)
+        elif not isinstance(source, EstimatedState):
+            plant = Plant(self._simulation.robot)
+            self._simulation = plant.simulation
+            self._take(EstimatedState(plant, self.robot, self._estimator()))
+
+    @property
+    def known_robot(self) -> Robot:
+        """The robot in its world as its model has it, whatever an episode draws."""
+        source = self._state_source
+        return source.plant.robot if isinstance(source, EstimatedState) else self._simulation.robot
+
+    def _estimator(self) -> EstimatorConfig:
+        return RAW if self._raw else self.estimator
+
+    def believe_raw(self, raw: bool) -> None:
+        """Whether the controller gets what is measured, as it is, instead of an estimate."""
+        if raw != self._raw:
+            self._raw = raw
+            source = self._state_source
+            if isinstance(source, EstimatedState):
+                self._take(EstimatedState(source.plant, self.robot, self._estimator()))
+
+    @property
+    def simulation(self) -> Simulation:
+        """The robot and its world; may be replaced between episodes, and the state is then known.
+
+        Setting it makes the realism ideal.
+        """
+        return self._simulation
+
+    @simulation.setter
+    def simulation(self, simulation: Simulation) -> None:
+        self._simulation, self._realism, self.drawn = simulation, Realism(), None
+        self._take(StateSource(simulation))
+
+    @property
+    def state_source(self) -> StateSource:
+        """The source of what is believed of the state; may be replaced between episodes.
+
+        The simulation's own state is what is judged. Raises ConfigError for a source of another
+        simulation.
+        """
+        return self._state_source
+
+    @state_source.setter
+    def state_source(self, source: StateSource) -> None:
+        if source.simulation is not self.simulation:
+            raise ConfigError("is about another simulation", field="state_source")
+        self._take(source)
+
+    def _take(self, source: StateSource) -> None:
+        self._state_source = source
+        source.simulation.equip(source.drive, source.sense, source.bus)
+        self._unbind()
+
+    def _draw(self, given: object, rng: np.random.Generator) -> None:
+        """Draw the robot of an episode, with fields that are `given` fixed; before the reset.
+
+        The generator is one of its own, so that starts and pushes are those of the ideal world.
+        Raises ConfigError for fields that are wrong, or that the ideal world does not have.
+        """
+        source = self._state_source
+        if not isinstance(source, EstimatedState):
+            if given:
+                raise ConfigError("only where the environment's realism is not ideal",
+                                  source="reset", field="realism")  # fmt: skip
+            return
+        level = overlaid(self.realism, given, "reset: realism") if given else self.realism
+        check_latency(level, self.robot.model.opt.timestep)
+        self.drawn = draw_robot(level, self.robot, rng.spawn(1)[0])
+        source.plant.become(self.drawn)
+
+    def _begin_sensing(self) -> None:
+        """Let the estimator begin; the simulation has just been reset."""
+        source = self._state_source
+        if isinstance(source, EstimatedState):
+            assert self.drawn is not None  # by `_draw`
+            source.begin(self.drawn, self._holding)
+        else:
+            source.reset()
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model, for reading: environments of one robot share it where it is ideal."""
+        return self.simulation.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data of this environment, current after `reset` and after every `step`."""
+        return self.simulation.data

@@ -1,1 +1,0 @@
-"""Sensors: the state that a controller may know, and when."""

@@ -1,0 +1,96 @@
+"""envs/sensing/plant.py: bodies and ground of an episode."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from poise.envs.physics.simulation import Simulation
+from poise.envs.pushes.sampler import push_bodies
+from poise.envs.sensing.plant import CHANGED, Plant
+from tests.support.physics import random_state
+from tests.support.sensing import drawn_of
+from tests.support.shared import robot
+
+DERIVED = ("body_subtreemass", "dof_M0", "dof_invweight0", "body_invweight0")
+
+
+@pytest.fixture(scope="module")
+def plant() -> Plant:
+    return Plant(robot())
+
+
+def test_masses_and_their_centres(plant):
+    """Factors of each body; shift and payload of the pushed one; the other rooms see the sum."""
+    drawn = drawn_of({"body": {"mass": 0.1, "payload": 0.2, "com": 0.05, "scale": 0.1}}, 2)
+    plant.become(drawn)
+    model, nominal = plant.simulation.model, robot().model
+    loaded = nominal.body(push_bodies(robot())[0]).id
+    masses = nominal.body_mass * drawn.mass_factor
+    np.testing.assert_allclose(
+        model.body_inertia, nominal.body_inertia * drawn.mass_factor[:, None]
+    )
+    masses[loaded] += 0.2 * robot().mass
+    np.testing.assert_allclose(model.body_mass, masses)
+    moved = model.body_ipos - nominal.body_ipos
+    assert np.linalg.norm(moved[loaded]) == pytest.approx(0.05)
+    assert not np.any(np.delete(moved, loaded, axis=0))
+    assert 0.98 < np.delete(drawn.mass_factor, 0).mean() < 1.22 and np.ptp(drawn.mass_factor) > 0.1
+    state = plant.simulation.reset(*random_state(robot(), np.random.default_rng(0)))
+    data = plant.simulation.data
+    com = masses @ data.xipos / masses.sum()
+    np.testing.assert_allclose(state.com, com, atol=1e-12)
+    assert state.mass == pytest.approx(masses.sum())
+    mujoco.mj_subtreeVel(model, data)  # its momentum, over its mass
+    np.testing.assert_allclose(state.com_vel, data.subtree_linvel[robot().root_body_id], atol=1e-12)
+
+
+def test_joints_and_ground(plant):
+    """Coulomb friction over the motor's limit; the ground's friction; contacts no harder."""
+    drawn = drawn_of(
+        {"motors": {"friction": [0.01, 0.05]}, "ground": {"friction": 0.4, "softness": 0.05}}
+    )
+    plant.become(drawn)
+    model, nominal, dofs = plant.simulation.model, robot().model, robot().motor_dofs
+    added = model.dof_frictionloss - nominal.dof_frictionloss
+    np.testing.assert_allclose(added[dofs], drawn.joint_friction[dofs - 6] * robot().torque_limit)
+    assert not np.any(added[:6]) and np.ptp(drawn.joint_friction) > 0.02
+    assert np.all(model.geom_friction[:, 0] == 0.4) and np.all(model.pair_friction[:, :2] == 0.4)
+    assert np.array_equal(model.geom_friction[:, 1:], nominal.geom_friction[:, 1:])
+    assert np.all(model.geom_solref[:, 0] == 0.05)
+    plant.become(drawn_of({"ground": {"softness": 0.001}}))
+    assert np.array_equal(model.geom_solref, nominal.geom_solref)
+
+
+def test_a_slope_tilts_gravity(plant):
+    """To where the ground falls, by its angle, as strong as ever."""
+    drawn = drawn_of({"ground": {"slope": 10.0}})
+    plant.become(drawn)
+    g = plant.simulation.model.opt.gravity
+    assert np.linalg.norm(g) == pytest.approx(9.81)
+    np.testing.assert_allclose(-g[:2] / g[2], drawn.slope, atol=1e-12)
+    assert np.degrees(np.arccos(-g[2] / 9.81)) == pytest.approx(10.0)
+
+
+def test_nothing_is_left_of_the_robot_before(plant):
+    """A model that has been another one is the one that a new plant makes, and moves alike."""
+    plant.become(drawn_of("field", 1))
+    fresh = Plant(robot())
+    for each in (plant, fresh):
+        each.become(drawn_of("lab", 2))
+    for name in (*CHANGED, *DERIVED):
+        one, other = getattr(plant.simulation.model, name), getattr(fresh.simulation.model, name)
+        assert np.array_equal(one, other), name
+    ends = []
+    for each in (plant, fresh):
+        each.simulation.reset()
+        ends.append(each.simulation.step(np.zeros(robot().model.nu), 50).qpos.copy())
+    assert np.array_equal(*ends)
+
+
+def test_the_known_robot_stays_as_it_is(plant):
+    """The model that environments share is not the plant's."""
+    plant.become(drawn_of("field", 1))
+    model, fresh = robot().model, mujoco.MjModel
+    assert isinstance(model, fresh) and model is not plant.simulation.model
+    assert Simulation(robot()).arrays.mass == pytest.approx(model.body_mass.sum())
+    assert plant.simulation.arrays.mass != pytest.approx(robot().mass, rel=1e-3)
