@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.envs.physics.state import RobotState
+from poise.envs.robots.description import match_names
 
 from .config import ObservationTerm, PolicyFileConfig
 
@@ -24,6 +26,7 @@ class Seen(NamedTuple):
     action: np.ndarray  # (na,) of the step before, zero at the start
     command: np.ndarray  # (3,) [m/s, m/s, rad/s]
     phase: float  # of the clock [rad]
+    legs: np.ndarray  # (l,) the phase of each leg [rad]
 
 
 def _turned(seen: Seen, vector: np.ndarray) -> np.ndarray:
@@ -31,19 +34,29 @@ def _turned(seen: Seen, vector: np.ndarray) -> np.ndarray:
     return seen.state.root_axes.T @ vector
 
 
-DOWN = np.array([0.0, 0.0, -1.0])
+def _roll_pitch(seen: Seen) -> np.ndarray:
+    """Rotations about the axes ahead and to the left, as R = R_z(yaw) R_y(pitch) R_x(roll)."""
+    x, y, z = seen.state.root_axes[2]
+    return np.array([np.arctan2(y, z), np.arcsin(np.clip(-x, -1.0, 1.0))])
 
-#: term → its numbers
+
+DOWN = np.array([0.0, 0.0, -1.0])
+CONSTANT, COMMAND = "constant", "velocity_commands"
+
+#: term → its numbers; besides these there are those of a constant
 TERMS: dict[str, Callable[[Seen], np.ndarray]] = {
     "base_lin_vel": lambda seen: _turned(seen, seen.state.qvel[:3]),
     "base_ang_vel": lambda seen: seen.state.qvel[3:6],
     "projected_gravity": lambda seen: _turned(seen, DOWN),
-    "velocity_commands": lambda seen: seen.command,
+    "roll_pitch": _roll_pitch,
+    COMMAND: lambda seen: seen.command,
     "joint_pos": lambda seen: seen.q,
     "joint_pos_rel": lambda seen: seen.q - seen.default,
     "joint_vel": lambda seen: seen.v,
     "last_action": lambda seen: seen.action,
     "phase": lambda seen: np.array([np.sin(seen.phase), np.cos(seen.phase)]),
+    "phase_sin": lambda seen: np.sin(seen.legs),
+    "phase_cos": lambda seen: np.cos(seen.legs),
 }
 #: other names of the same
 ALIASES = {
@@ -60,82 +73,245 @@ ALIASES = {
 }
 
 
-class Observer:
-    """The observation of a policy with `joints` joints and `actions` actions, step by step.
+def meaning(term: ObservationTerm) -> str:
+    """The name of a term in `TERMS`."""
+    return ALIASES.get(term.term, term.term)
 
-    Raises ConfigError for an unknown term, a scale of another size than its term, and frames of
-    terms with different histories.
+
+def follows_commands(config: PolicyFileConfig) -> bool:
+    """Return whether a policy sees the velocity that is commanded."""
+    parts = [part for parts in config.inputs.values() for part in parts]
+    return any(meaning(term) == COMMAND for part in parts for term in part.terms)
+
+
+class Place(NamedTuple):
+    """Where a term lies in an observation, and how many policy steps ago it was so."""
+
+    term: ObservationTerm
+    start: int
+    size: int
+    age: int
+
+
+class Observer:
+    """The observations of a policy, step by step: one for each of its network's inputs.
+
+    Args:
+        config: what the inputs show.
+        joints: names of the policy's joints.
+        moved: those of them that its action moves.
+        source: the file that describes it, for errors.
+
+    Raises ConfigError for an unknown term, numbers of another size than its term, joints that it
+    does not have, and frames of terms with different histories.
     """
 
-    def __init__(self, config: PolicyFileConfig, joints: int, actions: int, source: str):
-        sizes = {"joint_pos": joints, "joint_pos_rel": joints, "joint_vel": joints,
-                 "last_action": actions, "phase": 2}  # fmt: skip
-        self._by_frame = config.history == "frame"
-        self._terms: list[_Term] = []
-        for i, described in enumerate(config.observations):
-            name = ALIASES.get(described.term, described.term)
-            if name not in TERMS:
-                raise ConfigError(f"no such term: {shown(described.term)}", source=source,
-                                  field=f"observations[{i}].term",
-                                  choices=(*TERMS, *ALIASES))  # fmt: skip
-            first = config.observations[0].history
-            if self._by_frame and described.history != first:
-                raise ConfigError(f"{described.history} steps, where the first term shows {first}",
-                                  source=source, field=f"observations[{i}].history")  # fmt: skip
-            self._terms.append(_Term(described, name, sizes.get(name, 3), source, i))
+    def __init__(
+        self, config: PolicyFileConfig, joints: Sequence[str], moved: Sequence[str], source: str
+    ):
+        legs = len(config.phase_offsets)
+        names = {"joint_pos": joints, "joint_pos_rel": joints, "joint_vel": joints,
+                 "last_action": moved}  # fmt: skip
+        sizes = {"phase": 2, "roll_pitch": 2, "phase_sin": legs, "phase_cos": legs,
+                 **{term: len(each) for term, each in names.items()}}  # fmt: skip
+        known = _Known({term: list(each) for term, each in names.items()}, sizes, source)
+        self._inputs: dict[str, _Side | _Part] = {}
+        for name, parts in config.inputs.items():
+            field = f"observations.{name}" if name else "observations"
+            if config.history == "frame" and parts:
+                self._inputs[name] = _Part(_framed(parts, field, source), field, known, field)
+            else:
+                self._inputs[name] = _Side(parts, field, known)
 
     @property
-    def size(self) -> int:
-        """The size of an observation."""
-        return sum(term.size * term.described.history for term in self._terms)
+    def sizes(self) -> dict[str, int]:
+        """Input → the numbers of an observation."""
+        return {name: side.size for name, side in self._inputs.items()}
 
-    @property
-    def parts(self) -> str:
-        """The terms and their sizes, for errors."""
-        sizes = ((term, term.described.history) for term in self._terms)
-        return ", ".join(
-            f"{term.described.term} {term.size}" + (f" × {count}" if count > 1 else "")
-            for term, count in sizes
-        )
+    def __str__(self) -> str:
+        """How many numbers each input is given, and of which terms, for errors."""
+        return "; ".join(f"{side.size} numbers{' for ' if name else ''}{name} ({side})"
+                         for name, side in self._inputs.items())  # fmt: skip
+
+    def places(self) -> dict[str, list[Place]]:
+        """Input → where its terms lie, in their order."""
+        return {name: list(side.places(0, 0)) for name, side in self._inputs.items()}
 
     def forget(self) -> None:
         """Forget the last trial: the next observation fills the history."""
-        for term in self._terms:
-            term.kept.clear()
+        for side in self._inputs.values():
+            side.forget()
 
-    def observe(self, seen: Seen) -> np.ndarray:
-        """The observation (size,) float32 of this policy step, which enters the history."""
-        for term in self._terms:
-            term.look(seen)
-        if self._by_frame:
-            columns = [np.concatenate(frame) for frame in zip(*self._kept(), strict=True)]
-        else:
-            columns = [np.concatenate(list(kept)) for kept in self._kept()]
-        return np.concatenate(columns).astype(np.float32)
+    def observe(self, seen: Seen) -> dict[str, np.ndarray]:
+        """Input → the observation (size,) of this policy step, which enters the history."""
+        return {name: side.now(seen) for name, side in self._inputs.items()}
 
-    def _kept(self) -> list[deque[np.ndarray]]:
-        return [term.kept for term in self._terms]
+
+class _Known(NamedTuple):
+    """What is known of terms: the names of the joints that they have numbers of, and sizes."""
+
+    joints: dict[str, list[str]]
+    sizes: dict[str, int]  # 3, where it is not here
+    source: str
+
+
+def _framed(parts: Sequence[ObservationTerm], field: str, source: str) -> ObservationTerm:
+    """All parts of an input as one frame, which has the history that they have alike."""
+    first = parts[0]
+    for i, part in enumerate(parts):
+        if part.history != first.history:
+            raise ConfigError(f"{part.history} steps, where the first term shows {first.history}",
+                              source=source, field=f"{field}[{i}].history")  # fmt: skip
+    alone = tuple(replace(part, history=1, lag=0, newest_first=False) for part in parts)
+    return ObservationTerm(frame=alone, history=first.history, lag=first.lag, fill=first.fill,
+                           newest_first=first.newest_first)  # fmt: skip
+
+
+class _Side:
+    """Parts side by side in one step."""
+
+    def __init__(self, parts: Sequence[ObservationTerm], field: str, known: _Known):
+        self.parts = [_Part(part, f"{field}[{i}]", known) for i, part in enumerate(parts)]
+        self.size = sum(part.size for part in self.parts)
+
+    def __str__(self) -> str:
+        return ", ".join(map(str, self.parts))
+
+    def places(self, start: int, age: int) -> Iterator[Place]:
+        """Where their terms lie, from `start` on, of so many steps ago."""
+        for part in self.parts:
+            yield from part.places(start, age)
+            start += part.size
+
+    def now(self, seen: Seen) -> np.ndarray:
+        """(size,) what they show in this step."""
+        return np.concatenate([part.now(seen) for part in self.parts])
+
+    def forget(self) -> None:
+        """Forget the last trial."""
+        for part in self.parts:
+            part.forget()
+
+
+class _Part:
+    """A term, or a frame of them, and what it showed in the last steps, oldest first."""
+
+    def __init__(self, described: ObservationTerm, field: str, known: _Known, inside: str = ""):
+        self.described = described
+        self.inner: _Side | _Term = (
+            _Side(described.frame, inside or f"{field}.frame", known)
+            if described.frame
+            else _Term(described, field, known)
+        )
+        self.kept: deque[np.ndarray] = deque(maxlen=described.history + described.lag)
+        self.size = self.inner.size * described.history
+
+    def __str__(self) -> str:
+        count = self.described.history
+        name = f"({self.inner})" if self.described.frame else str(self.inner)
+        return name + (f" × {count}" if count > 1 else "")
+
+    def places(self, start: int, age: int) -> Iterator[Place]:
+        """Where it lies, step by step."""
+        steps = range(self.described.lag, self.described.lag + self.described.history)
+        for step in steps if self.described.newest_first else reversed(steps):
+            yield from self.inner.places(start, age + step)
+            start += self.inner.size
+
+    def now(self, seen: Seen) -> np.ndarray:
+        """(size,) what it shows in this step, which enters the history."""
+        own, value = self.described, self.inner.now(seen)
+        if not self.kept:
+            before = value if own.fill == "first" else np.zeros_like(value)
+            self.kept.extend([before] * (own.history + own.lag))
+        self.kept.append(value)
+        steps = list(self.kept)[: own.history]
+        return np.concatenate(steps[::-1] if own.newest_first else steps)
+
+    def forget(self) -> None:
+        """Forget the last trial."""
+        self.kept.clear()
+        self.inner.forget()
 
 
 class _Term:
-    """One term and what it showed in the last steps, oldest first."""
+    """One term in one step."""
 
-    def __init__(self, described: ObservationTerm, name: str, size: int, source: str, i: int):
-        self.described, self.name, self.size = described, name, size
-        self.kept: deque[np.ndarray] = deque(maxlen=described.history)
-        self.scale = np.asarray(described.scale, dtype=float)
-        if self.scale.size not in (1, size):
-            raise ConfigError(
-                f"has {self.scale.size} numbers, {described.term} has {size}",
-                source=source,
-                field=f"observations[{i}].scale",
+    def __init__(self, described: ObservationTerm, field: str, known: _Known):
+        self.described, self.name = described, meaning(described)
+        if self.name not in TERMS and self.name != CONSTANT:
+            raise ConfigError(f"no such term: {shown(described.term)}", source=known.source,
+                              field=f"{field}.term",
+                              choices=(*TERMS, CONSTANT, *ALIASES))  # fmt: skip
+        self._source, self._field = known.source, field
+        self.values = np.array(described.values, dtype=float)
+        names = known.joints.get(self.name, [])
+        whole = len(self.values) if self.name == CONSTANT else known.sizes.get(self.name, 3)
+        self.picked = self._picked(whole, names)
+        self.size = len(self.picked)
+        self.scale = self._scale([names[i] for i in self.picked] if names else [])
+        self.at_rest = self._at_rest()
+
+    def __str__(self) -> str:
+        return f"{self.described.term} {self.size}"
+
+    def _picked(self, whole: int, names: list[str]) -> np.ndarray:
+        """The places of its numbers that it shows."""
+        picked = list(self.described.pick or range(whole))
+        if self.described.joints:
+            if not names:
+                raise self._wrong("joints", f"{self.described.term} has no joints")
+            wanted = match_names(dict.fromkeys(self.described.joints, 0), names, self._source,
+                                 f"{self._field}.joints")  # fmt: skip
+            picked = [i for i in picked if i < whole and names[i] in wanted]
+        if not picked or max(picked) >= whole:
+            raise self._wrong(
+                "pick" if self.described.pick else "values",
+                f"{self.described.term} has {whole} numbers",
             )
+        return np.array(picked)
 
-    def look(self, seen: Seen) -> None:
-        """Remember what it shows now."""
-        value = np.array(TERMS[self.name](seen), dtype=float)
+    def _scale(self, names: list[str]) -> np.ndarray:
+        given = self.described.scale
+        if isinstance(given, dict):
+            found = match_names(given, names, self._source, f"{self._field}.scale")
+            lost = [name for name in names if name not in found]
+            if lost:
+                raise self._wrong("scale", f"has nothing for {', '.join(lost)}")
+            given = tuple(found[name] for name in names)
+        scale = np.asarray(given, dtype=float)
+        if scale.size not in (1, self.size):
+            raise self._wrong("scale", f"has {scale.size} numbers, {self.described.term} has "
+                              f"{self.size}")  # fmt: skip
+        return scale
+
+    def _at_rest(self) -> np.ndarray | None:
+        if self.described.at_rest is None:
+            return None
+        shown_at_rest = np.array(self.described.at_rest, dtype=float)
+        if len(shown_at_rest) != self.size:
+            raise self._wrong("at_rest", f"has {len(shown_at_rest)} numbers, "
+                              f"{self.described.term} has {self.size}")  # fmt: skip
+        return shown_at_rest
+
+    def _wrong(self, field: str, problem: str) -> ConfigError:
+        return ConfigError(problem, source=self._source, field=f"{self._field}.{field}")
+
+    def places(self, start: int, age: int) -> Iterator[Place]:
+        """Where it lies."""
+        yield Place(self.described, start, self.size, age)
+
+    def now(self, seen: Seen) -> np.ndarray:
+        """(size,) its numbers."""
+        if self.at_rest is not None and not np.any(seen.command):
+            value = self.at_rest
+        elif self.name == CONSTANT:
+            value = self.values[self.picked]
+        else:
+            value = np.asarray(TERMS[self.name](seen), dtype=float)[self.picked]
         if self.described.clip is not None:
             value = np.clip(value, *self.described.clip)
-        value = value * self.scale
-        for _ in range(max(1, self.described.history - len(self.kept))):
-            self.kept.append(value)
+        return value * self.scale
+
+    def forget(self) -> None:
+        """It remembers nothing."""

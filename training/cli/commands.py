@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Names, RobotName, Switch
-from .export import export
+from .policies import export
 from .results import compare, leaderboard, replay, report
 from .view import view
 from .walk import gait, walk
@@ -310,6 +310,11 @@ def motion() -> None:
     raise AssertionError("main() answers this sub-command")
 
 
+def policies() -> None:
+    """Public policies of others: which are known, which are here; check FILE: what one lacks."""
+    raise AssertionError("main() answers this sub-command")
+
+
 def list_names() -> None:
     """List what can be named: robots, environments, controllers, policies, suites and the like."""
     from poise.baselines.clips.library import packaged_clips
@@ -352,6 +357,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "tune": tune,
     "qp-set": qp_set,
     "export": export,
+    "policies": policies,
     "robot": robot,
     "motion": motion,
     "list": list_names,

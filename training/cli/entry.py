@@ -120,6 +120,10 @@ def _run(args: list[str]) -> int:
         from .motion import run as run_motion
 
         return run_motion(args[1:])
+    if args[:1] == ["policies"]:  # it has one, too
+        from .policies import run as run_policies
+
+        return run_policies(args[1:])
     code = tyro.extras.subcommand_cli_from_dict(
         COMMANDS,
         prog="poise",

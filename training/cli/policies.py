@@ -1,0 +1,89 @@
+"""`poise policies`: those of others, known and checked; `poise export` of those trained here."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from poise.configs.errors import ConfigError
+from poise.training.running.terminal import terminal
+
+from .arguments import Allow, PolicyName
+
+Checked = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+
+
+def show() -> None:
+    """List the public policies that are known, where they are, and how to get the others.
+
+    Each is played by its name: poise evaluate falcon-g1 --robot unitree_g1. poise policies check
+    FILE says what is missing of another one.
+    """
+    from poise.baselines.policy_files.known import known_policies
+    from poise.training.policy_check.tables import print_policies
+
+    print_policies(known_policies(), terminal())
+
+
+def check(file: Checked, /, *, robot: str, rollout: Path | None = None, allow: Allow = ()) -> int:
+    """Say what a policy lacks, let it stand for 10 s, compare it with its maker's own steps.
+
+    Args:
+        file: a network (.onnx, .pt), a description (.yaml), a folder, or a known name.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        rollout: an .npz file of observations (T, n) and actions (T, na) of its maker's loop, and,
+            if they are known, of the states qpos and qvel of this robot.
+
+    Returns:
+        0 if it is described, stands, and nothing of the rollout is against it; else 1.
+    """
+    from poise.baselines.allowance import allowing
+    from poise.envs.robots.robot import load_robot
+    from poise.training.policy_check.check import check_policy
+    from poise.training.policy_check.tables import print_check
+
+    with allowing(allow):
+        found = check_policy(file, load_robot(robot), rollout)
+    print_check(found, terminal())
+    return 0 if found.right else 1
+
+
+def run(args: Sequence[str]) -> int:
+    """Run `poise policies`: the list, or the sub-command `check`."""
+    if args and args[0] == "check":
+        return tyro.cli(check, prog="poise policies check", args=list(args[1:]))
+    if args and not args[0].startswith("-"):
+        raise ConfigError(f"no such command: policies {args[0]}", choices=("check",))
+    tyro.cli(show, prog="poise policies", args=list(args))
+    return 0
+
+
+def export(
+    policy: PolicyName,
+    /,
+    *,
+    out: Path,
+    result: Path | None = None,
+    licence: str | None = None,
+    allow: Allow = (),
+) -> None:
+    """Write a policy for other programs: ONNX, safetensors, Stable-Baselines3, a model card.
+
+    The ONNX file is compared with the policy on 10,000 random observations first. The folder is
+    one that Hugging Face takes as it is. Needs pip install -e '.[export]' in a checkout.
+
+    Args:
+        policy: a packaged policy (see poise list) or a folder written by poise train.
+        out: folder to write to: new, or empty.
+        result: a folder of poise evaluate or poise benchmark in which the policy took part, or its
+            summary.json: its figures go into the card.
+        licence: of the policy, as Hugging Face abbreviates it; of a packaged one it is known.
+    """
+    from poise.training.trials.names import check_policy_name
+
+    check_policy_name(policy)
+    from poise.training.export.export import export_policy
+
+    worst = export_policy(policy, out, result=result, licence=licence, allow=allow)
+    print(f"{out}: ONNX differs from the policy by {worst:.1g} at most")
