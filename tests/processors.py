@@ -17,6 +17,7 @@ import platform
 import re
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,6 +27,9 @@ import llvmlite.binding
 from numpy._core import _multiarray_umath as numpy_simd
 
 ROOT = Path(__file__).resolve().parents[1]
+CACHES = (
+    Path(tempfile.gettempdir()) / f"poise-processors-{os.getuid()}"
+)  # none in the working folder
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 AVX2 = ("avx2", "bmi2", "fma")
 AVX512 = (*AVX2, "avx512bw", "avx512dq", "avx512f", "avx512vl")
@@ -98,7 +102,7 @@ def play(setting: Setting, folder: Path, number: int, pytest_args: list[str]) ->
     with log.open("w") as out:
         done = subprocess.run(
             command, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT, check=False,
-            env=setting.environment(folder / "cache" / setting.name),
+            env=setting.environment(CACHES / setting.name),
         )  # fmt: skip
     lines = log.read_text().splitlines() or ["no output"]
     took = f"{time.perf_counter() - begun:.0f} s"

@@ -4,6 +4,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -11,7 +12,8 @@ from numba.core import event
 
 from poise.configs.errors import ConfigError
 
-from .kernel_cache import compiled_once, drop_stale_kernels, kept_in, kernel_folder
+from .cache_folder import file_folder, kernel_folder
+from .kernel_cache import compiled_once, kept_in
 
 #: Sums may be reordered (SIMD) and products fused into them, but NaN and infinity keep their
 #: meaning: checks rely on them.
@@ -35,27 +37,43 @@ def fastmath(environment: Mapping[str, str]) -> set[str]:
 
 
 _FLAGS = fastmath(os.environ)
-#: Of the cache of compiled kernels; None where nothing can be written.
-CACHE = kernel_folder(sorted(_FLAGS))
-if CACHE is not None:
-    drop_stale_kernels(CACHE)
+#: Of the cache of compiled kernels; None where there is none, and why.
+CACHE, NO_CACHE = kernel_folder(sorted(_FLAGS))
 
 
 def compiled(function: Callable) -> Any:
     """Numba's decorator: cached on disk, without the GIL, NumPy's rules for division by zero."""
-    with kept_in(CACHE):
-        dispatcher = numba.njit(
-            cache=CACHE is not None,
-            nogil=True,
-            no_cfunc_wrapper=True,  # of which nobody makes use; a twentieth of the compilation
-            error_model="numpy",
-            fastmath=_FLAGS,
-        )(function)
-    return dispatcher if CACHE is None else compiled_once(dispatcher, CACHE)
+    folder = _folder(function)
+    if folder is None:
+        return _decorated(function, cache=False)
+    with kept_in(folder):
+        return compiled_once(_decorated(function, cache=True), folder)
+
+
+def _decorated(function: Callable, cache: bool) -> Any:
+    return numba.njit(
+        cache=cache,
+        nogil=True,
+        no_cfunc_wrapper=True,  # of which nobody makes use; a twentieth of the compilation
+        error_model="numpy",
+        fastmath=_FLAGS,
+    )(function)
+
+
+def _folder(function: Callable) -> Path | None:
+    """Where the kernels of a function are kept; None: nowhere, nor are those without a file."""
+    if CACHE is None:
+        return None
+    try:
+        return file_folder(CACHE, function.__code__.co_filename)
+    except OSError:
+        return None
 
 
 PATIENCE = 1.0  # [s] of compilation before the user is told
 MESSAGE = "poise: compiling for the first use; this takes twenty to thirty seconds, once"
+if CACHE is None:
+    MESSAGE = f"poise: compiling, in every process anew, for no kernels are kept: {NO_CACHE}"
 
 
 class Patience(event.Listener):

@@ -1,4 +1,4 @@
-"""The cache of compiled kernels: a folder for everything that decides about their bits.
+"""The cache of compiled kernels: in a folder for everything that decides about their bits.
 
 Numba's own cache tells processors and the file of the function apart. It knows neither the flags of
 `fastmath` nor the functions that were compiled into a kernel from other files, and processes that
@@ -14,72 +14,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding
 import numba
 from llvmlite.binding import Linkage
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 
-_ROOM = Path(__file__).resolve().parents[1]
-_PACKAGES = (_ROOM, _ROOM.parent / "baselines")
-
-
-def processor() -> str:
-    """Name and features that Numba compiles for: the host's, or NUMBA_CPU_NAME and its like."""
-    name, features = numba.config.CPU_NAME, numba.config.CPU_FEATURES
-    if features is None:
-        with contextlib.suppress(RuntimeError):  # LLVM does not know them on every platform
-            features = llvmlite.binding.get_host_cpu_features().flatten()
-    return f"{name or llvmlite.binding.get_host_cpu_name()} {features}"
-
-
-def _roots() -> Iterator[Path]:
-    """Folders that may hold caches, the best one first."""
-    if numba.config.CACHE_DIR:
-        yield Path(numba.config.CACHE_DIR).absolute() / "poise"
-    else:
-        yield _ROOM / "__pycache__"
-        caches = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-        yield Path(caches).absolute() / "poise"
-
-
-def kernel_folder(flags: object) -> Path | None:
-    """The folder of kernels compiled with these flags, made if need be; None: none is writable."""
-    key = f"{_ROOM} {numba.__version__} {processor()} {flags}"
-    name = f"kernels-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
-    for root in _roots():
-        with contextlib.suppress(OSError):
-            (root / name).mkdir(parents=True, exist_ok=True)
-            if os.access(root / name, os.W_OK | os.X_OK):
-                return root / name
-    return None
-
-
-def stamp(folder: Path) -> Path:
-    """The file that holds the digest of the sources that the kernels were compiled from."""
-    return folder / "sources.sha256"
-
-
-def drop_stale_kernels(folder: Path, packages: tuple[Path, ...] = _PACKAGES) -> bool:
-    """Delete the kernels in `folder` if sources of `packages` have outdated them; True if so."""
-    digest = hashlib.sha256()
-    for package in packages:
-        for path in sorted(package.rglob("*.py")):
-            digest.update(path.read_bytes())
-    with contextlib.suppress(OSError):
-        if stamp(folder).is_file() and stamp(folder).read_text() == digest.hexdigest():
-            return False
-        for pattern in ("*.nbi", "*.nbc"):
-            for path in folder.rglob(pattern):
-                path.unlink(missing_ok=True)
-        stamp(folder).write_text(digest.hexdigest())
-    return True
-
 
 @contextlib.contextmanager
-def kept_in(folder: Path | None) -> Iterator[None]:
+def kept_in(folder: Path) -> Iterator[None]:
     """Functions that Numba decorates meanwhile keep their machine code in `folder`."""
-    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder or "")
+    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
     try:
         yield
     finally:

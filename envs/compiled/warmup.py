@@ -11,9 +11,10 @@ from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 
 from . import jit
-from .kernel_cache import stamp
+from .cache_folder import file_folder
+from .sources import module_file
 
-_READY = "kernels.ready"  # beside the kernels: the digest of the sources, then parts
+_READY = "parts.ready"  # in the folder of the module that lists them: those that were compiled
 _compiling = False  # whether this process is one of those that compile
 _tried: set[str] = set()  # parts that this process has had compiled, or could not have
 
@@ -26,12 +27,10 @@ def fill_cache(module: str, *groups: Sequence[str]) -> None:
     """
     if _compiling or jit.CACHE is None:
         return
-    ready = jit.CACHE / _READY
     try:
-        sources = stamp(jit.CACHE).read_text()
+        ready = file_folder(jit.CACHE, module_file(module)) / _READY
         for parts in groups:
-            digest, *done = ready.read_text().split() if ready.is_file() else [""]
-            done = done if digest == sources else []
+            done = ready.read_text().split() if ready.is_file() else []
             missing = [part for part in parts if part not in done and part not in _tried]
             if not missing:
                 continue
@@ -39,7 +38,7 @@ def fill_cache(module: str, *groups: Sequence[str]) -> None:
             jit.tell()
             if not _compile_apart(module, missing):
                 return
-            write_atomic(ready, "\n".join([sources, *done, *missing]))
+            write_atomic(ready, "\n".join([*done, *missing]))
     except (OSError, PoiseError):
         return  # a folder that cannot be written has no cache: nothing to share
 

@@ -1,16 +1,17 @@
 """Compiled kernels are kept apart for everything that their bits depend on."""
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.envs.compiled import jit, kernel_cache
+from poise.envs.compiled import jit
+from poise.envs.compiled.sources import source_digest
 
 #: Prints the folder of the kernels, whether one was read from it, and the bits of a sum that
 #: `fastmath` reorders and fuses.
@@ -117,27 +118,34 @@ def test_the_process_that_compiles_goes_on_with_the_bits_of_those_that_read(tmp_
     assert seen[0] == seen[1]
 
 
-def test_kernels_of_other_sources_are_dropped(tmp_path: Path) -> None:
-    """A changed file of the package, wherever it is, outdates what was compiled from it."""
-    package, folder = tmp_path / "package", tmp_path / "kernels"
-    (package / "part").mkdir(parents=True)
-    (folder / "below").mkdir(parents=True)
-    source, kernel = package / "part" / "a.py", folder / "below" / "a.1.nbc"
-    for text, stale in (("x = 1", True), ("x = 1", False), ("x = 2", True)):
-        source.write_text(text)
-        kernel.write_bytes(b"code")
-        assert kernel_cache.drop_stale_kernels(folder, (package,)) == stale
-        assert kernel.exists() != stale
+def test_a_prepared_kernel_is_read_where_nobody_else_writes(tmp_path: Path) -> None:
+    """Kernels are unpickled, which runs what they say: none from a folder that others may write."""
+    kept, sprung = Path(total.stats.cache_path), tmp_path / "sprung"
+    place = tmp_path / "room" / "poise" / kept.relative_to(jit.CACHE.parent)
+    place.mkdir(parents=True)
+    for folder in (place, *place.parents[: place.parts[::-1].index("room")]):
+        folder.chmod(0o700)
+    index = place / f"{total._cache._impl.filename_base}.nbi"
+    index.write_bytes(pickle.dumps(Trap(sprung)))
+    (tmp_path / "room").chmod(0o777)
+    assert probe(tmp_path / "room")[:2] == (Path("None"), 0) and not sprung.exists()
+    (tmp_path / "room").chmod(0o700)
+    probe(tmp_path / "room")
+    assert sprung.exists()  # the user's own folder is trusted
 
 
-def test_a_folder_is_found_where_the_package_cannot_be_written(tmp_path, monkeypatch) -> None:
-    """First NUMBA_CACHE_DIR, then beside the sources, then the user's caches, then none."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
-    (tmp_path / "file").touch()
-    monkeypatch.setattr(kernel_cache, "_ROOM", tmp_path / "file")
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    assert kernel_cache.kernel_folder([]).parent == tmp_path / "caches" / "poise"
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert kernel_cache.kernel_folder([]) is None
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "numba"))
-    assert kernel_cache.kernel_folder([]).parent == tmp_path / "numba" / "poise"
+class Trap:
+    """Unpickled, it makes a file."""
+
+    def __init__(self, path: Path):
+        self.path = path
+
+    def __reduce__(self):
+        return Path.touch, (self.path,)
+
+
+def test_a_kernel_is_kept_in_the_folder_of_its_sources() -> None:
+    """Its name has the digest of the file and of what that imports."""
+    digest = source_digest(__file__)[:16]
+    kept = jit.CACHE / f"compiled.test_kernel_cache-{digest}"
+    assert kept in Path(total.stats.cache_path).parents
