@@ -13,8 +13,11 @@ from poise.baselines.policy_files.networks import onnx_session, script_sizes
 LONGEST = 50  # steps of a history that is guessed
 #: terms that most policies see, and their numbers; joints and actions are added
 ALWAYS = ("base_ang_vel", "projected_gravity")
-MAYBE = (("", 0), ("velocity_commands", 3)), (("", 0), ("phase", 2), ("phase_cos, phase_sin", 4)), (
-    ("", 0), ("base_lin_vel", 3))  # fmt: skip
+MAYBE = (
+    (("velocity_commands", 3), ("", 0)),
+    (("", 0), ("phase", 2), ("phase_cos, phase_sin", 4)),
+    (("", 0), ("base_lin_vel", 3)),
+)
 #: field of a description → what it is called in the projects that policies come from
 WORDS = {
     "joints": "the order of the joints: joint_names, dof_names, joint_ids_map",

@@ -328,7 +328,7 @@ def test_a_policy_for_walking_follows_what_is_asked(g1: Robot) -> None:
     """It walks at the commanded velocity, turns to another one, and stands at zero again."""
     network("unitree-g1-velocity")
     env = ResidualBalanceEnv(g1, controller="unitree-g1-velocity", pushes=None, duration=9.0)
-    course = [{"ahead": 0.5}, {"ahead": 0.0, "left": 0.3, "start": 3.0}, {"start": 6.0}]
+    course = [{"ahead": 0.5}, {"left": 0.5, "start": 3.0}, {"start": 6.0}]
     env.reset(seed=0, options={"command": course, "push": []})
     places = []
     for _ in range(3):
@@ -336,7 +336,7 @@ def test_a_policy_for_walking_follows_what_is_asked(g1: Robot) -> None:
         places.append(env.simulation.state.com[:2].copy())
     assert env.command is not None and env.command.speed == 0.0 and env.recovered
     assert places[0][0] > 0.8 and abs(places[0][1]) < 0.3
-    assert places[1][1] - places[0][1] > 0.4 > abs(places[1][0] - places[0][0])
+    assert places[1][1] - places[0][1] > 0.8 and abs(places[1][0] - places[0][0]) < 0.5
 
 
 def test_a_command_moves_what_is_seen_and_the_clock(robot: Robot, own: Path) -> None:
@@ -382,12 +382,11 @@ def test_joints_that_the_action_does_not_move_are_held(robot: Robot, own: Path) 
     *moved, last = fields["joints"]
     lost = [name for name in robot.joint_names if name not in fields["joints"]]
     held = {last: 0.2, lost[0]: {"position": 0.1, "stiffness": 77.0}}
-    fields |= {"action_joints": list(range(len(moved))), "observations": [{"term": "actions"}]}
+    fields |= {"action_joints": list(range(len(moved))), "observations": [{"term": "actions"}],
+               "policy": "few.onnx"}  # fmt: skip
     write_onnx(own.with_name("few.onnx"), linear(len(moved), len(moved)))
     without, by_name, by_list = (
-        load_controller(
-            str(write_yaml(own.with_name("held.yaml"), **fields, policy="few.onnx", **more)), robot
-        ).joints
+        load_controller(str(write_yaml(own.with_name("held.yaml"), **fields, **more)), robot).joints
         for more in ({}, {"held": held}, {"held": [0.3] * len(fields["joints"])})
     )
     place, other = robot.joint_names.index(last), robot.joint_names.index(lost[0])
