@@ -24,7 +24,8 @@ from poise.envs.robots.robot import Robot
 from .config import PolicyFileConfig
 from .joints import joint_servos
 from .networks import load_network
-from .observations import Observer, Seen, follows_commands
+from .observations import Observer, follows_commands
+from .terms import Seen
 
 
 @dataclass(frozen=True, eq=False)

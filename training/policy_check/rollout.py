@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from poise.baselines.policy_files.controller import PolicyFile
-from poise.baselines.policy_files.observations import Observer, Place, Seen, meaning
+from poise.baselines.policy_files.observations import Observer
+from poise.baselines.policy_files.terms import Place, Seen, meaning
 from poise.configs.archives import read_arrays
 from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation

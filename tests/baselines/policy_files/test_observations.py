@@ -9,7 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.policy_files.config import ObservationTerm, PolicyFileConfig
-from poise.baselines.policy_files.observations import ALIASES, Observer, Seen
+from poise.baselines.policy_files.observations import Observer
+from poise.baselines.policy_files.terms import ALIASES, Seen
 from poise.configs.errors import ConfigError
 from tests.support.shared import generic_state
 

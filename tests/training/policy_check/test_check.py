@@ -14,7 +14,7 @@ from poise.baselines.policy_files import known
 from poise.baselines.policy_files.config import KnownFile, Origin
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.policy_files.known import Known
-from poise.baselines.policy_files.observations import Seen
+from poise.baselines.policy_files.terms import Seen
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
