@@ -91,7 +91,7 @@ class _Side:
 
     def __init__(self, parts: Sequence[ObservationTerm], field: str, known: KnownTerms):
         self.parts = [_Part(part, f"{field}[{i}]", known) for i, part in enumerate(parts)]
-        self.size = sum(part.size for part in self.parts)
+        self.size: int = sum(part.size for part in self.parts)
 
     def __str__(self) -> str:
         return ", ".join(map(str, self.parts))
@@ -123,7 +123,7 @@ class _Part:
             else Term(described, field, known)
         )
         self.kept: deque[np.ndarray] = deque(maxlen=described.history + described.lag)
-        self.size = self.inner.size * described.history
+        self.size: int = self.inner.size * described.history
 
     def __str__(self) -> str:
         count = self.described.history

@@ -134,8 +134,8 @@ def _expected(place: Place, policy: PolicyFile, rollout: Rollout) -> np.ndarray 
     now = replace(place.term, history=1, lag=0)
     config = replace(policy.config, observations=(now,), history="term")
     joints, names = policy.joints, policy.robot.joint_names
-    alone = Observer(config, *([names[i] for i in each] for each in (joints.index, joints.moved)),
-                     source="")  # fmt: skip
+    known, moved = ([names[i] for i in each] for each in (joints.index, joints.moved))
+    alone = Observer(config, known, moved, "")
     simulation, found = Simulation(policy.robot), []
     for step in range(1, len(rollout.actions) - place.age):
         if rollout.qpos is not None and rollout.qvel is not None:

@@ -334,7 +334,8 @@ def test_a_policy_for_walking_follows_what_is_asked(g1: Robot) -> None:
     for _ in range(3):
         actions_here(env, 150)
         places.append(env.simulation.state.com[:2].copy())
-    assert env.command is not None and env.command.speed == 0.0 and env.recovered
+    assert env.command is not None and env.command.speed == 0.0 and not env.fallen
+    assert np.linalg.norm(env.simulation.state.com_vel[:2]) < 0.1
     assert places[0][0] > 0.8 and abs(places[0][1]) < 0.3
     assert places[1][1] - places[0][1] > 0.8 and abs(places[1][0] - places[0][0]) < 0.5
 
