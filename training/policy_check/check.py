@@ -129,11 +129,11 @@ def _layouts(sizes: Sizes, joints: int) -> list[Layout]:
 
 
 def _unsaid(config: PolicyFileConfig) -> tuple[str, ...]:
-    """The fields of `WORDS` that are as they are where nothing says them."""
+    """Fields of `WORDS` that are as they are where nothing says them, which is seldom right."""
     defaults = {each.name: each.default for each in fields(PolicyFileConfig)}
     named = config.joints or config.motors
     return tuple(
         name
-        for name in ("joints", "default", "stiffness", "damping", "action_scale")
+        for name in ("joints", "default", "stiffness", "damping")
         if getattr(config, name) == defaults[name] and not (name == "joints" and named)
     )

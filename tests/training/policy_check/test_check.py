@@ -229,7 +229,7 @@ def test_what_is_not_said_is_taken_and_told(tmp_path: Path) -> None:
     path = write_yaml(tmp_path / "own.yaml", kind="policy-file", motors=list(range(N)), damping=3.0,
                       observations=[{"term": "base_ang_vel"}])  # fmt: skip
     assert check_policy(str(path), robot("compact")).unsaid == (
-        "default", "stiffness", "action_scale")  # fmt: skip
+        "default", "stiffness")  # fmt: skip
 
 
 def test_a_known_network_is_recognised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
