@@ -11,10 +11,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from poise.baselines.allowance import is_script
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.extras import how_to_install
 from poise.configs.reading import read_bytes
 
+from .bounds import Clocked
 from .config import Memory, PolicyFileConfig
 from .files import BYTES
 
@@ -68,9 +69,14 @@ def onnx_session(path: Path) -> Any:
 
 
 class OnnxNetwork:
-    """A network in ONNX, played by onnxruntime; a recurrent one starts from zeros."""
+    """A network in ONNX, played by onnxruntime; a recurrent one starts from zeros.
 
-    def __init__(self, path: Path, config: PolicyFileConfig):
+    Asking it raises PoiseError in one line where onnxruntime fails or takes too long, and where it
+    remembers more than it did.
+    """
+
+    def __init__(self, path: Path, config: PolicyFileConfig | None = None):
+        config = config or PolicyFileConfig()
         self.path, self.config = path, config
         self._session = onnx_session(path)
         outputs = [each.name for each in self._session.get_outputs()]
@@ -86,6 +92,7 @@ class OnnxNetwork:
         }
         self._roles = {role: _output(output, outputs, f"outputs.{role}", path)
                        for role, output in {"action": 0, **config.outputs}.items()}  # fmt: skip
+        self._clocked = Clocked()
 
     def __reduce__(self) -> tuple[object, ...]:
         return OnnxNetwork, (self.path, self.config), {"_memory": self._memory}
@@ -94,13 +101,27 @@ class OnnxNetwork:
         self._memory = {name: np.zeros_like(value) for name, value in self._memory.items()}
 
     def act(self, observations: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        given = {self._inputs[place].name: _given(self._inputs[place], values)
-                 for place, values in observations.items()}  # fmt: skip
         wanted = [*self._roles.values(), *self._pairs.values()]
-        found = self._session.run(wanted, {**given, **self._memory})
-        self._memory = dict(zip(self._pairs, found[len(self._roles) :], strict=True))
-        return {role: np.asarray(values, dtype=float).ravel()
-                for role, values in zip(self._roles, found, strict=False)}  # fmt: skip
+        try:
+            given = {self._inputs[place].name: _given(self._inputs[place], values)
+                     for place, values in observations.items()}  # fmt: skip
+            with self._clocked.run() as options:
+                found = self._session.run(wanted, {**given, **self._memory}, options)
+            answer = {role: np.asarray(values, dtype=float).ravel()
+                      for role, values in zip(self._roles, found, strict=False)}  # fmt: skip
+        except Exception as error:  # of onnxruntime, or what comes back is no numbers
+            raise PoiseError(f"{self.path}: cannot be asked ({error})") from None
+        memory = dict(zip(self._pairs, found[len(self._roles) :], strict=True))
+        for name, after in memory.items():
+            if after.shape != self._memory[name].shape:
+                raise PoiseError(f"{self.path}: {name}: remembers {_times(after.shape)} numbers, "
+                                 f"not {_times(self._memory[name].shape)}")  # fmt: skip
+        self._memory = memory
+        return answer
+
+
+def _times(shape: Sequence[object]) -> str:
+    return " × ".join(map(str, shape))
 
 
 def _pairs(
@@ -170,7 +191,7 @@ def _given(about: Any, values: np.ndarray) -> np.ndarray:
         steps = whole // max(1, len(values))
         many = f"; {whole} = {steps} × {len(values)}: a history of {steps} steps?"
         guess = many if steps > 1 and steps * len(values) == whole else ""
-        raise ValueError(f"it takes {' × '.join(map(str, sizes)) or 1}{guess}")
+        raise ValueError(f"it takes {_times(sizes) or 1}{guess}")
     return values.astype(TYPES.get(about.type, np.float32)).reshape(sizes)
 
 
@@ -178,7 +199,7 @@ def _zeros(about: Any, path: Path) -> np.ndarray:
     """The memory at the start; a size that is left open is 1."""
     sizes = [size if isinstance(size, int) else 1 for size in about.shape]
     if min(sizes, default=0) < 0 or math.prod(sizes) > MEMORY:
-        raise ConfigError(f"must be at most {MEMORY} numbers, not {' × '.join(map(str, sizes))}",
+        raise ConfigError(f"must be at most {MEMORY} numbers, not {_times(sizes)}",
                           source=path, field=about.name)  # fmt: skip
     return np.zeros(sizes, dtype=TYPES.get(about.type, np.float32))
 

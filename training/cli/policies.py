@@ -1,12 +1,13 @@
-"""`poise policies`: those of others, known and checked; `poise export` of those trained here."""
+"""`poise policies`: those of others, known and checked; policies, and what they do, written."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, shown
+from poise.training.options.parsing import parsed
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, PolicyName
@@ -51,12 +52,15 @@ def check(file: Checked, /, *, robot: str, rollout: Path | None = None, allow: A
 
 def run(args: Sequence[str]) -> int:
     """Run `poise policies`: the list, or the sub-command `check`."""
+    command: Callable[..., object] = show
+    name, given = "poise policies", list(args)
     if args and args[0] == "check":
-        return tyro.cli(check, prog="poise policies check", args=list(args[1:]))
-    if args and not args[0].startswith("-"):
-        raise ConfigError(f"no such command: policies {args[0]}", choices=("check",))
-    tyro.cli(show, prog="poise policies", args=list(args))
-    return 0
+        command, name, given = check, "poise policies check", list(args[1:])
+    elif args and not args[0].startswith("-"):
+        raise ConfigError(f"no such command: policies {shown(args[0])}", choices=("check",))
+    given = ["--help" if arg == "--help-all" else arg for arg in given]
+    code = parsed(command, given, name)()
+    return code if isinstance(code, int) else 0
 
 
 def export(
@@ -87,3 +91,39 @@ def export(
 
     worst = export_policy(policy, out, result=result, licence=licence, allow=allow)
     print(f"{out}: ONNX differs from the policy by {worst:.1g} at most")
+
+
+def dataset(
+    controller: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="CONTROLLER")],
+    /,
+    *,
+    out: Path,
+    name: str = "poise/pushes-v0",
+    suite: str = "strong",
+    trials: int | None = None,
+    robot: str = "humanoid",
+    seed: int = 0,
+    allow: Allow = (),
+) -> None:
+    """Write trials as a data set of Minari: observations, actions, rewards, the push as arrays.
+
+    Needs pip install -e '.[dataset]' in a checkout.
+
+    Args:
+        controller: as poise evaluate takes one; its environment is that of the data.
+        out: folder to write to: new, or empty; MINARI_DATASETS_PATH for what reads it.
+        name: of the data set, namespace/name-v0.
+        suite: of pushes: packaged or a .yaml file.
+        trials: number of episodes; the suite's if not given.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        seed: of the trials.
+    """
+    from poise.training.trials.names import check_names
+
+    check_names([controller], robot=robot, suite=suite)
+    from poise.training.export.dataset import write_dataset
+
+    found = write_dataset(controller, out, name=name, suite=suite, robot=robot, trials=trials,
+                          seed=seed, allow=allow)  # fmt: skip
+    print(f"{out}: {name}, {found['episodes']} episodes, {found['steps']} steps, "
+          f"{found['recovered']} recovered")  # fmt: skip

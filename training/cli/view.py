@@ -19,7 +19,8 @@ Pushes = Annotated[
     tyro.conf.UseAppendAction,
     tyro.conf.arg(
         metavar="PUSH",
-        help="A push that is known beforehand, such as '{impulse: 20, direction: 90, body: torso, "
+        help="A push that is known beforehand: 20@90 [N·s, degrees from ahead to the left] at 1 s, "
+        "20@90@1.5 at 1.5 s, or with all its fields '{impulse: 20, direction: 90, body: torso, "
         "duration: 0.1, start: 1}'; repeatable.",
     ),
 ]

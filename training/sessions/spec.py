@@ -7,6 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from urllib.parse import parse_qs, urlencode
 
+from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError, shown
 
 STANDING = "standing"  # the motion of a session that names none
@@ -60,7 +61,8 @@ class TrialSpec:
     def command(self) -> str:
         """The command line that shows the same."""
         words = ["poise", "view", self.folder, "--trial", str(self.trial)]
-        return shlex.join([*words, "--controllers", *self.controllers])
+        allowed = [word for name in named(*self.controllers) for word in ("--allow", name)]
+        return shlex.join([*words, "--controllers", *self.controllers, *allowed])
 
     @property
     def link(self) -> str:

@@ -28,6 +28,8 @@ from poise.training.trials.agents import Agent, check_may_walk, check_walks, loa
 from poise.training.trials.play import run_trial
 from poise.training.trials.trial import Outcome, Trial
 
+from .loading import read_pushes
+
 EVERY = 5.0  # [s] between lines about a walk
 PUSH = re.compile(r"(?P<impulse>[^@]+)@(?P<direction>[^@]+)")
 Say = Callable[[str], object]  # prints a line
@@ -121,8 +123,12 @@ def check_asked(
 def parse_push(text: str, start: float, duration: float, robot: Robot) -> Push:
     """The push of 0.1 s that "20@90" means: 20 N·s towards 90°, of the robot's first push body.
 
+    A YAML mapping of a push's fields is taken, too, with its own start.
+
     Raises ConfigError for another form, numbers out of range, and a start after the `duration`.
     """
+    if text.lstrip().startswith("{"):
+        return read_pushes(text, robot)[0]
     found = PUSH.fullmatch(text.strip())
     try:
         numbers = {name: float(value) for name, value in found.groupdict().items()} if found else {}

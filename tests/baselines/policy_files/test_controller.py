@@ -257,7 +257,8 @@ def test_a_simulation_that_diverged_is_a_fall(robot: Robot, own: Path) -> None:
     ("changes", "parts"),
     [
         ({"observations": [{"term": "base_ang_vel"}]},
-         ("observations: policy.onnx does not take 3 numbers (base_ang_vel 3): it takes 1 × 112",)),
+         ("observations: policy.onnx does not take 3 numbers (base_ang_vel 3)",
+          "it takes 1 × 112")),
         ({"observations": [{"term": "joint_torques"}]},
          ("observations[0].term: no such term: 'joint_torques'", "projected_gravity", "dof_pos")),
         ({"observations": [{"term": "phase", "scale": [1.0, 1.0, 1.0]}]},

@@ -14,7 +14,7 @@ import torch
 import poise
 from poise.baselines.policy_files.config import Memory, ObservationTerm, PolicyFileConfig
 from poise.baselines.policy_files.networks import load_network, script_sizes
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, PoiseError
 from tests.support.policies import helper, write_graph, write_recurrent
 
 SEEN = {"": np.ones(2)}
@@ -104,7 +104,7 @@ def test_a_size_that_is_a_multiple_is_perhaps_a_history(tmp_path: Path) -> None:
     nodes = [helper.make_node("Identity", ["obs"], ["actions"])]
     path = write_graph(tmp_path / "p.onnx", nodes, {}, [("obs", ["batch", 384], 1)],
                        [("actions", ["batch", 384], 1)])  # fmt: skip
-    with pytest.raises(ValueError, match="1 × 384; 384 = 4 × 96: a history of 4 steps\\?"):
+    with pytest.raises(PoiseError, match="1 × 384; 384 = 4 × 96: a history of 4 steps\\?"):
         load_network(path).act({"": np.zeros(96)})
     path = write_graph(tmp_path / "q.onnx", nodes, {}, [("obs", [1, 2, "n"], 1)],
                        [("actions", [1, 2, "n"], 1)])  # fmt: skip
