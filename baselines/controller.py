@@ -15,6 +15,8 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
+COMMAND_ENTRIES = 8  # of `BaseController.orders`
+
 
 class ServoOutputs(NamedTuple):
     """Servos that give the torques: τ = K (q* − q) − D q̇ of each joint, within the limits."""
@@ -148,6 +150,8 @@ class BaseController(Copyable):
     period: float  #: seconds between two calls of `torques`
     config: Any = None  #: that it was made from
     com_offset: float = 0.0  #: forward, of the CoM that it stands with from the motion's [m]
+    #: (8,) what it is told, `GaitCommand.array`, into which compiled code may write; None: nothing
+    orders: np.ndarray | None = None
     #: True of one that brings an estimator of its own: it gets what is measured, late and noisy
     raw_measurements: bool = False
 

@@ -14,6 +14,7 @@ from poise.baselines.performing.config import MotionStepConfig
 from poise.baselines.performing.motion_step import MotionStep
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
+from poise.baselines.policy_files.known import RIVALS
 from poise.baselines.policy_files.reading import is_policy, policy_config, policy_file_config
 from poise.baselines.stepping.capture_step import CaptureStep
 from poise.baselines.stepping.config import CaptureStepConfig, IPMStepConfig
@@ -145,7 +146,8 @@ def _build(data: dict[str, object], source: str) -> ControllerConfig:
     `base` names a controller whose fields hold where `data` has none of its own; within `qp` and
     `step_qp` one of the momentum QP.
     """
-    data = on_base(data, "controllers", source, parts=("qp", "step_qp"))
+    bases = RIVALS if data.get("kind") == "policy-file" else "controllers"
+    data = on_base(data, bases, source, parts=("qp", "step_qp"))
     kind = data.get("kind", "momentum-qp")
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigError(

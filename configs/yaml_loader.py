@@ -150,6 +150,15 @@ def _error(problem: str, mark: Any) -> yaml.MarkedYAMLError:
     return yaml.composer.ComposerError(None, None, problem, mark)
 
 
+def _all(loader: Loader, node: yaml.Node) -> None:
+    """A slice of everything, as Isaac Lab dumps it: null, which stands for all. None is built."""
+    parts = loader.construct_sequence(node) if isinstance(node, yaml.SequenceNode) else [node.value]
+    if any(part is not None for part in parts):
+        raise _error("a slice is read only where it is of everything", node.start_mark)
+
+
+Loader.add_constructor("tag:yaml.org,2002:python/object/apply:builtins.slice", _all)
+
 # YAML 1.1, which PyYAML follows, wants a dot and a signed exponent: 1e-3 would be a string.
 Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",

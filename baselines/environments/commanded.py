@@ -3,9 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from poise.baselines.controller import BaseController
 from poise.baselines.registry import walking_controllers
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.command import GaitCommand, command_of
 from poise.baselines.walking.controller import (
     LimitedWalker,
     ReachingWalker,
@@ -27,7 +29,7 @@ from poise.envs.balance.start import RESET_OPTIONS
 
 
 class CommandedEnv(BalanceEnv):
-    """Base of environments around a controller, which may be one that walks."""
+    """Base of environments around a controller, which may be one that follows commands."""
 
     option_names = (*RESET_OPTIONS, "command")  #: of `reset`
 
@@ -35,17 +37,24 @@ class CommandedEnv(BalanceEnv):
         """Take the controller that is told what to do, if it walks."""
         decides = controller.unwrapped
         self._walker = decides if isinstance(decides, WalkingController) else None
+        #: (8,) what it is told; None where it follows no command
+        self._orders: np.ndarray | None = getattr(decides, "orders", None)
+        if self._walker is not None:
+            self._orders = self._walker.gait.command
         self._decides = type(decides).__name__
         self._timetable = empty_timetable()
 
     @property
     def command(self) -> GaitCommand | None:
-        """What a controller that walks is told to do now; None for one that does not walk.
+        """What a controller that follows commands is told now; None for one that follows none.
 
         Setting it ends the commands of the reset. Raises ConfigError for a controller that does not
-        walk, and for a command out of the robot's reach.
+        walk, and for a command out of the robot's reach. A policy from outside is told its velocity
+        and turn; it does not know the rest.
         """
-        return None if self._walker is None else self._walker.command
+        if self._walker is not None:
+            return self._walker.command
+        return None if self._orders is None else command_of(self._orders)
 
     @command.setter
     def command(self, command: GaitCommand | Mapping[str, float]) -> None:
@@ -53,12 +62,16 @@ class CommandedEnv(BalanceEnv):
             command = build(GaitCommand, to_dict(command), "command")
         self.check_command(command)
         self._timetable.clear()
-        self._expect_walker("environment").command = command
+        if self._walker is not None:
+            self._walker.command = command
+        else:
+            self._expect_orders("environment")[:] = command.array()
 
     def check_command(self, command: GaitCommand) -> None:
         """Raise ConfigError with the robot's limits for a command that is out of its reach, and
         for a controller that does not walk."""
-        check_reach(self._expect_walker("environment"), command)
+        self._expect_orders("environment")
+        self._check_reach(command)
 
     @property
     def reach(self) -> Reach | None:
@@ -67,19 +80,23 @@ class CommandedEnv(BalanceEnv):
 
     @property
     def transfer_time(self) -> float | None:
-        """T_d on both feet between two steps [s]; None for a controller that does not walk."""
+        """T_d on both feet between two steps [s]; None for a controller that plans none."""
         return None if self._walker is None else float(self._walker.gait.transfer_time)
 
-    def _expect_walker(self, source: str) -> WalkingController:
-        """The controller; raises ConfigError for one that does not walk."""
-        if self._walker is None:
+    def _expect_orders(self, source: str) -> np.ndarray:
+        """What the controller is told; raises ConfigError for one that does not walk."""
+        if self._orders is None:
             raise ConfigError(
                 f"the controller {self._decides} does not walk; give one that does",
                 source=source,
                 field="command",
                 choices=walking_controllers(),
             )
-        return self._walker
+        return self._orders
+
+    def _check_reach(self, command: GaitCommand) -> None:
+        if self._walker is not None:
+            check_reach(self._walker, command)
 
     def _commands(self, options: Mapping[str, Any]) -> Sequence[TimedCommand]:
         """The commands of an episode that begins with these options."""
@@ -96,17 +113,17 @@ class CommandedEnv(BalanceEnv):
         self._tell_terrain()
         commands = self._commands(options)
         if "command" in options:
-            walker = self._expect_walker("reset")
+            self._expect_orders("reset")
             for command in commands:
-                check_reach(walker, command)
+                self._check_reach(command)
         self._timetable.fill(commands)
-        if self._walker is not None:
-            follow_timetable(self._follower(self._walker))
+        if self._orders is not None:
+            follow_timetable(self._follower(self._orders))
 
-    def _follower(self, walker: WalkingController) -> Follower:
+    def _follower(self, orders: np.ndarray) -> Follower:
         """The block by which the controller is told its commands."""
         clock = self.simulation.clock
-        return Follower(self._timetable, clock, self.arrays.timestep, walker.gait.command)
+        return Follower(self._timetable, clock, self.arrays.timestep, orders)
 
 
 def check_reach(walker: WalkingController, command: GaitCommand) -> None:

@@ -136,9 +136,9 @@ class ControlledEnv(CommandedEnv):
 
     def _reports(self, tick: Any) -> list[tuple[Callable[..., None], Block]]:
         """The kernels that follow a judged policy step, before it is observed."""
-        if self._walker is None:
+        if self._orders is None:
             return []
-        return [(follow_timetable, self._follower(self._walker))]
+        return [(follow_timetable, self._follower(self._orders))]
 
     def advance(self) -> None:
         step = self.compiled_step()
@@ -187,8 +187,8 @@ class ControlledEnv(CommandedEnv):
         self.episode.ticks[0] = 0
         self.episode.metrics[FAILURES] = self._base.failures
         judge_step(self.step_end().judge)
-        if self._walker is not None:
-            follow_timetable(self._follower(self._walker))
+        if self._orders is not None:
+            follow_timetable(self._follower(self._orders))
         self._observe()
 
     def _account(self) -> TickAccount:

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 #: one number for all joints, one for each in the policy's order, or by the joints' names
 PerJoint = float | tuple[float, ...] | dict[str, float]
+
+#: what an output may be: the action, and gains that come with it
+ROLES = ("action", "stiffness", "damping")
+
+
+def _new(default: Any, **bounds: float) -> Any:
+    """A field that files of before do not have: left out where it is its default."""
+    return field(default=default, metadata={"omit": "default", **bounds})
 
 
 def _check_order(bounds: tuple[float, float], name: str) -> None:
@@ -17,23 +26,113 @@ def _check_order(bounds: tuple[float, float], name: str) -> None:
 
 @dataclass(frozen=True)
 class ObservationTerm:
-    """A part of the observation.
+    """A part of the observation: a term, or several side by side, in one step or several.
 
     Attributes:
         term: its name, see `TERMS`.
-        scale: factor, or one for each number of the term; after `clip`.
+        scale: factor, or one for each number of the term, or by the names of its joints; after
+            `clip`.
         clip: least and largest value.
-        history: how many policy steps it shows, this one among them.
+        history: how many policy steps it shows, the last `lag` ones left out.
+        frame: in the place of `term`: parts that lie side by side in each of these steps.
+        values: the numbers of the term ``constant``.
+        joints: names or patterns of the joints that it shows, of a term that has a number for each.
+        pick: the places in the term's numbers that it shows.
+        at_rest: what it shows in their place while no velocity is commanded, before `clip`.
+        newest_first: whether the history begins with the newest step.
+        lag: policy steps by which the newest one shown is old; 1: this step is left out.
+        fill: what a history shows of the time before the first step: that step, or zeros.
     """
 
-    term: str
-    scale: float | tuple[float, ...] = 1.0
+    term: str = ""
+    scale: PerJoint = 1.0
     clip: tuple[float, float] | None = None
     history: int = field(default=1, metadata={"min": 1, "max": 1000})
+    frame: tuple[ObservationTerm, ...] = _new(())
+    values: tuple[float, ...] = _new(())
+    joints: tuple[str, ...] = _new(())
+    pick: tuple[int, ...] = _new((), min=0)
+    at_rest: tuple[float, ...] | None = _new(None)
+    newest_first: bool = _new(False)
+    lag: int = _new(0, min=0, max=1000)
+    fill: Literal["first", "zeros"] = _new("first")
 
     def __post_init__(self) -> None:
         if self.clip is not None:
             _check_order(self.clip, "clip")
+        if bool(self.term) == bool(self.frame):
+            raise ValueError("needs a term or a frame of them, and not both")
+
+    @property
+    def terms(self) -> Iterator[ObservationTerm]:
+        """The terms in it: itself, or those of its frame."""
+        if self.term:
+            yield self
+        for part in self.frame:
+            yield from part.terms
+
+
+@dataclass(frozen=True)
+class Held:
+    """How a joint is held that the action does not move; what is not said is as without it.
+
+    Attributes:
+        position: [rad].
+        stiffness: K [N·m/rad].
+        damping: D [N·m·s/rad].
+    """
+
+    position: float | None = None
+    stiffness: float | None = field(default=None, metadata={"min": 0.0})
+    damping: float | None = field(default=None, metadata={"min": 0.0})
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a network gives in a step and is given in the next; zero when a trial starts.
+
+    Attributes:
+        input: its name; of TorchScript any, it comes after the observation, in this order.
+        output: its name, or its place in what the network gives.
+        shape: of TorchScript, which does not tell it.
+    """
+
+    input: str
+    output: str | int
+    shape: tuple[int, ...] = field(default=(), metadata={"min": 1})
+
+
+@dataclass(frozen=True)
+class KnownFile:
+    """A file of a policy that others publish: its size and SHA-256."""
+
+    bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a policy is published.
+
+    Attributes:
+        project: ``owner/name`` at GitHub.
+        commit: of that project.
+        folder: that its files are in there.
+        files: name → its size and sum; the network is the first.
+        licence: as SPDX abbreviates it.
+        robot: that it was trained for, by its name here.
+    """
+
+    project: str
+    commit: str
+    files: dict[str, KnownFile]
+    licence: str
+    robot: str
+    folder: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.files:
+            raise ValueError("files: must not be empty")
 
 
 @dataclass(frozen=True)
@@ -46,7 +145,8 @@ class PolicyFileConfig:
 
     Attributes:
         policy: an ONNX file, or TorchScript (``.pt``), which is code and has to be allowed;
-            relative to the YAML file. Empty: the one beside it.
+            relative to the YAML file. Empty: the one beside it, or that of `origin`.
+        origin: where the network is published; it is looked for by its sum, see `find_network`.
         deploy: a configuration of unitree_rl_mjlab, unitree_rl_lab or unitree_rl_gym that says what
             is not said here; relative to the YAML file.
         joints: names in the policy's order; empty: `motors` tells.
@@ -58,12 +158,24 @@ class PolicyFileConfig:
         action_joints: places in `joints` of those that the action moves; empty: all.
         action_scale: of the action, a number or one for each [rad].
         action_offset: q* of action zero [rad]; None: `default`.
-        action_clip: least and largest value of each action.
-        observations: the terms, in order.
+        action_clip: least and largest value of each action, or of all.
+        held: posture of the joints that the action does not move [rad], in the order of `joints`
+            or by name, then with gains of their own, see `Held`; None: `default` holds, or the
+            standing posture where the policy does not have the joint.
+        observations: the terms, in order; of a network with several inputs by their names.
+        outputs: what the network's outputs are, of ``action``, ``stiffness`` and ``damping``: a
+            name, or a place among them; the action is the first one by default.
+        memory: inputs that are outputs of the step before; ``NAME_in`` and ``NAME_out``, and
+            ``input_NAME`` and ``output_NAME``, are known to be.
+        batch: whether the observation of TorchScript has an axis before its own; ONNX tells it.
         history: of several steps, oldest first: each term's side by side ("term"), or all terms of
             a step side by side ("frame").
-        command: velocity that is asked for, forward and left [m/s], and turning left [rad/s].
-        phase: period of the clock that a term ``phase`` shows [s].
+        command: velocity that is asked for, forward and left [m/s], and turning left [rad/s],
+            unless the environment commands one.
+        phase: period of the clock that the terms ``phase``, ``phase_sin`` and ``phase_cos`` show
+            [s].
+        phase_offsets: how far each leg is ahead of the clock, of its period.
+        phase_runs: whether the clock runs always, or begins anew when a velocity is commanded.
         policy_period: of the policy [s].
         hold: joints that the policy does not have are held in the standing posture, critically
             damped, with this natural frequency [rad/s].
@@ -84,7 +196,7 @@ class PolicyFileConfig:
     action_scale: float | tuple[float, ...] = 0.25
     action_offset: PerJoint | None = None
     action_clip: tuple[tuple[float, float], ...] = ()
-    observations: tuple[ObservationTerm, ...] = ()
+    observations: tuple[ObservationTerm, ...] | dict[str, tuple[ObservationTerm, ...]] = ()
     history: Literal["term", "frame"] = "term"
     command: tuple[float, float, float] = (0.0, 0.0, 0.0)
     phase: float = field(default=0.8, metadata={"above": 0.0})
@@ -92,7 +204,25 @@ class PolicyFileConfig:
     hold: float = field(default=15.0, metadata={"min": 0.0, "max": 200.0})
     digest: str = ""
     described_in: str = field(default="", compare=False)
+    origin: Origin | None = field(default=None, metadata={"omit": "default"}, compare=False)
+    held: tuple[float, ...] | dict[str, float | Held] | None = field(
+        default=None, metadata={"omit": "default"}
+    )
+    outputs: dict[str, str | int] = field(default_factory=dict, metadata={"omit": "default"})
+    memory: tuple[Memory, ...] = _new(())
+    batch: bool = _new(True)
+    phase_offsets: tuple[float, ...] = _new((0.0, 0.5))
+    phase_runs: Literal["always", "commanded"] = _new("always")
 
     def __post_init__(self) -> None:
         for i, bounds in enumerate(self.action_clip):
             _check_order(bounds, f"action_clip[{i}]")
+        for role in self.outputs:
+            if role not in ROLES:
+                raise ValueError(f"outputs: no such output: {role!r}; choices: {', '.join(ROLES)}")
+
+    @property
+    def inputs(self) -> dict[str, tuple[ObservationTerm, ...]]:
+        """Input → what it shows; "" stands for the only one, whatever its name."""
+        given = self.observations
+        return given if isinstance(given, dict) else {"": given}

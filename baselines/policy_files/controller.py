@@ -7,7 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from poise.baselines.controller import CompiledController, Outputs, ServoOutputs, Targets
+from poise.baselines.controller import (
+    COMMAND_ENTRIES,
+    CompiledController,
+    Outputs,
+    ServoOutputs,
+    Targets,
+)
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.numbers import whole_steps
 from poise.envs.balance.servos import pd_torque
@@ -24,7 +30,8 @@ from poise.envs.robots.robot import Robot
 from .config import PolicyFileConfig
 from .joints import joint_servos
 from .networks import load_network
-from .observations import Observer, Seen
+from .observations import Observer, follows_commands
+from .terms import Seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +76,8 @@ def policy_tick(t: PolicyTick):
 class PolicyFile(CompiledController):
     """Plays a policy from its files: the network every `policy_period`, PD in every physics step.
 
-    What it is asked to reach (`targets`) it does not know: its command is that of `config`.
+    What it is asked to reach (`targets`) it does not know. Its command is that of `config`, or
+    what is written into `orders`; None where it sees no command.
 
     Raises ConfigError where policy and robot do not fit: the period is no whole number of physics
     steps, joints that the robot lacks, lists of other sizes than the joints, terms that do not add
@@ -84,17 +92,21 @@ class PolicyFile(CompiledController):
         self.period = self.arrays.timestep
         every = whole_steps(config.policy_period, self.period, "policy_period", config.described_in)
         self.joints = joint_servos(robot, config)
-        moved = len(self.joints.moved)
-        self.observer = Observer(config, len(self.joints.index), moved, config.described_in)
-        self.action = np.zeros(moved)
-        self.network = load_network(Path(config.policy))
+        known, moved = ([robot.joint_names[i] for i in each]
+                        for each in (self.joints.index, self.joints.moved))  # fmt: skip
+        self.observer = Observer(config, known, moved, config.described_in)
+        self.action = np.zeros(len(moved))
+        self._legs = 2.0 * np.pi * np.array(config.phase_offsets)
+        self.orders = guarded_zeros(COMMAND_ENTRIES) if follows_commands(config) else None
+        self._clock_start: float | None = None  # [s]; None: it stands
+        self.network = load_network(Path(config.policy), config)
         self._check_sizes()
         nj = len(self.joints.target)
         limit = np.zeros(nj)
         limit[self.arrays.motor_dofs - 6] = self.arrays.torque_limit
         self._servos = Servos(
-            self.joints.stiffness, self.joints.damping, limit, self.joints.target.copy(),
-            guarded_zeros(nj), guarded_zeros(1, dtype=np.int64), every,
+            self.joints.stiffness.copy(), self.joints.damping.copy(), limit,
+            self.joints.target.copy(), guarded_zeros(nj), guarded_zeros(1, dtype=np.int64), every,
         )  # fmt: skip
         self._failures, self._no_wrench = guarded_zeros(1, dtype=np.int64), guarded_zeros(6)
         self._callback = Callback(self._ask)
@@ -106,22 +118,19 @@ class PolicyFile(CompiledController):
 
     def _check_sizes(self) -> None:
         """Ask the network once, with zeros."""
-        observation = np.zeros(self.observer.size, dtype=np.float32)
         name, source = Path(self.config.policy).name, self.config.described_in
         try:
-            action = self.network.act(observation)
-        except Exception as error:  # of onnxruntime or torch
-            raise ConfigError(
-                f"{name} does not take {len(observation)} numbers ({self.observer.parts}): {error}",
-                source=source,
-                field="observations",
-            ) from None
-        if len(action) != len(self.action):
-            raise ConfigError(
-                f"{name} gives {len(action)} actions for {len(self.action)} joints",
-                source=source,
-                field="joints",
+            answer = self.network.act(
+                {n: np.zeros(size) for n, size in self.observer.sizes.items()}
             )
+        except Exception as error:  # of onnxruntime or torch
+            raise ConfigError(f"{name} does not take {self.observer}: {error}", source=source,
+                              field="observations") from None  # fmt: skip
+        for role, values in answer.items():
+            if len(values) != len(self.action):
+                what = f"{len(values)} {'actions' if role == 'action' else role}"
+                raise ConfigError(f"{name} gives {what} for {len(self.action)} joints",
+                                  source=source, field="joints")  # fmt: skip
         self.network.reset()
 
     def reset(self, state: RobotState | None = None) -> None:
@@ -129,7 +138,12 @@ class PolicyFile(CompiledController):
         self.network.reset()
         self.observer.forget()
         self.action[:] = 0.0
-        self._servos.target[:] = self.joints.target
+        if self.orders is not None:
+            self.orders[:] = 0.0
+            self.orders[:3] = self.config.command
+        self._clock_start = None
+        for name in ("stiffness", "damping", "target"):
+            getattr(self._servos, name)[:] = getattr(self.joints, name)
         self._servos.tau[:] = 0.0
         self._servos.ticks[0] = 0
         self._callback.error = None
@@ -139,20 +153,35 @@ class PolicyFile(CompiledController):
         assert self._state is not None
         now = self._servos.ticks[0] * self.period
         index, state = self.joints.index, self._state
+        command = np.array(self.config.command) if self.orders is None else self.orders[:3]
+        phase = self._phase(now, bool(np.any(command)))
         seen = Seen(
             state, state.q[index], state.qvel[6:][index], self.joints.default, self.action,
-            np.array(self.config.command), 2.0 * np.pi * (now / self.config.phase % 1.0),
+            command, phase, phase + self._legs,
         )  # fmt: skip
-        observation = self.observer.observe(seen)
-        if not np.all(np.isfinite(observation)):
+        observations = self.observer.observe(seen)
+        if not all(np.all(np.isfinite(each)) for each in observations.values()):
             return  # the simulation diverged, which is a fall
-        action = self.network.act(observation)
-        if not np.all(np.isfinite(action)):
-            lost = np.count_nonzero(~np.isfinite(action))
-            raise PoiseError(f"{self.config.policy}: action: {lost} of {len(action)} numbers are "
-                             f"not finite at {now:.2f} s")  # fmt: skip
-        self.action[:] = action
+        answer = self.network.act(observations)
+        for role, values in answer.items():
+            if lost := np.count_nonzero(~np.isfinite(values)):
+                raise PoiseError(f"{self.config.policy}: {role}: {lost} of {len(values)} numbers "
+                                 f"are not finite at {now:.2f} s")  # fmt: skip
+        self.action[:] = action = answer.pop("action")
         self._servos.target[self.joints.moved] = self.joints.targets(action)
+        for gain, values in answer.items():
+            getattr(self._servos, gain)[self.joints.moved] = np.maximum(values, 0.0)
+
+    def _phase(self, now: float, walks: bool) -> float:
+        """Of the clock [rad]; where it runs for a walk alone, it is 0 at rest and at its begin."""
+        if self.config.phase_runs == "always":
+            self._clock_start = 0.0
+        elif not walks:
+            self._clock_start = None
+        elif self._clock_start is None:
+            self._clock_start = now
+        since = 0.0 if self._clock_start is None else now - self._clock_start
+        return 2.0 * np.pi * (since / self.config.phase % 1.0)
 
     def tick(self, state: RobotState) -> PolicyTick:
         """The block that `policy_tick` works on, for `state`."""

@@ -21,7 +21,8 @@ class LabAction:
         scale: a number, or one for each action [rad].
         offset: target of action zero [rad]; None: the default posture.
         clip: least and largest value of each action.
-        joint_ids: places of the moved joints in the policy's order; None: all.
+        joint_ids: places of the moved joints in the policy's order; None, as which a slice of all
+            is read, stands for all.
     """
 
     scale: float | tuple[float, ...] = 1.0

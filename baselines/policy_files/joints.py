@@ -11,7 +11,7 @@ from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 
-from .config import PerJoint, PolicyFileConfig
+from .config import Held, PerJoint, PolicyFileConfig
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +34,10 @@ class JointServos:
 
 
 def joint_servos(robot: Robot, config: PolicyFileConfig) -> JointServos:
-    """The joints of `config` on `robot`. Others hold the standing posture.
+    """The joints of `config` on `robot`. Others hold the standing posture, or what `held` says.
 
     These are held with K = ω² M_jj and D = 2 ω M_jj, M the inertia of the standing robot and ω
-    `hold`.
+    `hold`, unless `held` says otherwise.
 
     Raises ConfigError for joints that the robot lacks, and lists of other sizes.
     """
@@ -56,9 +56,9 @@ def joint_servos(robot: Robot, config: PolicyFileConfig) -> JointServos:
     na = len(places)
     bounds = np.tile([-np.inf, np.inf], (na, 1))
     if config.action_clip:
-        if len(config.action_clip) != na:
+        if len(config.action_clip) not in (1, na):
             raise _wrong(config, "action_clip", f"has {len(config.action_clip)} pairs for {na}")
-        bounds = np.array(config.action_clip)
+        bounds = np.broadcast_to(np.array(config.action_clip), (na, 2))
     simulation = Simulation(robot)
     inertia = np.diag(simulation.state.M)[6:]
     stiffness, damping = config.hold**2 * inertia, 2.0 * config.hold * inertia
@@ -67,11 +67,36 @@ def joint_servos(robot: Robot, config: PolicyFileConfig) -> JointServos:
     target = robot.standing_qpos[7:].copy()
     target[index] = default
     target[index[list(places)]] = offset_moved
-    return JointServos(
+    servos = JointServos(
         index, index[list(places)], default, offset_moved,
         _spread(config.action_scale, names[:na], "action_scale", config), bounds, stiffness,
         damping, target,
     )  # fmt: skip
+    _hold(servos, robot, config)
+    return servos
+
+
+def _hold(servos: JointServos, robot: Robot, config: PolicyFileConfig) -> None:
+    """Hold the joints that the action does not move where `held` says, with its gains."""
+    if config.held is None:
+        return
+    still = [i for i in range(len(robot.joint_names)) if i not in servos.moved]
+    if isinstance(config.held, tuple):
+        if len(config.held) != len(servos.index):
+            raise _wrong(config, "held", f"has {len(config.held)} numbers for "
+                         f"{len(servos.index)} joints")  # fmt: skip
+        pairs = zip(servos.index, config.held, strict=True)
+        said: dict[int, float | Held] = {int(i): q for i, q in pairs if i in still}
+    else:
+        names = [robot.joint_names[i] for i in still]
+        found = match_names(config.held, names, config.described_in, "held")
+        said = {still[names.index(name)]: held for name, held in found.items()}
+    for i, each in said.items():
+        held = each if isinstance(each, Held) else Held(each)
+        for array, value in ((servos.target, held.position), (servos.stiffness, held.stiffness),
+                             (servos.damping, held.damping)):  # fmt: skip
+            if value is not None:
+                array[i] = value
 
 
 def _index(robot: Robot, config: PolicyFileConfig) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The metadata that mjlab writes into the ONNX files that it exports."""
+"""The metadata that mjlab and holosoma write into the ONNX files that they export."""
 
 from __future__ import annotations
 
@@ -7,31 +7,45 @@ import sys
 from pathlib import Path
 
 from poise.configs.errors import ConfigError
+from poise.configs.reading import parse_json
 
 #: terms that mjlab's tasks call by the name of another one: there they are relative
 RELATIVE = {"joint_pos": "joint_pos_rel", "joint_vel": "joint_vel"}
-NUMBERS = {"joint_stiffness": "stiffness", "joint_damping": "damping",
-           "default_joint_pos": "default"}  # fmt: skip
+NAMES = ("joint_names", "dof_names")  # mjlab's, holosoma's
+NUMBERS = {"joint_stiffness": "stiffness", "joint_damping": "damping", "kp": "stiffness",
+           "kd": "damping", "default_joint_pos": "default", "default_dof_pos": "default",
+           "default_joint_angles": "default", "action_scale": "action_scale"}  # fmt: skip
 
 
 def metadata_fields(metadata: dict[str, str], source: Path) -> dict[str, object]:
     """Fields of a `PolicyFileConfig` from the metadata of an ONNX file; none where it has none.
 
+    Lists have commas between their entries (mjlab) or are JSON (holosoma).
+
     Raises ConfigError for numbers that are none, histories that are no numbers of steps, and lists
     of different lengths.
     """
     fields: dict[str, object] = {}
-    if "joint_names" in metadata:
-        fields["joints"] = tuple(metadata["joint_names"].split(","))
+    for key in NAMES:
+        if key in metadata:
+            fields["joints"] = tuple(map(str, _entries(metadata[key], key, source)))
     for key, name in NUMBERS.items():
         if key in metadata:
-            fields[name] = _numbers(metadata[key], ",", key, source)
-    if "action_scale" in metadata:
-        scale = _numbers(metadata["action_scale"], ",", "action_scale", source)
-        fields["action_scale"] = scale[0] if len(scale) == 1 else scale
+            numbers = _floats(_entries(metadata[key], key, source), key, source)
+            fields[name] = numbers[0] if len(numbers) == 1 else numbers
     if "observation_names" in metadata:
         fields["observations"] = _terms(metadata, source)
     return fields
+
+
+def _entries(text: str, field: str, source: Path) -> list[object]:
+    """The entries of a list, the only one where it is none."""
+    if not text.lstrip().startswith("["):
+        return list(text.split(","))
+    try:
+        return list(parse_json(text))
+    except ValueError as error:
+        raise ConfigError(f"is no list in JSON: {error}", source=source, field=field) from None
 
 
 def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, object]]:
@@ -46,7 +60,7 @@ def _terms(metadata: dict[str, str], source: Path) -> list[dict[str, object]]:
             raise ConfigError(f"has {len(entries)} entries for {len(names)} observations",
                               source=source, field=whole)  # fmt: skip
         for term, entry in zip(terms, entries, strict=True):
-            values = _numbers(entry, ";", whole, source)
+            values = _floats(entry.split(";"), whole, source)
             if name == "history":
                 term[name] = _steps(values, whole, source)
             elif name == "clip":
@@ -75,9 +89,9 @@ def _bounds(values: tuple[float, ...], field: str, source: Path) -> tuple[float,
     return (-farthest if low == -math.inf else low, farthest if high == math.inf else high)
 
 
-def _numbers(text: str, between: str, field: str, source: Path) -> tuple[float, ...]:
+def _floats(entries: list[object] | list[str], field: str, source: Path) -> tuple[float, ...]:
     try:
-        return tuple(float(part) for part in text.split(between))
-    except ValueError:
-        raise ConfigError(f"must be numbers, not {text[:60]!r}", source=source,
+        return tuple(float(entry) for entry in entries)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise ConfigError(f"must be numbers, not {str(entries)[:60]}", source=source,
                           field=field) from None  # fmt: skip

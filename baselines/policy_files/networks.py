@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,33 +16,41 @@ from poise.configs.extras import how_to_install
 from poise.configs.reading import read_bytes
 
 from .bounds import Clocked
+from .config import Memory, PolicyFileConfig
 from .files import BYTES
 
 MEMORY = 10_000_000  # numbers that a network may remember, of each kind
 HOW = f"needs the package onnxruntime: {how_to_install('onnx')}"
+#: ONNX's types of an input → NumPy's
+TYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(float16)": np.float16,
+         "tensor(int64)": np.int64, "tensor(int32)": np.int32}  # fmt: skip
 
 
 class Network(Protocol):
-    """A policy's network: an observation in, an action out, with a memory of its own."""
+    """A policy's network: observations in, an action out, with a memory of its own."""
 
     def reset(self) -> None:
         """Forget the last trial: a new one begins."""
 
-    def act(self, observation: np.ndarray) -> np.ndarray:
-        """The action (na,) float64 of an observation (n,) float32.
+    def act(self, observations: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Its outputs (na,) by what they are, see `ROLES`, of the observation (n,) of each input.
 
         Raises whatever the library of the network raises.
         """
 
 
-def load_network(path: Path) -> Network:
+def load_network(path: Path, config: PolicyFileConfig | None = None) -> Network:
     """The network in an ONNX or a TorchScript file. TorchScript runs: ask `check_allowed` before.
 
-    Raises ConfigError naming the file: onnxruntime is missing, it cannot be read, or it has inputs
-    besides the observation that are no memory (``NAME_in`` with an output ``NAME_out``), or its
-    memory is huge.
+    Its inputs, outputs and memory are those of `config`.
+
+    Raises ConfigError naming the file: onnxruntime is missing, it cannot be read, has inputs that
+    are neither said to be observations nor memory, lacks what is said, or its memory is huge.
     """
-    return ScriptNetwork(read_bytes(path, BYTES), path) if is_script(path) else OnnxNetwork(path)
+    config = config or PolicyFileConfig()
+    if is_script(path):
+        return ScriptNetwork(read_bytes(path, BYTES), path, config)
+    return OnnxNetwork(path, config)
 
 
 def onnx_session(path: Path) -> Any:
@@ -67,66 +75,145 @@ class OnnxNetwork:
     remembers more than it did.
     """
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: Path, config: PolicyFileConfig | None = None):
+        config = config or PolicyFileConfig()
+        self.path, self.config = path, config
         self._session = onnx_session(path)
-        inputs = {each.name: each.shape for each in self._session.get_inputs()}
         outputs = [each.name for each in self._session.get_outputs()]
-        self._memory = {name: _zeros(shape, name, path) for name, shape in inputs.items()
-                        if _after(name) in outputs}  # fmt: skip
-        others = [name for name in inputs if name not in self._memory]
-        if len(others) != 1:
-            raise ConfigError(f"must have one input, the observation, not {', '.join(inputs)}",
-                              source=path)  # fmt: skip
-        self._input = others[0]
-        self._outputs = [outputs[0], *map(_after, self._memory)]
+        given = {each.name: each for each in self._session.get_inputs()}
+        # inputs with a value of their own: memory where it is said so, else numbers of the network
+        optional = {each.name: each for each in self._session.get_overridable_initializers()}
+        self._pairs = _pairs(given | optional, outputs, config.memory, path)
+        given |= {name: each for name, each in optional.items() if name in self._pairs}
+        self._memory = {name: _zeros(given[name], path) for name in self._pairs}
+        self._inputs = {
+            place: given[name]
+            for place, name in _observed([*given], self._pairs, config, path).items()
+        }
+        self._roles = {role: _output(output, outputs, f"outputs.{role}", path)
+                       for role, output in {"action": 0, **config.outputs}.items()}  # fmt: skip
         self._clocked = Clocked()
 
     def __reduce__(self) -> tuple[object, ...]:
-        return OnnxNetwork, (self.path,), {"_memory": self._memory}
+        return OnnxNetwork, (self.path, self.config), {"_memory": self._memory}
 
     def reset(self) -> None:
         self._memory = {name: np.zeros_like(value) for name, value in self._memory.items()}
 
-    def act(self, observation: np.ndarray) -> np.ndarray:
-        given = {self._input: observation[None], **self._memory}
+    def act(self, observations: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        wanted = [*self._roles.values(), *self._pairs.values()]
         try:
+            given = {self._inputs[place].name: _given(self._inputs[place], values)
+                     for place, values in observations.items()}  # fmt: skip
             with self._clocked.run() as options:
-                action, *memory = self._session.run(self._outputs, given, options)
-            numbers = np.asarray(action, dtype=float).ravel()
-        except Exception as error:  # of onnxruntime, or the action is no numbers
+                found = self._session.run(wanted, {**given, **self._memory}, options)
+            answer = {role: np.asarray(values, dtype=float).ravel()
+                      for role, values in zip(self._roles, found, strict=False)}  # fmt: skip
+        except Exception as error:  # of onnxruntime, or what comes back is no numbers
             raise PoiseError(f"{self.path}: cannot be asked ({error})") from None
-        for (name, before), after in zip(self._memory.items(), memory, strict=True):
-            if after.shape != before.shape:
+        memory = dict(zip(self._pairs, found[len(self._roles) :], strict=True))
+        for name, after in memory.items():
+            if after.shape != self._memory[name].shape:
                 raise PoiseError(f"{self.path}: {name}: remembers {_times(after.shape)} numbers, "
-                                 f"not {_times(before.shape)}")  # fmt: skip
-        self._memory = dict(zip(self._memory, memory, strict=True))
-        return numbers
-
-
-def _after(name: str) -> str:
-    """The output that an input of this name is taken from in the next step."""
-    return name.removesuffix("_in") + "_out" if name.endswith("_in") else ""
+                                 f"not {_times(self._memory[name].shape)}")  # fmt: skip
+        self._memory = memory
+        return answer
 
 
 def _times(shape: Sequence[object]) -> str:
     return " × ".join(map(str, shape))
 
 
-def _zeros(shape: list[object], name: str, path: Path) -> np.ndarray:
+def _pairs(
+    inputs: Mapping[str, Any], outputs: Sequence[str], said: Sequence[Memory], path: Path
+) -> dict[str, str]:
+    """Input → the output that it is taken from in the next step."""
+    pairs = {name: after for name in inputs for after in _after(name) if after in outputs}
+    for i, memory in enumerate(said):
+        if memory.input not in inputs:
+            raise ConfigError(f"{path.name} has no input {memory.input!r}", source=path,
+                              field=f"memory[{i}].input", choices=inputs)  # fmt: skip
+        pairs[memory.input] = _output(memory.output, outputs, f"memory[{i}].output", path)
+    return pairs
+
+
+def _after(name: str) -> list[str]:
+    """What the output that an input of this name is taken from may be called."""
+    names = [name.removesuffix("_in") + "_out"] if name.endswith("_in") else []
+    return names + (["output" + name.removeprefix("input")] if name.startswith("input_") else [])
+
+
+def _output(output: str | int, outputs: Sequence[str], field: str, path: Path) -> str:
+    """The name of an output."""
+    if isinstance(output, int) and 0 <= output < len(outputs):
+        return outputs[output]
+    if output not in outputs:
+        raise ConfigError(f"{path.name} has no output {output!r}", source=path, field=field,
+                          choices=outputs)  # fmt: skip
+    return str(output)
+
+
+def _observed(
+    names: Sequence[str], memory: Mapping[str, str], config: PolicyFileConfig, path: Path
+) -> dict[str, str]:
+    """Input of the description → that of the network; all but its memory are observations."""
+    others = [name for name in names if name not in memory]
+    said = list(config.inputs)
+    if said == [""]:
+        if len(others) != 1:
+            raise ConfigError(
+                f"must have one input, the observation, not {', '.join(others)}: say what each "
+                "shows (observations: {NAME: [...]}), or which output it remembers (memory)",
+                source=path,
+            )
+        return {"": others[0]}
+    if lost := [name for name in others if name not in said]:
+        raise ConfigError(f"what the input {lost[0]!r} shows is not said", source=path,
+                          field="observations", choices=others)  # fmt: skip
+    if unknown := [name for name in said if name not in others]:
+        raise ConfigError(f"{path.name} has no such input: {unknown[0]!r}", source=path,
+                          field="observations", choices=others)  # fmt: skip
+    return {name: name for name in said}
+
+
+def _given(about: Any, values: np.ndarray) -> np.ndarray:
+    """Numbers as an input takes them: a size that is left open is 1, the last one what is left.
+
+    Raises ValueError where they are more or less than it takes.
+    """
+    sizes = [size if isinstance(size, int) and size > 0 else 0 for size in about.shape]
+    whole = math.prod(filter(None, sizes))
+    if sizes and sizes[-1] == 0:
+        sizes[-1] = max(1, len(values) // whole)
+    sizes = [size or 1 for size in sizes]
+    if math.prod(sizes) != len(values):
+        whole = math.prod(sizes)
+        steps = whole // max(1, len(values))
+        many = f"; {whole} = {steps} × {len(values)}: a history of {steps} steps?"
+        guess = many if steps > 1 and steps * len(values) == whole else ""
+        raise ValueError(f"it takes {_times(sizes) or 1}{guess}")
+    return values.astype(TYPES.get(about.type, np.float32)).reshape(sizes)
+
+
+def _zeros(about: Any, path: Path) -> np.ndarray:
     """The memory at the start; a size that is left open is 1."""
-    sizes = [size if isinstance(size, int) else 1 for size in shape]
+    sizes = [size if isinstance(size, int) else 1 for size in about.shape]
     if min(sizes, default=0) < 0 or math.prod(sizes) > MEMORY:
         raise ConfigError(f"must be at most {MEMORY} numbers, not {_times(sizes)}",
-                          source=path, field=name)  # fmt: skip
-    return np.zeros(sizes, dtype=np.float32)
+                          source=path, field=about.name)  # fmt: skip
+    return np.zeros(sizes, dtype=TYPES.get(about.type, np.float32))
 
 
 class ScriptNetwork:
     """A network in TorchScript; one that remembers is loaded anew for every trial."""
 
-    def __init__(self, content: bytes, path: Path):
-        self.content, self.path = content, path
+    def __init__(self, content: bytes, path: Path, config: PolicyFileConfig):
+        self.content, self.path, self.config = content, path, config
+        for i, memory in enumerate(config.memory):
+            if not memory.shape or math.prod(memory.shape) > MEMORY:
+                raise ConfigError(f"needs a shape, of at most {MEMORY} numbers: TorchScript does "
+                                  "not tell it", source=config.described_in or path,
+                                  field=f"memory[{i}].shape")  # fmt: skip
         self.reset()
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -134,20 +221,52 @@ class ScriptNetwork:
 
         buffer = io.BytesIO()
         torch.jit.save(self._module, buffer)
-        return _with_module, (self.content, self.path, buffer.getvalue())
+        return (
+            _with_module,
+            (self.content, self.path, self.config, buffer.getvalue(), self._memory),
+        )
 
     def reset(self) -> None:
-        self._module = _module(self.content, self.path)
-
-    def act(self, observation: np.ndarray) -> np.ndarray:
         import torch
 
+        self._module = _module(self.content, self.path)
+        kinds = (value.dtype for value in self._module.parameters())
+        self._type = next((kind for kind in kinds if kind.is_floating_point), torch.float32)
+        self._memory = [torch.zeros(each.shape, dtype=self._type) for each in self.config.memory]
+
+    def act(self, observations: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        import torch
+
+        given = [torch.from_numpy(values).to(self._type) for values in observations.values()]
+        if self.config.batch:
+            given = [values[None] for values in given]
         with torch.inference_mode():
-            action = self._module(torch.from_numpy(observation)[None])
-        return action.double().numpy().ravel()
+            found = self._module(*given, *self._memory)
+        found = found if isinstance(found, (tuple, list)) else (found,)
+        self._memory = [found[_place(each.output)].clone() for each in self.config.memory]
+        roles = {"action": 0, **self.config.outputs}
+        return {role: found[_place(output)].double().numpy().ravel()
+                for role, output in roles.items()}  # fmt: skip
 
 
-def _module(content: bytes, path: Path) -> Callable[..., Any]:
+def script_sizes(path: Path) -> tuple[int | None, int | None]:
+    """The numbers that TorchScript takes and gives, as its first and last matrix tell.
+
+    It runs: ask `check_allowed` before.
+    """
+    matrices = [each for each in _module(read_bytes(path, BYTES), path).parameters()
+                if each.dim() == 2]  # fmt: skip
+    return (matrices[0].shape[1], matrices[-1].shape[0]) if matrices else (None, None)
+
+
+def _place(output: str | int) -> int:
+    """The place of an output of TorchScript, which has no names; raises ValueError for a name."""
+    if not isinstance(output, int):
+        raise ValueError(f"outputs of TorchScript have places, not names such as {output!r}")
+    return output
+
+
+def _module(content: bytes, path: Path) -> Any:
     import torch
 
     try:
@@ -156,7 +275,9 @@ def _module(content: bytes, path: Path) -> Callable[..., Any]:
         raise ConfigError(f"is no TorchScript ({error})", source=path) from None
 
 
-def _with_module(content: bytes, path: Path, module: bytes) -> ScriptNetwork:
-    network = ScriptNetwork(content, path)
-    network._module = _module(module, path)
+def _with_module(
+    content: bytes, path: Path, config: PolicyFileConfig, module: bytes, memory: list[Any]
+) -> ScriptNetwork:
+    network = ScriptNetwork(content, path, config)
+    network._module, network._memory = _module(module, path), memory
     return network

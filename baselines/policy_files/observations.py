@@ -1,141 +1,153 @@
-"""The observation of a policy: terms by the names of mjlab, Isaac Lab and legged_gym."""
+"""The observations of a policy: terms side by side, of one step or of several."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from poise.configs.errors import ConfigError, shown
-from poise.envs.physics.state import RobotState
+from poise.configs.errors import ConfigError
 
 from .config import ObservationTerm, PolicyFileConfig
+from .terms import COMMAND, KnownTerms, Place, Seen, Term, meaning
 
 
-class Seen(NamedTuple):
-    """All that terms are made from: n joints of the policy, na actions."""
-
-    state: RobotState
-    q: np.ndarray  # (n,) joint positions [rad]
-    v: np.ndarray  # (n,) joint velocities [rad/s]
-    default: np.ndarray  # (n,) posture that positions are relative to [rad]
-    action: np.ndarray  # (na,) of the step before, zero at the start
-    command: np.ndarray  # (3,) [m/s, m/s, rad/s]
-    phase: float  # of the clock [rad]
-
-
-def _turned(seen: Seen, vector: np.ndarray) -> np.ndarray:
-    """A vector of the world in the root's axes."""
-    return seen.state.root_axes.T @ vector
-
-
-DOWN = np.array([0.0, 0.0, -1.0])
-
-#: term → its numbers
-TERMS: dict[str, Callable[[Seen], np.ndarray]] = {
-    "base_lin_vel": lambda seen: _turned(seen, seen.state.qvel[:3]),
-    "base_ang_vel": lambda seen: seen.state.qvel[3:6],
-    "projected_gravity": lambda seen: _turned(seen, DOWN),
-    "velocity_commands": lambda seen: seen.command,
-    "joint_pos": lambda seen: seen.q,
-    "joint_pos_rel": lambda seen: seen.q - seen.default,
-    "joint_vel": lambda seen: seen.v,
-    "last_action": lambda seen: seen.action,
-    "phase": lambda seen: np.array([np.sin(seen.phase), np.cos(seen.phase)]),
-}
-#: other names of the same
-ALIASES = {
-    "gravity_orientation": "projected_gravity",
-    "command": "velocity_commands",
-    "commands": "velocity_commands",
-    "generated_commands": "velocity_commands",
-    "dof_pos": "joint_pos_rel",
-    "dof_vel": "joint_vel",
-    "joint_vel_rel": "joint_vel",
-    "action": "last_action",
-    "actions": "last_action",
-    "gait_phase": "phase",
-}
+def follows_commands(config: PolicyFileConfig) -> bool:
+    """Return whether a policy sees the velocity that is commanded."""
+    parts = [part for parts in config.inputs.values() for part in parts]
+    return any(meaning(term) == COMMAND for part in parts for term in part.terms)
 
 
 class Observer:
-    """The observation of a policy with `joints` joints and `actions` actions, step by step.
+    """The observations of a policy, step by step: one for each of its network's inputs.
 
-    Raises ConfigError for an unknown term, a scale of another size than its term, and frames of
-    terms with different histories.
+    Args:
+        config: what the inputs show.
+        joints: names of the policy's joints.
+        moved: those of them that its action moves.
+        source: the file that describes it, for errors.
+
+    Raises ConfigError for an unknown term, numbers of another size than its term, joints that it
+    does not have, and frames of terms with different histories.
     """
 
-    def __init__(self, config: PolicyFileConfig, joints: int, actions: int, source: str):
-        sizes = {"joint_pos": joints, "joint_pos_rel": joints, "joint_vel": joints,
-                 "last_action": actions, "phase": 2}  # fmt: skip
-        self._by_frame = config.history == "frame"
-        self._terms: list[_Term] = []
-        for i, described in enumerate(config.observations):
-            name = ALIASES.get(described.term, described.term)
-            if name not in TERMS:
-                raise ConfigError(f"no such term: {shown(described.term)}", source=source,
-                                  field=f"observations[{i}].term",
-                                  choices=(*TERMS, *ALIASES))  # fmt: skip
-            first = config.observations[0].history
-            if self._by_frame and described.history != first:
-                raise ConfigError(f"{described.history} steps, where the first term shows {first}",
-                                  source=source, field=f"observations[{i}].history")  # fmt: skip
-            self._terms.append(_Term(described, name, sizes.get(name, 3), source, i))
+    def __init__(
+        self, config: PolicyFileConfig, joints: Sequence[str], moved: Sequence[str], source: str
+    ):
+        legs = len(config.phase_offsets)
+        names = {"joint_pos": joints, "joint_pos_rel": joints, "joint_vel": joints,
+                 "last_action": moved}  # fmt: skip
+        sizes = {"phase": 2, "roll_pitch": 2, "phase_sin": legs, "phase_cos": legs,
+                 **{term: len(each) for term, each in names.items()}}  # fmt: skip
+        known = KnownTerms({term: list(each) for term, each in names.items()}, sizes, source)
+        self._inputs: dict[str, _Side | _Part] = {}
+        for name, parts in config.inputs.items():
+            field = f"observations.{name}" if name else "observations"
+            if config.history == "frame" and parts:
+                self._inputs[name] = _Part(_framed(parts, field, source), field, known, field)
+            else:
+                self._inputs[name] = _Side(parts, field, known)
 
     @property
-    def size(self) -> int:
-        """The size of an observation."""
-        return sum(term.size * term.described.history for term in self._terms)
+    def sizes(self) -> dict[str, int]:
+        """Input → the numbers of an observation."""
+        return {name: side.size for name, side in self._inputs.items()}
 
-    @property
-    def parts(self) -> str:
-        """The terms and their sizes, for errors."""
-        sizes = ((term, term.described.history) for term in self._terms)
-        return ", ".join(
-            f"{term.described.term} {term.size}" + (f" × {count}" if count > 1 else "")
-            for term, count in sizes
-        )
+    def __str__(self) -> str:
+        """How many numbers each input is given, and of which terms, for errors."""
+        return "; ".join(f"{side.size} numbers{' for ' if name else ''}{name} ({side})"
+                         for name, side in self._inputs.items())  # fmt: skip
+
+    def places(self) -> dict[str, list[Place]]:
+        """Input → where its terms lie, in their order."""
+        return {name: list(side.places(0, 0)) for name, side in self._inputs.items()}
 
     def forget(self) -> None:
         """Forget the last trial: the next observation fills the history."""
-        for term in self._terms:
-            term.kept.clear()
+        for side in self._inputs.values():
+            side.forget()
 
-    def observe(self, seen: Seen) -> np.ndarray:
-        """The observation (size,) float32 of this policy step, which enters the history."""
-        for term in self._terms:
-            term.look(seen)
-        if self._by_frame:
-            columns = [np.concatenate(frame) for frame in zip(*self._kept(), strict=True)]
-        else:
-            columns = [np.concatenate(list(kept)) for kept in self._kept()]
-        return np.concatenate(columns).astype(np.float32)
-
-    def _kept(self) -> list[deque[np.ndarray]]:
-        return [term.kept for term in self._terms]
+    def observe(self, seen: Seen) -> dict[str, np.ndarray]:
+        """Input → the observation (size,) of this policy step, which enters the history."""
+        return {name: side.now(seen) for name, side in self._inputs.items()}
 
 
-class _Term:
-    """One term and what it showed in the last steps, oldest first."""
+def _framed(parts: Sequence[ObservationTerm], field: str, source: str) -> ObservationTerm:
+    """All parts of an input as one frame, which has the history that they have alike."""
+    first = parts[0]
+    for i, part in enumerate(parts):
+        if part.history != first.history:
+            raise ConfigError(f"{part.history} steps, where the first term shows {first.history}",
+                              source=source, field=f"{field}[{i}].history")  # fmt: skip
+    alone = tuple(replace(part, history=1, lag=0, newest_first=False) for part in parts)
+    return ObservationTerm(frame=alone, history=first.history, lag=first.lag, fill=first.fill,
+                           newest_first=first.newest_first)  # fmt: skip
 
-    def __init__(self, described: ObservationTerm, name: str, size: int, source: str, i: int):
-        self.described, self.name, self.size = described, name, size
-        self.kept: deque[np.ndarray] = deque(maxlen=described.history)
-        self.scale = np.asarray(described.scale, dtype=float)
-        if self.scale.size not in (1, size):
-            raise ConfigError(
-                f"has {self.scale.size} numbers, {described.term} has {size}",
-                source=source,
-                field=f"observations[{i}].scale",
-            )
 
-    def look(self, seen: Seen) -> None:
-        """Remember what it shows now."""
-        value = np.array(TERMS[self.name](seen), dtype=float)
-        if self.described.clip is not None:
-            value = np.clip(value, *self.described.clip)
-        value = value * self.scale
-        for _ in range(max(1, self.described.history - len(self.kept))):
-            self.kept.append(value)
+class _Side:
+    """Parts side by side in one step."""
+
+    def __init__(self, parts: Sequence[ObservationTerm], field: str, known: KnownTerms):
+        self.parts = [_Part(part, f"{field}[{i}]", known) for i, part in enumerate(parts)]
+        self.size: int = sum(part.size for part in self.parts)
+
+    def __str__(self) -> str:
+        return ", ".join(map(str, self.parts))
+
+    def places(self, start: int, age: int) -> Iterator[Place]:
+        """Where their terms lie, from `start` on, of so many steps ago."""
+        for part in self.parts:
+            yield from part.places(start, age)
+            start += part.size
+
+    def now(self, seen: Seen) -> np.ndarray:
+        """(size,) what they show in this step."""
+        return np.concatenate([part.now(seen) for part in self.parts])
+
+    def forget(self) -> None:
+        """Forget the last trial."""
+        for part in self.parts:
+            part.forget()
+
+
+class _Part:
+    """A term, or a frame of them, and what it showed in the last steps, oldest first."""
+
+    def __init__(self, described: ObservationTerm, field: str, known: KnownTerms, inside: str = ""):
+        self.described = described
+        self.inner: _Side | Term = (
+            _Side(described.frame, inside or f"{field}.frame", known)
+            if described.frame
+            else Term(described, field, known)
+        )
+        self.kept: deque[np.ndarray] = deque(maxlen=described.history + described.lag)
+        self.size: int = self.inner.size * described.history
+
+    def __str__(self) -> str:
+        count = self.described.history
+        name = f"({self.inner})" if self.described.frame else str(self.inner)
+        return name + (f" × {count}" if count > 1 else "")
+
+    def places(self, start: int, age: int) -> Iterator[Place]:
+        """Where it lies, step by step."""
+        steps = range(self.described.lag, self.described.lag + self.described.history)
+        for step in steps if self.described.newest_first else reversed(steps):
+            yield from self.inner.places(start, age + step)
+            start += self.inner.size
+
+    def now(self, seen: Seen) -> np.ndarray:
+        """(size,) what it shows in this step, which enters the history."""
+        own, value = self.described, self.inner.now(seen)
+        if not self.kept:
+            before = value if own.fill == "first" else np.zeros_like(value)
+            self.kept.extend([before] * (own.history + own.lag))
+        self.kept.append(value)
+        steps = list(self.kept)[: own.history]
+        return np.concatenate(steps[::-1] if own.newest_first else steps)
+
+    def forget(self) -> None:
+        """Forget the last trial."""
+        self.kept.clear()
+        self.inner.forget()

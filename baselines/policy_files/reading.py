@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,18 @@ from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
 from poise.configs.schema import build
 
 from .bounds import try_network
-from .config import PolicyFileConfig
+from .config import Origin, PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
 from .files import description, digest, is_network, is_policy_place, only_network
+from .known import RIVALS, expect_network
 from .metadata import metadata_fields
 from .networks import onnx_session
 
-RIVALS = "rivals"  # folder of packaged policies of others, which are for one robot each
+
+def advice(network: str | Path) -> str:
+    """What helps with a network that nothing describes."""
+    return (f"poise policies check {shlex.quote(str(network))} --robot ROBOT says what a "
+            "description of it needs")  # fmt: skip
 
 
 def is_policy(name: object) -> bool:
@@ -64,6 +70,7 @@ def policy_file_config(data: dict[str, Any], source: Path) -> PolicyFileConfig:
 
     What `data` says wins over `deploy`, and this over the metadata of an ONNX file. Paths are
     relative to the folder of `source` and become absolute; the digest is that of the files now.
+    Where it names no network but an `origin`, it is the known one that is found, by its sum.
 
     Raises ConfigError naming the file and the field: an unknown field, a wrong type, a missing
     file, TorchScript that the user has not allowed, no observations.
@@ -75,14 +82,19 @@ def policy_file_config(data: dict[str, Any], source: Path) -> PolicyFileConfig:
     below: dict[str, Any] = {}
     if deploy := data.pop("deploy", None):
         below = deploy_fields(read_yaml(folder / deploy), folder / deploy)
-    path, version = _network(data.get("policy") or below.get("policy"), folder, source)
+    named = data.get("policy") or below.get("policy")
+    if not named and data.get("origin"):
+        origin = build(Origin, data["origin"], f"{source}: origin")
+        named = str(expect_network(origin, source.stem))
+    path, version = _network(named, folder, source)
     if not is_script(path):
         try_network(path, version)
         metadata = onnx_session(path).get_modelmeta().custom_metadata_map
         below = {**metadata_fields(metadata, path), **below}
     config = build(PolicyFileConfig, {**below, **data, "policy": str(path)}, source)
-    if not config.observations:
-        raise ConfigError("what the policy sees is not said", source=source, field="observations")
+    if not config.observations or not all(config.inputs.values()):
+        raise ConfigError(f"what the policy sees is not said; {advice(path)}", source=source,
+                          field="observations")  # fmt: skip
     return replace(config, digest=version, described_in=str(source))
 
 

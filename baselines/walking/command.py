@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from poise.baselines.controller import COMMAND_ENTRIES
 from poise.configs.errors import ConfigError
 
 MOST_STEP_TIME = 5.0  # [s] by which ξ has left any robot that stands on one foot
@@ -83,5 +84,5 @@ def command_of(array: np.ndarray) -> GaitCommand:
 
 #: of a command, besides its velocity and turn
 STEP_PARAMETERS = ("step_time", "width", "clearance", "arm_swing", "step_length")
-ENTRIES = 8  #: of the array of a command
+ENTRIES = COMMAND_ENTRIES  #: of the array of a command
 STEP_TIME, WIDTH, CLEARANCE, ARM_SWING, STEP_LENGTH = range(3, ENTRIES)  #: of its entries

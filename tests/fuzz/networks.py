@@ -165,5 +165,6 @@ def play(case: Json, folder: Path) -> None:
     assert isinstance(config, PolicyFileConfig)
     controller = PolicyFile(robot("compact"), config)
     for _ in range(40):
-        action = controller.network.act(np.zeros(controller.observer.size, dtype=np.float32))
+        sizes = controller.observer.sizes
+        action = controller.network.act({name: np.zeros(n) for name, n in sizes.items()})["action"]
         assert action.shape == (len(controller.action),)

@@ -16,6 +16,7 @@ from poise.training.trials.agents import load_agent
 from tests.support.benchmarks_small import TRIALS, play_in_process, write_small
 from tests.support.evaluations import InProcess, write_suite
 from tests.support.policies import linear, write_onnx, write_yaml
+from tests.support.rivals import network
 from tests.support.shared import robot
 
 QUIET = {"duration": 1.2, "quiet": {"trials": 1}}
@@ -112,6 +113,8 @@ def test_what_cannot_play_is_refused(
     folder: Path, name: str, parts: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 2, one line."""
+    if name == "unitree-g1-velocity":
+        network(name)
     assert main(["evaluate", name, "--robot", "compact", "--out", str(folder.parent / "out")]) == 2
     error = capsys.readouterr().err
     assert all(part in error for part in parts) and error.count("\n") == 1

@@ -41,7 +41,7 @@ FLOORS = """
 14 training/trials
 15 training/figures, training/following, training/open_loop, training/standalone
 15 training/suites, training/tuning
-16 training/metrics, training/qp_set, training/robot_check
+16 training/metrics, training/policy_check, training/qp_set, training/robot_check
 17 training/evaluation
 18 training/gaits, training/results
 19 training/export, training/report, training/sessions

@@ -58,13 +58,17 @@ def write_layers(path: Path, sizes: list[int], seed: int = 0) -> Path:
     return _write(path, nodes, weights, [("obs", sizes[0])], [("actions", sizes[-1])])
 
 
-def write_recurrent(path: Path, n: int) -> Path:
-    """a = h' = h + o, which remembers."""
+def write_recurrent(
+    path: Path, n: int, names: tuple[str, str] = ("h_in", "h_out"), optional: bool = False
+) -> Path:
+    """a = h' = h + o, which remembers; with `optional` the file has zeros for h."""
+    before, after = names
     nodes = [
-        helper.make_node("Add", ["obs", "h_in"], ["h_out"]),
-        helper.make_node("Identity", ["h_out"], ["actions"]),
+        helper.make_node("Add", ["obs", before], [after]),
+        helper.make_node("Identity", [after], ["actions"]),
     ]
-    return _write(path, nodes, {}, [("obs", n), ("h_in", n)], [("actions", n), ("h_out", n)])
+    zeros = {before: np.zeros((1, n), np.float32)} if optional else {}
+    return _write(path, nodes, zeros, [("obs", n), (before, n)], [("actions", n), (after, n)])
 
 
 def _write(
@@ -76,11 +80,23 @@ def _write(
     metadata: dict[str, str] | None = None,
     outside: bool = False,
 ) -> Path:
+    sides = [[(name, [1, size], onnx.TensorProto.FLOAT) for name, size in side]
+             for side in (inputs, outputs)]  # fmt: skip
+    return write_graph(path, nodes, weights, *sides, metadata, outside)
+
+
+def write_graph(
+    path: Path,
+    nodes: list[Any],
+    weights: dict[str, np.ndarray],
+    inputs: list[tuple[str, list[int | str], int]],
+    outputs: list[tuple[str, list[int | str], int]],
+    metadata: dict[str, str] | None = None,
+    outside: bool = False,
+) -> Path:
+    """A network of these nodes; inputs and outputs have a name, a shape and ONNX's type."""
     ends = [
-        [
-            helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, [1, size])
-            for name, size in side
-        ]
+        [helper.make_tensor_value_info(name, kind, shape) for name, shape, kind in side]
         for side in (inputs, outputs)
     ]
     tensors = [numpy_helper.from_array(value, name) for name, value in weights.items()]

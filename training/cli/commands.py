@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, Json, Names, RobotName, Switch, print_json
-from .export import dataset, export
+from .policies import dataset, export
 from .results import compare, leaderboard, replay, report
 from .view import view
 from .walk import gait, walk
@@ -331,6 +331,11 @@ def motion() -> None:
     raise AssertionError("main() answers this sub-command")
 
 
+def policies() -> None:
+    """Public policies of others: which are known, which are here; check FILE: what one lacks."""
+    raise AssertionError("main() answers this sub-command")
+
+
 def list_names(*, json: Json = False) -> None:
     """List what can be named: robots, controllers, policies with their J50, suites and the like."""
     from poise.baselines.clips.library import packaged_clips
@@ -363,6 +368,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "tune": tune,
     "qp-set": qp_set,
     "export": export,
+    "policies": policies,
     "dataset": dataset,
     "robot": robot,
     "motion": motion,

@@ -141,6 +141,10 @@ def _run(args: list[str]) -> int:
         from .motion import run as run_motion
 
         return run_motion(given)
+    if name == "policies":  # it has one, too
+        from .policies import run as run_policies
+
+        return run_policies(given)
     given = ["--help" if arg == "--help-all" else arg for arg in given]  # all there is
     code = parsed(COMMANDS[name], given, f"poise {name}")()
     return code if isinstance(code, int) else 0

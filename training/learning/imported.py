@@ -19,7 +19,7 @@ from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.policy_files.config import ObservationTerm, PolicyFileConfig
 from poise.baselines.policy_files.joints import joint_servos
 from poise.baselines.policy_files.layers import Layers, read_layers
-from poise.baselines.policy_files.observations import ALIASES
+from poise.baselines.policy_files.terms import meaning
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
@@ -87,14 +87,19 @@ class Translation:
 
         Raises ConfigError for a term that the environment's lacks, with a history, or with limits.
         """
-        parts = [self._term(i, term) for i, term in enumerate(self.config.observations)]
+        (terms, *more) = self.config.inputs.values()
+        if more:
+            raise self._wrong(0, "with several inputs it cannot be imported")
+        parts = [self._term(i, term) for i, term in enumerate(terms)]
         columns = [[p.index for p in parts], [p.gain for p in parts], [p.offset for p in parts]]
         return Affine(*(np.concatenate(column) for column in columns))
 
     def _term(self, i: int, described: ObservationTerm) -> Affine:
-        name = ALIASES.get(described.term, described.term)
-        if described.history > 1 or described.clip is not None:
-            raise self._wrong(i, "with a history or limits it cannot be imported")
+        name = meaning(described)
+        if described.frame or described != ObservationTerm(described.term, described.scale):
+            raise self._wrong(i, "with a history or limits it cannot be imported, nor in part")
+        if isinstance(described.scale, dict):
+            raise self._wrong(i, "with factors by name it cannot be imported")
         if name == "velocity_commands":
             constant = Affine(np.full(3, -1), np.ones(3), np.array(self.config.command))
             return constant.scaled(described.scale)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from poise.baselines.policy_files.reading import RIVALS
+from poise.baselines.policy_files.known import RIVALS
 from poise.configs.files import packaged
 from poise.training.trials.names import NO_CONTROL
 

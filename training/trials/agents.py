@@ -97,7 +97,7 @@ def check_may_walk(name: str, source: str) -> ControllerConfig | None:
     if not described or is_policy(name):
         return None
     config = controller_config(name)
-    if not isinstance(config, (WalkConfig, SimbiconConfig, PluginConfig)):
+    if not isinstance(config, (WalkConfig, SimbiconConfig, PluginConfig, PolicyFileConfig)):
         raise does_not_walk(name, source)
     return config
 
@@ -120,7 +120,7 @@ def check_follows(name: str, agent: Agent, source: str) -> None:
 def _wherever(config: ControllerConfig) -> ControllerConfig:
     """The same for a policy's files in any folder: their digest tells them apart."""
     if isinstance(config, PolicyFileConfig):
-        return replace(config, policy=Path(config.policy).name, described_in="")
+        return replace(config, policy=Path(config.policy).name, described_in="", origin=None)
     return config
 
 

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from poise.baselines.allowance import is_plugin
-from poise.baselines.policy_files.reading import RIVALS, is_policy
+from poise.baselines.allowance import is_plugin, is_script
+from poise.baselines.policy_files.known import RIVALS
+from poise.baselines.policy_files.reading import advice, is_policy
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder
@@ -38,6 +39,9 @@ def check_name(name: str) -> None:
     Nothing is loaded for that, and nothing compiled; what the name stands for may still be wrong.
     """
     names = (*packaged("controllers"), *packaged(RIVALS), *packaged("policies"), NO_CONTROL)
+    if is_script(name) and is_file(name):
+        raise ConfigError(f"a network alone does not say what its numbers mean; {advice(name)}",
+                          source=name, field="controller")  # fmt: skip
     of_file = is_file(name) and Path(name).suffix in (".yaml", ".yml")
     if not (name in names or of_file or is_folder(name) or is_policy(name) or is_plugin(name)):
         raise ConfigError(

@@ -115,8 +115,7 @@ def test_some_commands_need_a_momentum_qp():
 
 
 def test_every_kind_is_packaged():
-    """Each kind but that from outside has a file; `qp: momentum-qp` stands for its gains."""
-    names = [*packaged("controllers"), *packaged("rivals")]
-    kinds = {controller_config(name).kind for name in names}
-    assert kinds | {"outside"} == set(KINDS)
+    """Each kind but those from outside has a file; `qp: momentum-qp` stands for its gains."""
+    kinds = {controller_config(name).kind for name in packaged("controllers")}
+    assert kinds | {"outside", "policy-file"} == set(KINDS)
     assert controller_config("lqr-lip").qp == controller_config("momentum-qp")

@@ -98,7 +98,7 @@ def test_a_network_that_takes_long_later_ends_with_an_error(
     monkeypatch.setattr(bounds, "_thread", None)  # one that looks that often
     begun = time.monotonic()
     with pytest.raises(PoiseError, match=r"policy.onnx: cannot be asked \(") as caught:
-        network.act(np.ones(3, dtype=np.float32))
+        network.act({"": np.ones(3)})
     assert time.monotonic() - begun < 20.0 and str(caught.value).isprintable()
     with Clocked().run() as options:
         assert not options.terminate
@@ -115,7 +115,7 @@ def test_a_memory_that_grows_ends_the_trial(tmp_path: Path) -> None:
     path.write_bytes(model.SerializeToString())
     network = OnnxNetwork(path)
     with pytest.raises(PoiseError, match="h_in: remembers 1 × 4 numbers, not 1 × 1"):
-        network.act(np.ones(3, dtype=np.float32))
+        network.act({"": np.ones(3)})
 
 
 def with_data(folder: Path, name: str, place: str = "initializer") -> Path:

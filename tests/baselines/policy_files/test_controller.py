@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.policy_files.controller import PolicyFile
-from poise.baselines.registry import controller_config, load_controller
+from poise.baselines.registry import load_controller
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.robots.menagerie import WHEEL
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.batch import EnvBatch, replicate
 from tests.support.policies import linear, onnx_session, write_onnx, write_yaml
+from tests.support.rivals import network
 from tests.support.shared import robot as shared_robot
 
 STEPS, SUBSTEPS = 200, 10
@@ -224,8 +224,8 @@ class Faulty:
     def reset(self) -> None:
         pass
 
-    def act(self, observation: np.ndarray) -> np.ndarray:
-        return np.array([self.value, np.nan, np.nan])
+    def act(self, observations: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {"action": np.array([self.value, np.nan, np.nan])}
 
 
 def test_an_action_that_is_not_finite_is_an_error(robot: Robot, own: Path) -> None:
@@ -257,7 +257,8 @@ def test_a_simulation_that_diverged_is_a_fall(robot: Robot, own: Path) -> None:
     ("changes", "parts"),
     [
         ({"observations": [{"term": "base_ang_vel"}]},
-         ("observations: policy.onnx does not take 3 numbers (base_ang_vel 3)",)),
+         ("observations: policy.onnx does not take 3 numbers (base_ang_vel 3)",
+          "it takes 1 × 112")),
         ({"observations": [{"term": "joint_torques"}]},
          ("observations[0].term: no such term: 'joint_torques'", "projected_gravity", "dof_pos")),
         ({"observations": [{"term": "phase", "scale": [1.0, 1.0, 1.0]}]},
@@ -271,7 +272,10 @@ def test_a_simulation_that_diverged_is_a_fall(robot: Robot, own: Path) -> None:
         ({"action_joints": [1, 1]}, ("action_joints: must be different places in 23 joints",)),
         ({"action_joints": [1, 23]}, ("action_joints: must be different places in 23 joints",)),
         ({"action_joints": [0, 1]}, ("does not take",)),
-        ({"action_clip": [[-1.0, 1.0]]}, ("action_clip: has 1 pairs for 23",)),
+        ({"action_clip": [[-1.0, 1.0]] * 2}, ("action_clip: has 2 pairs for 23",)),
+        ({"held": [0.1]}, ("held: has 1 numbers for 23 joints",)),
+        ({"held": {"left_tail": 0.1}}, ("held: no joint is called 'left_tail'", "choices")),
+        ({"outputs": {"torque": "actions"}}, ("outputs: no such output: 'torque'", "stiffness")),
         ({"policy_period": 0.0213}, ("policy_period: 0.0213 s is not a whole number",)),
         ({"policy_period": 0.0}, ("policy_period: must be above 0",)),
         ({"command": [0.0]}, ("command: must be a list of 3",)),
@@ -310,8 +314,9 @@ def g1() -> Robot:
     return shared_robot("unitree_g1")
 
 
-def test_the_packaged_rival_stands_on_the_g1_and_steps(g1: Robot) -> None:
+def test_a_public_policy_recovers_on_the_g1_by_steps(g1: Robot) -> None:
     """Unitree's policy recovers, after steps, what no controller of feet in place survives."""
+    network("unitree-g1-velocity")
     env = ResidualBalanceEnv(g1, controller="unitree-g1-velocity", pushes=None, duration=5.0)
     push = {"impulse": 0.9 * g1.mass, "direction": 0.0, "duration": 0.1, "start": 0.3}
     env.reset(seed=0, options={"push": push})
@@ -320,26 +325,90 @@ def test_the_packaged_rival_stands_on_the_g1_and_steps(g1: Robot) -> None:
     assert env.simulation.state.com[0] > 0.2
 
 
-def test_the_packaged_rival_acts_as_in_a_loop_of_its_own(g1: Robot) -> None:
-    """Its first 200 actions from a shaky start, from its own deploy.yaml, computed apart."""
-    config = controller_config("unitree-g1-velocity")
-    env = make_env(g1, "unitree-g1-velocity")
-    assert isinstance(env.controller, PolicyFile)
-    env.reset(seed=1, options=SHAKY)
-    data = mujoco.MjData(g1.model)
-    data.qpos[:], data.qvel[:] = env.simulation.data.qpos, env.simulation.data.qvel
-    session = onnx_session(config.policy)
-    kp, kd, target = (np.array(getattr(config, k)) for k in ("stiffness", "damping", "default"))
-    default, action, apart = target.copy(), np.zeros(29), []
-    for _ in range(STEPS):
-        rotation = np.zeros(9)
-        mujoco.mju_quat2Mat(rotation, data.qpos[3:7])
-        observation = np.concatenate([
-            data.qvel[3:6], -rotation[6:], np.zeros(3), data.qpos[7:] - default, data.qvel[6:],
-            action,
-        ])  # fmt: skip
-        action = session.run(None, {"obs": observation[None].astype(np.float32)})[0][0]
-        apart.append(action)
-        target = default + np.array(config.action_scale) * action.astype(float)
-        _servo(g1.model, data, kp, kd, target)
-    np.testing.assert_allclose(actions_here(env), apart, atol=1e-4)
+def test_a_policy_for_walking_follows_what_is_asked(g1: Robot) -> None:
+    """It walks at the commanded velocity, turns to another one, and stands at zero again."""
+    network("unitree-g1-velocity")
+    env = ResidualBalanceEnv(g1, controller="unitree-g1-velocity", pushes=None, duration=9.0)
+    course = [{"ahead": 0.5}, {"left": 0.5, "start": 3.0}, {"start": 6.0}]
+    env.reset(seed=0, options={"command": course, "push": []})
+    places = []
+    for _ in range(3):
+        actions_here(env, 150)
+        places.append(env.simulation.state.com[:2].copy())
+    assert env.command is not None and env.command.speed == 0.0 and not env.fallen
+    assert np.linalg.norm(env.simulation.state.com_vel[:2]) < 0.1
+    assert places[0][0] > 0.8 and abs(places[0][1]) < 0.3
+    assert places[1][1] - places[0][1] > 0.8 and abs(places[1][0] - places[0][0]) < 0.5
+
+
+def test_a_command_moves_what_is_seen_and_the_clock(robot: Robot, own: Path) -> None:
+    """The command of the environment takes the place of the description's; a reset forgets it."""
+    fields = described(robot)
+    fields |= {"phase_runs": "commanded", "command": [0.0, 0.0, 0.0]}
+    path = write_yaml(own.with_name("told.yaml"), **fields)
+    env = make_env(robot, str(path))
+    seen: list[np.ndarray] = []
+    act = env.controller.network.act
+    env.controller.network.act = lambda given: seen.append(given[""].copy()) or act(given)
+    env.reset(seed=3, options={**SHAKY, "command": {"ahead": 0.5, "turn": 0.4, "start": 0.04}})
+    actions_here(env, 5)
+    rows, n = np.array(seen), len(fields["joints"])
+    np.testing.assert_allclose(rows[:, 12:15], [[0, 0, 0]] * 2 + [[1.0, 0.0, 0.1]] * 3)
+    angles = 2 * np.pi * np.array([0.0, 0.0, 0.0, 0.02, 0.04]) / 0.8
+    clock = 15 + 2 * n + n + n
+    np.testing.assert_allclose(rows[:, clock], np.sin(angles), atol=1e-9)
+    env.command = {"left": 0.25}
+    actions_here(env, 1)
+    np.testing.assert_allclose(seen[-1][12:15], [0.0, 0.5, 0.0])
+    env.reset(seed=3, options=SHAKY)
+    assert env.command.speed == 0.0
+
+
+def test_a_policy_without_a_command_does_not_walk(robot: Robot, own: Path) -> None:
+    """Which is said when it is told one."""
+    write_onnx(own.with_name("blind.onnx"), linear(3, len(robot.joint_names) - 2))
+    fields = {
+        **described(robot),
+        "policy": "blind.onnx",
+        "observations": [{"term": "base_ang_vel"}],
+    }
+    env = make_env(robot, str(write_yaml(own.with_name("blind.yaml"), **fields)))
+    assert env.command is None
+    with pytest.raises(ConfigError, match="PolicyFile does not walk"):
+        env.reset(options={"command": {"ahead": 0.5}})
+
+
+def test_joints_that_the_action_does_not_move_are_held(robot: Robot, own: Path) -> None:
+    """Where `held` says, with gains of their own; others as without it."""
+    fields = described(robot)
+    *moved, last = fields["joints"]
+    lost = [name for name in robot.joint_names if name not in fields["joints"]]
+    held = {last: 0.2, lost[0]: {"position": 0.1, "stiffness": 77.0}}
+    fields |= {"action_joints": list(range(len(moved))), "observations": [{"term": "actions"}],
+               "policy": "few.onnx"}  # fmt: skip
+    write_onnx(own.with_name("few.onnx"), linear(len(moved), len(moved)))
+    without, by_name, by_list = (
+        load_controller(str(write_yaml(own.with_name("held.yaml"), **fields, **more)), robot).joints
+        for more in ({}, {"held": held}, {"held": [0.3] * len(fields["joints"])})
+    )
+    place, other = robot.joint_names.index(last), robot.joint_names.index(lost[0])
+    changed = {i: (0.2 if i == place else 0.1) for i in (place, other)}
+    for i in range(len(robot.joint_names)):
+        assert by_name.target[i] == changed.get(i, without.target[i])
+    assert by_name.stiffness[other] == 77.0 and by_name.damping[other] == without.damping[other]
+    assert by_list.target[place] == 0.3 and by_list.target[other] == without.target[other]
+
+
+def test_gains_may_come_with_the_action(robot: Robot, own: Path) -> None:
+    """Of the joints that it moves; they are the description's again in a new trial."""
+    env = make_env(robot, str(own))
+    env.reset(seed=3, options=SHAKY)
+    moved, before = env.controller.joints.moved, env.controller.joints.stiffness.copy()
+    act = env.controller.network.act
+    gains = {"stiffness": np.full(len(moved), 33.0), "damping": np.full(len(moved), -1.0)}
+    env.controller.network.act = lambda given: {**act(given), **gains}
+    actions_here(env, 1)
+    servos = env.controller.gains()
+    assert np.all(servos.stiffness[moved] == 33.0) and np.all(servos.damping[moved] == 0.0)
+    env.reset(seed=3, options=SHAKY)
+    np.testing.assert_array_equal(servos.stiffness, before)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.policy_files.config import ObservationTerm, PolicyFileConfig
-from poise.baselines.policy_files.networks import load_network
-from poise.baselines.policy_files.observations import ALIASES, Observer, Seen
+from poise.baselines.policy_files.observations import Observer
+from poise.baselines.policy_files.terms import ALIASES, Seen
 from poise.configs.errors import ConfigError
-from tests.support.policies import write_recurrent
 from tests.support.shared import generic_state
+
+JOINTS = ["left_hip", "left_knee", "right_hip"]
 
 
 def seen(**changes: Any) -> Seen:
@@ -23,17 +22,22 @@ def seen(**changes: Any) -> Seen:
     state = generic_state().state
     given = Seen(
         state, state.q[:3], state.qvel[6:9], np.array([0.1, 0.2, 0.3]), np.array([0.5, -0.5]),
-        np.array([1.0, 2.0, 3.0]), np.pi / 6,
+        np.array([1.0, 2.0, 3.0]), np.pi / 6, np.array([np.pi / 6, np.pi]),
     )  # fmt: skip
     return given._replace(**changes)
 
 
-def observer(*terms: ObservationTerm, history: Any = "term") -> Observer:
-    return Observer(PolicyFileConfig(observations=terms, history=history), 3, 2, "own.yaml")
+def observer(*terms: ObservationTerm, **fields: Any) -> Observer:
+    config = PolicyFileConfig(observations=terms, **fields)
+    return Observer(config, JOINTS, JOINTS[1:], "own.yaml")
+
+
+def shown(term: ObservationTerm, **changes: Any) -> np.ndarray:
+    return observer(term).observe(seen(**changes))[""]
 
 
 def observed(name: str) -> np.ndarray:
-    return observer(ObservationTerm(name)).observe(seen())
+    return shown(ObservationTerm(name))
 
 
 def test_terms_mean_what_others_call_so() -> None:
@@ -45,12 +49,15 @@ def test_terms_mean_what_others_call_so() -> None:
         "base_lin_vel": turn.apply(np.array(state.qvel[:3])),
         "base_ang_vel": state.qvel[3:6],
         "projected_gravity": turn.apply([0.0, 0.0, -1.0]),
+        "roll_pitch": turn.inv().as_euler("ZYX")[:0:-1],
         "velocity_commands": [1.0, 2.0, 3.0],
         "joint_pos": state.q[:3],
         "joint_pos_rel": state.q[:3] - [0.1, 0.2, 0.3],
         "joint_vel": state.qvel[6:9],
         "last_action": [0.5, -0.5],
         "phase": [0.5, np.sqrt(0.75)],
+        "phase_sin": [0.5, 0.0],
+        "phase_cos": [np.sqrt(0.75), -1.0],
     }
     for name, value in expected.items():
         np.testing.assert_allclose(observed(name), value, atol=1e-6, err_msg=name)
@@ -61,7 +68,108 @@ def test_terms_mean_what_others_call_so() -> None:
 def test_scale_comes_after_clip() -> None:
     """As in Isaac Lab and mjlab."""
     term = ObservationTerm("command", scale=(1.0, 10.0, 100.0), clip=(-1.5, 1.5))
-    np.testing.assert_allclose(observer(term).observe(seen()), [1.0, 15.0, 150.0])
+    np.testing.assert_allclose(shown(term), [1.0, 15.0, 150.0])
+
+
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        ({"term": "constant", "values": (1.0, 0.0, -2.0), "scale": 2.0}, [2.0, 0.0, -4.0]),
+        ({"term": "velocity_commands", "pick": (2, 0)}, [3.0, 1.0]),
+        ({"term": "joint_pos_rel", "joints": ("*_hip",), "scale": 0.0}, [0.0, 0.0]),
+        ({"term": "last_action", "joints": ("right_hip",)}, [-0.5]),
+        ({"term": "last_action", "scale": {"*_knee": 0.0, "*": 3.0}}, [0.0, -1.5]),
+        ({"term": "velocity_commands", "at_rest": (7.0, 8.0, 9.0)}, [1.0, 2.0, 3.0]),
+    ],
+)
+def test_parts_of_terms(fields: dict[str, Any], expected: list[float]) -> None:
+    """Constants, places in a term, joints by name, and factors by the joints' names."""
+    np.testing.assert_allclose(shown(ObservationTerm(**fields)), expected)
+
+
+def test_a_term_may_stand_still_while_nothing_is_commanded() -> None:
+    """It shows other numbers then, which are clipped and scaled as its own."""
+    stand = ObservationTerm("constant", values=(1.0,), at_rest=(0.0,))
+    clock = ObservationTerm("phase_cos", at_rest=(-1.0, -1.0), scale=2.0)
+    for command, expected in ((np.zeros(3), [0.0, -2.0, -2.0]), (np.ones(3), [1.0, 3**0.5, -2.0])):
+        both = observer(stand, clock).observe(seen(command=command))[""]
+        np.testing.assert_allclose(both, expected)
+
+
+def steps(*terms: ObservationTerm, **fields: Any) -> list[list[float]]:
+    """What is shown of a command that is 1, 2, 3 (as one number) and an action of 4, 5, 6."""
+    watched = observer(*terms, **fields)
+    return [
+        watched.observe(seen(command=np.full(3, 1.0 + k), action=np.full(2, 4.0 + k)))[""].tolist()
+        for k in range(3)
+    ]
+
+
+ONE = {"term": "command", "pick": (0,)}
+OTHER = ObservationTerm("action", pick=(0,))
+
+
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        ({"history": 2, "newest_first": True}, [[1, 1], [2, 1], [3, 2]]),
+        ({"history": 2, "fill": "zeros"}, [[0, 1], [1, 2], [2, 3]]),
+        ({"history": 2, "lag": 1, "fill": "zeros"}, [[0, 0], [0, 1], [1, 2]]),
+        ({"history": 2, "lag": 1, "newest_first": True}, [[1, 1], [1, 1], [2, 1]]),
+    ],
+)
+def test_histories_of_other_kinds(fields: dict[str, Any], expected: list[list[int]]) -> None:
+    """Newest first, without the present, from zeros; places say how old each step is."""
+    term = ObservationTerm(**ONE, **fields)
+    assert steps(term) == expected
+    ages = [place.age for place in observer(term).places()[""]]
+    lag = fields.get("lag", 0)
+    assert ages == ([lag, lag + 1] if fields.get("newest_first") else [lag + 1, lag])
+
+
+def test_a_frame_lies_anywhere() -> None:
+    """Several terms of a step side by side, between other terms, with a past of their own."""
+    frame = ObservationTerm(frame=(ObservationTerm(**ONE), OTHER), history=2, lag=1, fill="zeros")
+    assert steps(OTHER, frame, ObservationTerm(**ONE)) == [
+        [4, 0, 0, 0, 0, 1], [5, 0, 0, 1, 4, 2], [6, 1, 4, 2, 5, 3]]  # fmt: skip
+    watched = observer(OTHER, frame)
+    places = [(place.start, place.size, place.age) for place in watched.places()[""]]
+    assert places == [(0, 1, 0), (1, 1, 2), (2, 1, 2), (3, 1, 1), (4, 1, 1)]
+    assert str(watched) == "5 numbers (action 1, (command 1, action 1) × 2)"
+
+
+def test_an_input_each() -> None:
+    """Inputs of a network show what is said of each."""
+    config = PolicyFileConfig(observations={"now": (OTHER,), "past": (ObservationTerm(**ONE),) * 2})
+    watched = Observer(config, JOINTS, JOINTS[1:], "own.yaml")
+    assert watched.sizes == {"now": 1, "past": 2}
+    assert {k: v.tolist() for k, v in watched.observe(seen()).items()} == {
+        "now": [0.5], "past": [1.0, 1.0]}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("term", "message"),
+    [
+        ({"term": "constant"}, r"own.yaml: observations\[0\].values: constant has 0 numbers"),
+        ({"term": "phase", "pick": (2,)}, r"observations\[0\].pick: phase has 2 numbers"),
+        ({"term": "phase", "joints": ("a",)}, r"observations\[0\].joints: phase has no joints"),
+        ({"term": "dof_pos", "joints": ("tail",)}, "no joint is called 'tail' .choices: left_hip"),
+        ({"term": "dof_pos", "scale": {"*_hip": 1.0}}, "scale: has nothing for left_knee"),
+        ({"term": "phase", "at_rest": (0.0,)}, "at_rest: has 1 numbers, phase has 2"),
+        ({"frame": (ObservationTerm("no"),)}, r"observations\[0\].frame\[0\].term: no such term"),
+    ],
+)
+def test_what_does_not_fit_a_term(term: dict[str, Any], message: str) -> None:
+    """The file, the field, the sizes."""
+    with pytest.raises(ConfigError, match=message):
+        observer(ObservationTerm(**term))
+
+
+def test_a_part_is_a_term_or_a_frame() -> None:
+    """Not both, and not neither."""
+    for fields in ({}, {"term": "phase", "frame": (OTHER,)}):
+        with pytest.raises(ValueError, match="needs a term or a frame of them, and not both"):
+            ObservationTerm(**fields)
 
 
 @pytest.mark.parametrize(
@@ -70,15 +178,15 @@ def test_scale_comes_after_clip() -> None:
 )
 def test_histories(history: str, expected: list[list[float]] | None) -> None:
     """Oldest first; the first observation fills them; a new trial starts anew."""
-    shown = observer(
+    watched = observer(
         ObservationTerm("command", history=3),
         ObservationTerm("last_action", history=3 if expected is None else 2),
         history=history,
     )
     for _ in range(2):
-        shown.forget()
+        watched.forget()
         rows = [
-            shown.observe(seen(command=np.full(3, 1.0 + k), action=np.full(2, 7.0 + k)))
+            watched.observe(seen(command=np.full(3, 1.0 + k), action=np.full(2, 7.0 + k)))[""]
             for k in range(3)
         ]
         if expected is None:
@@ -90,7 +198,8 @@ def test_histories(history: str, expected: list[list[float]] | None) -> None:
             for row, values in zip(rows, expected, strict=True):
                 np.testing.assert_array_equal(row[sizes], np.repeat(values[:3], 3))
                 np.testing.assert_array_equal(row[~sizes], np.repeat(values[3:], 2))
-    assert shown.size == len(rows[0]) and "command 3 × 3" in shown.parts
+    parts = "(command 3, last_action 2) × 3" if expected is None else "command 3 × 3"
+    assert watched.sizes == {"": len(rows[0])} and parts in str(watched)
 
 
 def test_frames_need_one_length() -> None:
@@ -98,33 +207,3 @@ def test_frames_need_one_length() -> None:
     with pytest.raises(ConfigError, match=r"own.yaml: observations\[1\].history: 2 .* 3"):
         observer(ObservationTerm("command", history=3), ObservationTerm("action", history=2),
                  history="frame")  # fmt: skip
-
-
-def test_a_recurrent_network_starts_from_zeros(tmp_path: Path) -> None:
-    """Its memory is an input with an output of that name; a copy has one of its own."""
-    network = load_network(write_recurrent(tmp_path / "policy.onnx", 2))
-    one = np.ones(2, dtype=np.float32)
-    assert [network.act(one)[0] for _ in range(3)] == [1.0, 2.0, 3.0]
-    other = copy.deepcopy(network)
-    assert other.act(one)[0] == 4.0 == network.act(one)[0]
-    network.reset()
-    assert network.act(one)[0] == 1.0
-
-
-def test_a_network_has_one_input(tmp_path: Path) -> None:
-    """Besides what it remembers."""
-    path = write_recurrent(tmp_path / "two.onnx", 2)
-    content = path.read_bytes().replace(b"h_out", b"h_new")
-    path.write_bytes(content)
-    with pytest.raises(ConfigError, match="two.onnx: must have one input.*obs, h_in"):
-        load_network(path)
-
-
-@pytest.mark.parametrize("numbers", [10**8, 10**15, 2**62])
-def test_a_memory_has_bounds(tmp_path: Path, numbers: int) -> None:
-    """A file of a few bytes may ask for all of a machine's."""
-    path = write_recurrent(tmp_path / "huge.onnx", numbers)
-    with pytest.raises(
-        ConfigError, match=rf"huge.onnx: h_in: must be at most .*not 1 × {numbers}$"
-    ):
-        load_network(path)

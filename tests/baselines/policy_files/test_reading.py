@@ -2,6 +2,7 @@
 
 import os
 import sys
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -121,6 +122,67 @@ def test_an_onnx_file_of_mjlab_needs_nothing_else(tmp_path: Path) -> None:
     load_controller(config, robot("compact"))
 
 
+def test_holosomas_metadata_are_lists_in_json(tmp_path: Path) -> None:
+    """Names and gains; the rest is said beside them."""
+    metadata = {"dof_names": '["left_knee", "right_knee"]', "kp": "[40.5, 41.5]", "kd": "[2, 3]",
+                "action_scale": "0.25", "command_ranges": '{"lin_vel_x": [-1.0, 1.0]}'}  # fmt: skip
+    write_onnx(tmp_path / "policy.onnx", linear(3, 2), metadata)
+    path = write_yaml(tmp_path / "own.yaml", kind="policy-file", default=[0.1, 0.2],
+                      observations=[{"term": "base_ang_vel"}])  # fmt: skip
+    config = read(path)
+    assert config.joints == ("left_knee", "right_knee") and config.action_scale == 0.25
+    assert config.stiffness == (40.5, 41.5) and config.damping == (2.0, 3.0)
+
+
+def test_a_slice_of_everything_is_read_as_all(tmp_path: Path) -> None:
+    """As Isaac Lab dumps it; nothing is built of it, and no other slice is taken."""
+    lab_folder(tmp_path)
+    text = (tmp_path / "deploy.yaml").read_text()
+    tag = "joint_ids: !!python/object/apply:builtins.slice"
+    (tmp_path / "deploy.yaml").write_text(text.replace("joint_ids: null", f"{tag} [null, null]"))
+    assert read(tmp_path).action_joints == ()
+    (tmp_path / "deploy.yaml").write_text(text.replace("joint_ids: null", f"{tag} [0, 12]"))
+    with pytest.raises(ConfigError, match=r"deploy.yaml: .*a slice is read only where it is of"):
+        read(tmp_path)
+
+
+def test_a_known_network_is_found_by_its_sum(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever it is called; another version is told, and played by its path alone."""
+    there = tmp_path / "there"
+    content = write_onnx(there / "deep/renamed.onnx", linear(3, 2)).read_bytes()
+    files = {"policy.onnx": {"bytes": len(content), "sha256": sha256(content).hexdigest()}}
+    path = write_yaml(
+        tmp_path / "own.yaml", kind="policy-file", joints=["left_knee", "right_knee"],
+        observations=[{"term": "base_ang_vel"}],
+        origin={"project": "them/theirs", "commit": "1a", "licence": "MIT", "robot": "compact",
+                "files": files},
+    )  # fmt: skip
+    monkeypatch.setenv("POISE_POLICIES", str(there))
+    assert read(path).policy == str(there / "deep/renamed.onnx")
+    (there / "deep/renamed.onnx").unlink()
+    with pytest.raises(ConfigError, match="git clone https://github.com/them/theirs") as error:
+        read(path)
+    assert "own: policy: the network of own is not here" in str(error.value)
+    other = write_onnx(there / "policy.onnx", linear(3, 2, seed=1))
+    with pytest.raises(ConfigError, match=f"{other} has another sum than the known one"):
+        read(path)
+    text = path.read_text()
+    path.write_text(f"{text}policy: {other}\n")
+    assert read(path).policy == str(other)
+
+
+def test_a_description_may_have_another_one_as_its_base(tmp_path: Path) -> None:
+    """Of a known policy, so that another version of it is played by its path."""
+    write_onnx(tmp_path / "mine.onnx", linear(96, 29))
+    path = write_yaml(tmp_path / "own.yaml", kind="policy-file", base="unitree-g1-velocity",
+                      policy="mine.onnx", command=[0.5, 0.0, 0.0])  # fmt: skip
+    config = read(path)
+    assert config.policy == str(tmp_path / "mine.onnx") and len(config.joints) == 29
+    assert config.command[0] == 0.5 and len(config.observations) == 6
+
+
 def test_the_yaml_wins_over_deploy_and_this_over_metadata(tmp_path: Path) -> None:
     """Each says what the others do not."""
     lab_folder(tmp_path)
@@ -171,6 +233,13 @@ def two_networks(folder: Path) -> Path:
     return folder
 
 
+def pointer(folder: Path) -> Path:
+    (folder / "policy.onnx").write_text(
+        "version https://git-lfs.github.com/spec/v1\noid sha256:0\n"
+    )
+    return folder
+
+
 def scribbled(folder: Path) -> Path:
     (folder / "policy.onnx").write_bytes(b"no network")
     return folder
@@ -197,6 +266,7 @@ LIMITS = "observation_terms_clip"
 BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
     "no data file": (no_data, ("policy.onnx needs the file 'policy.onnx.data' beside it",)),
     "data elsewhere": (data_elsewhere, ("has data in '../../etc/passwd', not beside it",)),
+    "a pointer": (pointer, ("policy: policy.onnx is a pointer of Git LFS", "git lfs pull")),
     "no ONNX": (scribbled, ("policy.onnx: is no ONNX file",)),
     "two networks": (two_networks, ("policy: several networks", "choices: a.onnx, b.onnx")),
     "no network": (lambda f: write_yaml(f / "deploy.yaml", **lab_deploy(N)).parent,
@@ -210,7 +280,11 @@ BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
                             ("own.yaml: observations[0]: clip: 1.0 is above -1.0",)),
     "least action above largest": (lambda f: bare(f, action_clip=[[-1, 1], [2, 1]]),
                                    ("own.yaml: action_clip[1]: 2.0 is above 1.0",)),
-    "nothing seen": (bare, ("own.yaml: observations: what the policy sees is not said",)),
+    "nothing seen": (bare, ("own.yaml: observations: what the policy sees is not said",
+                            "poise policies check ", "policy.onnx --robot ROBOT")),
+    "an input without terms": (lambda f: bare(f, observations={"obs": []}),
+                               ("own.yaml: observations: what the policy sees is not said",)),
+    "names that are no list": (metadata(dof_names="[1,"), ("dof_names: is no list in JSON",)),
     "no such deploy": (lambda f: bare(f, deploy="lost.yaml"), ("lost.yaml: cannot be read",)),
     "deploy of nobody": (lambda f: bare(f, deploy="own.yaml"), ("is no configuration of unitree",)),
     "short posture": (deploy(default_joint_pos=[0.0]),
@@ -304,9 +378,9 @@ def test_torchscript_forgets_and_is_copied(script: Path) -> None:
     """Whatever state is in the module."""
     with poise.allowing(str(script.with_name("policy.pt"))):
         network = load_controller(str(script), robot("compact")).network
-    observation = np.zeros(3, dtype=np.float32)
-    assert [network.act(observation)[0] for _ in range(2)] == [1.0, 2.0]
+    seen = {"": np.zeros(3)}
+    assert [network.act(seen)["action"][0] for _ in range(2)] == [1.0, 2.0]
     kind, arguments = network.__reduce__()
-    assert kind(*arguments).act(observation)[0] == 3.0 == network.act(observation)[0]
+    assert kind(*arguments).act(seen)["action"][0] == 3.0 == network.act(seen)["action"][0]
     network.reset()
-    assert network.act(observation)[0] == 1.0
+    assert network.act(seen)["action"][0] == 1.0

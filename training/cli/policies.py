@@ -1,11 +1,66 @@
-"""The sub-commands that write a policy, or what it does, for other programs."""
+"""`poise policies`: those of others, known and checked; policies, and what they do, written."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
+from poise.configs.errors import ConfigError, shown
+from poise.training.options.parsing import parsed
+from poise.training.running.terminal import terminal
+
 from .arguments import Allow, PolicyName
+
+Checked = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+
+
+def show() -> None:
+    """List the public policies that are known, where they are, and how to get the others.
+
+    Each is played by its name: poise evaluate falcon-g1 --robot unitree_g1. poise policies check
+    FILE says what is missing of another one.
+    """
+    from poise.baselines.policy_files.known import known_policies
+    from poise.training.policy_check.tables import print_policies
+
+    print_policies(known_policies(), terminal())
+
+
+def check(file: Checked, /, *, robot: str, rollout: Path | None = None, allow: Allow = ()) -> int:
+    """Say what a policy lacks, let it stand for 10 s, compare it with its maker's own steps.
+
+    Args:
+        file: a network (.onnx, .pt), a description (.yaml), a folder, or a known name.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        rollout: an .npz file of observations (T, n) and actions (T, na) of its maker's loop, and,
+            if they are known, of the states qpos and qvel of this robot.
+
+    Returns:
+        0 if it is described, stands, and nothing of the rollout is against it; else 1.
+    """
+    from poise.baselines.allowance import allowing
+    from poise.envs.robots.robot import load_robot
+    from poise.training.policy_check.check import check_policy
+    from poise.training.policy_check.tables import print_check
+
+    with allowing(allow):
+        found = check_policy(file, load_robot(robot), rollout)
+    print_check(found, terminal())
+    return 0 if found.right else 1
+
+
+def run(args: Sequence[str]) -> int:
+    """Run `poise policies`: the list, or the sub-command `check`."""
+    command: Callable[..., object] = show
+    name, given = "poise policies", list(args)
+    if args and args[0] == "check":
+        command, name, given = check, "poise policies check", list(args[1:])
+    elif args and not args[0].startswith("-"):
+        raise ConfigError(f"no such command: policies {shown(args[0])}", choices=("check",))
+    given = ["--help" if arg == "--help-all" else arg for arg in given]
+    code = parsed(command, given, name)()
+    return code if isinstance(code, int) else 0
 
 
 def export(

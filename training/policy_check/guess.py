@@ -1,0 +1,104 @@
+"""What a network's sizes tell of its observation, where nothing describes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+from poise.baselines.allowance import check_allowed, is_script
+from poise.baselines.policy_files.networks import onnx_session, script_sizes
+
+LONGEST = 50  # steps of a history that is guessed
+#: terms that most policies see, and their numbers; joints and actions are added
+ALWAYS = ("base_ang_vel", "projected_gravity")
+MAYBE = (
+    (("velocity_commands", 3), ("", 0)),
+    (("", 0), ("phase", 2), ("phase_cos, phase_sin", 4)),
+    (("", 0), ("base_lin_vel", 3)),
+)
+#: field of a description → what it is called in the projects that policies come from
+WORDS = {
+    "joints": "the order of the joints: joint_names, dof_names, joint_ids_map",
+    "default": "the posture that positions are relative to: default_joint_pos, default_dof_pos, "
+    "default_angles",
+    "stiffness": "kp, kps, joint_stiffness, stiffness",
+    "damping": "kd, kds, joint_damping, damping",
+    "action_scale": "action_scale, policy_action_scale, actions.scale",
+    "policy_period": "control_dt, step_dt, 1 / rl_rate, sim_dt × decimation",
+    "observations": "the observation's terms in their order: obs_dict, observations, "
+    "compute_observations, with their scales (obs_scales, ang_vel_scale) and history_length",
+}
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """What a file tells of its network.
+
+    Attributes:
+        inputs: name → numbers; None where they are left open.
+        outputs: name → numbers, likewise.
+    """
+
+    inputs: dict[str, int | None]
+    outputs: dict[str, int | None]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A usual observation of `size` numbers: these terms in a step, and so many steps."""
+
+    terms: tuple[str, ...]
+    frame: int
+    steps: int
+    joints: int
+
+    def __str__(self) -> str:
+        whole = self.frame * self.steps
+        history = f"{whole} = {self.steps} × {self.frame}: a history of {self.steps} steps of "
+        return (history if self.steps > 1 else f"{whole} = ") + " + ".join(self.terms)
+
+
+def network_sizes(path: Path) -> Sizes:
+    """The sizes of a network; TorchScript, which is code, must have been allowed.
+
+    Raises ConfigError as `onnx_session` and `check_allowed` do.
+    """
+    if is_script(path):
+        check_allowed(str(path))
+        observation, action = script_sizes(path)
+        return Sizes({"observation": observation}, {"action": action})
+    session = onnx_session(path)
+    sides = [{each.name: _numbers(each.shape) for each in side}
+             for side in (session.get_inputs(), session.get_outputs())]  # fmt: skip
+    return Sizes(*sides)
+
+
+def _numbers(shape: list[object]) -> int | None:
+    """The numbers of an input or output; axes left open are the batch's, but for the last."""
+    if shape and not isinstance(shape[-1], int):
+        return None
+    whole = 1
+    for size in shape:
+        whole *= size if isinstance(size, int) else 1
+    return whole
+
+
+def layouts(size: int, actions: int, joints: int) -> Iterator[Layout]:
+    """Usual observations of this size, the shortest history first.
+
+    Positions and velocities are of the `joints` of the robot or of those that are moved.
+    """
+    options = [
+        (tuple(name for name, _ in (*chosen,) if name), sum(n for _, n in chosen))
+        for chosen in product(*MAYBE)
+    ]
+    for steps in range(1, LONGEST + 1):
+        if size % steps:
+            continue
+        for n, (names, more) in product(dict.fromkeys((actions, joints)), options):
+            frame = 6 + 2 * n + actions + more
+            if frame * steps == size:
+                own = (f"joint_pos_rel {n}", f"joint_vel {n}", f"last_action {actions}")
+                yield Layout((*(f"{each} 3" for each in ALWAYS), *names, *own), frame, steps, n)

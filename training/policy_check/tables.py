@@ -1,0 +1,121 @@
+"""Checks of policies, and the policies that are known, for people in the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from poise.baselines.allowance import is_script
+from poise.baselines.policy_files.config import PolicyFileConfig
+from poise.baselines.policy_files.known import PLACES, Known, find_network, how_to_get, places
+
+from .check import SECONDS, PolicyCheck
+from .guess import WORDS
+
+VERDICTS = {True: "right", False: "WRONG", None: "not told"}
+
+
+def print_policies(known: list[Known], console: Console) -> None:
+    """The known policies: whose, for which robot, and whether they are here."""
+    table = Table()
+    for name in ("policy", "robot", "Hz", "project, commit", "licence", "here"):
+        table.add_column(name, overflow="fold", no_wrap=name == "policy")
+    missing = []
+    for each in known:
+        found, origin = find_network(each.origin), each.origin
+        here = str(found.network or "no")
+        if found.network is None:
+            missing.append(each)
+            for other in found.others:
+                here = f"no: {other} has another sum than the known one"
+        elif is_script(found.network):
+            here += " (TorchScript: --allow it)"
+        project, rate = f"{origin.project} {origin.commit}", f"{1.0 / each.period:g}"
+        table.add_row(each.name, origin.robot, rate, project, origin.licence, escape(here))
+    console.print(table)
+    _print_places(known, console)
+    for each in missing:
+        name, file = next(iter(each.origin.files.items()))
+        path = f"{each.origin.folder}/{name}" if each.origin.folder else name
+        console.print(f"{each.name}: {how_to_get(each.origin)}; {path}, SHA-256 {file.sha256}",
+                      markup=False, highlight=False)  # fmt: skip
+
+
+def _print_places(known: list[Known], console: Console) -> None:
+    found = dict.fromkeys(str(place) for each in known for place in places(each.origin))
+    console.print(f"looked for, by size and SHA-256, in the folders of {PLACES}, in checkouts of "
+                  "the projects here or beside the repository, and in ../shared/rivals: "
+                  f"{', '.join(found) or 'none of them is there'}",
+                  markup=False, highlight=False)  # fmt: skip
+
+
+def print_check(check: PolicyCheck, console: Console) -> None:
+    """What is known, what is missing, how it stood, what the rollout tells, and the verdict."""
+
+    def say(line: str) -> None:
+        console.print(line, markup=False, highlight=False)
+
+    say(f"{check.file}: {_sides(check)}")
+    if check.known is not None:
+        say(f"it is {check.known}, a known policy: that name plays it, too")
+    if check.stood is None:
+        _say_missing(check, say)
+        return
+    for name in check.unsaid:
+        taken = getattr(PolicyFileConfig(), name)
+        say(f"not said: {name} ({WORDS[name]}); {taken or 'the first joints'} is taken")
+    stood = check.stood
+    how = f"fell after {stood.fell:.2f} s" if stood.fell is not None else (
+        f"stood for {SECONDS:g} s, {'at rest' if stood.rests else 'never at rest'}, "
+        f"{1000.0 * stood.moved:.0f} mm from where it began")  # fmt: skip
+    say(how)
+    for finding in check.findings:
+        say(f"  {VERDICTS[finding.right]}: {finding.what}: {finding.text}")
+    say(_verdict(check))
+
+
+def _sides(check: PolicyCheck) -> str:
+    sides = [", ".join(f"{name} {size or '?'}" for name, size in side.items())
+             for side in (check.sizes.inputs, check.sizes.outputs)]  # fmt: skip
+    return f"takes {sides[0]}; gives {sides[1]}"
+
+
+def _say_missing(check: PolicyCheck, say: Callable[[str], None]) -> None:
+    """What a description needs, and one to begin with."""
+    if not check.layouts:
+        say("no usual observation has that size")
+    for layout in check.layouts:
+        say(f"perhaps {layout}")
+    say("nothing says what its numbers mean; a description needs, in its maker's words:")
+    for name in check.unsaid:
+        say(f"  {name}: {WORDS[name]}")
+    say("to begin with, in a .yaml file beside it:")
+    say(_skeleton(check))
+
+
+def _skeleton(check: PolicyCheck) -> str:
+    """A description with places to fill in."""
+    lines = ["kind: policy-file", f"policy: {check.file.rpartition('/')[2]}"]
+    lines += [f"{name}: ...  # {WORDS[name]}" for name in check.unsaid if name != "observations"]
+    lines.append("observations:")
+    for layout in check.layouts[:1]:
+        names = [name for term in layout.terms for name in term.split(", ")]
+        history = f", history: {layout.steps}" if layout.steps > 1 else ""
+        lines += [f"  - {{term: {name.split()[0]}{history}}}" for name in names]
+    return "\n".join(lines)
+
+
+def _verdict(check: PolicyCheck) -> str:
+    wrong = sum(each.right is False for each in check.findings)
+    if wrong:
+        return f"the adapter is wrong: {wrong} of {len(check.findings)} findings speak against it"
+    if check.stood is not None and check.stood.fell is not None:
+        return "it does not stand: another robot, gains, order of joints, or term than its own"
+    if not check.findings:
+        return ("that it stands is a sign, no proof: --rollout compares it with steps of its "
+                "maker's loop")  # fmt: skip
+    told = sum(each.right is True for each in check.findings)
+    return f"the adapter is right, as far as {told} of {len(check.findings)} findings tell"
