@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
@@ -169,7 +170,9 @@ class Realism:
         """
         if factor <= 0.0:
             return Realism(self.name)
-        parts = {part.name: _scaled(getattr(self, part.name), factor) for part in fields(self)[1:]}
+        parts: dict[str, Any] = {
+            part.name: _scaled(getattr(self, part.name), factor) for part in fields(self)[1:]
+        }
         return replace(self, **parts)
 
 

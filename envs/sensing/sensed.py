@@ -28,6 +28,8 @@ class SensedRobot:
     robot: Robot
     estimator: EstimatorConfig
     drawn: DrawnRobot | None
+    _simulation: Simulation
+    _state_source: StateSource
     _raw = False  # whether the controller brings an estimator of its own
 
     def _unbind(self) -> None:

@@ -86,7 +86,8 @@ def played(source: EstimatedState, promises: np.ndarray | None) -> tuple[np.ndar
         source.simulation.step(torque)
         source.update()
         seen.append((state.qpos.copy(), state.qvel.copy()))
-    return tuple(map(np.array, zip(*seen, strict=True)))
+    positions, velocities = zip(*seen, strict=True)
+    return np.array(positions), np.array(velocities)
 
 
 def test_kept_promises_undo_all_delays(source):

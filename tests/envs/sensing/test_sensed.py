@@ -41,7 +41,7 @@ def limp() -> TorqueBalanceEnv:
 
 
 def under(env: BalanceEnv, level: object) -> BalanceEnv:
-    env.realism = load_realism(level)  # type: ignore[arg-type]
+    env.realism = load_realism(level)
     return env
 
 
@@ -185,7 +185,8 @@ def test_threads_change_no_bit():
         ends.append((np.array(seen), [env.data.qpos.copy() for env in envs]))
         many.close()
     assert np.array_equal(ends[0][0], ends[1][0]) and np.array_equal(ends[0][1], ends[1][1])
-    assert not np.allclose(*ends[0][1][:2], atol=1e-6)
+    first, second = ends[0][1][:2]
+    assert not np.allclose(first, second, atol=1e-6)
 
 
 def test_the_fall_is_judged_by_the_truth(limp):
