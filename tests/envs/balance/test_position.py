@@ -72,7 +72,9 @@ def test_a_late_state_does_not_delay_the_servos():
     for action in actions:
         seen.append(now.step(action)[0])
         observation = late.step(action)[0]
-        assert np.array_equal(now.data.qpos, late.data.qpos)
+        np.testing.assert_allclose(
+            late.data.qpos, now.data.qpos, atol=1e-9
+        )  # motors add in another order
     place = [term.name for term in now.terms].index("joint_pos")
     begin = sum(term.size for term in now.terms[:place])
     own = slice(begin, begin + now.terms[place].size)
