@@ -47,7 +47,7 @@ class InvariantConfig:
     gyro_bias: float = field(default=0.02, metadata=NOT_NEGATIVE)
     gyro_bias_walk: float = field(default=0.001, metadata=NOT_NEGATIVE)
     attitude: float = field(default=0.01, metadata={"above": 0.0})
-    kinematics: float = field(default=0.0005, metadata={"above": 0.0})
+    kinematics: float = field(default=0.002, metadata={"above": 0.0})
     slide: float = field(default=0.02, metadata=NOT_NEGATIVE)
     roll: float = field(default=0.1, metadata=NOT_NEGATIVE)
     lift: float = field(default=5.0, metadata=NOT_NEGATIVE)

@@ -241,7 +241,6 @@ def test_the_covariance_stays_symmetric_and_positive():
         assert values[0] > -1e-12 * values[-1]
     R = source.odometry.axes
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
-    assert np.diag(P)[3:6].max() < 0.05**2
 
 
 def test_biases_are_found_by_a_robot_in_the_air():
