@@ -6,10 +6,12 @@
 # make clean   remove what was built (not .venv)
 # make release   the wheel and the sdist, checked, and tried alone on each of PYTHONS; notes, and
 #                the leaderboard's data for an archive such as Zenodo (.zenodo.json)
-# make weekly  the examples that need TorchRL, RLlib, RL Zoo or MoviePy, each in a fresh environment;
-#              EXTRAS="zoo video" some of them alone
+# make weekly  the tests that are marked so, which `make test` leaves out for time; then the examples that
+#              need TorchRL, RLlib, RL Zoo, MoviePy, Optuna or Minari, each in a fresh environment;
+#              EXTRAS="zoo video" some of them alone, EXTRAS= none
 # make test-processors   the tests as other processors would run them, three times each: hours
 # make lock    requirements.lock from constraints.txt      make audit   known holes in either
+# make fleet   public humanoids of wheels: read, checked, stood and pushed; an hour; the table: docs/robots.md
 # make fuzz    malformed input of all kinds, MINUTES=30 WORKERS=1 SEED=number
 #
 # PYTHON311 names another interpreter; PIP_ARGS and PYTEST_ARGS are passed on, as in
@@ -19,7 +21,7 @@
 PYTHON311 ?= $(shell command -v python3.11 || command -v python3)
 PIP_ARGS ?=
 PYTHONS ?= python3.11 python3.12 python3.13
-EXTRAS ?= torchrl rllib zoo video
+EXTRAS ?= torchrl rllib zoo video optuna dataset
 LOCKED ?=
 PYTEST_ARGS ?=
 PYTEST_WORKERS ?= -n auto --maxprocesses 4 --dist worksteal
@@ -29,13 +31,14 @@ SEED ?=
 FUZZ_ARGS ?=
 PYTHON := .venv/bin/python
 STAMP := .venv/.poise-setup
+FLEET := dm-control example-robot-data fourier-robot-descriptions gb-robot-models icub-models
 DOCS := .venv/.poise-docs
 
-.PHONY: setup test weekly test-processors demo check docs format build release bench fuzz lock audit clean types-tree
+.PHONY: setup test weekly test-processors demo check docs format build release bench fleet fuzz lock audit clean
 
 setup: $(STAMP)
 
-$(STAMP): pyproject.toml setup.py constraints.txt
+$(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m pip --version >/dev/null 2>&1 || $(PYTHON311) -m venv .venv
 	$(if $(LOCKED),$(PYTHON) -m pip install -q $(PIP_ARGS) --require-hashes -r requirements.lock)
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt setuptools
@@ -47,7 +50,8 @@ test: setup
 
 # Not in .venv: RLlib and the Zoo ask for other versions of Gymnasium than constraints.txt has. Of
 # that file torch alone is held, so that no other build of it is pulled.
-weekly:
+weekly: setup
+	$(PYTHON) -m pytest -q -m weekly $(PYTEST_WORKERS) $(PYTEST_ARGS)
 	mkdir -p build && grep '^torch==' constraints.txt > build/torch.txt
 	failed=; for extra in $(EXTRAS); do \
 		echo "$$extra:"; rm -rf build/weekly; $(PYTHON311) -m venv build/weekly && \
@@ -63,7 +67,7 @@ test-processors: setup
 demo: setup
 	.venv/bin/poise demo
 
-check: setup types-tree
+check: setup
 	.venv/bin/ruff format --check .
 	.venv/bin/ruff check .
 	$(PYTHON) -m mypy
@@ -72,7 +76,7 @@ $(DOCS): $(STAMP)
 	$(PYTHON) -m pip install -q $(PIP_ARGS) -c constraints.txt --no-build-isolation -e ".[docs]"
 	touch $@
 
-docs: $(DOCS) types-tree
+docs: $(DOCS)
 	NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build -q
 
 format: setup
@@ -95,13 +99,6 @@ lock: build/audit
 
 audit: build/audit
 	build/audit/bin/pip-audit -r requirements.lock --disable-pip
-
-# mypy cannot follow the map of folders to packages, so it gets the map as links.
-types-tree:
-	mkdir -p build/types/poise
-	for folder in envs baselines training configs; do \
-		ln -sfn ../../../$$folder build/types/poise/$$folder; done
-	ln -sf ../../../src/poise/__init__.py ../../../src/poise/lazy.py ../../../src/poise/py.typed build/types/poise/
 
 # The second environment holds the wheel alone; its dependencies are those of .venv, by a path
 # file, which does not bring the editable install with it.
@@ -136,6 +133,13 @@ release: build build/twine
 
 bench: setup
 	$(PYTHON) -m tests.performance
+
+# Not in .venv, and without what they need: only their models are read.
+build/fleet:
+	$(PYTHON) -m pip install -q $(PIP_ARGS) --no-deps --only-binary :all: --target $@ $(FLEET)
+
+fleet: setup build/fleet
+	$(PYTHON) -m tests.performance.fleet build/fleet --workers $(WORKERS) --write
 
 fuzz: setup
 	$(PYTHON) -m tests.fuzz --minutes $(MINUTES) --workers $(WORKERS) \

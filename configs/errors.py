@@ -32,8 +32,13 @@ def shown(value: object) -> str:
 
 
 def meant(name: object, names: Iterable[str]) -> str:
-    """What an error about `name` adds: the one of the valid `names` that it looks like, if any."""
-    near = difflib.get_close_matches(str(name)[:LONGEST_VALUE], list(names), n=1)
+    """What an error about `name` adds: the one of the valid `names` that it looks like, if any.
+
+    A word of a name will do: ``g1`` is ``unitree_g1``.
+    """
+    names, text = list(names), str(name)[:LONGEST_VALUE]
+    near = difflib.get_close_matches(text, names, n=1)
+    near = near or [each for each in names if text.lower() in re.split(r"\W|_", each.lower())]
     return f", did you mean {one_line(near[0], LONGEST_VALUE)}?" if near else ""
 
 
@@ -60,6 +65,10 @@ class PoiseError(Exception):
 
     def __init__(self, text: object = "") -> None:
         super().__init__(one_line(str(text), 4 * LONGEST_TEXT))
+
+
+class PoiseWarning(UserWarning):
+    """Something of a user's file is not used as it is written; the text says what instead."""
 
 
 class ConfigError(PoiseError):

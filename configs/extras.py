@@ -2,5 +2,8 @@
 
 
 def how_to_install(extra: str) -> str:
-    """The commands that install an extra such as "view", for a message or a docstring."""
-    return f"pip install 'poise[{extra}]', in a checkout pip install -e '.[{extra}]'"
+    """The command that installs an extra such as "view", for a message or a docstring.
+
+    Poise is on no index yet: it runs in the checkout that Poise is installed from.
+    """
+    return f"pip install -e '.[{extra}]' in the checkout of Poise"

@@ -14,6 +14,9 @@ from .errors import ConfigError, PoiseError, meant, shown
 from .outputs import check_out_folder
 from .reading import is_file, is_folder
 
+#: kind → suffixes that do besides those of YAML
+OTHERS = {"robots": (".xml", ".mjcf", ".urdf")}
+
 
 def packaged(kind: str) -> list[str]:
     """Names of the packaged configurations of one kind: ``packaged("robots")``.
@@ -35,7 +38,8 @@ def resolve(kind: str, name: str | Path) -> Path:
 
     Args:
         kind: folder of ``poise.configs``, such as ``robots`` or ``controllers``.
-        name: a packaged name, or a path with a folder or a suffix in it.
+        name: a packaged name, or a path with a folder or a suffix in it; of a robot also that of
+            its model.
 
     Raises:
         ConfigError: there is no such name or file; its text lists the packaged names.
@@ -46,7 +50,7 @@ def resolve(kind: str, name: str | Path) -> Path:
     if str(name) in names:
         return packaged_folder(kind) / f"{name}.yaml"
     path = Path(name)
-    if path.suffix in (".yaml", ".yml") and is_file(path):
+    if path.suffix.lower() in (".yaml", ".yml", *OTHERS.get(kind, ())) and is_file(path):
         return path
     problem = "no such file" if path.suffix or len(path.parts) > 1 else "no such name"
     hint = meant(name, names) or ";"

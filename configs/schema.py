@@ -81,7 +81,8 @@ def build(cls: type[T], data: dict[str, Any], source: str | Path) -> T:
     is converted. A number must be finite. ``field(metadata={"min": 0, "max": 1, "above": 0})``
     bounds a number (min and max inclusive, above exclusive), or each number of a tuple, list or
     dict. A ValueError of ``__post_init__`` becomes a ConfigError. A class variable ``RENAMED``
-    maps the old name of a field to its name: an error of the old one says the new one.
+    maps the old name of a field to its name: an error of the old one says the new one. A dataclass
+    with a static method ``named`` may be given by a name, which that takes.
 
     Args:
         cls: the dataclass.
@@ -155,6 +156,8 @@ def _build(hint: Any, value: Any, source: str, path: str, bounds: Any) -> Any:
     if hint is Any:
         return value
     if dataclasses.is_dataclass(hint):
+        if isinstance(value, str) and hasattr(hint, "named"):
+            return hint.named(value)
         return _build_dataclass(_of_kind(hint, value, source, path), value, source, path)
     if is_typeddict(hint):
         return _build_typed_dict(hint, value, source, path)

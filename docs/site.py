@@ -6,7 +6,6 @@ MkDocs calls the functions named on_… (hooks of mkdocs.yml).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
@@ -16,20 +15,21 @@ from mkdocs.structure.pages import Page
 ROOT = Path(__file__).parents[1]
 PACKAGES = {"src/poise": "poise", "envs": "poise.envs", "baselines": "poise.baselines"}
 PACKAGES |= {"training": "poise.training", "configs": "poise.configs"}
+PUBLIC = ("poise", "poise.envs", "poise.baselines", "poise.training")  # whose names users import
 # Links of README to what has no page.
 TOP = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|#|docs/)([^)#]*?)/?\)")
 DIFFERENT = {"README.md": "index.md", "CHANGELOG.md": "changelog.md"}
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Adds the API and the days of the log to the navigation."""
+    """Adds the API to the navigation: what is public, then the rooms behind it."""
     assert config.nav is not None
-    sections = {name: part for entry in config.nav for name, part in entry.items()}
-    sections["Log"] += sorted(f"log/{path.name}" for path in log_days())
     packages: dict[str, list[str]] = {}
     for name in rooms():
         packages.setdefault(".".join(name.split(".")[:2]), []).append(api_page(name))
-    config.nav.insert(-1, {"API": ["api/index.md", *({k: v} for k, v in packages.items())]})
+    public = [{f"{name}, public": api_page(name)} for name in PUBLIC]
+    inside = [{name: pages} for name, pages in packages.items()]
+    config.nav.append({"API": ["api/index.md", *public, {"Inside": inside}]})
     return config
 
 
@@ -44,16 +44,14 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
-    """Links to README and the changelog lead to their pages."""
+    """Links to README and the changelog lead to their pages; the log's days are not searched."""
+    if page.file.src_uri.startswith("log/2"):
+        page.meta["search"] = {"exclude": True}
     return re.sub(
         r"\]\((?:\.\./)+(README|CHANGELOG)\.md",
         lambda found: f"]({'../' * page.file.src_uri.count('/')}{DIFFERENT[f'{found[1]}.md']}",
         markdown,
     )
-
-
-def log_days() -> Iterator[Path]:
-    return (ROOT / "docs/log").glob("2*.md")
 
 
 def from_top(name: str) -> str:

@@ -18,6 +18,7 @@ __all__ = [
     "EstimatorConfig",
     "FallLimits",
     "Kick",
+    "PlainInfo",
     "PositionBalanceEnv",
     "Push",
     "PushSampler",
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     from poise.envs.balance.torque import TorqueBalanceEnv
     from poise.envs.physics.simulation import Simulation
     from poise.envs.physics.state import RobotState
+    from poise.envs.plain_info import PlainInfo
     from poise.envs.pushes.options import parse_pushes
     from poise.envs.pushes.push import Kick, Push
     from poise.envs.pushes.sampler import PushSampler
@@ -80,6 +82,7 @@ else:
             "balance.torque": ("TorqueBalanceEnv",),
             "physics.simulation": ("Simulation",),
             "physics.state": ("RobotState",),
+            "plain_info": ("PlainInfo",),
             "pushes.options": ("parse_pushes",),
             "pushes.push": ("Kick", "Push"),
             "pushes.sampler": ("PushSampler",),

@@ -9,10 +9,13 @@ import gymnasium
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.tune.registry import register_env
 
+# Before MuJoCo, which may load OSMesa, whose LLVM would take the place of that of torch's Triton.
+import poise.envs  # noqa: F401
+
 
 def make(arguments: dict) -> gymnasium.Env:
     """Also called in Ray's own processes, which have to register the environments, too."""
-    import poise  # noqa: F401
+    import poise.envs  # noqa: F401, F811
 
     return gymnasium.make("poise/ResidualBalance-v0", **arguments)
 

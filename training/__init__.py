@@ -24,16 +24,19 @@ __all__ = [
     "record",
     "replay",
     "train",
+    "train_config",
     "train_seeds",
     "tune",
+    "write_dataset",
     "write_report",
 ]
 
 if TYPE_CHECKING:
     from poise.training.evaluation.evaluate import benchmark, evaluate
+    from poise.training.export.dataset import write_dataset
     from poise.training.export.export import export_policy
     from poise.training.figures.video import frame_strip, record
-    from poise.training.learning.config import TrainConfig
+    from poise.training.learning.config import TrainConfig, train_config
     from poise.training.learning.policy import Policy, load_policy
     from poise.training.learning.train import train
     from poise.training.learning.train_seeds import train_seeds
@@ -50,9 +53,10 @@ else:
         __name__,
         {
             "evaluation.evaluate": ("benchmark", "evaluate"),
+            "export.dataset": ("write_dataset",),
             "export.export": ("export_policy",),
             "figures.video": ("frame_strip", "record"),
-            "learning.config": ("TrainConfig",),
+            "learning.config": ("TrainConfig", "train_config"),
             "learning.policy": ("Policy", "load_policy"),
             "learning.train": ("train",),
             "learning.train_seeds": ("train_seeds",),

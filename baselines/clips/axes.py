@@ -8,10 +8,12 @@ import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 
-UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "dm": 0.1}
 AXES = ("x", "-x", "y", "-y", "z", "-z")
 LEGS = (0.5, 1.2)  # [m] thigh and shank of a person
-LEG = 0.8  # [m] what they become if the unit is none of metre and centimetre
+ADULT = (0.65, 1.0)  # [m] the same for units that are not usual, and characters have any size
+USUAL = ("m", "cm")
+LEG = 0.8  # [m] what they become if the unit is none of these
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +74,13 @@ def nearest_axis(vector: np.ndarray) -> str:
 def unit_from_legs(length: float) -> float:
     """Length of the unit [m] in which legs of a person are `length` long.
 
-    Metre or centimetre if legs are then as long as a person's, else what makes them 0.8 m.
+    The one of `UNITS` in which legs are then as long as a person's, at most one, else what makes
+    them 0.8 m.
     """
-    for name in ("m", "cm"):
-        if LEGS[0] <= length * UNITS[name] <= LEGS[1]:
-            return UNITS[name]
+    for name, metres in UNITS.items():
+        least, most = LEGS if name in USUAL else ADULT
+        if least <= length * metres <= most:
+            return metres
     return LEG / length
 
 

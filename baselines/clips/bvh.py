@@ -1,29 +1,30 @@
-"""BVH files in and out, by the library pybvh; nothing else imports it."""
+"""BVH files in and out; what is written is written by the library pybvh."""
 
 from __future__ import annotations
 
 import tempfile
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from poise.configs.errors import ConfigError, shown
+from poise.configs.extras import how_to_install
 from poise.configs.files import write_atomic
-from poise.configs.reading import parsing
 
 from .axes import FileAxes, axes_of, named_unit, nearest_axis, unit_from_legs
-from .bvh_text import check_bvh
+from .bvh_pose import rigid, rooted_at_hips, unrooted
+from .bvh_text import read_bvh_text
 from .clip import Clip
-from .rotations import from_scipy, to_scipy
-from .skeleton import SIDES, Skeleton, find_roles, leg_length
-
-if TYPE_CHECKING:
-    from pybvh import Bvh
+from .names import ROLES, SIDES, find_roles
+from .rotations import to_scipy
+from .skeleton import Skeleton, leg_length
+from .structure import structural_roles
 
 Y_UP = axes_of("y", "z")  # what most programs write
+LEGS = tuple(f"{joint}_{side}" for joint in ("hip", "knee", "ankle") for side in SIDES)
 
 
 class BvhFile(NamedTuple):
@@ -34,46 +35,62 @@ class BvhFile(NamedTuple):
 
 
 def read_bvh(
-    path: str | Path, unit: str = "auto", up: str = "auto", forward: str = "auto"
+    path: str | Path,
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    joints: Mapping[str, str] | None = None,
 ) -> BvhFile:
     """The clip of a BVH file, its z axis up, x forward in the rest pose, in metres.
 
+    Joints above the hips, and beside them, are left out; what moves them moves the hips. Positions
+    of other joints must be those of rigid bones.
+
     Args:
         path: a file whose name ends in ``.bvh``.
-        unit: ``m``, ``cm``, ``mm``, ``dm``, ``inch``, a length in metres, or ``auto``: metre or
-            centimetre if legs are then as long as a person's, else what makes them 0.8 m long.
+        unit: ``m``, ``cm``, ``mm``, ``dm``, ``inch``, a length in metres, or ``auto``: the one in
+            which legs are as long as a person's, else what makes them 0.8 m long.
         up: the file's axis that is up, such as ``y``; ``auto``: where the hips are above the feet.
         forward: where the rest pose faces; ``auto``: square to the line of its hips.
+        joints: role, one of `ROLES`, → name of the joint, where neither the names nor the structure
+            tell it.
 
     Raises:
         ConfigError: no such file, no BVH file (the text names the line), more than the bounds of
-            `check_bvh`, pybvh is missing; with ``auto``, legs that are not known by name.
+            `read_bvh_text`, bones that are not rigid; with ``auto``, legs that are not known.
     """
-    path = Path(path)
-    if path.suffix != ".bvh":
+    path, source = Path(path), str(path)
+    if path.suffix.lower() != ".bvh":
         raise ConfigError("must be the name of a .bvh file", source=path, choices=("*.bvh",))
-    check_bvh(path)
-    file = _parsed(path)
-    joints = [node for node in file.nodes if not node.is_end_site()]
-    index = {id(node): i for i, node in enumerate(joints)}
-    ends = [node for node in file.nodes if node.is_end_site()]
-    names = tuple(node.name for node in joints)
-    parents = np.array([index.get(id(node.parent), -1) for node in joints])
-    offsets = np.array([node.offset for node in joints])
-    orders = tuple("".join(node.rot_channels) for node in joints)
-    turns = _quaternions(file.joint_angles, orders)
-    places = np.empty_like(file.root_pos)
-    for column, axis in enumerate(file.root.pos_channels):
-        places[:, "XYZ".index(axis)] = file.root_pos[:, column]
-    end_offsets = np.array([node.offset for node in ends]).reshape(-1, 3)
-    raw = Skeleton(names, parents, offsets, np.array([index[id(n.parent)] for n in ends], int),
-                   end_offsets, orders)  # fmt: skip
-    axes = _axes(raw, places, turns, unit, up, forward, str(path))
-    skeleton = Skeleton(names, parents, axes.places(offsets), raw.end_parents,
-                        axes.places(end_offsets), orders)  # fmt: skip
-    clip = Clip(path.stem, skeleton, float(file.frame_time), axes.places(places),
-                axes.turns(turns))  # fmt: skip
+    text = read_bvh_text(path)
+    whole = unrooted(text)
+    known = find_roles(text.names)
+    if len(known.keys() & set(LEGS)) < len(LEGS):
+        frames = slice(None, None, 10)
+        places, turns = whole.skeleton.global_pose(whole.root[frames], whole.turns[frames])
+        ends = whole.skeleton.ends(places, turns)
+        sure = structural_roles(text.parents, text.offsets, text.end_parents, places, ends)
+        known = {**sure, **known} if not known.keys() & set(LEGS) else known
+    known |= _named(joints or {}, text.names, source)
+    posed = rigid(rooted_at_hips(whole, known), source)
+    raw, places, turns = posed.skeleton, posed.root, posed.turns
+    axes = _axes(raw, places, turns, unit, up, forward, source)
+    skeleton = Skeleton(raw.names, raw.parents, axes.places(raw.offsets), raw.end_parents,
+                        axes.places(raw.end_offsets), raw.orders, raw.known)  # fmt: skip
+    clip = Clip(path.stem, skeleton, text.dt, axes.places(places), axes.turns(turns))
     return BvhFile(clip, axes)
+
+
+def _named(joints: Mapping[str, str], names: tuple[str, ...], source: str) -> dict[str, int]:
+    """Role → joint, as a user names them."""
+    for role, name in joints.items():
+        if role not in ROLES:
+            raise ConfigError(f"no such role: {shown(role)}", source=source, field="joints",
+                              choices=ROLES)  # fmt: skip
+        if name not in names:
+            raise ConfigError(f"no joint is called {shown(name)}", source=source,
+                              field=f"joints.{role}", choices=names)  # fmt: skip
+    return {role: names.index(name) for role, name in joints.items()}
 
 
 def write_bvh(clip: Clip, path: str | Path, axes: FileAxes = Y_UP) -> None:
@@ -83,7 +100,7 @@ def write_bvh(clip: Clip, path: str | Path, axes: FileAxes = Y_UP) -> None:
         ConfigError: the name does not end in ``.bvh``, or pybvh is missing.
         PoiseError: the file cannot be written.
     """
-    if Path(path).suffix != ".bvh":
+    if Path(path).suffix.lower() != ".bvh":
         raise ConfigError("must be the name of a .bvh file", source=path, choices=("*.bvh",))
     from_clip = _library().Bvh(
         nodes=_nodes(clip.skeleton, axes),
@@ -102,26 +119,9 @@ def _library():  # a module
     try:
         import pybvh
     except ImportError:
-        raise ConfigError("needs the package pybvh: pip install 'poise[motion]'",
+        raise ConfigError(f"needs the package pybvh: {how_to_install('motion')}",
                           source="motion") from None  # fmt: skip
     return pybvh
-
-
-def _parsed(path: Path) -> Bvh:
-    library = _library()
-    with parsing(path, "is no BVH file"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return library.read_bvh_file(path, world_up="+y")
-
-
-def _quaternions(angles: np.ndarray, orders: tuple[str, ...]) -> np.ndarray:
-    """(F, J, 4) rotations from Euler angles (F, J, 3) [rad] about the moving axes of `orders`."""
-    turns = np.empty((*angles.shape[:2], 4))
-    for order in set(orders):
-        chosen = [i for i, each in enumerate(orders) if each == order]
-        rotation = Rotation.from_euler(order, angles[:, chosen].reshape(-1, 3))
-        turns[:, chosen] = from_scipy(rotation, (len(angles), len(chosen)))
-    return turns
 
 
 def _angles(turns: np.ndarray, orders: tuple[str, ...]) -> np.ndarray:
@@ -141,13 +141,13 @@ def _axes(
     source: str,
 ) -> FileAxes:  # fmt: skip
     """Axes and unit as they are given, or as legs, hips and feet tell them."""
-    roles = find_roles(raw.names)
+    roles = raw.roles
     if "auto" in (unit, up, forward):
-        missing = [f"{joint}_{side}" for joint in ("hip", "knee", "ankle") for side in SIDES]
-        missing = [role for role in missing if role not in roles]
+        missing = [role for role in LEGS if role not in roles]
         if missing:
             raise ConfigError(
-                f"no joint is called as {shown(missing[0])} is: name unit, up and forward",
+                f"no joint is called as {shown(missing[0])} is, and the structure does not tell: "
+                f"name it, {missing[0]}=JOINT (--joints), or unit, up and forward",
                 source=source, field="joints", choices=raw.names,
             )  # fmt: skip
     length = named_unit(unit, source) if unit != "auto" else _unit(raw, roles, source)

@@ -1,16 +1,16 @@
-"""The text of a BVH file, looked at line by line, so that an error says in which line it is.
-
-pybvh, which reads the file, allocates what the file announces and tells rows, not lines.
-"""
+"""The text of a BVH file, read line by line, so that an error says in which line it is."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from poise.configs.errors import ConfigError, shown
-from poise.configs.reading import MIB, read_text
+from poise.configs.reading import MIB, read_bytes
 
 BVH_BYTES = 64 * MIB
 MOST_JOINTS = 500
@@ -21,14 +21,40 @@ HIERARCHY = ("HIERARCHY", "ROOT", "JOINT", "End Site", "{", "}", "OFFSET", "CHAN
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 
 
-def check_bvh(path: Path) -> None:
-    """Raise ConfigError, with the number of the line, for what is no BVH file within bounds.
+@dataclass(frozen=True, eq=False)
+class BvhText:
+    """What a BVH file says, in its own axes and unit.
 
-    At most 64 MiB, 500 joints, 100 levels, 20 million values; all numbers finite; one root with
-    three places and three rotations, three rotations for every other joint; as many rows of as many
-    values as are announced.
+    Attributes:
+        names: of the joints, parents first.
+        parents: (J,) index of the parent; −1 of the root.
+        offsets: (J, 3).
+        end_parents: (E,) joints on which an end site hangs; `end_offsets` (E, 3).
+        channels: of each joint, such as ``Xposition``, in the order of the values.
+        values: (F, C) of all channels, rotations in degrees.
+        dt: between frames [s].
     """
-    lines = enumerate(read_text(path, BVH_BYTES).splitlines(), start=1)
+
+    names: tuple[str, ...]
+    parents: np.ndarray
+    offsets: np.ndarray
+    end_parents: np.ndarray
+    end_offsets: np.ndarray
+    channels: tuple[tuple[str, ...], ...]
+    values: np.ndarray
+    dt: float
+
+
+def read_bvh_text(path: Path) -> BvhText:
+    """The joints and the values of a BVH file.
+
+    A byte order mark before it and end marks after it do not count.
+
+    Raises ConfigError, with the number of the line, for what is no BVH file within bounds: at most
+    64 MiB, 500 joints, 100 levels, 20 million values; all numbers finite; one root; as many rows of
+    as many values as are announced.
+    """
+    lines = enumerate(_text(path).splitlines(), start=1)
     head = _Head(path)
     for number, line in lines:
         words = line.split()
@@ -36,7 +62,22 @@ def check_bvh(path: Path) -> None:
             break
     else:
         raise ConfigError("ends before a line 'Frame Time:'", source=path)
-    _check_rows(lines, head)
+    values = _rows(lines, head)
+    return BvhText(
+        tuple(head.names), np.array(head.parents), np.array(head.offsets),
+        np.array(head.end_parents, int), np.array(head.end_offsets).reshape(-1, 3),
+        tuple(tuple(each) for each in head.joint_channels), values, head.dt,
+    )  # fmt: skip
+
+
+def _text(path: Path) -> str:
+    """Names may be in any encoding; all else is ASCII."""
+    data = read_bytes(path, BVH_BYTES)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text.rstrip("\x1a\0 \t\r\n")
 
 
 class _Head:
@@ -44,9 +85,16 @@ class _Head:
 
     def __init__(self, path: Path):
         self.path = path
-        self.level, self.joints, self.channels, self.frames = 0, 0, 0, 0
-        self.names: set[str] = set()
+        self.channels, self.frames, self.dt = 0, 0, 0.0
+        self.names: dict[str, int] = {}
+        self.parents: list[int] = []
+        self.offsets: list[list[float]] = []
+        self.joint_channels: list[list[str]] = []
+        self.end_parents: list[int] = []
+        self.end_offsets: list[list[float]] = []
         self.expects = ""  # "{" after the name of a joint
+        self.new = -1  # the joint whose "{" is expected; an end site has −1
+        self.open: list[int] = []  # joints whose "}" is to come; −1 of an end site
 
     def fail(self, number: int, text: str, choices: tuple[str, ...] | None = None) -> None:
         raise ConfigError(f"line {number}: {text}", source=self.path, choices=choices)
@@ -62,7 +110,7 @@ class _Head:
         elif word in ("{", "}"):
             self._brace(number, words)
         elif word == "OFFSET":
-            self._numbers(number, words[1:], 3)
+            self._offset(number, words)
         elif word == "CHANNELS":
             self._channels(number, words)
         elif word == "Frames:":
@@ -76,25 +124,46 @@ class _Head:
     def _joint(self, number: int, words: list[str]) -> None:
         self.expects = "{"
         if words[0] == "End":
+            self.new = -1
             return
-        if len(words) != 2:
-            self.fail(number, f"{words[0]} must be followed by one name")
-        if words[1] in self.names:
-            self.fail(number, f"a second joint is called {shown(words[1])}")
+        name = " ".join(words[1:])
+        if not name or "{" in name:
+            self.fail(number, f"{words[0]} must be followed by a name")
+        if name in self.names:
+            self.fail(number, f"a second joint is called {shown(name)}: rename one of them")
         if words[0] == "ROOT" and self.names:
             self.fail(number, "a second ROOT: one skeleton with one root can be read")
-        self.names.add(words[1])
+        if words[0] == "JOINT" and (not self.open or self.open[-1] < 0):
+            self.fail(number, "a JOINT that is in no other joint")
+        self.new = self.names[name] = len(self.names)
+        self.parents.append(self.open[-1] if self.open else -1)
+        self.offsets.append([0.0, 0.0, 0.0])
+        self.joint_channels.append([])
         if len(self.names) > MOST_JOINTS:
             self.fail(number, f"more than {MOST_JOINTS} joints")
 
     def _brace(self, number: int, words: list[str]) -> None:
         if len(words) != 1:
             self.fail(number, f"{words[0]!r} must stand in a line by itself")
-        self.level += 1 if words[0] == "{" else -1
-        if self.level < 0:
+        if words[0] == "{":
+            self.open.append(self.new)
+            self.new = -1
+        elif self.open:
+            self.open.pop()
+        else:
             self.fail(number, "'}' without a '{'")
-        if self.level > MOST_LEVELS:
+        if len(self.open) > MOST_LEVELS:
             self.fail(number, f"more than {MOST_LEVELS} joints on each other")
+
+    def _offset(self, number: int, words: list[str]) -> None:
+        values = self._numbers(number, words[1:], 3)
+        if not self.open:
+            self.fail(number, "an OFFSET in no joint")
+        if self.open[-1] >= 0:
+            self.offsets[self.open[-1]] = values
+        elif len(self.open) > 1 and self.open[-2] >= 0:
+            self.end_parents.append(self.open[-2])
+            self.end_offsets.append(values)
 
     def _channels(self, number: int, words: list[str]) -> None:
         known = {name.lower() for name in CHANNELS}
@@ -103,9 +172,15 @@ class _Head:
                 self.fail(number, f"no such channel: {shown(word)}", CHANNELS)
         if words[1:2] != [str(len(words) - 2)]:
             self.fail(number, f"CHANNELS {shown(' '.join(words[1:2]))} and {len(words) - 2} names")
-        if len({word.lower() for word in words[2:]}) != len(words) - 2:
+        named = [word.capitalize() for word in words[2:]]
+        if len(set(named)) != len(named):
             self.fail(number, "a channel is named twice")
-        self.channels += len(words) - 2
+        if not self.open or self.open[-1] < 0 or self.joint_channels[self.open[-1]]:
+            self.fail(number, "CHANNELS in no joint, or twice in one")
+        if self.open[-1] != len(self.names) - 1:
+            self.fail(number, "CHANNELS of a joint after those of joints in it")
+        self.joint_channels[self.open[-1]] = named
+        self.channels += len(named)
 
     def _frames(self, number: int, words: list[str]) -> None:
         if len(words) != 2 or not words[1].isascii() or not words[1].isdigit():
@@ -119,10 +194,11 @@ class _Head:
         (dt,) = self._numbers(number, words[2:], 1)
         if not 1e-4 <= dt <= 10.0:
             self.fail(number, f"a frame time must be within 0.0001 and 10 s, not {dt:g}")
-        if self.level or not self.names:
-            self.fail(number, f"{self.level} '{{' are not closed" if self.level else "no ROOT")
+        if self.open or not self.names:
+            self.fail(number, f"{len(self.open)} '{{' are not closed" if self.open else "no ROOT")
         if not self.frames:
             self.fail(number, "'Frame Time:' before 'Frames:'")
+        self.dt = dt
         return True
 
     def _numbers(self, number: int, words: list[str], count: int) -> list[float]:
@@ -149,15 +225,19 @@ def _floats(head: _Head, number: int, words: list[str]) -> list[float]:
     return values
 
 
-def _check_rows(lines: Iterator[tuple[int, str]], head: _Head) -> None:
-    rows = number = 0
+def _rows(lines: Iterator[tuple[int, str]], head: _Head) -> np.ndarray:
+    """(F, C) the values of all frames."""
+    rows: list[np.ndarray] = []
+    number = 0
     for number, line in lines:
         words = line.split()
         if not words:
             continue
-        rows += 1
         if len(words) != head.channels:
             head.fail(number, f"{len(words)} values instead of {head.channels}, as the joints have")
-        _floats(head, number, words)
-    if rows != head.frames:
-        head.fail(number, f"the file ends after {rows} rows, 'Frames:' says {head.frames}")
+        rows.append(np.array(_floats(head, number, words)))
+        if len(rows) > head.frames:
+            break
+    if len(rows) != head.frames:
+        head.fail(number, f"the file ends after {len(rows)} rows, 'Frames:' says {head.frames}")
+    return np.array(rows)

@@ -23,7 +23,7 @@ def find_bvh(name: str | Path) -> Path:
     if str(name) in names:
         return packaged_folder("clips") / f"{name}.bvh"
     path = Path(name)
-    if path.suffix == ".bvh" and is_file(path):
+    if path.suffix.lower() == ".bvh" and is_file(path):
         return path
     problem = "no such file" if path.suffix or len(path.parts) > 1 else "no such name"
     raise ConfigError(f"{problem}: {shown(str(name))}; give a path to a .bvh file or a packaged "

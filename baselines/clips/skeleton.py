@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -10,23 +9,8 @@ import numpy as np
 
 from poise.configs.errors import ConfigError
 
+from .names import ROLES, SIDES, find_roles, sided
 from .rotations import multiply, rotate
-
-SIDES = ("left", "right")
-#: role of a joint on either side → names that files have for it, the most certain one first
-SIDED = {
-    "hip": ("upleg", "upperleg", "upperleg01", "thigh", "femur", "hip"),
-    "knee": ("leg", "lowerleg", "lowerleg01", "loleg", "shin", "calf", "tibia", "knee"),
-    "ankle": ("ankle", "foot"),  # where a file has both, its foot is the ball
-    "toe": ("toebase", "toes", "toe", "toe11", "ball"),
-    "shoulder": ("arm", "upperarm", "upperarm01", "uparm", "humerus", "shoulder"),
-    "elbow": ("forearm", "lowerarm", "lowerarm01", "lowarm", "loarm", "radius", "elbow"),
-    "wrist": ("wrist", "hand"),
-}
-MIDDLE = {"head": ("head",), "neck": ("neck", "neck01", "lowerneck")}
-ROLES = (*(f"{role}_{side}" for role in SIDED for side in SIDES), *MIDDLE)
-_BEFORE = re.compile(r"^(left|right|l|r)[_.\- ]?(.+)$")
-_AFTER = re.compile(r"^(.+?)[_.\- ](left|right|l|r)$")
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +91,14 @@ class Skeleton:
     @cached_property
     def partners(self) -> np.ndarray:
         """(J,) the joint of the same name on the other side; the joint itself in the middle."""
-        sided = {_sided(name): i for i, name in enumerate(self.names)}
+        bases = sided(self.names)
+        places = {base: i for i, base in enumerate(bases)}
         other = {"left": "right", "right": "left", "": ""}
-        found = [sided.get((base, other[side]), i) for i, (base, side) in enumerate(
-            _sided(name) for name in self.names)]  # fmt: skip
+        found = [places.get((base, other[side]), i) for i, (base, side) in enumerate(bases)]
+        for role in [role for role in self.known if role.endswith("_left")]:
+            pair = [self.known.get(f"{role.removesuffix('_left')}_{side}", -1) for side in SIDES]
+            if min(pair) >= 0:
+                found[pair[0]], found[pair[1]] = pair[1], pair[0]
         return np.array(found)
 
     @cached_property
@@ -131,36 +119,3 @@ def leg_length(offsets: np.ndarray, parents: np.ndarray, roles: dict[str, int]) 
             total += float(np.linalg.norm(offsets[joint]))
             joint = int(parents[joint])
     return total / len(SIDES)
-
-
-def find_roles(names: tuple[str, ...]) -> dict[str, int]:
-    """Role → index among `names`; of several names for a role the most certain one wins."""
-    sided = {}
-    for i, name in reversed(list(enumerate(names))):
-        base, side = _sided(name)
-        sided[base.replace("_", ""), side] = i
-    found = {}
-    for role, words in SIDED.items():
-        for side in SIDES:
-            hits = [sided[word, side] for word in words if (word, side) in sided]
-            if hits:
-                found[f"{role}_{side}"] = hits[0]
-    for role, words in MIDDLE.items():
-        hits = [sided[word, ""] for word in words if (word, "") in sided]
-        if hits:
-            found[role] = hits[0]
-    return found
-
-
-def _sided(name: str) -> tuple[str, str]:
-    """(base, side) of a joint's name: ``mixamorig:LeftArm`` is (arm, left), ``Neck`` (neck, "")."""
-    plain = name.rpartition(":")[2].lower()
-    if match := _AFTER.match(plain):
-        base, side = match.groups()
-    elif match := _BEFORE.match(plain):
-        side, base = match.groups()
-    else:
-        return plain, ""
-    if side in ("l", "r") and base in ("owerback", "owerneck", "oot", "ib", "owerspine"):
-        return plain, ""  # lowerback, lowerneck, root, rib
-    return base, "left" if side.startswith("l") else "right"

@@ -35,14 +35,23 @@ class HandOverConfig:
     They may no longer when the robot was calm for `calm_time`: the capture point nearer than
     `closes`, both feet on the ground, the root's tilt below `tilt`, the CoM slower than `speed` and
     all joints together than `joint_speed` (root mean square).
+
+    Attributes:
+        opens: Distance of the capture point from its reference from which servos may take over [m].
+        closes: Distance of the capture point below which the robot counts as calm [m].
+        tilt: Tilt of the root below which it counts as calm [rad].
+        speed: Speed of the CoM below which it counts as calm [m/s].
+        joint_speed: Speed of all joints together, root mean square, below which it counts as calm
+            [rad/s].
+        calm_time: Time for which it must be calm before the controller takes back [s].
     """
 
-    opens: float = field(default=0.06, metadata={"above": 0.0})  # [m]
-    closes: float = field(default=0.04, metadata={"above": 0.0})  # [m]
-    tilt: float = field(default=0.2, metadata={"above": 0.0})  # [rad]
-    speed: float = field(default=0.1, metadata={"above": 0.0})  # [m/s]
-    joint_speed: float = field(default=0.4, metadata={"above": 0.0})  # [rad/s]
-    calm_time: float = field(default=0.2, metadata={"above": 0.0})  # [s]
+    opens: float = field(default=0.06, metadata={"above": 0.0})
+    closes: float = field(default=0.04, metadata={"above": 0.0})
+    tilt: float = field(default=0.2, metadata={"above": 0.0})
+    speed: float = field(default=0.1, metadata={"above": 0.0})
+    joint_speed: float = field(default=0.4, metadata={"above": 0.0})
+    calm_time: float = field(default=0.2, metadata={"above": 0.0})
 
     def __post_init__(self) -> None:
         if self.closes > self.opens:

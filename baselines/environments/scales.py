@@ -13,14 +13,22 @@ from .policy_step import Residual
 
 @dataclass(frozen=True)
 class ResidualScales:
-    """The offsets that an action of 1 gives, heading frame; a scale of 0 takes an entry away."""
+    """The offsets that an action of 1 gives, heading frame; a scale of 0 takes an entry away.
 
-    com: float = field(default=0.2, metadata={"min": 0.0})  # Δc_ref x, y [m]
-    cop: float = field(default=0.15, metadata={"min": 0.0})  # Δp_ref x, y [m]
-    height: float = field(default=0.0, metadata={"min": 0.0})  # Δc_ref z [m]
-    lean: float = field(default=0.0, metadata={"min": 0.0})  # of the root, about x and y [rad]
-    momentum: float = field(default=0.0, metadata={"min": 0.0})  # L_ref x, y [m h² ω]
-    # of each motor, added to the controller's [its limit]
+    Attributes:
+        com: Offset of the CoM's target along x and y [m].
+        cop: Offset of the CoP's target along x and y [m].
+        height: Offset of the CoM's target height [m].
+        lean: Lean of the root about x and y [rad].
+        momentum: Angular momentum that is asked for about x and y [m h² ω].
+        torque: Torque added to each motor's, over its limit.
+    """
+
+    com: float = field(default=0.2, metadata={"min": 0.0})
+    cop: float = field(default=0.15, metadata={"min": 0.0})
+    height: float = field(default=0.0, metadata={"min": 0.0})
+    lean: float = field(default=0.0, metadata={"min": 0.0})
+    momentum: float = field(default=0.0, metadata={"min": 0.0})
     torque: float = field(default=0.0, metadata={"min": 0.0, "omit": "default"})
 
     def entries(self) -> dict[str, float]:
@@ -34,13 +42,19 @@ class ResidualScales:
 
 @dataclass(frozen=True)
 class StepScales(ResidualScales):
-    """The offsets that an action of 1 gives, heading frame; a scale of 0 takes an entry away."""
+    """The offsets that an action of 1 gives, heading frame; a scale of 0 takes an entry away.
 
-    com: float = field(default=0.1, metadata={"min": 0.0})  # Δc_ref x, y [m]
-    cop: float = field(default=0.05, metadata={"min": 0.0})  # Δp_ref x, y [m]
-    foothold: float = field(default=0.15, metadata={"min": 0.0})  # x, y [m]
-    time: float = field(default=0.08, metadata={"min": 0.0})  # of a step [s]
-    trigger: float = field(default=0.0, metadata={"min": 0.0})  # of a step [m]
+    Attributes:
+        foothold: Offset of the next foothold along x and y [m].
+        time: Change of the time that the next step takes [s].
+        trigger: Change of the distance at which a step begins [m].
+    """
+
+    com: float = field(default=0.1, metadata={"min": 0.0})
+    cop: float = field(default=0.05, metadata={"min": 0.0})
+    foothold: float = field(default=0.15, metadata={"min": 0.0})
+    time: float = field(default=0.08, metadata={"min": 0.0})
+    trigger: float = field(default=0.0, metadata={"min": 0.0})
 
     def entries(self) -> dict[str, float]:
         """The scale of each target that can be moved: those of the base class come first."""

@@ -28,11 +28,21 @@ class Tempo:
     While a foot is in the air `least` is 0. After that the motion goes on from where it is
     (`resume`), runs up to `fastest` times as fast until it is on time (`catch-up`), or goes back to
     its begin first, if β fell below one half (`restart`).
+
+    Attributes:
+        waits: Whether the motion's time slows while the robot catches itself.
+        distance: Distance d of the CoM from its reference at which the motion slows, over the
+            standing height.
+        lag: Time constant τ with which the rate of the motion follows [s].
+        least: Least rate of the motion while both feet stand.
+        after: What comes after a wait: go on (resume), run until on time (catch-up), or begin anew
+            (restart).
+        fastest: Largest rate of the motion while it catches up.
     """
 
     waits: bool = False
-    distance: float = field(default=0.02, metadata={"above": 0.0})  # d, in h
-    lag: float = field(default=0.1, metadata={"above": 0.0})  # τ [s]
+    distance: float = field(default=0.02, metadata={"above": 0.0})
+    lag: float = field(default=0.1, metadata={"above": 0.0})
     least: float = field(default=0.1, metadata={"min": 0.0, "max": 1.0})
     after: Literal["resume", "catch-up", "restart"] = "catch-up"
     fastest: float = field(default=1.25, metadata={"min": 1.0, "max": 10.0})

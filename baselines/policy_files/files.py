@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from pathlib import Path
 
 from poise.baselines.allowance import SCRIPTS, is_script
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import MIB, is_file, is_folder, read_bytes, whole_path
+
+from .onnx_tensors import external_files
 
 BYTES = 64 * MIB  # of each file
 ONNX = (".onnx",)
 DESCRIPTIONS = ("policy.yaml", "deploy.yaml", "params/deploy.yaml")
 NETWORKS = ("", "exported", "params")  # folders in which frameworks put them
-_LOCATION = re.compile(rb"\n\x08location\x12(.)", re.DOTALL)  # of tensors outside of an ONNX file
 
 
 def is_network(path: Path) -> bool:
@@ -60,23 +60,25 @@ def only_network(folder: Path, source: str | Path) -> Path:
 def digest(path: Path, source: str | Path) -> str:
     """SHA-256 (hexadecimal) of a network and of the files that its tensors are in.
 
-    Raises ConfigError where one of them is missing, or lies elsewhere than beside it.
+    Raises ConfigError where it is no ONNX file, or one of these is missing, or lies elsewhere than
+    beside it.
     """
     content = read_bytes(path, BYTES)
     found = hashlib.sha256(content)
-    for name in _outside(content) if path.suffix in ONNX else ():
-        if Path(name).name != name:
-            raise ConfigError(f"{path.name} has data in {name!r}, not beside it", source=source,
-                              field="policy")  # fmt: skip
-        if not is_file(path.with_name(name)):
-            raise ConfigError(f"{path.name} needs the file {name!r} beside it, which is missing",
+    for name in () if is_script(path) else sorted(_outside(content, path)):  # whatever it is called
+        if name in ("", "..") or Path(name).name != name:
+            raise ConfigError(f"{path.name} has data in {shown(name)}, not beside it",
                               source=source, field="policy")  # fmt: skip
+        if not is_file(path.with_name(name)):
+            raise ConfigError(f"{path.name} needs the file {shown(name)} beside it, which is "
+                              "missing", source=source, field="policy")  # fmt: skip
         found.update(read_bytes(path.with_name(name), BYTES))
     return found.hexdigest()
 
 
-def _outside(content: bytes) -> list[str]:
+def _outside(content: bytes, path: Path) -> set[str]:
     """Names of the files that an ONNX file says its tensors are in."""
-    places = (match.end() for match in _LOCATION.finditer(content))
-    names = {content[at : at + content[at - 1]].decode(errors="replace") for at in places}
-    return sorted(names)
+    try:
+        return external_files(content)
+    except ValueError as error:
+        raise ConfigError(f"is no ONNX file ({error})", source=path) from None

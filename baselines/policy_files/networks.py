@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from poise.baselines.allowance import is_script
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.extras import how_to_install
 from poise.configs.reading import read_bytes
 
+from .bounds import Clocked
 from .files import BYTES
 
 MEMORY = 10_000_000  # numbers that a network may remember, of each kind
@@ -60,7 +61,11 @@ def onnx_session(path: Path) -> Any:
 
 
 class OnnxNetwork:
-    """A network in ONNX, played by onnxruntime; a recurrent one starts from zeros."""
+    """A network in ONNX, played by onnxruntime; a recurrent one starts from zeros.
+
+    Asking it raises PoiseError in one line where onnxruntime fails or takes too long, and where it
+    remembers more than it did.
+    """
 
     def __init__(self, path: Path):
         self.path = path
@@ -75,6 +80,7 @@ class OnnxNetwork:
                               source=path)  # fmt: skip
         self._input = others[0]
         self._outputs = [outputs[0], *map(_after, self._memory)]
+        self._clocked = Clocked()
 
     def __reduce__(self) -> tuple[object, ...]:
         return OnnxNetwork, (self.path,), {"_memory": self._memory}
@@ -84,9 +90,18 @@ class OnnxNetwork:
 
     def act(self, observation: np.ndarray) -> np.ndarray:
         given = {self._input: observation[None], **self._memory}
-        action, *memory = self._session.run(self._outputs, given)
+        try:
+            with self._clocked.run() as options:
+                action, *memory = self._session.run(self._outputs, given, options)
+            numbers = np.asarray(action, dtype=float).ravel()
+        except Exception as error:  # of onnxruntime, or the action is no numbers
+            raise PoiseError(f"{self.path}: cannot be asked ({error})") from None
+        for (name, before), after in zip(self._memory.items(), memory, strict=True):
+            if after.shape != before.shape:
+                raise PoiseError(f"{self.path}: {name}: remembers {_times(after.shape)} numbers, "
+                                 f"not {_times(before.shape)}")  # fmt: skip
         self._memory = dict(zip(self._memory, memory, strict=True))
-        return np.asarray(action, dtype=float).ravel()
+        return numbers
 
 
 def _after(name: str) -> str:
@@ -94,11 +109,15 @@ def _after(name: str) -> str:
     return name.removesuffix("_in") + "_out" if name.endswith("_in") else ""
 
 
+def _times(shape: Sequence[object]) -> str:
+    return " × ".join(map(str, shape))
+
+
 def _zeros(shape: list[object], name: str, path: Path) -> np.ndarray:
     """The memory at the start; a size that is left open is 1."""
     sizes = [size if isinstance(size, int) else 1 for size in shape]
     if min(sizes, default=0) < 0 or math.prod(sizes) > MEMORY:
-        raise ConfigError(f"must be at most {MEMORY} numbers, not {' × '.join(map(str, sizes))}",
+        raise ConfigError(f"must be at most {MEMORY} numbers, not {_times(sizes)}",
                           source=path, field=name)  # fmt: skip
     return np.zeros(sizes, dtype=np.float32)
 

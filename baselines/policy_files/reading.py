@@ -12,6 +12,7 @@ from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
 from poise.configs.schema import build
 
+from .bounds import try_network
 from .config import PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
 from .files import description, digest, is_network, is_policy_place, only_network
@@ -74,22 +75,23 @@ def policy_file_config(data: dict[str, Any], source: Path) -> PolicyFileConfig:
     below: dict[str, Any] = {}
     if deploy := data.pop("deploy", None):
         below = deploy_fields(read_yaml(folder / deploy), folder / deploy)
-    path = _network(data.get("policy") or below.get("policy"), folder, source)
+    path, version = _network(data.get("policy") or below.get("policy"), folder, source)
     if not is_script(path):
+        try_network(path, version)
         metadata = onnx_session(path).get_modelmeta().custom_metadata_map
         below = {**metadata_fields(metadata, path), **below}
     config = build(PolicyFileConfig, {**below, **data, "policy": str(path)}, source)
     if not config.observations:
         raise ConfigError("what the policy sees is not said", source=source, field="observations")
-    return replace(config, digest=digest(path, source), described_in=str(source))
+    return replace(config, digest=version, described_in=str(source))
 
 
-def _network(name: str | None, folder: Path, source: Path) -> Path:
-    """The policy's file, which the user must have allowed if it is code."""
+def _network(name: str | None, folder: Path, source: Path) -> tuple[Path, str]:
+    """The policy's file, which the user must have allowed if it is code, and its digest."""
     path = whole_path(folder / name, source, "policy") if name else only_network(folder, source)
     if not is_file(path):
         raise ConfigError(f"no such file: {path}", source=source, field="policy")
-    digest(path, source)  # what is missing beside it is said before onnxruntime finds it
+    version = digest(path, source)  # what is missing beside it is said before onnxruntime finds it
     if is_script(path):
         check_allowed(str(path))
-    return path
+    return path, version

@@ -27,6 +27,7 @@ from poise.baselines.motions.robot_clip import (
 )
 from poise.baselines.motions.stances import at_rest, carried, home_frames, home_place, place_of
 from poise.configs.errors import ConfigError
+from poise.configs.extras import how_to_install
 from poise.configs.files import packaged_folder
 from poise.configs.reading import MIB, read_bytes
 from poise.envs.robots.robot import Robot
@@ -169,6 +170,6 @@ def _plant() -> Any:  # the function `plant`
     try:
         from .solve import plant
     except ImportError as error:
-        raise ConfigError(f"needs the package {error.name}: pip install 'poise[motion]'",
+        raise ConfigError(f"needs the package {error.name}: {how_to_install('motion')}",
                           source="motion") from None  # fmt: skip
     return plant

@@ -11,6 +11,7 @@ from poise.baselines.clips.contacts import measure_contacts
 from poise.baselines.motions.footwork import perform_plan
 from poise.baselines.motions.robot_clip import RATE, About, RobotClip
 from poise.configs.errors import ConfigError
+from poise.configs.extras import how_to_install
 from poise.envs.robots.robot import Robot
 
 from .limbs import Limbs, find_limbs
@@ -147,6 +148,6 @@ def _solver() -> Any:  # the function `solve_frames`
     try:
         from .solve import solve_frames
     except ImportError as error:
-        raise ConfigError(f"needs the package {error.name}: pip install 'poise[motion]'",
+        raise ConfigError(f"needs the package {error.name}: {how_to_install('motion')}",
                           source="motion") from None  # fmt: skip
     return solve_frames

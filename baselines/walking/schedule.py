@@ -32,12 +32,19 @@ class CommandSampler:
 
     The first one holds from the reset on; with an `interval` [s] another one is drawn after each,
     at most 256 in an episode. Equal ends are a fixed command.
+
+    Attributes:
+        ahead: Range of the commanded speed ahead [m/s].
+        left: Range of the commanded speed to the left [m/s].
+        turn: Range of the commanded turning rate to the left [rad/s].
+        interval: Range of the time after which another command is drawn [s]; None: one holds
+            throughout.
     """
 
-    ahead: Range = (0.5, 0.5)  # [m/s]
-    left: Range = (0.0, 0.0)  # [m/s]
-    turn: Range = (0.0, 0.0)  # [rad/s]
-    interval: Range | None = field(default=None, metadata={"above": 0.0})  # [s]
+    ahead: Range = (0.5, 0.5)
+    left: Range = (0.0, 0.0)
+    turn: Range = (0.0, 0.0)
+    interval: Range | None = field(default=None, metadata={"above": 0.0})
 
     def __post_init__(self) -> None:
         for name in ("ahead", "left", "turn", "interval"):

@@ -73,7 +73,7 @@ def com_offset(robot: Robot, task: CoMTask) -> float:
     A robot whose description says nothing else stands as described: the offset of gains that were
     searched on another robot would make it lean.
     """
-    if robot.description.posture.com == "posture":
+    if robot.description.posture.com != "controller":
         return robot.com_ahead
     return task.offset * robot.height_com
 

@@ -1,12 +1,14 @@
 """The base of all environments: a pushed robot, its observation, reward, fall and record."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 
 from poise.configs.errors import PoiseError
 from poise.configs.numbers import real_array, seed_number, whole_steps
@@ -50,6 +52,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
     observation_space: spaces.Box
     action_space: spaces.Box
+    _spec: EnvSpec | None = None
     known_terms: ClassVar[Terms] = TERMS  #: of which `observation` chooses
     option_names: ClassVar[tuple[str, ...]] = RESET_OPTIONS  #: of `reset`
 
@@ -121,6 +124,16 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         self._step: CompiledStep | None = None  # of a policy step
         self._end: StepEnd | None = None
         self._end_of: World | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What `gymnasium.make` made it from, with the steps of its episodes; None without that."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        # not registered with a number: Gymnasium would cut off those that are made longer
+        self._spec = spec and replace(spec, max_episode_steps=self.max_steps)
 
     def arguments(self) -> dict[str, Any]:
         """The arguments that make another environment like this one; the robot is shared."""
@@ -249,13 +262,16 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         return self.episode.observation.astype(np.float32), self.info()
 
     def set_action(self, action: np.ndarray) -> None:
-        """Check `action` and remember it and the one before.
+        """Check `action`, or clip it where `config.clip_action`; remember it and the one before.
 
         Raises ConfigError as `check_action` does.
         """
         vector, e = real_array(action), self.episode
         if vector is not None and vector.shape == e.action.shape:
-            if take_action(vector.astype(float), e.last_action, e.action):
+            vector = vector.astype(float)
+            if self.config.clip_action:
+                vector = np.clip(vector, -1.0, 1.0)
+            if take_action(vector, e.last_action, e.action):
                 return
         self.check_action(action)  # raises, and names what is wrong
 

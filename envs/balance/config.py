@@ -27,10 +27,15 @@ class UnknownArgument(ConfigError, TypeError):
 
 @dataclass(frozen=True)
 class ObservationConfig:
-    """The terms that an observation is made of, by name and in this order."""
+    """The terms that an observation is made of, by name and in this order.
 
-    terms: tuple[str, ...] | None = None  # None: those that the environment has by default
-    extra: tuple[str, ...] = ()  # after them
+    Attributes:
+        terms: Terms of the observation by name, in this order; None: the environment's own.
+        extra: Terms of the observation that come after those.
+    """
+
+    terms: tuple[str, ...] | None = None
+    extra: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -39,10 +44,23 @@ class EnvConfig:
 
     A field that came later is left out of files while it has its default, with which environments
     are as they were before: fingerprints of policies hash these files.
+
+    Attributes:
+        policy_period: Time between two actions [s].
+        duration: Length of an episode [s].
+        pushes: Pushes that are drawn at a reset; None: none.
+        noise: Disturbance of the start.
+        fall: When the robot has fallen, and when it is quiet.
+        reward: Weights of the reward's terms.
+        observation: What the observation is made of.
+        realism: How real sensors, motors, body and ground are: a level by name, file or fields.
+        estimator: How the state is estimated where it is not known exactly.
+        terrain: What the robot stands on.
+        clip_action: Take actions beyond [-1, 1] as 1 or -1, instead of refusing them.
     """
 
-    policy_period: float = field(default=0.02, metadata={"above": 0.0, "max": 1.0})  # [s]
-    duration: float = field(default=6.0, metadata={"above": 0.0, "max": 1e6})  # of an episode [s]
+    policy_period: float = field(default=0.02, metadata={"above": 0.0, "max": 1.0})
+    duration: float = field(default=6.0, metadata={"above": 0.0, "max": 1e6})
     pushes: PushSampler | None = field(
         default_factory=lambda: PushSampler(magnitude=(0.2, 0.5), unit="specific_impulse")
     )
@@ -57,6 +75,7 @@ class EnvConfig:
         default_factory=EstimatorConfig, metadata={"omit": "default"}
     )
     terrain: Terrain = field(default_factory=Flat, metadata={"omit": "default"})
+    clip_action: bool = field(default=False, metadata={"omit": "default"})
 
 
 def env_config(config: EnvConfig | str | Path | Mapping | None, **overrides: object) -> EnvConfig:

@@ -7,6 +7,7 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
+from poise.configs.texts import plain
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
@@ -179,7 +180,8 @@ def observation_table(terms: Iterable[Term]) -> str:
     for term in terms:
         for entry in term.entries:
             index = len(rows) - 2
-            rows.append(f"| {index} | {term.name} | {entry} | {term.unit} | {term.meaning} |")
+            cells = f"{term.name} | {plain(entry)} | {term.unit} | {term.meaning}"
+            rows.append(f"| {index} | {cells} |")
     return "\n".join(rows)
 
 

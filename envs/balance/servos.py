@@ -26,14 +26,22 @@ class ServoConfig:
     the joint, β the angle of its axis from the vertical. D = 2 `damping_ratio` √(K I), with
     I = 1/(M⁻¹)_jj, the inertia that the joint feels when all others are free. Mappings are from
     joint names, or patterns such as ``*_ankle_y``, and win.
+
+    Attributes:
+        deflection: Error at which a servo gives its motor's limit [rad].
+        carry: Stiffness of the legs' joints at least, over what holds half of the body upright
+            above them.
+        damping_ratio: Damping of a servo, 1 is critical.
+        stiffness: Stiffness K of joints by name or pattern, in place of that [N·m/rad].
+        damping: Damping D of joints by name or pattern, in place of that [N·m·s/rad].
+        reach: How far an action of 1 moves the target of joints by name or pattern [rad].
     """
 
-    deflection: float = field(default=0.3, metadata=POSITIVE)  # [rad]
+    deflection: float = field(default=0.3, metadata=POSITIVE)
     carry: float = field(default=2.0, metadata=NOT_NEGATIVE)
     damping_ratio: float = field(default=1.0, metadata=NOT_NEGATIVE)
-    stiffness: dict[str, float] = field(default_factory=dict, metadata=POSITIVE)  # [N·m/rad]
-    damping: dict[str, float] = field(default_factory=dict, metadata=NOT_NEGATIVE)  # [N·m·s/rad]
-    # how far an action of 1 moves the target [rad]
+    stiffness: dict[str, float] = field(default_factory=dict, metadata=POSITIVE)
+    damping: dict[str, float] = field(default_factory=dict, metadata=NOT_NEGATIVE)
     reach: dict[str, float] = field(default_factory=lambda: {"*": 1.0}, metadata=POSITIVE)
 
 

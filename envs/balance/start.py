@@ -20,11 +20,17 @@ RESET_OPTIONS = ("push", "noise", "qpos", "qvel", "realism")
 
 @dataclass(frozen=True)
 class StartNoise:
-    """The range in which a reset departs from the standing posture; uniform in ±."""
+    """The range in which a reset departs from the standing posture; uniform in ±.
 
-    joints: float = field(default=0.02, metadata={"min": 0.0, "max": 0.5})  # [rad]
-    joint_speeds: float = field(default=0.05, metadata={"min": 0.0})  # [rad/s]
-    speed: float = field(default=0.02, metadata={"min": 0.0})  # root, horizontal [m/s]
+    Attributes:
+        joints: Largest departure of a joint at a reset [rad].
+        joint_speeds: Largest speed of a joint at a reset [rad/s].
+        speed: Largest horizontal speed of the root at a reset [m/s].
+    """
+
+    joints: float = field(default=0.02, metadata={"min": 0.0, "max": 0.5})
+    joint_speeds: float = field(default=0.05, metadata={"min": 0.0})
+    speed: float = field(default=0.02, metadata={"min": 0.0})
 
 
 def disturbed_start(

@@ -13,16 +13,26 @@ from poise.envs.physics.kinematics import StateArrays
 
 @dataclass(frozen=True)
 class FallLimits:
-    """The limits beyond which a robot has fallen, and within which it is quiet again."""
+    """The limits beyond which a robot has fallen, and within which it is quiet again.
 
-    height: float = field(default=0.6, metadata={"above": 0.0, "max": 1.0})  # of the standing h
-    # root [deg]: a deep bow, the hip strategy at its end, is not yet a fall
+    Attributes:
+        height: Height of the CoM below which the robot has fallen, over that of standing.
+        tilt: Tilt of the root beyond which it has fallen [deg]; a deep bow, the hip strategy at its
+            end, is not yet a fall.
+        ground_contact: Whether anything but the feet on the ground is a fall.
+        quiet_speed: Speed of the CoM below which the robot is quiet [m/s].
+        quiet_tilt: Tilt of the root below which it is quiet [deg].
+        quiet_time: Time for which it must be quiet at the end to have recovered [s].
+        quiet_slide: Most that a sole moves in that time [m]: recoveries of the default humanoid
+            stay below 1 mm.
+    """
+
+    height: float = field(default=0.6, metadata={"above": 0.0, "max": 1.0})
     tilt: float = field(default=90.0, metadata={"above": 0.0, "max": 180.0})
-    ground_contact: bool = True  # anything but the feet on the ground is a fall
-    quiet_speed: float = field(default=0.1, metadata={"above": 0.0})  # CoM [m/s]
-    quiet_tilt: float = field(default=30.0, metadata={"above": 0.0, "max": 90.0})  # root [deg]
-    quiet_time: float = field(default=1.0, metadata={"above": 0.0})  # [s]
-    # most that a sole moves in it [m]: recoveries of the default humanoid stay below 1 mm
+    ground_contact: bool = True
+    quiet_speed: float = field(default=0.1, metadata={"above": 0.0})
+    quiet_tilt: float = field(default=30.0, metadata={"above": 0.0, "max": 90.0})
+    quiet_time: float = field(default=1.0, metadata={"above": 0.0})
     quiet_slide: float = field(default=0.01, metadata={"min": 0.0, "omit": "default"})
 
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 import numba
 from numba.core import event
@@ -41,13 +42,18 @@ _FLAGS = fastmath(os.environ)
 CACHE, NO_CACHE = kernel_folder(sorted(_FLAGS))
 
 
+kernels: WeakSet[Any] = WeakSet()  #: all that `compiled` has made, whether compiled yet or not
+
+
 def compiled(function: Callable) -> Any:
     """Numba's decorator: cached on disk, without the GIL, NumPy's rules for division by zero."""
     folder = _folder(function)
     if folder is None:
         return _decorated(function, cache=False)
     with kept_in(folder):
-        return compiled_once(_decorated(function, cache=True), folder)
+        kernel = compiled_once(_decorated(function, cache=True), folder)
+    kernels.add(kernel)
+    return kernel
 
 
 def _decorated(function: Callable, cache: bool) -> Any:

@@ -10,7 +10,6 @@ import hashlib
 import os
 import re
 from functools import cache
-from importlib.util import find_spec
 
 _ROOM = os.path.dirname(os.path.realpath(__file__))
 _HOUSE = os.path.dirname(os.path.dirname(_ROOM))
@@ -39,13 +38,6 @@ def imported(file: str) -> set[str]:
         seen |= new
         ahead += new
     return seen
-
-
-def module_file(module: str) -> str:
-    """The file of a module, which need not have been imported."""
-    spec = find_spec(module)
-    assert spec is not None and spec.origin is not None
-    return spec.origin
 
 
 @cache

@@ -3,18 +3,18 @@
 Several at once are done sooner than one, and a user is told once that this takes a while.
 """
 
+import contextlib
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 
 from . import jit
-from .cache_folder import file_folder
-from .sources import module_file
+from .sources import source_digest
 
-_READY = "parts.ready"  # in the folder of the module that lists them: those that were compiled
 _compiling = False  # whether this process is one of those that compile
 _tried: set[str] = set()  # parts that this process has had compiled, or could not have
 
@@ -27,20 +27,30 @@ def fill_cache(module: str, *groups: Sequence[str]) -> None:
     """
     if _compiling or jit.CACHE is None:
         return
+    for parts in groups:
+        missing = [part for part in parts if part not in _tried and not _is_ready(module, part)]
+        if not missing:
+            continue
+        _tried.update(missing)
+        jit.tell()
+        if not _compile_apart(module, missing):
+            return
+
+
+def _is_ready(module: str, part: str) -> bool:
+    """Whether a part was compiled from the files that its kernels would be compiled from now."""
     try:
-        ready = file_folder(jit.CACHE, module_file(module)) / _READY
-        for parts in groups:
-            done = ready.read_text().split() if ready.is_file() else []
-            missing = [part for part in parts if part not in done and part not in _tried]
-            if not missing:
-                continue
-            _tried.update(missing)
-            jit.tell()
-            if not _compile_apart(module, missing):
-                return
-            write_atomic(ready, "\n".join([*done, *missing]))
-    except (OSError, PoiseError):
-        return  # a folder that cannot be written has no cache: nothing to share
+        lines = _record(module, part).read_text().splitlines()
+        files = [line.partition(" ")[::2] for line in lines]
+        return bool(files) and all(source_digest(file) == digest for digest, file in files)
+    except OSError:
+        return False
+
+
+def _record(module: str, part: str) -> Path:
+    """What says from which files, with their digests, a part was compiled."""
+    assert jit.CACHE is not None
+    return jit.CACHE / f"{module}.{part}.ready"
 
 
 # Ends with the process that holds the other end of its standard input, even if that is killed.
@@ -59,8 +69,8 @@ def _compile_apart(module: str, parts: Sequence[str]) -> bool:
     try:
         for part in parts:
             code = (
-                f"{_WATCH}from {__name__} import begin; begin();"
-                f"from {module} import {part}; {part}()"
+                f"{_WATCH}from {__name__} import begin, end; begin();"
+                f"from {module} import {part}; {part}(); end({module!r}, {part!r})"
             )
             jobs.append(
                 subprocess.Popen(  # -P: no modules from the current folder
@@ -83,3 +93,11 @@ def begin() -> None:
     global _compiling
     _compiling = True
     jit.quiet()
+
+
+def end(module: str, part: str) -> None:
+    """This process has compiled a part: note from what."""
+    used = {each.py_func.__code__.co_filename for each in jit.kernels if each.overloads}
+    lines = [f"{source_digest(file)} {file}" for file in sorted(used)]
+    with contextlib.suppress(OSError, PoiseError):  # nothing to share
+        write_atomic(_record(module, part), "\n".join(lines))

@@ -35,10 +35,14 @@ class LimitTable:
 
     Measured with square pushes of 0.1 s; between two directions the limit is linear, around
     the circle.
+
+    Attributes:
+        directions: Directions in which J50 is known, heading frame [deg].
+        impulses: J50 in each of these directions [N·s].
     """
 
-    directions: tuple[float, ...]  # [deg], heading frame
-    impulses: tuple[float, ...] = field(metadata={"min": 0.0})  # J50 [N·s]
+    directions: tuple[float, ...]
+    impulses: tuple[float, ...] = field(metadata={"min": 0.0})
 
     def __post_init__(self):
         turns = [direction % 360.0 for direction in self.directions]
@@ -60,21 +64,38 @@ class PushSampler:
     impulse [N·s], force [N] (peak), specific_impulse [N·s/kg], delta_v [m/s] (velocity kicks),
     ankle_fraction (of `ankle_limit`), controller_fraction (of the controller's own J50, which
     grows with duration and profile as the ankle limit does).
+
+    Attributes:
+        magnitude: Range of the size of a push, in `unit`.
+        unit: Unit of the size of a push.
+        bodies: Bodies of which one is drawn for each push; none: those that the robot's description
+            names.
+        duration: Range of how long a push lasts [s].
+        direction: Range of the horizontal direction of a push, counter-clockwise from ahead [deg].
+        elevation: Range of the angle of a push above the horizontal [deg].
+        offset: Half side of the cube around the body's centre in which the point of a push is drawn
+            [m].
+        profile: Force over time: constant (square), or as half a sine.
+        start: Range of when the first push begins, after the reset [s].
+        count: Range of how many pushes there are in an episode.
+        interval: Range of the time from the end of a push to the start of the next one [s].
+        no_push: Probability of an episode without any push.
+        limit_table: J50 by direction that `controller_fraction` is measured by.
     """
 
     magnitude: Range = field(metadata={"min": 0.0})
     unit: Unit
-    bodies: tuple[str, ...] = ()  # one is drawn for each push; none: `push_bodies`
+    bodies: tuple[str, ...] = ()
     duration: Range = field(default=(LIMIT_DURATION, LIMIT_DURATION), metadata={"above": 0.0})
-    direction: Range = field(default=(0.0, 360.0), metadata={"min": -360.0, "max": 360.0})  # [deg]
-    elevation: Range = field(default=(0.0, 0.0), metadata={"min": -90.0, "max": 90.0})  # [deg]
-    offset: float = field(default=0.0, metadata={"min": 0.0})  # half side of the cube of points [m]
+    direction: Range = field(default=(0.0, 360.0), metadata={"min": -360.0, "max": 360.0})
+    elevation: Range = field(default=(0.0, 0.0), metadata={"min": -90.0, "max": 90.0})
+    offset: float = field(default=0.0, metadata={"min": 0.0})
     profile: Profile = "square"
-    start: Range = field(default=(0.5, 0.5), metadata={"min": 0.0})  # of the first push [s]
+    start: Range = field(default=(0.5, 0.5), metadata={"min": 0.0})
     count: tuple[int, int] = field(default=(1, 1), metadata={"min": 1, "max": 1000})
-    interval: Range = field(default=(1.0, 1.0), metadata={"min": 0.0})  # end to next start [s]
-    no_push: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0})  # probability
-    limit_table: LimitTable | None = None  # for controller_fraction
+    interval: Range = field(default=(1.0, 1.0), metadata={"min": 0.0})
+    no_push: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0})
+    limit_table: LimitTable | None = None
 
     def __post_init__(self):
         for name in (

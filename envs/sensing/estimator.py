@@ -61,11 +61,14 @@ from .odometry import (
 from .plant import Plant
 from .prediction import allocate_promises, keep_promises, predict
 from .realism import Realism
+from .rollout import Rollout, make_rollout, roll_out
 from .source import StateSource
 
 POSITIVE = {"above": 0.0}
-SENSE, EARLIER, HORIZON, EXACT, INVARIANT = range(5)  # entries of `Belief.steps`
+SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT = range(6)  # entries of `Belief.steps`
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
+#: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
+SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
 SINK = 0.05  # of the height error of the soles that a tick takes away
 
 
@@ -74,25 +77,27 @@ class EstimatorConfig:
     """How the state is estimated.
 
     Attributes:
-        kind: `odometry` integrates the accelerometer and is corrected by legs that stand;
-            `inekf` is the invariant Kalman filter of the same measurements;
+        kind: Estimator of the state: `odometry` integrates the accelerometer and is corrected by
+            legs that stand; `inekf` is the invariant Kalman filter of the same measurements;
             `exact` is the true state, as late as the sensors are; `auto` is `exact` at a level
             whose sensors have no errors, and else `odometry`.
-        predictor: `promised` leads the state on by the accelerations that the QP has promised, to
-            when the torques of this tick will act; `none` leaves it as late as it is.
-        filtered: whether joint velocities are filtered.
-        joint_acceleration: of joints, that nobody knows of, from step to step [rad/s²].
-        turn_acceleration: likewise of the root [rad/s²].
-        acceleration: the error of the accelerometer besides its noise, from step to step [m/s²].
-        bias: of the accelerometer, with that of the attitude, at the start [m/s²].
-        bias_walk: by which that changes in a second [m/s²].
-        slip: the error of a velocity that one leg tells, besides the joints' noise [m/s].
-        roll_radius: of it for each rad/s that the sole turns by [m].
-        invariant: what only `inekf` goes by.
+        predictor: Way in which the state is led on to when the torques of this tick will act:
+            `promised` by the accelerations that the QP has promised, `rollout` by a simulation of
+            the known robot with what its motors were asked for, `none` not at all; `auto` is
+            `rollout` while motors run servos, whose accelerations nobody promises, else `promised`.
+        filtered: Whether joint velocities are filtered.
+        joint_acceleration: Acceleration of joints that nobody knows of, step to step [rad/s²].
+        turn_acceleration: Angular acceleration of the root that nobody knows of [rad/s²].
+        acceleration: Error of the accelerometer besides its noise, from step to step [m/s²].
+        bias: Error of accelerometer and attitude together at the start [m/s²].
+        bias_walk: Change of that error in a second [m/s²].
+        slip: Error of a velocity that one leg tells, besides the joints' noise [m/s].
+        roll_radius: Error of that velocity for each rad/s that the sole turns by [m].
+        invariant: What only `inekf` goes by.
     """
 
     kind: Literal["auto", "odometry", "inekf", "exact"] = "auto"
-    predictor: Literal["promised", "none"] = "promised"
+    predictor: Literal["auto", "promised", "rollout", "none"] = "auto"
     filtered: bool = True
     joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
     turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
@@ -118,7 +123,8 @@ class Belief(Block):
     robot: RobotArrays  # that is believed in
     views: SimViews  # of its simulation
     state: StateArrays
-    steps: np.ndarray  # (5,) int: physics steps, see SENSE and its like
+    rollout: Rollout
+    steps: np.ndarray  # (6,) int: physics steps, see SENSE and its like
     axes: np.ndarray  # (3, 3) of the root, led on
     q: np.ndarray  # (nj,) likewise
     v: np.ndarray  # (nv,)
@@ -150,8 +156,10 @@ def believe(b: Belief):
         if b.steps[INVARIANT]:
             for a in range(3):
                 b.v[3 + a] -= b.invariant.gyro_bias[a]
-    if b.steps[HORIZON] > 0:  # at the start of an episode less is late than later on
-        ahead = b.steps[HORIZON] - b.steps[SENSE] + now - known
+    ahead = b.steps[HORIZON] - b.steps[SENSE] + now - known  # at an episode's start less is late
+    if b.steps[HORIZON] > 0 and b.steps[SIMULATED] + b.rollout.motors.bus.servoed[0] > 1:
+        roll_out(b.rollout, known, ahead, b.steps[EARLIER], b.position, b.axes, b.q, b.v)
+    elif b.steps[HORIZON] > 0:
         predict(
             o.promises, known, ahead, b.steps[EARLIER], b.robot.timestep,
             b.position, b.axes, b.q, b.v,
@@ -226,7 +234,8 @@ class EstimatedState(StateSource, Copyable):
         nv, zeros = plant.simulation.model.nv, guarded_zeros
         self.belief = Belief(
             rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
-            zeros(5, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
+            make_rollout(robot, plant.simulation.robot.terrain, self.motors),
+            zeros(6, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
         self.drive = Program.of([(drive_motors, self.motors)])
         self.sense = Program.of([(measure, self.sensors)])
@@ -245,7 +254,9 @@ class EstimatedState(StateSource, Copyable):
         earlier = max(round((drawn.command * dt + drawn.lag + drawn.misjudged) / dt), 0)
         horizon = drawn.sense + earlier if predicted else 0
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
-        self.belief.steps[:] = drawn.sense, earlier, horizon, exact, c.kind == "inekf"
+        self.belief.steps[:] = (
+            drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf"
+        )  # fmt: skip
         self._begin_odometry()
         self._begin_invariant()
         self.update()

@@ -35,13 +35,13 @@ class InvariantConfig:
     """What the invariant filter thinks of the world, besides the noises of the sensors.
 
     Attributes:
-        gyro_bias: at the start [rad/s].
-        gyro_bias_walk: by which it changes in a second [rad/s].
-        attitude: error of the attitude besides its drift, taken as new in every step [rad].
-        kinematics: error of a sole's place besides the encoders' noise [m].
-        slide: by which a sole that bears the robot wanders in a second [m].
-        roll: likewise for each rad/s that it turns by [m].
-        lift: likewise of a sole in the air [m].
+        gyro_bias: Bias of the gyroscope at the start, as `inekf` thinks [rad/s].
+        gyro_bias_walk: Change of that bias in a second [rad/s].
+        attitude: Error of the attitude besides its drift, taken as new in every step [rad].
+        kinematics: Error of a sole's place besides the encoders' noise [m].
+        slide: Way that a sole that bears the robot wanders in a second [m].
+        roll: Way that such a sole wanders for each rad/s that it turns by [m].
+        lift: Way that a sole in the air may go in a second [m].
     """
 
     gyro_bias: float = field(default=0.02, metadata=NOT_NEGATIVE)

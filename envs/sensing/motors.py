@@ -28,7 +28,7 @@ class Motors(Block):
     views: SimViews
     bus: MotorBus
     asked: np.ndarray  # (RING, 4, nu) what was asked for: torque, target, stiffness, damping
-    next: np.ndarray  # (1,) int: the row of the next ones
+    written: np.ndarray  # (1,) int: rows that were written since the reset; the next one follows
     late: np.ndarray  # (1,) int: physics steps
     torque: np.ndarray  # (nu,) that act [N·m]
     gain: np.ndarray  # (nu,)
@@ -43,7 +43,7 @@ def allocate_motors(simulation: Simulation, bus: MotorBus) -> Motors:
         views=simulation.views,
         bus=bus,
         asked=guarded_zeros((RING, 4, nu)),
-        next=guarded_zeros(1, dtype=np.int64),
+        written=guarded_zeros(1, dtype=np.int64),
         late=guarded_zeros(1, dtype=np.int64),
         torque=guarded_zeros(nu),
         gain=guarded_zeros(nu),
@@ -55,7 +55,7 @@ def begin_motors(m: Motors, drawn: DrawnRobot, holding: np.ndarray) -> None:
     """Start an episode, before which torques `holding` (nu,) [N·m] were asked for all the time."""
     m.asked[:], m.torque[:], m.gain[:] = 0.0, drawn.gain * holding, drawn.gain
     m.asked[:, TORQUE], m.bus.servoed[0] = holding, 0
-    m.next[0], m.late[0] = 0, drawn.command
+    m.written[0], m.late[0] = 0, drawn.command
     m.numbers[BLEND] = -np.expm1(-m.robot.timestep / drawn.lag) if drawn.lag > 0.0 else 1.0
     m.numbers[NO_LOAD] = drawn.no_load_speed
 
@@ -84,10 +84,10 @@ def drive_motors(m: Motors):
 
     `views.ctrl` stays what is asked for: the difference is a generalised force.
     """
-    k, n = m.next[0], m.asked.shape[0]
-    m.next[0] = (k + 1) % n
-    remember(m, m.asked[k])
-    then = m.asked[(k - m.late[0] + n) % n]
+    k, n = m.written[0], m.asked.shape[0]
+    m.written[0] += 1
+    remember(m, m.asked[k % n])
+    then = m.asked[(k - m.late[0]) % n]
     for i in range(m.torque.shape[0]):
         dof = m.robot.motor_dofs[i]
         asked = then[TORQUE, i]

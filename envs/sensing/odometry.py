@@ -19,6 +19,7 @@ from .prediction import Promises
 
 FROM_Q, FROM_DQ = 0, 1  # columns of `Odometry.gains`
 STIR, WANDER, SLIP, ROLL, JOINT_NOISE, RATE_GAIN = range(6)  # entries of `Odometry.numbers`
+LEAST = 1e-5, 1e-2  # noises of a joint's position and velocity [rad, rad/s]
 LOAD = 2  # column of `Odometry.pressed`
 VV, VB, BB = range(3)  # entries of `Odometry.variance`
 
@@ -60,11 +61,12 @@ def filter_gains(dt: float, acceleration: float, noise_q: float, noise_v: float)
     """(2, 2) gains of the stationary Kalman filter of a joint, whose state is (q, q̇).
 
     An acceleration that nobody knows, of this standard deviation [rad/s²] and new in every step of
-    `dt` [s], moves the joint; position and velocity are measured with noises [rad, rad/s].
+    `dt` [s], moves the joint; position and velocity are measured with noises [rad, rad/s], of which
+    neither is taken for less than `LEAST`.
     """
     A = np.array([[1.0, dt], [0.0, 1.0]])
     B = np.array([[0.5 * dt * dt], [dt]])
-    R = np.diag([max(noise_q, 1e-6) ** 2, max(noise_v, 1e-6) ** 2])
+    R = np.diag([max(noise_q, LEAST[0]) ** 2, max(noise_v, LEAST[1]) ** 2])
     P = solve_discrete_are(A.T, np.eye(2), acceleration**2 * B @ B.T + 1e-18 * np.eye(2), R)
     return P @ np.linalg.inv(P + R)
 

@@ -33,110 +33,128 @@ class RealismPart:
 
 @dataclass(frozen=True)
 class Latency(RealismPart):
-    """Time that passes [s], in whole physics steps: the nearest number of them is taken."""
+    """Time that passes, in whole physics steps: the nearest number of them is taken.
 
-    sense: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.05}
-    )  # from a measurement until it is known
-    command: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.05}
-    )  # from a torque that is asked for until the motor has it
-    #: by which the estimator takes both together for longer than they are
+    Attributes:
+        sense: Time from a measurement until it is known [s].
+        command: Time from a torque that is asked for until the motor has it [s].
+        misjudged: Time by which the estimator takes all delays for longer than they are [s].
+    """
+
+    sense: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.05})
+    command: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.05})
     misjudged: Spread = field(default=0.0, metadata={"min": -0.05, "max": 0.05})
 
 
 @dataclass(frozen=True)
-class Motors(RealismPart):
-    """What comes of a torque that a motor is asked for."""
+class MotorErrors(RealismPart):
+    """What comes of a torque that a motor is asked for.
 
-    lag: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.1}
-    )  # time constant of its first-order response [s]
-    gain_error: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.9}
-    )  # each motor's gain is 1 ± this, uniformly
-    friction: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 1.0}
-    )  # Coulomb's, of each joint, over the motor's limit
-    #: at which a motor has no torque left [rad/s]; it falls linearly from half of it on; 0: never
+    Attributes:
+        lag: Time constant of a motor's first-order response [s].
+        gain_error: Range ± of each motor's gain around 1.
+        friction: Coulomb friction of each joint, over the motor's limit.
+        no_load_speed: Speed at which a motor has no torque left, which falls from half of it on
+            [rad/s]; 0: never.
+        backlash: Play between a joint and its encoder [rad].
+    """
+
+    lag: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.1})
+    gain_error: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.9})
+    friction: Spread = field(default=0.0, metadata={"min": 0.0, "max": 1.0})
     no_load_speed: Spread = field(default=0.0, metadata={"min": 0.0})
-    backlash: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.2}
-    )  # play between joint and encoder [rad]
+    backlash: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.2})
 
 
 @dataclass(frozen=True)
-class Sensors(RealismPart):
+class SensorErrors(RealismPart):
     """Errors of measurements, one each physics step; a noise is the deviation of a normal one.
 
     A bias is drawn for an episode, each entry uniformly in ± the number.
+
+    Attributes:
+        encoder_noise: Noise of joint positions [rad].
+        encoder_bias: Bias of joint positions [rad].
+        velocity_noise: Noise of joint velocities [rad/s].
+        gyro_noise: Noise of the gyroscope [rad/s].
+        gyro_bias: Bias of the gyroscope [rad/s].
+        accelerometer_noise: Noise of the accelerometer [m/s²].
+        accelerometer_bias: Bias of the accelerometer [m/s²].
+        tilt_bias: Bias of the IMU's mount about each axis [rad].
+        tilt_drift: Deviation of the attitude's error, which is correlated over 1 s [rad].
+        force_noise: Noise of the ground's force, over the weight.
+        cop_noise: Noise of the centre of pressure [m].
     """
 
-    encoder_noise: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.1}
-    )  # of joint positions [rad]
-    encoder_bias: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.5})  # [rad]
-    velocity_noise: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 100.0}
-    )  # of joint velocities [rad/s]
-    gyro_noise: Spread = field(default=0.0, metadata={"min": 0.0, "max": 10.0})  # [rad/s]
-    gyro_bias: Spread = field(default=0.0, metadata={"min": 0.0, "max": 1.0})  # [rad/s]
-    accelerometer_noise: Spread = field(default=0.0, metadata={"min": 0.0, "max": 100.0})  # [m/s²]
-    accelerometer_bias: Spread = field(default=0.0, metadata={"min": 0.0, "max": 10.0})  # [m/s²]
-    tilt_bias: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.5}
-    )  # of the IMU's mount about each axis [rad]
-    tilt_drift: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.5}
-    )  # deviation of the attitude, correlated over 1 s [rad]
-    force_noise: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 1.0}
-    )  # of the ground's force over the weight
-    cop_noise: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.5}
-    )  # of the centre of pressure at full load [m]
+    encoder_noise: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.1})
+    encoder_bias: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.5})
+    velocity_noise: Spread = field(default=0.0, metadata={"min": 0.0, "max": 100.0})
+    gyro_noise: Spread = field(default=0.0, metadata={"min": 0.0, "max": 10.0})
+    gyro_bias: Spread = field(default=0.0, metadata={"min": 0.0, "max": 1.0})
+    accelerometer_noise: Spread = field(default=0.0, metadata={"min": 0.0, "max": 100.0})
+    accelerometer_bias: Spread = field(default=0.0, metadata={"min": 0.0, "max": 10.0})
+    tilt_bias: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.5})
+    tilt_drift: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.5})
+    force_noise: Spread = field(default=0.0, metadata={"min": 0.0, "max": 1.0})
+    cop_noise: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.5})
 
 
 @dataclass(frozen=True)
-class Body(RealismPart):
-    """By what the robot differs from its model."""
+class BodyErrors(RealismPart):
+    """By what the robot differs from its model.
 
-    com: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.5}
-    )  # shift of the pushed body's centre of mass [m], any direction
-    mass: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 0.9}
-    )  # each body's mass is 1 ± this of the model's, uniformly
-    scale: Spread = field(
-        default=0.0, metadata={"min": -0.9, "max": 10.0}
-    )  # by which all masses are larger
-    payload: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 10.0}
-    )  # carried on the pushed body, over the robot's mass
+    Attributes:
+        com: Shift of the pushed body's centre of mass, in any direction [m].
+        mass: Range ± of each body's mass around that of the model.
+        scale: Fraction by which all masses are larger.
+        payload: Load on the pushed body, over the robot's mass.
+    """
+
+    com: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.5})
+    mass: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.9})
+    scale: Spread = field(default=0.0, metadata={"min": -0.9, "max": 10.0})
+    payload: Spread = field(default=0.0, metadata={"min": 0.0, "max": 10.0})
 
 
 @dataclass(frozen=True)
-class Ground(RealismPart):
-    """By what the ground differs from the model's; None: by nothing."""
+class GroundErrors(RealismPart):
+    """By what the ground differs from the model's.
+
+    Attributes:
+        friction: Sliding friction of all geoms; None: the model's.
+        softness: Least time constant of contacts, MuJoCo's `solref` [s]; None: the model's.
+        slope: Slope of all ground in any direction, which is thought level [deg].
+    """
 
     friction: Spread | None = field(default=None, metadata={"above": 0.0, "max": 10.0})
-    #: time constant of contacts, MuJoCo's first number of `solref` [s]
     softness: Spread | None = field(default=None, metadata={"above": 0.0, "max": 1.0})
-    slope: Spread = field(
-        default=0.0, metadata={"min": 0.0, "max": 30.0}
-    )  # of all ground, in any direction, thought level [deg]
+    slope: Spread = field(default=0.0, metadata={"min": 0.0, "max": 30.0})
 
 
 @dataclass(frozen=True)
 class Realism:
-    """A level: what an episode's robot is drawn from, see `draw_robot`."""
+    """A level: what an episode's robot is drawn from, see `draw_robot`.
+
+    Attributes:
+        name: Name of the level, as it is told.
+        latency: How late measurements and torques are.
+        motors: What motors do otherwise than they are asked.
+        sensors: How sensors err.
+        body: By what the robot differs from its model.
+        ground: By what the ground differs from the model's.
+    """
 
     name: str = IDEAL
     latency: Latency = field(default_factory=Latency)
-    motors: Motors = field(default_factory=Motors)
-    sensors: Sensors = field(default_factory=Sensors)
-    body: Body = field(default_factory=Body)
-    ground: Ground = field(default_factory=Ground)
+    motors: MotorErrors = field(default_factory=MotorErrors)
+    sensors: SensorErrors = field(default_factory=SensorErrors)
+    body: BodyErrors = field(default_factory=BodyErrors)
+    ground: GroundErrors = field(default_factory=GroundErrors)
+
+    @staticmethod
+    def named(name: str) -> Realism:
+        """The level that a configuration names, see `load_realism`."""
+        return load_realism(name)
 
     @property
     def ideal(self) -> bool:
@@ -157,7 +175,7 @@ class Realism:
 
 def _scaled(part: RealismPart, factor: float) -> RealismPart:
     def value(spread: Spread | None, name: str) -> Spread | None:
-        if spread is None or (name in ("friction", "softness") and isinstance(part, Ground)):
+        if spread is None or (name in ("friction", "softness") and isinstance(part, GroundErrors)):
             return spread
         if isinstance(spread, tuple):
             return (factor * spread[0], factor * spread[1])

@@ -42,10 +42,10 @@ class Terrain(OfKind):
     The start is at z = 0.
 
     Attributes:
-        error: by which the heights of surfaces differ from what is believed, at most, uniform in ±
-            [m]; the one of the start does not.
-        unseen: whether level ground is believed, without any surface to step on.
-        seed: of the errors, and of what else a kind draws.
+        error: Largest difference of a surface's height from what is believed, uniform in ± [m]; the
+            start's has none.
+        unseen: Whether level ground is believed, without any surface to step on.
+        seed: Seed of the heights' errors, and of what else a kind draws.
     """
 
     room: ClassVar[str] = str(__package__)

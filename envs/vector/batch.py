@@ -181,6 +181,8 @@ class EnvBatch(Copyable):
                 f"has shape {vectors.shape}, expected {record.action.shape}", field="action"
             )
         vectors = vectors[live].astype(float, copy=False)
+        if self.envs[0].config.clip_action:
+            vectors = np.clip(vectors, -1.0, 1.0)
         good = np.abs(vectors) <= 1.0 + BEYOND  # NaN is not
         if not good.all():
             for env, vector in zip(np.array(self.envs, dtype=object)[live], vectors, strict=True):

@@ -29,6 +29,7 @@ __all__ = [
     "load_policy",
     "load_robot",
     "load_standalone",
+    "make_env",
     "training",
 ]
 
@@ -78,7 +79,7 @@ if TYPE_CHECKING:
     from poise.configs.errors import ConfigError, PoiseError
     from poise.envs.robots.robot import load_robot
     from poise.training.evaluation.evaluate import benchmark, evaluate
-    from poise.training.learning.policy import load_policy
+    from poise.training.learning.policy import load_policy, make_env
     from poise.training.standalone.controller import load_standalone
 else:
     __getattr__, __dir__ = lazy(
@@ -90,7 +91,7 @@ else:
             "configs.errors": ("ConfigError", "PoiseError"),
             "envs.robots.robot": ("load_robot",),
             "training.evaluation.evaluate": ("benchmark", "evaluate"),
-            "training.learning.policy": ("load_policy",),
+            "training.learning.policy": ("load_policy", "make_env"),
             "training.standalone.controller": ("load_standalone",),
         },
     )

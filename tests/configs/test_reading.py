@@ -38,6 +38,7 @@ from poise.configs.schema import build
 from poise.configs.yaml_loader import DEPTH, DIGITS, NODES
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
+from poise.envs.sensing.realism import load_realism
 from poise.training.gaits.human import load_knee_moment
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
@@ -49,6 +50,7 @@ from tests.support.hangs import no_hang
 from tests.support.shared import robot
 
 LOADERS: dict[str, Callable[[Any], Any]] = {
+    "realism": load_realism,
     "robots": load_robot,
     "envs": env_config,
     "controllers": controller_config,

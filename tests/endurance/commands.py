@@ -27,6 +27,10 @@ from tests.support.shared import tiny_config
 
 RUN = ("command", "versions", "machine", "workers", "backend", "commit", "seconds", "tick_us")
 WORKERS = "2"
+WALKS = {
+    "duration": 3.0,
+    "walk": {"commands": [{"ahead": 0.0}, {"ahead": 0.4}], "trials": 8},
+}
 TUNING = {
     "controller": "momentum-qp",
     "gains": {"com.stiffness": [0.2, 12.0], "com.offset": [-0.06, 0.06]},
@@ -46,10 +50,12 @@ class Command:
     kept: Callable[[Path], int]
     resumes: Callable[[Path], bool] = lambda out: False  # whether it wants --resume there
     has_workers: bool = True
+    file: str = ""  # that is written in the folder, where the command wants no folder
 
     def line(self, out: Path) -> list[str]:
         """To start, or to go on."""
-        return [*self.arguments, "--out", str(out), *(["--resume"] if self.resumes(out) else [])]
+        place = str(out / self.file) if self.file else str(out)
+        return [*self.arguments, "--out", place, *(["--resume"] if self.resumes(out) else [])]
 
 
 def commands(room: Path, trials: int = 60) -> list[Command]:
@@ -61,10 +67,12 @@ def commands(room: Path, trials: int = 60) -> list[Command]:
         "small": yaml.safe_dump(small),
         "train": train,
         "tune": yaml.safe_dump(TUNING),
+        "walks": yaml.safe_dump(WALKS),
     }
     for name, text in files.items():
         (room / f"{name}.yaml").write_text(text)
     both, workers = ("momentum-qp", "zero"), ("--workers", WORKERS)
+    policies = ("residual", "residual-step")
     return [
         Command(
             "evaluate",
@@ -91,6 +99,19 @@ def commands(room: Path, trials: int = 60) -> list[Command]:
             ("train", "--config", f"{room}/train.yaml", "--seeds", "0", "1", *workers),
             _seeds, lambda out: sum(_steps(folder) for folder in out.glob("seed-*")),
             lambda out: (out / "seeds.json").exists(),
+        ),
+        Command(
+            "policies",
+            ("evaluate", *policies, "--suite", f"{room}/suite.yaml", "--seed", "4", *workers),
+            _evaluation, lambda out: _lines(out / "trials.jsonl"),
+        ),
+        Command(
+            "walk", ("evaluate", "walk", "--suite", f"{room}/walks.yaml", "--seed", "1", *workers),
+            _evaluation, lambda out: _lines(out / "trials.jsonl"),
+        ),
+        Command(
+            "motion", ("motion", "import", "cmu02_punch"), _files("punch.npz"), lambda out: 0,
+            has_workers=False, file="punch.npz",
         ),
     ]  # fmt: skip
 

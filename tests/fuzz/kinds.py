@@ -13,7 +13,7 @@ from hypothesis.strategies import SearchStrategy
 from .values import Json
 
 NAMES = ("yaml_files", "robots", "resets", "pushes", "actions", "constructors", "policies",
-         "results", "commands")  # fmt: skip
+         "results", "commands", "motions", "networks", "urdfs")  # fmt: skip
 
 
 @dataclass(frozen=True)

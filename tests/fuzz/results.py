@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -46,6 +47,16 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "replay of pd": lambda path: replay(path, 1, "pd"),
     "report": lambda path: write_report(path, films=False),
 }
+INSTEAD: dict[str, Callable[[Path], Any]] = {  # of a file
+    "pipe": os.mkfifo,
+    "folder": Path.mkdir,
+    "link outside": lambda file: file.symlink_to("/etc/passwd"),
+    "link to a device": lambda file: file.symlink_to("/dev/zero"),
+    "circle": lambda file: file.symlink_to(file),
+}
+#: what a spreadsheet, a page, a terminal or Markdown would take for more than a text
+TEXTS_THAT_ACT = ("=1+1", "@SUM(A1)", "\x1b]0;a\x07", "<img src=q onerror=a()>", "`${a()}`",
+                  "[a](javascript:a())", "{{7*7}}")  # fmt: skip
 SELDOM = ("report", "replay", "replay of pd")  # tenths of a second each
 
 
@@ -62,7 +73,9 @@ def _changed_cell(draw: Draw, content: bytes) -> bytes:
     how = draw(st.sampled_from(["cell", "cell", "cell", "drop", "twice", "longer", "shorter"]))
     if how == "cell":
         junk = st.sampled_from([str(n) for n in NUMBERS if not isinstance(n, dict)] + TEXTS)
-        rows[row][column] = draw(st.one_of(junk, st.sampled_from(["nan", "-inf", "[{}]", "[1]"])))
+        rows[row][column] = draw(
+            st.one_of(junk, st.sampled_from(["nan", "-inf", "[{}]", "[1]", *TEXTS_THAT_ACT]))
+        )
     elif how == "drop":
         del rows[row]
     elif how == "twice":
@@ -86,11 +99,17 @@ def cases(draw: Draw) -> Json:
         content = changed(draw, _file(result, name), form)
     often = [reader for reader in READERS if reader not in SELDOM]
     reader = draw(st.sampled_from(often * 3 + list(SELDOM)))
-    return {"result": result, "file": name, "content": packed(content), "reader": reader}
+    kind = draw(st.sampled_from(["file"] * 12 + sorted(INSTEAD)))
+    return {"result": result, "file": name, "content": packed(content), "reader": reader,
+            "as": kind}  # fmt: skip
 
 
 def play(case: Json, folder: Path) -> None:
     """Read it."""
     path = copy_sample(case["result"], folder)
-    (path / case["file"]).write_bytes(decode(case["content"]))
+    file = path / case["file"]
+    file.write_bytes(decode(case["content"]))
+    if case.get("as", "file") != "file":
+        file.unlink()
+        INSTEAD[case["as"]](file)
     READERS[case["reader"]](path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 import re
 import xml.etree.ElementTree as ET
 from functools import cache
@@ -52,7 +53,18 @@ ELEMENTS = [
     '<include file="robot.xml"/>',
     '<include file="nowhere.xml"/>',
     '<include file="/dev/zero"/>',
+    '<include file="pipe"/>',
+    '<include file="../outside.xml"/>',
+    '<include file="folder"/>',
     '<asset><mesh name="nowhere" file="nowhere.obj"/></asset>',
+    '<asset><mesh name="p" file="pipe"/><texture name="q" type="2d" file="pipe"/></asset>',
+    '<asset><mesh name="many" file="many.stl"/></asset>',
+    '<asset><mesh name="link" file="link.stl"/></asset>',
+    '<asset><model name="p" file="pipe"/></asset>',
+    '<asset><hfield name="p" file="pipe" size="1 1 1 1"/></asset>',
+    '<deformable><skin name="p" file="pipe"/></deformable>',
+    '<flexcomp type="mesh" file="pipe" name="p"/>',
+    '<extension><plugin plugin="nowhere"/></extension>',
     '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>',
     '<asset><mesh name="m" builtin="sphere" params="9"/></asset>',
     '<asset><hfield name="h" nrow="40000" ncol="40000" size="1 1 1 1"/></asset>',
@@ -119,7 +131,7 @@ def _scaled(draw: Draw, text: str) -> str:
     return " ".join(words)
 
 
-def _edit_xml(draw: Draw, content: bytes) -> bytes:
+def edit_xml(draw: Draw, content: bytes) -> bytes:
     root = ET.fromstring(content)
     for _ in range(draw(st.integers(1, 3))):
         _edit_element(draw, root)
@@ -133,7 +145,7 @@ def cases(draw: Draw) -> Json:
     mjcf, description = _file(name, "xml"), _file(name, "yaml")
     what = draw(st.sampled_from(["elements"] * 5 + ["bytes", "description"]))
     if what == "elements":
-        mjcf = _edit_xml(draw, mjcf)
+        mjcf = edit_xml(draw, mjcf)
     elif what == "bytes":
         mjcf = edit_bytes(mjcf, byte_edits(draw, len(mjcf)))
     else:
@@ -141,11 +153,26 @@ def cases(draw: Draw) -> Json:
     return {"robot": name, "mjcf": packed(mjcf), "description": packed(description)}
 
 
+def write_strange(folder: Path) -> None:
+    """What models name that is no model: a pipe, a folder, a link outside, a mesh of 10⁸ faces."""
+    os.mkfifo(folder / "pipe")
+    (folder / "folder").mkdir()
+    os.symlink("/etc/passwd", folder / "link.stl")
+    (folder / "many.stl").write_bytes(bytes(80) + (10**8).to_bytes(4, "little") + bytes(50))
+    (folder.parent / "outside.xml").write_text("<mujoco><worldbody/></mujoco>")
+
+
 def play(case: Json, folder: Path) -> None:
     """Load the robot; if it loads, let it stand for three policy steps."""
+    write_strange(folder)
     (folder / f"{case['robot']}.xml").write_bytes(decode(case["mjcf"]))
     path = folder / f"{case['robot']}.yaml"
     path.write_bytes(decode(case["description"]))
+    stand(path)
+
+
+def stand(path: Path) -> None:
+    """Load a robot, and let it stand for three policy steps."""
     env = TorqueBalanceEnv(load_robot(path))
     observation, _ = env.reset(seed=0)
     for _ in range(3):

@@ -29,6 +29,10 @@ IDS = {
     "poise/PositionBalance-v0": PositionBalanceEnv,
 }
 EACH = pytest.mark.parametrize("name", IDS)
+#: one of them in every run, all in `make weekly`
+ONE = pytest.mark.parametrize(
+    "name", [name if k == 0 else pytest.param(name, marks=pytest.mark.weekly)
+             for k, name in enumerate(IDS)])  # fmt: skip
 PUSHES = {"magnitude": [0.1, 0.3], "unit": "specific_impulse", "start": [0.0, 0.1]}
 SMALL = {"duration": 0.4, "pushes": PUSHES, "fall": {"quiet_time": 0.1}}
 
@@ -54,7 +58,9 @@ def test_stable_baselines3_finds_nothing_to_say(name):
 def test_make_gives_the_documented_class(name):
     """`unwrapped` is the class, and no wrapper ends episodes before the configuration does."""
     env = gymnasium.make(name)
-    assert type(env.unwrapped) is IDS[name] and env.spec.max_episode_steps is None
+    assert (
+        type(env.unwrapped) is IDS[name] and env.spec.max_episode_steps == env.unwrapped.max_steps
+    )
     assert env.observation_space == env.unwrapped.observation_space
     assert env.action_space.low.min() == -1.0 and env.action_space.high.max() == 1.0
 
@@ -66,6 +72,7 @@ def test_processes_without_poise_can_make_it():
     assert out.stdout.strip() == "poise/TorqueBalance-v0"
 
 
+@pytest.mark.weekly
 def test_processes_of_stable_baselines3():
     """Its spawned workers make the environment by the id with the module's name."""
     code = (
@@ -93,9 +100,20 @@ def test_the_spec_can_be_written_and_read(name):
     assert np.array_equal(again.reset(seed=3)[0], env.reset(seed=3)[0])
 
 
+@ONE
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_gymnasium_s_vectors_are_single_environments(name, mode):
+    """Observations, rewards, ends and infos of Gymnasium's own vector environments."""
+    compare_with_single_ones(name, mode)
+
+
 @EACH
-@pytest.mark.parametrize("mode", ["vector_entry_point", "sync", "async"])
-def test_vector_environments_are_single_ones(name, mode):
+def test_vector_environments_are_single_ones(name):
+    """The same of ours."""
+    compare_with_single_ones(name, "vector_entry_point")
+
+
+def compare_with_single_ones(name, mode):
     """Rows of make_vec equal single environments with the seeds of the rows."""
     vector = gymnasium.make_vec(name, num_envs=2, vectorization_mode=mode, **SMALL)
     try:
@@ -120,8 +138,18 @@ def test_vector_environments_are_single_ones(name, mode):
 
 
 @EACH
-@pytest.mark.parametrize("algorithm", [PPO, SAC])
-def test_sb3_algorithms_learn(name, algorithm):
+def test_ppo_learns(name):
+    """Stable-Baselines3's, on every environment."""
+    learn(name, PPO)
+
+
+@ONE
+def test_sac_learns(name):
+    """The same, off policy."""
+    learn(name, SAC)
+
+
+def learn(name, algorithm):
     """PPO and SAC run on the plain environment, and their weights change."""
     settings = (
         {"n_steps": 64, "batch_size": 32, "n_epochs": 1}

@@ -24,7 +24,7 @@ from poise.training.cli import entry, motion, train
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 LANGUAGES = {"python", "bash", "yaml", ""}  # "" is a figure: an equation, a tree, a listing
-SCRIPTS = ("git ", "tensorboard ", "pip install ")  # commands of others
+SCRIPTS = ("git ", "tensorboard ", "pip install ", "docker ")  # commands of others
 INLINE = re.compile(r"`(poise\s[^`]+)`")
 FOLDERS = "envs|baselines|training|configs|tests|examples"
 PLACES = {"N": "1", "K": "1", "…": "", "CONTROLLER…": "momentum-qp"}  # where a page names no value
@@ -146,7 +146,7 @@ def test_commands_of_sentences_parse(page: str, command: str, parsed: list[str])
     if words[:1] == ["motion"] and len(words) == 2:
         assert words[1] in motion.MOTION, page
         return
-    if len(words) == 1 or words[1] == "--help" or words[0] == "--print-completion":
+    if len(words) == 1 or words[1] in ("--help", "--help-all") or words[0] == "--print-completion":
         assert words[0] in {*entry.COMMANDS, "COMMAND", "--print-completion"}, page
         return
     if words[0] in NEEDED and "--out" not in words:

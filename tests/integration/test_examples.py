@@ -9,6 +9,7 @@ import pytest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ARGUMENTS = {
+    "optuna_search.py": ["1", "64"],
     "own_controller.py": [],
     "plain_mujoco.py": ["feedback-step"],
     "ppo_single_file.py": ["--steps", "128", "--envs", "2", "--rollout", "32"],
@@ -46,12 +47,14 @@ def test_a_controller_outside_of_environments_stands(tmp_path):
     assert len((EXAMPLES / "plain_mujoco.py").read_text().splitlines()) <= 40
 
 
+@pytest.mark.weekly
 def test_ppo_in_a_single_file(tmp_path):
     """The loop collects and updates, and reports as it goes."""
     lines = run("ppo_single_file.py", tmp_path).splitlines()
     assert [int(re.sub(r"\D", "", line.split("steps")[0])) for line in lines] == [64, 128]
 
 
+@pytest.mark.weekly
 def test_stable_baselines3_in_ten_lines(tmp_path):
     """It learns and saves."""
     assert "fps" in run("sb3_train.py", tmp_path)
@@ -84,12 +87,34 @@ def test_zoo(tmp_path):
     assert list(tmp_path.glob("logs/ppo/**/*.zip"))
 
 
+def test_optuna(tmp_path):
+    """A trial of a few steps."""
+    pytest.importorskip("optuna", reason="make weekly has it")
+    assert "learning_rate" in run("optuna_search.py", tmp_path)
+
+
+def test_dataset(tmp_path, monkeypatch):
+    """Two trials that Minari reads back, with their pushes."""
+    minari = pytest.importorskip("minari", reason="make weekly has it")
+    from poise.training.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    assert main(["dataset", "zero", "--trials", "2", "--out", "data"]) == 0
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "data"))
+    data = minari.load_dataset("poise/pushes-v0")
+    assert data.total_episodes == 2
+    first = data[0]
+    assert len(first.observations) == len(first.actions) + 1 == len(first.rewards) + 1
+    assert first.infos["push"]["impulse"].shape == (len(first.observations), 1)
+
+
 def test_video(tmp_path, can_render):
     """Gymnasium's own wrapper films two episodes."""
     pytest.importorskip("moviepy", reason="make weekly has it")
     assert run("record_video.py", tmp_path).count("frames") == 2
 
 
+@pytest.mark.weekly
 def test_the_picture_of_the_readme(tmp_path, can_render):
     """Frames of a push are drawn into one picture."""
     run("push_strip.py", tmp_path)

@@ -31,12 +31,12 @@ FOLDERS = {
 
 
 def tracked_files() -> list[Path]:
-    """Files of the mapped folders that git tracks, relative to the root."""
+    """Files of the mapped folders that git tracks, relative to the root; no links."""
     if not (ROOT / ".git").exists():
         pytest.skip("not a git checkout")
     command = ["git", "ls-files", "-z", "--", *FOLDERS]
     listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    return [Path(name) for name in listing.split("\0") if name and (ROOT / name).exists()]
+    return [Path(name) for name in listing.split("\0") if name and (ROOT / name).is_file()]
 
 
 def installed_name(path: Path) -> str:
@@ -48,13 +48,16 @@ def installed_name(path: Path) -> str:
 
 
 def test_the_wheel_holds_exactly_the_tracked_files(tmp_path: Path) -> None:
-    """A package or data file that setup.py or pyproject.toml forgets is found here."""
+    """A package or data file that pyproject.toml forgets is found here."""
     tracked = tracked_files()
-    others = [Path(name) for name in ("setup.py", "pyproject.toml", "LICENSE", "README.md")]
+    others = [Path(name) for name in ("pyproject.toml", "LICENSE", "README.md")]
     source = tmp_path / "source"
     for path in tracked + [path for path in others if (ROOT / path).exists()]:
         (source / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / path, source / path)
+    for link in (ROOT / "src/poise").iterdir():
+        if link.is_symlink():
+            (source / "src/poise" / link.name).symlink_to(link.readlink())
     options = ["--no-deps", "--no-build-isolation", "--quiet", "--wheel-dir", str(tmp_path)]
     command = [sys.executable, "-m", "pip", "wheel", *options, str(source)]
     built = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -106,6 +109,20 @@ def test_every_mapped_folder_is_imported_as_poise(folder: str) -> None:
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert result.returncode == 1
     assert f"write `import poise.{folder}`" in result.stderr
+
+
+def test_types_are_seen_where_poise_is_installed() -> None:
+    """Type checkers follow `import poise` of a user's file from this environment's site-packages
+    to annotated sources: they do not run import hooks, and without py.typed take nothing."""
+    modulefinder = pytest.importorskip("mypy.modulefinder")
+    options = importlib.import_module("mypy.options").Options()
+    options.python_executable = sys.executable
+    packages = modulefinder.compute_search_paths([], options, str(ROOT)).package_path
+    paths = modulefinder.SearchPaths((), (), packages, ())
+    cache = modulefinder.FindModuleCache(paths, None, options)
+    for name in ("poise", "poise.envs.robots.robot", "poise.training.learning.policy"):
+        found = cache.find_module(name)
+        assert isinstance(found, str) and found.endswith(".py"), (name, found)
 
 
 def test_import_poise_is_light() -> None:

@@ -23,21 +23,21 @@ MOST = 14  # files in a room
 FLOORS = """
  1 configs, training/statistics
  2 envs/compiled, baselines/allowance, baselines/scripts
- 3 envs/maths, envs/terrain, baselines/solvers, baselines/warmup
- 3 training/running
+ 3 envs/maths, envs/robots/models, envs/terrain, baselines/solvers, baselines/warmup
+ 3 training/options, training/running
  4 envs/robots, baselines/clips
  5 envs/pushes, baselines/joining
  6 envs/physics, baselines/inverse_kinematics, baselines/matching, baselines/motion_graphs
  7 envs/sensing, envs/viewing, baselines/controller
  7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
  8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
- 9 envs/vector, baselines/feasibility, baselines/in_place, baselines/policy_files
+ 9 envs/plain_info, envs/vector, baselines/feasibility, baselines/in_place, baselines/policy_files
  9 baselines/retargeting
  9 baselines/stepping, baselines/walking/models
 10 baselines/performing, baselines/space_time/constraints, baselines/synthesis, baselines/walking
 11 baselines/registry, baselines/space_time
 12 baselines/environments
-13 training/learning, training/tracking
+13 training/diagnosis, training/learning, training/tracking
 14 training/trials
 15 training/figures, training/following, training/open_loop, training/standalone
 15 training/suites, training/tuning

@@ -1,5 +1,6 @@
 """The types of arguments that several sub-commands take, and a first look at what is given."""
 
+import json
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -20,6 +21,11 @@ PolicyName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY"
 RobotName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
+Json = Annotated[
+    bool,
+    tyro.conf.FlagCreatePairsOff,
+    tyro.conf.arg(help="Print the result as JSON; what people read goes to standard error."),
+]
 Allow = Annotated[
     tuple[str, ...],
     tyro.conf.UseAppendAction,
@@ -29,6 +35,11 @@ Allow = Annotated[
         "or a policy, or a policy's file of TorchScript (.pt, .pth, .jit, .ts); repeatable.",
     ),
 ]
+
+
+def print_json(value: object) -> None:
+    """Print a value as JSON, and nothing else."""
+    print(json.dumps(value, indent=2, ensure_ascii=False))
 
 
 def check_folders(*paths: str | Path) -> None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 
 from poise.training.running.terminal import terminal
 
-from .arguments import Allow, Names, RobotName, Switch
-from .export import export
+from .arguments import Allow, Json, Names, RobotName, Switch, print_json
+from .export import dataset, export
 from .results import compare, leaderboard, replay, report
 from .view import view
 from .walk import gait, walk
@@ -28,8 +28,9 @@ def demo(
 ) -> None:
     """Push four controllers and compare: a table, two plots and a video, in a minute or so.
 
-    momentum-qp, whose feet stay in place; capture-step, which steps; feedback-step and the policy
-    residual-step, which step better. The same command goes on where it was stopped.
+    momentum-qp, whose feet stay in place; capture-step, which steps; feedback-step, which steps
+    better; the policy residual-torque on top of that. The same command goes on where it was
+    stopped.
 
     Args:
         out: folder to write to; out/demo, or out/demo-full, if not given.
@@ -48,14 +49,14 @@ def demo(
 
 
 def train() -> None:
-    """Train a residual policy with PPO; `poise train --help` lists every field of its config."""
+    """Train a policy with PPO: `poise train --quick` is a first one, in some ten minutes."""
     raise AssertionError("main() answers this sub-command")
 
 
 def evaluate(
     controllers: Names,
     /,
-    suite: str = "random",
+    suite: str = "strong",
     *,
     out: Path | None = None,
     robot: str = "humanoid",
@@ -68,6 +69,7 @@ def evaluate(
     motions: tuple[str, ...] = (),
     realism: str | None = None,
     overwrite: Switch = False,
+    json: Json = False,
     allow: Allow = (),
 ) -> int:
     """Play a suite of pushes with several controllers, all on the same trials.
@@ -77,12 +79,12 @@ def evaluate(
     controller raised.
 
     Args:
-        controllers: a name of `poise list`, such as residual (a shipped policy), zero (no torque),
-            a .yaml file of a controller, a folder written by poise train, with --seeds too, or a
-            class of your own, my_file.py:Class or module:Class. What a file or a folder names so
-            needs --allow my_file.py:Class besides.
-        suite: random, envelope, grid, quiet, repeated, in-step, follow, those of poise benchmark,
-            or a .yaml file.
+        controllers: a name of `poise list`, such as residual-torque (a shipped policy), zero (no
+            torque), a .yaml file of a controller, a folder written by poise train, with --seeds
+            too, or a class of your own, my_file.py:Class or module:Class. What a file or a folder
+            names so needs --allow my_file.py:Class besides.
+        suite: strong (random pushes that tell good controllers apart), random, envelope, grid,
+            quiet, repeated, in-step, follow, those of poise benchmark, or a .yaml file.
         out: folder to write to; out/SUITE if not given.
         robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the trials.
@@ -112,18 +114,21 @@ def evaluate(
     summary = evaluate(
         controllers, suite, out=folder, robot=robot, seed=seed, workers=workers, backend=backend,
         trials=trials, limits=limits, motions=motions, realism=realism, overwrite=overwrite,
-        console=terminal(), allow=allow,
+        console=terminal(stderr=json), allow=allow,
     )  # fmt: skip
     if write_limits is not None:
         measured_limits(summary, write_limits, robot)
-        print(write_limits)
+        terminal(stderr=json).print(str(write_limits), soft_wrap=True)
+    if json:
+        print_json(summary)
     return _raised(summary, folder)
 
 
 def benchmark(
+    controllers: Names = (),
+    /,
     *,
     out: Path,
-    controllers: tuple[str, ...] = (),
     suite: str = "standard",
     robot: str = "humanoid",
     seed: int = 0,
@@ -133,6 +138,7 @@ def benchmark(
     realism: str | None = None,
     overwrite: Switch = False,
     report: bool = True,
+    json: Json = False,
     allow: Allow = (),
 ) -> int:
     """Rank controllers: J50 per direction, factors one at a time, a random mix; see docs.
@@ -142,10 +148,10 @@ def benchmark(
     raised.
 
     Args:
-        out: folder to write to.
         controllers: names as poise evaluate takes them, also my_file.py:Class (one that a file or
             a folder names needs --allow my_file.py:Class besides); all packaged ones that can rest
             if not given.
+        out: folder to write to.
         suite: quick (minutes), standard (an hour), full (many hours), those of poise evaluate, or a
             .yaml file.
         robot: a packaged robot or a .yaml description.
@@ -169,13 +175,16 @@ def benchmark(
 
     summary = benchmark(
         controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
-        trials=trials, realism=realism, overwrite=overwrite, console=terminal(), allow=allow,
+        trials=trials, realism=realism, overwrite=overwrite, console=terminal(stderr=json),
+        allow=allow,
     )  # fmt: skip
     code = _raised(summary, out)
+    if json:
+        print_json(summary)
     if report:
         from poise.training.report.page import write_report
 
-        write_report(out, console=terminal(), allow=[*named(*controllers), *allow])
+        write_report(out, console=terminal(stderr=json), allow=[*named(*controllers), *allow])
     return code
 
 
@@ -183,7 +192,7 @@ def _raised(summary: "Summary", out: Path) -> int:
     """The exit code: 1, with a line that tells the first error, if a controller raised."""
     if failed := sum(entry["errors"] for entry in summary["controllers"].values()):
         table = out / "trials.csv"
-        with table.open(newline="") as file:
+        with table.open(newline="", encoding="utf-8") as file:
             first = next(filter(None, (row["error"] for row in csv.DictReader(file))), "unknown")
         print(f"poise: a controller raised an error in {failed} trials, see the column error of "
               f"{table}; the first one: {first}", file=sys.stderr)  # fmt: skip
@@ -270,18 +279,21 @@ def robot(
     *,
     out: Path | None = None,
     picture: Path | None = None,
+    json: Json = False,
 ) -> None:
     """Check a robot before anything is tried on it: what it can hold, what will go wrong.
 
-    Mass, soles, margins, torques to stand on both feet and on one, self-contacts, posture, which
-    controllers take it, and the pushes that a pendulum of its size stops.
+    Mass, soles, margins, torques to stand on both feet and on one, self-contacts, posture, two
+    seconds at rest, which controllers take it, and the pushes that a pendulum of its size stops.
+
+    Of a model alone, .xml or .urdf, it guesses the description and writes it to the current folder.
 
     Args:
-        name: a packaged robot (see poise list) or a .yaml description.
+        name: a packaged robot (see poise list), a .yaml description, or a model.
         out: a JSON file to write the figures to.
-        picture: a PNG file to write: the robot standing, and its soles.
+        picture: a PNG file to write: the robot standing, its CoM, and its soles.
     """
-    import json
+    from json import dumps
 
     from poise.configs.files import write_atomic
     from poise.configs.outputs import check_out_file
@@ -293,16 +305,20 @@ def robot(
 
         check_out_file(picture, "picture")
         choose_gl_backend()
-    from poise.envs.robots.robot import load_robot
     from poise.training.robot_check.check import check_robot
     from poise.training.robot_check.tables import print_check
+    from poise.training.robot_check.written import load_and_write
 
-    loaded = load_robot(name)
+    loaded, written = load_and_write(name)
+    if written is not None:
+        print(f"{written}: a guessed description, to correct and to name from now on")
     check = check_robot(loaded)
-    print_check(check, terminal())
+    print_check(check, terminal(stderr=json))
+    if json:
+        print_json(check.to_json())
     if out is not None:
-        write_atomic(out, json.dumps(check.to_json(), indent=2, ensure_ascii=False) + "\n")
-        print(out)
+        write_atomic(out, dumps(check.to_json(), indent=2, ensure_ascii=False) + "\n")
+        terminal(stderr=json).print(str(out), soft_wrap=True)
     if picture is not None:
         from poise.training.robot_check.picture import draw_robot
 
@@ -315,31 +331,21 @@ def motion() -> None:
     raise AssertionError("main() answers this sub-command")
 
 
-def list_names() -> None:
-    """List what can be named: robots, environments, controllers, policies, suites and the like."""
+def list_names(*, json: Json = False) -> None:
+    """List what can be named: robots, controllers, policies with their J50, suites and the like."""
     from poise.baselines.clips.library import packaged_clips
     from poise.baselines.scripts.library import packaged_scripts
-    from poise.configs.files import packaged
+    from poise.training.options.names import named
+    from poise.training.options.pages import print_names
 
-    kinds = (
-        "robots",
-        "envs",
-        "controllers",
-        "policies",
-        "rivals",
-        "suites",
-        "training",
-        "motions",
-        "constraints",
-        "tuning",
-        "limits",
-        "human",
-    )
-    for kind in kinds:
-        print(f"{kind}: {', '.join(packaged(kind)) or 'none'}")
-    print(f"clips: {', '.join(packaged_clips())}")
-    print(f"scripts: {', '.join(packaged_scripts())}")
-    print("also as controllers: policies, zero, a folder written by poise train, module:Class")
+    more = {"clips": packaged_clips(), "scripts": packaged_scripts()}
+    if json:
+        print_json({**named(), **more})
+        return
+    print_names(named(), terminal())
+    for kind, names in more.items():
+        print(f"{kind}: {', '.join(names)}")
+    print("also as controllers: zero, a folder written by poise train, my_file.py:Class")
 
 
 COMMANDS: dict[str, Callable[..., object]] = {
@@ -357,6 +363,7 @@ COMMANDS: dict[str, Callable[..., object]] = {
     "tune": tune,
     "qp-set": qp_set,
     "export": export,
+    "dataset": dataset,
     "robot": robot,
     "motion": motion,
     "list": list_names,

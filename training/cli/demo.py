@@ -14,11 +14,10 @@ from poise.training.running.files import PLOTS
 from poise.training.running.stopping import keeps
 from poise.training.running.summary import Summary
 from poise.training.running.terminal import print_paths
-from poise.training.trials.agents import SHIPPED
 
-CONTROLLERS = ("momentum-qp", "capture-step", "feedback-step", "residual-step")
+CONTROLLERS = ("momentum-qp", "capture-step", "feedback-step", "residual-torque")
 SUITE = "demo"
-FULL_CONTROLLERS = ("momentum-qp", SHIPPED, "capture-step", "residual-step", "feedback-step")
+FULL_CONTROLLERS = (*CONTROLLERS[:3], "residual-step", CONTROLLERS[3])
 FULL_SUITES = ("demo-full-envelope", "demo-full-random")
 FILMED, VIDEO = 3, "push.mp4"  # how many controllers the video shows, its name
 
@@ -65,7 +64,7 @@ def _film(results: Results, console: Console) -> None:
         return
     ranking = results.summary["ranking"]
     names = list(dict.fromkeys([*ranking[:-FILMED:-1], ranking[0]]))  # the best to the right
-    command = f"poise replay {results.folder} --trial {trial} --controller {' '.join(names)}"
+    command = f"poise replay {results.folder} --trial {trial} --controllers {' '.join(names)}"
     path = results.folder / VIDEO
     try:
         film(results, trial, names, path)

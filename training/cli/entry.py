@@ -1,6 +1,7 @@
 """The process of the command `poise`: exit codes, stops, and what nobody reads any more."""
 
 import atexit
+import contextlib
 import errno
 import os
 import select
@@ -12,6 +13,9 @@ import tyro
 
 import poise
 from poise.configs.errors import ConfigError, PoiseError, meant, shown
+from poise.training.options.pages import print_commands
+from poise.training.options.parsing import parsed
+from poise.training.options.spelling import respelled, suggestion
 from poise.training.running.stopping import (
     exit_at_once,
     ignore_stops,
@@ -19,11 +23,19 @@ from poise.training.running.stopping import (
     stop_message,
     stoppable,
 )
+from poise.training.running.terminal import speak_plainly, terminal
 
 from .arguments import check_flags
 from .commands import COMMANDS
 
 SHELLS = ("bash", "zsh", "fish")  # for which tyro writes completions
+HELP = ("-h", "--help", "--help-all")
+ALONE = ("--help", "--version", "--print-completion")  # options without a command
+USAGE = """usage: poise COMMAND [OPTIONS]
+
+Keep a simulated humanoid on its feet while it is pushed. Begin with: poise demo.
+poise COMMAND --help tells of a command, poise --version which version this is.
+"""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
 
@@ -34,6 +46,7 @@ def main(args: Sequence[str] | None = None) -> int:
     # Small matrices lose time to threads, and sums may change their order. Read at import.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    speak_plainly()
     try:
         try:
             return _stoppable(args)
@@ -107,23 +120,34 @@ def _run(args: list[str]) -> int:
         print(f"poise {poise.__version__}")
         return 0
     if args[:1] == ["--print-completion"]:
-        args = ["--tyro-print-completion", _shell(args[1:])]
-    if args and not args[0].startswith("-") and args[0] not in COMMANDS:
-        raise _unknown(args[0])
-    if args[:1] == ["train"]:  # its flags are the fields of a heavy dataclass
-        check_flags(args, {"--config": "training", "--robot": "robots"})
+        return _complete(_shell(args[1:]))
+    if not args or args[0] in HELP:
+        print_commands(USAGE, COMMANDS, terminal())
+        return 0
+    name, given = args[0], respelled(args[0], args[1:])
+    if name.startswith("-"):
+        raise ConfigError(f"no such option{suggestion(name, ALONE)}", field=name, choices=ALONE)
+    if name not in COMMANDS:
+        raise _unknown(name)
+    if name == "train":  # its flags are the fields of a heavy dataclass
+        check_flags(given, {"--config": "training", "--robot": "robots"})
         from .train import run
 
-        run(args[1:])
+        run(given)
         return 0
-    if args[:1] == ["motion"]:  # it has sub-commands
+    if name == "motion":  # it has sub-commands
         from .motion import run as run_motion
 
-        return run_motion(args[1:])
-    code = tyro.extras.subcommand_cli_from_dict(
-        COMMANDS,
-        prog="poise",
-        description="Keep a simulated humanoid on its feet while it is pushed (--version: which).",
-        args=args,
-    )
+        return run_motion(given)
+    given = ["--help" if arg == "--help-all" else arg for arg in given]  # all there is
+    code = parsed(COMMANDS[name], given, f"poise {name}")()
     return code if isinstance(code, int) else 0
+
+
+def _complete(shell: str) -> int:
+    """Print the script by which a shell completes commands and options."""
+    with contextlib.suppress(SystemExit):
+        tyro.extras.subcommand_cli_from_dict(
+            COMMANDS, prog="poise", args=["--tyro-print-completion", shell]
+        )
+    return 0

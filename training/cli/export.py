@@ -1,6 +1,9 @@
-"""The sub-command that writes a policy for other programs."""
+"""The sub-commands that write a policy, or what it does, for other programs."""
 
 from pathlib import Path
+from typing import Annotated
+
+import tyro
 
 from .arguments import Allow, PolicyName
 
@@ -33,3 +36,39 @@ def export(
 
     worst = export_policy(policy, out, result=result, licence=licence, allow=allow)
     print(f"{out}: ONNX differs from the policy by {worst:.1g} at most")
+
+
+def dataset(
+    controller: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="CONTROLLER")],
+    /,
+    *,
+    out: Path,
+    name: str = "poise/pushes-v0",
+    suite: str = "strong",
+    trials: int | None = None,
+    robot: str = "humanoid",
+    seed: int = 0,
+    allow: Allow = (),
+) -> None:
+    """Write trials as a data set of Minari: observations, actions, rewards, the push as arrays.
+
+    Needs pip install -e '.[dataset]' in a checkout.
+
+    Args:
+        controller: as poise evaluate takes one; its environment is that of the data.
+        out: folder to write to: new, or empty; MINARI_DATASETS_PATH for what reads it.
+        name: of the data set, namespace/name-v0.
+        suite: of pushes: packaged or a .yaml file.
+        trials: number of episodes; the suite's if not given.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        seed: of the trials.
+    """
+    from poise.training.trials.names import check_names
+
+    check_names([controller], robot=robot, suite=suite)
+    from poise.training.export.dataset import write_dataset
+
+    found = write_dataset(controller, out, name=name, suite=suite, robot=robot, trials=trials,
+                          seed=seed, allow=allow)  # fmt: skip
+    print(f"{out}: {name}, {found['episodes']} episodes, {found['steps']} steps, "
+          f"{found['recovered']} recovered")  # fmt: skip

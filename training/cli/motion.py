@@ -10,9 +10,12 @@ import tyro
 from poise.baselines.clips.bvh import read_bvh, write_bvh
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.library import find_bvh
-from poise.configs.errors import ConfigError
+from poise.baselines.clips.names import ROLES
+from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
+from poise.training.options.pages import print_commands
+from poise.training.options.parsing import parsed
 from poise.training.running.terminal import terminal
 
 from .arguments import Switch
@@ -20,11 +23,24 @@ from .motion_check import check, follow
 from .motion_join import join, match
 from .motion_script import graph, plan, synth
 
+USAGE = """usage: poise motion COMMAND [OPTIONS]
+
+Motion capture: what files hold, a robot's motion of them, and performing it.
+"""
 Solver = Literal["frame", "spacetime", "grid"]
+Joints = tuple[str, ...]
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
 
-def info(file: File, /, *, unit: str = "auto", up: str = "auto", forward: str = "auto") -> None:
+def info(
+    file: File,
+    /,
+    *,
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    joints: Joints = (),
+) -> None:
     """What a BVH file holds: joints, unit, axes, rate, planted feet, skating.
 
     Args:
@@ -32,10 +48,11 @@ def info(file: File, /, *, unit: str = "auto", up: str = "auto", forward: str = 
         unit: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
         up: the file's axis that is up, such as y or -z, or auto.
         forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
     """
     from poise.training.following.tables import print_clip
 
-    clip, axes = read_bvh(find_bvh(file), unit, up, forward)
+    clip, axes = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints))
     print_clip(clip, axes, terminal())
 
 
@@ -47,6 +64,7 @@ def convert(
     unit: str = "auto",
     up: str = "auto",
     forward: str = "auto",
+    joints: Joints = (),
     cut: tuple[float, float] | None = None,
     speed: float = 1.0,
     mirror: Switch = False,
@@ -68,6 +86,7 @@ def convert(
         unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
         up: the file's axis that is up, such as y or -z, or auto.
         forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
         cut: two times [s]; what lies between is kept.
         speed: how many times as fast.
         mirror: exchange left and right.
@@ -78,7 +97,7 @@ def convert(
         rate: frames a second.
         robot: whose .npz it is.
     """
-    clip = _clip(file, unit, up, forward, robot)
+    clip = _clip(file, unit, up, forward, robot, joints)
     if cut is not None:
         clip = clip.cut(*cut)
     clip = clip.at_speed(speed) if speed != 1.0 else clip
@@ -104,6 +123,7 @@ def bring(
     unit: str = "auto",
     up: str = "auto",
     forward: str = "auto",
+    joints: Joints = (),
     cut: tuple[float, float] | None = None,
     speed: float = 1.0,
     mirror: Switch = False,
@@ -116,7 +136,8 @@ def bring(
     """Retarget a BVH file to a robot, its soles planted where the clip's are; see docs/motions.md.
 
     The .npz file is taken wherever a motion is named. A clip whose feet move by 12 cm becomes a
-    motion with steps, which motion-step performs. Needs pip install 'poise[motion]'.
+    motion with steps, which motion-step performs. Needs pip install -e '.[motion]' in a
+    checkout.
 
     Args:
         file: a .bvh file, or the name of a packaged clip.
@@ -125,6 +146,7 @@ def bring(
         unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
         up: the file's axis that is up, such as y or -z, or auto.
         forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
         cut: two times [s]; what lies between is kept.
         speed: how many times as fast.
         mirror: exchange left and right.
@@ -140,7 +162,7 @@ def bring(
     from poise.training.following.tables import print_retargeted
 
     check_out_file(out)
-    clip = read_bvh(find_bvh(file), unit, up, forward).clip
+    clip = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
     clip = clip.cut(*cut) if cut is not None else clip
     clip = clip.at_speed(speed) if speed != 1.0 else clip
     clip = clip.mirrored() if mirror else clip
@@ -170,6 +192,7 @@ def play(
     unit: str = "auto",
     up: str = "auto",
     forward: str = "auto",
+    joints: Joints = (),
     size: tuple[int, int] = (640, 480),
     planted: Switch = False,
 ) -> None:
@@ -182,6 +205,7 @@ def play(
         unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
         up: the file's axis that is up, such as y or -z, or auto.
         forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
         size: width and height [pixels], even.
         planted: take the feet as planted though they move in the clip.
     """
@@ -198,7 +222,7 @@ def play(
         clip = read_robot_clip(file)
         reference_from(clip, body, str(file))  # of this robot
     else:
-        source = read_bvh(find_bvh(file), unit, up, forward).clip
+        source = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
         made = retarget(source, body, planted=planted)
         clip, heading = made.clip, None if made.clip.planted is None else clip_heading(source)
         skeleton = beside_of(body, source, made.scale, made.begins, heading, made.stride)
@@ -224,21 +248,32 @@ MOTION: dict[str, Callable[..., object]] = {
 
 def run(args: Sequence[str]) -> int:
     """Run a sub-command of `poise motion`; returns 0, or 1 (see `check`)."""
-    if args and not args[0].startswith("-") and args[0] not in MOTION:
-        raise ConfigError(f"no such command: motion {args[0]}", choices=MOTION)
-    code = tyro.extras.subcommand_cli_from_dict(
-        MOTION,
-        prog="poise motion",
-        description="Motion capture: what files hold, a robot's motion of them, and performing it.",
-        args=list(args),
-    )
+    if not args or args[0] in ("-h", "--help", "--help-all"):
+        print_commands(USAGE, MOTION, terminal())
+        return 0
+    name = args[0]
+    if name not in MOTION:
+        raise ConfigError(f"no such command: motion {shown(name)}{meant(name, MOTION)}",
+                          choices=MOTION)  # fmt: skip
+    given = ["--help" if arg == "--help-all" else arg for arg in args[1:]]
+    code = parsed(MOTION[name], given, f"poise motion {name}")()
     return code if isinstance(code, int) else 0
 
 
-def _clip(file: Path, unit: str, up: str, forward: str, robot: str) -> Clip:
+def named_joints(joints: Sequence[str]) -> dict[str, str]:
+    """Role → name of the joint; raises ConfigError for what is not ``role=JOINT``."""
+    pairs = dict(each.partition("=")[::2] for each in joints)
+    for role, name in pairs.items():
+        if not name:
+            raise ConfigError(f"must be role=JOINT, not {shown(role)}", field="joints",
+                              choices=ROLES)  # fmt: skip
+    return pairs
+
+
+def _clip(file: Path, unit: str, up: str, forward: str, robot: str, joints: Sequence[str]) -> Clip:
     """The clip of a BVH file, or of a robot's .npz."""
     if file.suffix != ".npz":
-        return read_bvh(find_bvh(file), unit, up, forward).clip
+        return read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
     from poise.baselines.motions.robot_clip import read_robot_clip
     from poise.baselines.retargeting.robot_bvh import clip_of_robot
 

@@ -87,6 +87,7 @@ def follow(
     share: float = 0.0,
     directions: int = 8,
     tempo: float = 1.0,
+    realism: str | None = None,
     waits: Switch = False,
     fastest: Switch = False,
     seed: int = 0,
@@ -108,6 +109,7 @@ def follow(
         share: the same as a share of the J50 of the push's direction, standing (configs/limits).
         directions: of the pushes, spread evenly, one after the other.
         tempo: how many times as fast the motion is played.
+        realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
         waits: let the motion wait while the robot catches itself.
         fastest: find the largest tempo at which none of the trials falls.
         seed: of starts and pushes.
@@ -150,7 +152,7 @@ def follow(
         waits_so = Tempo(waits=True) if waits else None
         trials = perform(motion, controller, robot=robot, starts=20 if starts is None else starts,
                          impulse=push, share=share, directions=directions, seed=seed, speed=tempo,
-                         tempo=waits_so, watch=film or watched)  # fmt: skip
+                         tempo=waits_so, watch=film or watched, realism=realism)  # fmt: skip
     pushed = f"pushed by {push:g} N s" if push else "not pushed"
     pushed = f"pushed by {share:g} of J50" if share else pushed
     faster = f", {tempo:g} times as fast" if tempo != 1.0 else ""

@@ -1,16 +1,19 @@
 """The sub-commands that read finished results: compare, leaderboard, replay and report."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from poise.configs.errors import ConfigError
+from poise.configs.texts import printable
 from poise.training.running.terminal import terminal
 
-from .arguments import Allow, Folder, check_folders
+from .arguments import Allow, Folder, Json, check_folders, print_json
 
 if TYPE_CHECKING:
+    from poise.envs.pushes.push import Kick, Push
     from poise.training.results.replay import Replay
 
 
@@ -18,6 +21,8 @@ def compare(
     a: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_A")],
     b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR_B")],
     /,
+    *,
+    json: Json = False,
 ) -> None:
     """Say what changed from one result to another, with intervals.
 
@@ -28,7 +33,10 @@ def compare(
     check_folders(a, b)
     from poise.training.results.compare import compare, print_comparison
 
-    print_comparison(compare(a, b), a, b, terminal())
+    found = compare(a, b)
+    print_comparison(found, a, b, terminal(stderr=json))
+    if json:
+        print_json(asdict(found))
 
 
 def leaderboard(
@@ -62,7 +70,7 @@ def replay(
     /,
     *,
     trial: int,
-    controller: tuple[str, ...] = (),
+    controllers: tuple[str, ...] = (),
     video: Path | None = None,
     plot: Path | None = None,
     allow: Allow = (),
@@ -72,8 +80,8 @@ def replay(
     Args:
         folder: written by poise evaluate or poise benchmark.
         trial: its number in trials.csv.
-        controller: which of the evaluated ones; the last if not given. A video shows several side
-            by side.
+        controllers: which of the evaluated ones; the last if not given. A video shows several
+            side by side.
         video: an MP4 or WebP file to write.
         plot: a PNG file to write: CoM, CoP, capture point and torque over time.
     """
@@ -90,9 +98,11 @@ def replay(
     for file, field in ((video, "video"), (plot, "plot")):
         if file is not None:
             check_out_file(file, field)
-    if plot is not None and len(controller) > 1:
+    if plot is not None and len(controllers) > 1:
         raise ConfigError("of one controller alone", field="plot")
-    played = [replay(folder, trial, name, plot=plot, allow=allow) for name in controller or (None,)]
+    played = [
+        replay(folder, trial, name, plot=plot, allow=allow) for name in controllers or (None,)
+    ]
     for done in played:
         _print_replay(done)
     if video is not None:
@@ -103,12 +113,19 @@ def replay(
 
 
 def _print_replay(done: "Replay") -> None:
-    """How a trial ended that was played again, and in what it differs from its record."""
+    """How a trial ended that was played again, why, and in what it differs from its record."""
+    from poise.training.diagnosis.words import push_told, why
+
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
     print(f"trial {done.trial.number}, {done.controller}: {end}")
-    print(done.trial.push or "no push")
+    events: list[Push | Kick] = [*done.trial.pushes, *done.trial.kicks]
+    events.sort(key=lambda each: each.start)
+    print("; ".join(map(push_told, events)) or "no push")
+    if reason := why(done.outcome.diagnosis, done.outcome.fall_time):
+        print(reason)
     for name, (recorded, now) in done.differences.items():
-        print(f"{name}: recorded {recorded or 'nothing'}, now {now or 'nothing'}")
+        print(f"{name}: recorded {printable(recorded) or 'nothing'}, "
+              f"now {printable(now) or 'nothing'}")  # fmt: skip
     print("differs from the record" if done.differences else "exactly as recorded")
 
 

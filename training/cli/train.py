@@ -5,9 +5,9 @@ import contextlib
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_type_hints
 
 import tyro
 
@@ -18,38 +18,65 @@ from poise.configs.schema import build, to_dict
 from poise.training.learning.checkpoints import STATE, find_checkpoint
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.policy_files import read_state
-from poise.training.learning.seeds import SEEDS, evaluations, start_and_best
+from poise.training.learning.seeds import SEEDS, Evaluation, evaluations, start_and_best
 from poise.training.learning.train import BEST, LAST, train
 from poise.training.learning.train_seeds import train_seeds
+from poise.training.options.described import Option, kind_of, options_of, sentences
+from poise.training.options.pages import grouped, print_options
+from poise.training.options.parsing import one_line_errors
 from poise.training.running.executor import Backend
 from poise.training.running.terminal import terminal
+from poise.training.statistics.differences import difference
+from poise.training.statistics.rates import wilson_interval
 
 from .commands import Allow
 
-DEFAULT, ANY_ROBOT = "residual", "any-robot"
+DEFAULT, ANY_ROBOT, QUICK = "residual-torque", "any-robot", "quick"
 HUMANOID = TrainConfig.robot  # whose bodies and limits DEFAULT names
+BASIC = ("out", "config", "quick", "steps", "seed", "robot", "controller", "resume", "threads",
+         "start-from", "seeds", "workers", "keep-every", "allow")  # fmt: skip
+GROUPS = {
+    "env": "the environment",
+    "env.pushes": "pushes, each range drawn from uniformly",
+    "env.pushes.limit-table": "what controller_fraction is measured by",
+    "env.noise": "the start",
+    "env.fall": "falls and rest",
+    "env.reward": "weights of the reward's terms",
+    "residual": "what an action of 1 adds, with --action residual",
+    "step-residual": "what an action of 1 adds, with --action step or walk",
+    "servos": "with --action position or whole",
+    "hand-over": "with --action whole",
+    "command": "of a walk",
+    "ppo": "Stable-Baselines3's PPO, its names",
+    "curriculum": "how pushes grow",
+    "evaluation": "held-out pushes during the run",
+}
 
 
 @dataclass(frozen=True)
 class Command:
-    """Train a residual policy with PPO.
+    """Train a policy with PPO.
 
     Attributes:
-        settings: fields of the configuration.
-        out: folder to write to.
-        config: a packaged training configuration or a path to a .yaml file; the flags below
-            replace its fields. If not given: residual, with another --robot any-robot, with
+        settings: Fields of the configuration.
+        out: Folder to write to; with --quick runs/quick if not given.
+        config: Packaged training configuration (see poise list) or a .yaml file; the options below
+            replace its fields. If not given: residual-torque, with another --robot any-robot, with
             --resume the run's own.
-        resume: go on with the run, or the runs, that the folder holds.
-        seeds: train a run for each of these seeds, in folders seed-SEED of the folder.
-        backend: of runs with several seeds: local (processes of this machine), joblib (the same
-            by joblib), ray (a cluster).
-        workers: with several seeds, runs at a time; all cores if not given.
+        quick: Train a first policy in some ten minutes: the configuration quick.
+        resume: Go on with the run, or the runs, that the folder holds.
+        seeds: Train a run for each of these seeds, in folders seed-SEED of the folder.
+        backend: What the runs of several seeds go on: processes of this machine (local), the same
+            by joblib, or a cluster (ray).
+        workers: How many of the runs of several seeds go on at a time; all cores if not given.
+        allow: What may run though a file names it: module:Class or file.py:Class of a controller or
+            a policy, or a policy's file of TorchScript (.pt, .pth, .jit, .ts); repeatable.
     """
 
     settings: Annotated[TrainConfig, tyro.conf.arg(name="")]  # no prefix
-    out: Path
+    out: Path = Path("runs/quick")
     config: str | None = None
+    quick: tyro.conf.FlagCreatePairsOff[bool] = False
     resume: tyro.conf.FlagCreatePairsOff[bool] = False
     seeds: tuple[int, ...] = ()
     backend: Backend = "local"
@@ -58,7 +85,10 @@ class Command:
 
 
 def run(args: Sequence[str]) -> None:
-    """Parse and train; raises ConfigError, and SystemExit as command lines do."""
+    """Parse and train, or print the help; raises ConfigError."""
+    if {"-h", "--help", "--help-all"} & set(args):
+        print_help(train_config(_base(args)), everything="--help-all" in args)
+        return
     command = parse(args)
     out, allow = command.out, [*named(_peek(args).controller), *command.allow]
     if not command.seeds and not (out / SEEDS).exists():
@@ -92,7 +122,20 @@ def last_words(config: TrainConfig, out: Path) -> list[str]:
         f"of {config.evaluation.trials} held-out pushes recovered: {start['recovered']:.1%} by "
         f"{of_what}, {best['recovered']:.1%} by {out / BEST} (at step {best['timesteps']:,})"
     )
-    return [measured, *next_commands(config, out, out)]
+    return [
+        measured,
+        gained(start, best, config.evaluation.trials),
+        *next_commands(config, out, out),
+    ]
+
+
+def gained(start: Evaluation, best: Evaluation, trials: int) -> str:
+    """The gain of the best evaluation over the first one, as far as so many pushes tell it."""
+    ends = [wilson_interval(round(row["recovered"] * trials), trials) for row in (start, best)]
+    gain, (low, high) = difference(start["recovered"], ends[0], best["recovered"], ends[1])
+    points = f"{100.0 * gain:+.1f} points, 95 % {100.0 * low:+.1f} to {100.0 * high:+.1f}"
+    said = "" if low > 0.0 else "; 0 is within: train on, or evaluate on more pushes"
+    return f"gain: {points}{said}"
 
 
 def next_commands(config: TrainConfig, out: Path, shown: Path) -> list[str]:
@@ -126,16 +169,45 @@ def steps_note(config: TrainConfig, out: Path, resume: bool) -> str:
     return f"steps come in rollouts of {rollout:,}: it ended at {end:,}"
 
 
+def options(config: TrainConfig) -> list[Option]:
+    """All options: the command's own, then the fields of the configuration."""
+    own = Command(config)
+    mine = {f.name: f.default for f in fields(Command) if f.name != "settings"}
+    told, hints = sentences(Command), get_type_hints(Command)
+    kinds = {name: "" if isinstance(default, bool) else kind_of(hints[name])
+             for name, default in mine.items()}  # fmt: skip
+    return [Option(f"--{name}", kinds[name], told[name], "") for name in mine] + [
+        *options_of(own.settings)
+    ]
+
+
+def print_help(config: TrainConfig, everything: bool) -> None:
+    """The options that a first run needs, or all in groups, with the defaults of `config`."""
+    console, found = terminal(), options(config)
+    console.print("usage: poise train --out DIR [OPTIONS]\n\nTrain a policy with PPO: "
+                  "poise train --quick is a first one, in some ten minutes.")  # fmt: skip
+    first = [option for option in found if option.name[2:] in BASIC]
+    print_options("first of all", first, console)
+    if not everything:
+        more = len(found) - len(first)
+        console.print(f"\n{more} more: poise train --help-all (docs/training.md#configuration)")
+        return
+    others = [option for option in found if option not in first]
+    for title, group in grouped(others, GROUPS).items():
+        print_options(title or "more of the run", group, console)
+
+
 def parse(args: Sequence[str]) -> Command:
     """The command of these arguments, its configuration checked like one from a file."""
-    base = train_config(_base(args))
-    command = tyro.cli(
-        Command,
-        prog="poise train",
-        args=list(args),
-        default=Command(base, out=tyro.MISSING, config=None),
-        config=(tyro.conf.AvoidSubcommands,),
-    )
+    base, quick = train_config(_base(args)), _peek(args).quick
+    with one_line_errors("poise train", [option.name for option in options(base)], args):
+        command = tyro.cli(
+            Command,
+            prog="poise train",
+            args=list(args),
+            default=Command(base) if quick else Command(base, out=tyro.MISSING),
+            config=(tyro.conf.AvoidSubcommands,),
+        )
     settings = build(TrainConfig, to_dict(command.settings), "command line")
     return replace(command, settings=settings)
 
@@ -143,8 +215,11 @@ def parse(args: Sequence[str]) -> Command:
 def _base(args: Sequence[str]) -> str | Path:
     """The file that the flags' defaults come from, looked up before the flags are read."""
     known = _peek(args)
-    if known.config is not None:
-        return known.config
+    if known.quick and (known.config is not None or known.resume):
+        raise ConfigError("goes with no --config and no --resume: a quick run goes on with "
+                          "--resume --out DIR", source="poise train", field="--quick")  # fmt: skip
+    if known.config is not None or known.quick:
+        return QUICK if known.config is None else known.config
     own = Path(known.out or ".") / "config.yaml"
     if known.resume and own.is_file():
         return own
@@ -157,7 +232,8 @@ def _peek(args: Sequence[str]) -> argparse.Namespace:
     for name in ("--config", "--out", "--controller"):
         peek.add_argument(name)
     peek.add_argument("--robot", default=HUMANOID)
-    peek.add_argument("--resume", action="store_true")
+    for name in ("--resume", "--quick"):
+        peek.add_argument(name, action="store_true")
     try:
         return peek.parse_known_args(list(args))[0]
     except argparse.ArgumentError as error:

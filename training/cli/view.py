@@ -19,7 +19,8 @@ Pushes = Annotated[
     tyro.conf.UseAppendAction,
     tyro.conf.arg(
         metavar="PUSH",
-        help="A push that is known beforehand, such as '{impulse: 20, direction: 90, body: torso, "
+        help="A push that is known beforehand: 20@90 [N·s, degrees from ahead to the left] at 1 s, "
+        "20@90@1.5 at 1.5 s, or with all its fields '{impulse: 20, direction: 90, body: torso, "
         "duration: 0.1, start: 1}'; repeatable.",
     ),
 ]
@@ -46,6 +47,7 @@ def view(
     seed: int = 0,
     push: Pushes = (),
     command: Commands = (),
+    realism: str = "ideal",
     trial: int | None = None,
     controllers: tuple[str, ...] = (),
     native: Switch = False,
@@ -67,6 +69,7 @@ def view(
         host: address to serve at; the default can be reached from this machine alone.
         port: of the page; 0 is any that is free.
         seed: of the start, which is a little disturbed.
+        realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
         trial: a trial's number in trials.csv.
         controllers: with --trial, up to three of those that took part; the last if not given.
         native: MuJoCo's own window, of one controller; it needs a display.
@@ -79,7 +82,7 @@ def view(
     from poise.training.trials.names import check_names
 
     if trial is None:
-        check_names(shown, robot=robot, motion=motion)
+        check_names(shown, robot=robot, motion=motion, realism=realism)
     else:
         check_folders(*shown)
     from poise.training.view.view import view, view_trial
@@ -90,7 +93,8 @@ def view(
                               field="controllers")  # fmt: skip
         view(
             shown, robot=robot, motion=motion, host=host, port=port, seed=seed, pushes=push,
-            commands=command, native=native, seconds=seconds, dark=dark, allow=allow,
+            commands=command, realism=realism, native=native, seconds=seconds, dark=dark,
+            allow=allow,
         )  # fmt: skip
         return
     if len(shown) != 1:

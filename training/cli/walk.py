@@ -31,6 +31,7 @@ def walk(
     robot: str = "humanoid",
     controller: str = "walk",
     terrain: str = "flat",
+    realism: str | None = None,
     video: Path | None = None,
     allow: Allow = (),
 ) -> None:
@@ -52,6 +53,7 @@ def walk(
         robot: a packaged robot (see poise list) or a .yaml description.
         controller: one that walks: a name, a .yaml file, or a folder written by poise train.
         terrain: flat, stairs, slope or stones, or with fields: "{kind: stairs, rise: 0.15}".
+        realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
         video: an MP4 or WebP file to write.
     """
     if not 0.0 < duration < math.inf:
@@ -62,13 +64,14 @@ def walk(
         choose_gl_backend()
     from poise.training.trials.names import check_names
 
-    check_names([controller], robot=robot)
+    check_names([controller], robot=robot, realism=realism)
     from poise.training.sessions.walk import walk
 
     walk(speed, left=left, turn=math.radians(turn), step_time=step_time,
          step_length=step_length, width=width, clearance=clearance, arm_swing=arm_swing,
          duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
-         push=push, push_at=push_at, seed=seed, video=video, say=_say, allow=allow)  # fmt: skip
+         realism=realism, push=push, push_at=push_at, seed=seed, video=video, say=_say,
+         allow=allow)  # fmt: skip
 
 
 def _terrain(text: str) -> str | dict[str, object]:

@@ -26,7 +26,7 @@ RESTLESS = ("simbicon",)  # always marks time, and so never counts as recovered
 @allows("controllers")
 def evaluate(
     controllers: Sequence[str],
-    suite: str | Path = "random",
+    suite: str | Path = "strong",
     *,
     out: str | Path,
     robot: str = "humanoid",

@@ -19,6 +19,7 @@ from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_folder
 from poise.configs.reading import exists
 from poise.configs.schema import build, read_yaml, to_yaml
+from poise.configs.texts import check_shown
 from poise.envs.pushes.sampler import LimitTable
 from poise.training.running.files import FILES, LOG, REPORT, SETTINGS, SUMMARY, TRIALS, csv_text
 from poise.training.running.folder_lock import FolderLock
@@ -190,7 +191,10 @@ def read_settings(folder: Path) -> Settings:
     path = folder / SETTINGS
     data = read_yaml(path)
     check_format(data.get("format"), path)
-    return build(Settings, data, str(path))
+    settings = build(Settings, data, str(path))
+    for name in settings.controllers:
+        check_shown(name, path, "controllers")
+    return settings
 
 
 def _difference(name: str, old: object, new: object) -> str:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -146,9 +146,8 @@ class Run:
             rows.sort(key=lambda row: row[0].number)  # of one number, in the order of the names
             folder.finish([trial_row(*row) for row in rows], summary)
         print_summary(summary, self.console)
-        print_lost(
-            {name: lost(played[name]) for name in summary["ranking"]}, self.out, self.console
-        )
+        numbers = {name: lost(played[name]) for name in summary["ranking"]}
+        print_lost(numbers, summary["controllers"], self.out, self.console)
         print_paths([*drawn, self.out / TRIALS, self.out / SUMMARY], self.console)
         return summary
 
@@ -168,8 +167,9 @@ class Run:
                 entry["timesteps"] = learned_from
         first = next(iter(played))
         reference = self.reference if self.reference and self.reference in played else first
-        against = [(reference, name) for name in played if name != reference]
-        pairs = combinations(played, 2) if self.reference is None else against
+        pairs: Iterator[tuple[str, str]] = combinations(played, 2)
+        if self.reference is not None:
+            pairs = compared(reference, played, ranked(entries))
         whole: Summary = {
             "format": FORMAT,
             "suite": settings.suite_name,
@@ -231,6 +231,14 @@ class Run:
                     folder.append(job.controller, job.trial.number, outcome)
                     rates.add(job.controller, outcome.recovered)
                     bar.update(task, completed=len(folder.finished), rates=str(rates))
+
+
+def compared(
+    reference: str, names: Iterable[str], ranking: Sequence[str]
+) -> Iterator[tuple[str, str]]:
+    """Pairs (a, b) of a ranking of many: all against the reference, each against the next best."""
+    yield from ((reference, name) for name in names if name != reference)
+    yield from ((b, a) for a, b in pairwise(ranking) if reference not in (a, b))
 
 
 class Rates:

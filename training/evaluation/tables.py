@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from poise.baselines.allowance import named
+from poise.training.diagnosis.words import told_losses
 from poise.training.following.motion_tables import motion_tables
 from poise.training.metrics.seed_groups import seed_lines
 from poise.training.running.summary import Entry, Interval, Summary
@@ -120,11 +122,17 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     return notes
 
 
-def print_lost(lost: Mapping[str, Sequence[int]], folder: Path, console: Console) -> None:
-    """The numbers of trials that each controller has lost, and how to look at one of them.
+def print_lost(
+    lost: Mapping[str, Sequence[int]],
+    entries: Mapping[str, Entry],
+    folder: Path,
+    console: Console,
+) -> None:
+    """The numbers of trials that each controller has lost, why, and how to look at one of them.
 
     Args:
         lost: name → the numbers of the trials that it did not recover.
+        entries: of the summary.
         folder: of the result.
         console: where the lines are printed.
     """
@@ -134,8 +142,12 @@ def print_lost(lost: Mapping[str, Sequence[int]], folder: Path, console: Console
         some = ", ".join(str(number) for number in numbers[:SHOWN])
         more = f", … ({len(numbers)})" if len(numbers) > SHOWN else ""
         command = ["poise", "view", str(folder), "--trial", str(numbers[0]), "--controllers", name]
-        console.print(f"lost trials of {name}: {some}{more} ({shlex.join(command)})",
-                      markup=False, highlight=False, emoji=False, soft_wrap=True)  # fmt: skip
+        command += [word for each in named(name) for word in ("--allow", each)]
+        lines = [f"lost trials of {name}: {some}{more} ({shlex.join(command)})"]
+        if told := told_losses(entries[name].get("losses", [])):
+            lines.append(f"  {told}")
+        for line in lines:
+            console.print(line, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
 
 def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,7 @@ import yaml
 
 import poise
 from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.configs.texts import code, plain
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.observation import observation_table
 from poise.training.learning.policy import Policy
@@ -22,7 +24,7 @@ TAGS = ("deep-reinforcement-learning", "reinforcement-learning", "stable-baselin
 PAGE = """\
 # {name}
 
-{what} Simulated robot: `{robot}`. It was trained for {timesteps:,} steps with PPO by
+{what} Simulated robot: {robot}. It was trained for {timesteps:,} steps with PPO by
 [Stable-Baselines3](https://github.com/DLR-RM/stable-baselines3) in `{environment}` of Poise
 {version}. Nothing of it was tried on a real robot.
 
@@ -124,19 +126,19 @@ def _page(
     environment = IDS[policy.config.action]
     below = ""
     if isinstance(env, ResidualBalanceEnv):
-        below = f" It moves the targets of the controller `{policy.config.controller}`, which runs"
-        below += f" every {env.controller.period:g} s; an action of 0 is this controller alone."
+        below = f" It moves the targets of the controller {code(policy.config.controller)}, which"
+        below += f" runs every {env.controller.period:g} s; an action of 0 is this one alone."
     rows = [
-        f"| {i} | {entry.name} | {entry.scale:g} | {entry.unit} |"
+        f"| {i} | {plain(entry.name)} | {entry.scale:g} | {entry.unit} |"
         for i, entry in enumerate(actions(env))
     ]
-    lines = [f"| {f.name} | {f.text} |" for f in figures]
+    lines = [f"| {plain(f.name)} | {f.text} |" for f in figures]
     table = "\n".join(["| figure | |", "| --- | --- |", *lines, "", ""]) if figures else ""
     values = ", ".join(f"{key} = {value:.6g}" for key, value in units(env).items())
     return PAGE.format(
-        name=name,
+        name=plain(name),
         what="A policy that keeps a humanoid on its feet while it is pushed.",
-        robot=env.robot.name,
+        robot=code(env.robot.name),
         timesteps=policy.state["timesteps"],
         environment=environment,
         version=poise.__version__,
@@ -148,5 +150,5 @@ def _page(
         observation=observation_table(env.terms),
         below=below,
         action="\n".join(rows),
-        notice=f"\n## Origin\n\n{notice}" if notice else "",
+        notice=f"\n## Origin\n\n{html.escape(notice, quote=False)}" if notice else "",
     )

@@ -83,10 +83,10 @@ def export_policy(
         write_stock(part, archive, loaded, env, source)
         _copy(FILES, source, part / OWN)
         _copy([n for n in (NOTICE, LICENCE) if is_file(source / n)], source, part)
-        (part / "config.json").write_text(_settings(part / archive))
-        (part / "results.json").write_text(_results(found))
+        (part / "config.json").write_text(_settings(part / archive), "utf-8")
+        (part / "results.json").write_text(_results(found), "utf-8")
         page = card(name, archive, loaded, env, found, licence, notice)
-        (part / "README.md").write_text(page)
+        (part / "README.md").write_text(page, "utf-8")
     return worst
 
 

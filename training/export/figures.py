@@ -71,7 +71,7 @@ def _of_result(fingerprint: str, path: Path) -> list[Figure]:
     path = path / SUMMARY if is_folder(path) else path
     summary = read_summary(path)
     entry = _entry(summary, fingerprint, path)
-    source = f"suite {summary['suite']}, seed {summary['seed']}, robot {summary['robot']}"
+    source = f"suite {summary['suite']}, seed {summary['seed']}, robot {summary['robot']['name']}"
     low, high = entry["recovered_ci95"]
     rate = f"{entry['recovered_rate']:.1%} of {entry['trials']}"
     found = [Figure("recovered_rate", f"recovered, {source}", entry["recovered_rate"],

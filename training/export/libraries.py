@@ -17,12 +17,12 @@ def check_libraries() -> None:
         library(name)
 
 
-def library(name: str) -> Any:
-    """A module of one of `NAMES`; raises ConfigError where it is missing."""
+def library(name: str, extra: str = "export") -> Any:
+    """A module of one of `NAMES`, or of another `extra`; raises ConfigError where it is missing."""
     try:
         return importlib.import_module(name)
     except ImportError:
         package = name.split(".")[0]
         raise ConfigError(
-            f"needs the package {package}: {how_to_install('export')}", source="export"
+            f"needs the package {package}: {how_to_install(extra)}", source=extra
         ) from None

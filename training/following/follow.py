@@ -19,6 +19,7 @@ from poise.envs.balance.termination import FallLimits
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.sensing.realism import load_realism
 from poise.training.tracking.record import ANYWHERE, TrackingFigures
 from poise.training.trials.agents import Agent, load_agent
 from poise.training.trials.play import Watch, run_trial
@@ -60,6 +61,7 @@ def follow(
     tempo: Tempo | None = None,
     watch: Callable[[Trial], Watch | None] | None = None,
     patient: bool = True,
+    realism: str | Path | None = None,
 ) -> list[Followed]:
     """Let a controller perform a motion from `starts` disturbed starts.
 
@@ -73,7 +75,7 @@ def follow(
 
     The motion is played `speed` times as fast, and waits as `tempo` says. `watch` gives, for a
     trial, what is called with the environment after the reset and after every step. Without
-    `patient` the first fall is the last trial.
+    `patient` the first fall is the last trial. `realism` is a level, by name or file.
 
     Raises:
         ConfigError: no such motion, controller or robot, one that does not play motions, counts
@@ -94,7 +96,7 @@ def follow(
     half = load_limits(body).j50() if share else None
     reference = load_motion(motion, body)
     reference = reference if speed == 1.0 else reference.at_speed(speed)
-    agent = performer(controller, body, reference, LONGEST, ANYWHERE, tempo)
+    agent = performer(controller, body, reference, LONGEST, ANYWHERE, tempo, realism)
     rng = np.random.default_rng(seed)
     trials = []
     for k in range(starts):
@@ -130,6 +132,7 @@ def performer(
     duration: float,
     fall: Mapping[str, float] | None = None,
     tempo: Tempo | None = None,
+    realism: str | Path | None = None,
 ) -> Agent:
     """An agent that performs a motion for `duration` [s], whose time runs as `tempo` says.
 
@@ -141,6 +144,7 @@ def performer(
     fall = fall or fall_limits(motion, robot)
     given: dict[str, Any] = {"motion": motion, "pushes": None, "duration": duration, "fall": fall}
     given |= {} if tempo is None else {"tempo": tempo}
+    given |= {} if realism is None else {"realism": load_realism(realism)}
     try:
         return load_agent(controller, robot, **given)
     except TypeError:

@@ -68,7 +68,7 @@ def stage_of(
 
 def is_clip(name: str) -> bool:
     """True for what is a robot's postures, or becomes that; false for keyframes."""
-    return name in packaged_clips() or Path(name).suffix in (".npz", ".bvh")
+    return name in packaged_clips() or Path(name).suffix.lower() in (".npz", ".bvh")
 
 
 def load_repertoire(

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from poise.baselines.clips.axes import FileAxes
+from poise.baselines.clips.axes import LEG, UNITS, FileAxes
 from poise.baselines.clips.clip import Clip
 from poise.baselines.clips.contacts import measure_contacts
 from poise.baselines.feasibility.check import Feasibility, shown
@@ -50,6 +50,12 @@ def print_followed(trials: Sequence[Followed], title: str, console: Console) -> 
     console.print(table)
 
 
+def _unit(metres: float) -> str:
+    """The unit of a file, by name where it has one."""
+    named = [name for name, length in UNITS.items() if abs(length / metres - 1.0) < 1e-9]
+    return f"{named[0]} ({metres:g} m)" if named else f"{metres:.4g} m, so that legs are {LEG} m"
+
+
 def print_clip(clip: Clip, axes: FileAxes, console: Console) -> None:
     """What a file of motion capture holds, and how it was understood."""
     contacts = measure_contacts(clip)
@@ -58,7 +64,7 @@ def print_clip(clip: Clip, axes: FileAxes, console: Console) -> None:
     for name, value in (
         ("joints", f"{len(clip.skeleton.names)}, {len(clip.skeleton.roles)} of them with a role"),
         ("frames", f"{len(clip)} at {1 / clip.dt:.4g} Hz, {clip.duration:.2f} s"),
-        ("unit, up, forward", f"{axes.unit:.4g} m, {up}, {forward}"),
+        ("unit, up, forward", f"{_unit(axes.unit)}, {up}, {forward}"),
         ("legs", f"{clip.skeleton.leg_length:.3f} m"),
         ("planted, left and right", "{:.0%}, {:.0%}".format(*contacts.planted.mean(axis=0))),
         ("feet stay in place", f"{'yes' if contacts.in_place else 'no'}, they move by "

@@ -11,16 +11,18 @@ import numpy as np
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from poise.configs.files import write_atomic
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.reward import REWARD_TERMS
 from poise.envs.robots.robot import Robot
 from poise.envs.vector.batch import EnvBatch
 from poise.training.running.terminal import ProgressLines
 
 from .checkpoints import controller_fingerprint, save_checkpoint
 from .config import TrainConfig
+from .vec_env import ThreadedVecEnv
 
 
 class Throughput(BaseCallback):
@@ -46,6 +48,33 @@ class Throughput(BaseCallback):
 
     def _on_step(self) -> bool:
         return True
+
+
+def step_terms(envs: VecEnv) -> np.ndarray:
+    """(terms,) of the reward in the last step, means over the environments."""
+    inner = envs.unwrapped
+    assert isinstance(inner, ThreadedVecEnv)
+    return inner.reward_terms.mean(axis=0)
+
+
+class RewardTerms(BaseCallback):
+    """Logs the weighted terms of the reward, means over the policy steps of a rollout."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._sum, self._steps = np.zeros(len(REWARD_TERMS)), 0
+
+    def _on_step(self) -> bool:
+        self._sum += step_terms(self.training_env)
+        self._steps += 1
+        return True
+
+    def _on_rollout_end(self) -> None:
+        means = self._sum / max(self._steps, 1)
+        for name, mean in zip(REWARD_TERMS, means, strict=True):
+            if mean != 0.0:
+                self.logger.record(f"reward/{name}", float(mean))
+        self._sum, self._steps = np.zeros_like(means), 0
 
 
 class Checkpoints(BaseCallback):

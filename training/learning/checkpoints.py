@@ -45,8 +45,8 @@ def save_checkpoint(
         plain(model).save(new / POLICY, exclude=LEFT_OUT)
         arrays: dict[str, Any] = statistics(normalize)
         np.savez(new / STATISTICS, **arrays)
-        (new / CONFIG).write_text(to_yaml(config))
-        (new / STATE).write_text(json.dumps(state, indent=1) + "\n")
+        (new / CONFIG).write_text(to_yaml(config), "utf-8")
+        (new / STATE).write_text(json.dumps(state, indent=1) + "\n", "utf-8")
         if folder.exists():
             shutil.rmtree(old, ignore_errors=True)
             os.replace(folder, old)
@@ -121,9 +121,10 @@ def check_robot(state: dict[str, object], fingerprint: str, path: Path) -> None:
     """Raise ConfigError unless the policy was trained for the robot with this fingerprint."""
     if state.get("fingerprint") != fingerprint:
         raise ConfigError(
-            f"trained for another robot, {shown(state.get('robot'))}, or another version of it",
+            f"the policy was trained on the robot {shown(state.get('robot'))} as it was then: name "
+            "that one, or train a policy on this one",
             source=path,
-            field="fingerprint",
+            field="robot",
         )
 
 
@@ -131,9 +132,9 @@ def check_controller(state: dict[str, object], config: TrainConfig, path: Path) 
     """Raise ConfigError unless the controller still has the gains that the policy learned on."""
     if state.get("controller_fingerprint") != controller_fingerprint(config):
         raise ConfigError(
-            f"trained on another version of the controller {shown(config.controller)}",
+            f"the policy was trained on other gains of the controller {shown(config.controller)}",
             source=path,
-            field="controller_fingerprint",
+            field="controller",
         )
 
 

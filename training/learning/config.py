@@ -30,15 +30,45 @@ MOST_SEED = 2**31 - 1  # that torch and NumPy take, also with a run's steps adde
 
 @dataclass(frozen=True)
 class PPOConfig:
-    """Stable-Baselines3's PPO, its names."""
+    """Stable-Baselines3's PPO, its names.
+
+    Attributes:
+        n_envs: Environments that are stepped side by side.
+        n_steps: Policy steps of each environment in a rollout, after which the policy is updated.
+        batch_size: Samples of one gradient step.
+        n_epochs: Passes over a rollout in its update.
+        learning_rate: Step size of Adam at the start.
+        final_learning_rate: Step size of Adam at the end of the run; it falls linearly in between.
+        actor_rate: Learning rate of the actor over that of the critic: small for an actor that does
+            not begin anew.
+        gamma: Discount γ of a reward that comes one policy step later.
+        gae_lambda: Decay λ of advantage estimation: 1 for returns alone, 0 for one step and the
+            critic.
+        clip_range: Change of an action's probability, relative, beyond which it brings nothing.
+        ent_coef: Weight of the policy's entropy in the loss.
+        vf_coef: Weight of the critic's error in the loss.
+        max_grad_norm: Norm at which a gradient is cut.
+        target_kl: The update of a rollout ends where the KL divergence exceeds 1.5 times this;
+            None: never.
+        net_arch: Widths of the actor's hidden layers, and of the critic's unless it has its own.
+        critic_arch: Widths of the critic's hidden layers; None: as the actor's.
+        activation: Function between the layers of actor and critic.
+        log_std_init: Logarithm of the exploration's standard deviation at the start.
+        log_std_final: The same at the end of the run, linear in time in between; None: it is
+            learned.
+        noise_correlation: Correlation of the exploration's noise in successive steps; 0: white, see
+            `exploration.py`.
+        use_sde: Explore by noise that is smooth in the state, as SB3's gSDE.
+        sde_sample_freq: Policy steps after which that noise is drawn anew; -1: once a rollout.
+        symmetric: Make the policy its own mirror image, see `symmetry.py`: each push teaches two.
+    """
 
     n_envs: int = field(default=32, metadata={"min": 1, "max": 4096})
-    n_steps: int = field(default=128, metadata={"min": 1})  # per environment and rollout
+    n_steps: int = field(default=128, metadata={"min": 1})
     batch_size: int = field(default=1024, metadata={"min": 2})
     n_epochs: int = field(default=8, metadata={"min": 1})
     learning_rate: float = field(default=3e-4, metadata={"above": 0.0})
-    final_learning_rate: float = field(default=5e-5, metadata={"min": 0.0})  # linear in time
-    # of the actor, times `learning_rate`: small for one that does not begin anew
+    final_learning_rate: float = field(default=5e-5, metadata={"min": 0.0})
     actor_rate: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0, "omit": "default"})
     gamma: float = field(default=0.99, metadata={"above": 0.0, "max": 1.0})
     gae_lambda: float = field(default=0.95, metadata={"min": 0.0, "max": 1.0})
@@ -46,20 +76,18 @@ class PPOConfig:
     ent_coef: float = field(default=0.0, metadata={"min": 0.0})
     vf_coef: float = field(default=0.5, metadata={"min": 0.0})
     max_grad_norm: float = field(default=0.5, metadata={"above": 0.0})
-    # the update of a rollout ends where KL exceeds 1.5 times this; None: never
     target_kl: float | None = field(default=None, metadata={"above": 0.0})
-    net_arch: tuple[int, ...] = (128, 128)  # of the actor, and of the critic unless it has its own
+    net_arch: tuple[int, ...] = (128, 128)
     critic_arch: tuple[int, ...] | None = field(default=None, metadata={"omit": "default"})
     activation: Literal["tanh", "elu"] = field(default="tanh", metadata={"omit": "default"})
     log_std_init: float = -1.5
-    log_std_final: float | None = None  # linear in time from log_std_init; None: learned
-    # of the exploration's noise in successive steps, see `exploration.py`; 0: white
+    log_std_final: float | None = None
     noise_correlation: float = field(
         default=0.0, metadata={"min": 0.0, "max": 0.99, "omit": "default"}
     )
-    use_sde: bool = False  # exploration that is smooth in the state
-    sde_sample_freq: int = field(default=16, metadata={"min": -1})  # [steps]
-    symmetric: bool = False  # the policy is its own mirror image, see `symmetry.py`
+    use_sde: bool = False
+    sde_sample_freq: int = field(default=16, metadata={"min": -1})
+    symmetric: bool = False
 
     def __post_init__(self):
         if self.symmetric and self.use_sde:
@@ -77,7 +105,12 @@ class PPOConfig:
 
 @dataclass(frozen=True)
 class Curriculum:
-    """The largest push grows from `start` times its final size over a fraction of the run."""
+    """The largest push grows from `start` times its final size over a fraction of the run.
+
+    Attributes:
+        start: Largest push at the start of the run, over its final size.
+        share: Fraction of the run over which the largest push grows.
+    """
 
     start: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})
     share: float = field(default=0.3, metadata={"min": 0.0, "max": 1.0})
@@ -85,13 +118,19 @@ class Curriculum:
 
 @dataclass(frozen=True)
 class EvaluationConfig:
-    """Held-out pushes that the deterministic policy meets during training."""
+    """Held-out pushes that the deterministic policy meets during training.
 
-    every: int = field(default=200_000, metadata={"min": 1})  # [environment steps]
+    Attributes:
+        every: Environment steps from one evaluation to the next.
+        trials: Held-out pushes that each evaluation plays.
+        seed: Seed of the held-out pushes, which are never used for training.
+        pushes: Distribution of the held-out pushes; None: that of training.
+    """
+
+    every: int = field(default=200_000, metadata={"min": 1})
     trials: int = field(default=128, metadata={"min": 1, "max": 100_000})
-    # never used for training
     seed: int = field(default=1_000_003, metadata={"min": 0, "max": MOST_SEED})
-    pushes: PushSampler | None = None  # None: those of training
+    pushes: PushSampler | None = None
 
 
 @dataclass(frozen=True)
@@ -104,21 +143,48 @@ class TrainConfig:
     `servos` and `hand_over` and no `residual`. With "torque" it is `poise/TorqueBalance-v0`, with
     "position" `poise/PositionBalance-v0` with these `servos`; then controller, motions and their
     tempo, both residuals, smoothing and gate are not used.
+
+    Attributes:
+        robot: Robot to train on: a packaged one (see poise list) or a .yaml description.
+        action: What the policy moves: a controller's targets (residual), its steps too (step), a
+            walk (walk), servos that take over (whole); or all torques or joint positions by itself
+            (torque, position).
+        controller: Controller below the policy: a packaged one or a .yaml file of one.
+        motion: Motion that is performed: a packaged one, a .yaml, or a .npz of poise motion import.
+        motions: Motions that the environments perform in turn, one each, instead of `motion`.
+        tempo: Whether the motion's time waits for the robot.
+        seed: Seed of the weights, the pushes and the exploration.
+        steps: Environment steps to train for, in all.
+        threads: Threads that step the environments; the result is the same for any number.
+        keep_every: Environment steps after which a policy is kept for learning curves; None: none
+            is kept.
+        start_from: Policy to begin with: a packaged one, a folder of poise train, or one from
+            outside; None: the controller alone.
+        env: The environment.
+        residual: What an action of 1 adds to each target, with `action` residual.
+        step_residual: The same with `action` step or walk.
+        command: The commands of a walk.
+        servos: The servos of `action` position or whole.
+        hand_over: When the servos take over, with `action` whole.
+        physics_step: Physics step of the training episodes [s]; None: the robot's own, in which
+            policies are evaluated and played.
+        smoothing: Time constant τ of the low-pass that an action goes through [s].
+        gate: Distance of the capture point from its reference below which the action fades out [m].
+        ppo: Stable-Baselines3's PPO.
+        curriculum: How pushes grow over the run.
+        evaluation: Held-out pushes during the run.
     """
 
     robot: str = "humanoid"
     action: Literal["residual", "step", "walk", "whole", "torque", "position"] = "residual"
     controller: str = "momentum-qp"
     motion: str = "standing"
-    # that the environments perform in turn instead of `motion`, one each
     motions: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
     tempo: Tempo = field(default_factory=Tempo, metadata={"omit": "default"})
     seed: int = field(default=0, metadata={"min": 0, "max": MOST_SEED})
-    steps: int = field(default=3_000_000, metadata={"min": 1})  # [environment steps]
+    steps: int = field(default=3_000_000, metadata={"min": 1})
     threads: int = field(default=2, metadata={"min": 1})
-    # [environment steps] after which a policy is kept for learning curves; None: none is
     keep_every: int | None = field(default=None, metadata={"min": 1, "omit": "default"})
-    # a policy whose weights and statistics are the first ones; or one from outside, see `imported`
     start_from: str | None = None
     env: EnvConfig = field(default_factory=EnvConfig)
     residual: ResidualScales = field(default_factory=ResidualScales)
@@ -126,10 +192,9 @@ class TrainConfig:
     command: CommandSampler = field(default_factory=CommandSampler, metadata={"omit": "default"})
     servos: ServoConfig = field(default_factory=ServoConfig)
     hand_over: HandOverConfig = field(default_factory=HandOverConfig, metadata={"omit": "default"})
-    # of the training episodes [s]; None: the robot's. What is trained plays in the robot's own
     physics_step: float | None = field(default=None, metadata={"above": 0.0, "max": 0.01})
-    smoothing: float = field(default=0.0, metadata={"min": 0.0})  # of the action [s]
-    gate: float = field(default=0.0, metadata={"min": 0.0})  # of the residual [m]
+    smoothing: float = field(default=0.0, metadata={"min": 0.0})
+    gate: float = field(default=0.0, metadata={"min": 0.0})
     ppo: PPOConfig = field(default_factory=PPOConfig)
     curriculum: Curriculum = field(default_factory=Curriculum)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)

@@ -27,10 +27,10 @@ from .checkpoints import (
     check_robot,
     find_checkpoint,
 )
-from .config import TrainConfig
+from .config import TrainConfig, train_config
 from .policy_files import read_state, read_statistics, read_weights
 
-SHIPPED = "residual"
+SHIPPED = "residual-torque"
 ACTOR = "mlp_extractor.policy_net."  # SB3's name of the actor's hidden layers
 
 
@@ -142,9 +142,9 @@ def load_policy(
 ) -> Policy:
     """A packaged policy, a policy folder, or the best checkpoint of a run folder.
 
-    None is the packaged policy ``residual``. No code from the files is executed, nor any that they
-    name: a policy on a controller from outside needs `allow`, the names (``module:Class``) that may
-    run.
+    None is the packaged policy ``residual-torque``. No code from the files is executed, nor any
+    that they name: a policy on a controller from outside needs `allow`, the names
+    (``module:Class``) that may run.
 
     Raises ConfigError naming the file when it is missing, truncated, made for another robot
     (of `robot`, or of the configuration's own), has another number of observations or actions, or
@@ -153,6 +153,34 @@ def load_policy(
     path = locate_policy(folder)
     with allowing(allow, source=path / CONFIG):
         return _read_policy(path, robot)
+
+
+def make_env(
+    name: str | Path | TrainConfig | Policy | None = None,
+    *,
+    allow: str | Iterable[str] = (),
+    **overrides: Any,
+) -> BalanceEnv:
+    """The environment of a policy, or of a training configuration.
+
+    Args:
+        name: a policy, or what `load_policy` takes; or a `TrainConfig`, a packaged name of one or
+            its .yaml file. None is the packaged policy ``residual-torque``.
+        allow: as of `load_policy`.
+        overrides: arguments of the environment, or fields of its `EnvConfig`.
+
+    Raises ConfigError for a name of neither, and as `load_policy`.
+    """
+    if isinstance(name, (TrainConfig, Policy)):
+        with allowing(allow):
+            return name.make_env(**overrides)
+    is_training = Path(name or "").suffix in (".yaml", ".yml") or (
+        name in packaged("training") and name not in packaged("policies")
+    )
+    if name is not None and is_training:
+        with allowing(allow, source=str(name)):
+            return train_config(name).make_env(**overrides)
+    return load_policy(name, allow=allow).make_env(**overrides)
 
 
 def _read_policy(path: Path, robot: Robot | None) -> Policy:

@@ -1,6 +1,6 @@
 """Training a residual policy with Stable-Baselines3's PPO on the CPU."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
@@ -28,7 +29,7 @@ from poise.envs.robots.variants import coarser_robot
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
 
-from .callbacks import Checkpoints, Progress, Throughput
+from .callbacks import Checkpoints, Progress, RewardTerms, Throughput
 from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
 from .curriculum import CurriculumCallback
@@ -51,6 +52,7 @@ def train(
     progress: bool = True,
     *,
     allow: str | Iterable[str] = (),
+    callback: BaseCallback | Sequence[BaseCallback] = (),
 ) -> Path:
     """Train into the folder `out`; returns the folder of the best checkpoint.
 
@@ -60,7 +62,9 @@ def train(
     the same but for `steps`, `threads` and `keep_every`. A new run begins with the policy
     `config.start_from`, if there is one, of the same robot; its network may be smaller
     (`widened`). The same configuration gives the same weights, whatever the number of threads; a
-    resumed run starts new episodes, and so differs. A controller from outside (``module:Class``)
+    resumed run starts new episodes, and so differs. `callback`, one of Stable-Baselines3 or
+    several, is called besides, such as Weights & Biases' `WandbCallback`; what it only reads
+    changes nothing. A controller from outside (``module:Class``)
     that the configuration names must be among `allow`.
 
     Raises ConfigError when `out` already holds a run and `resume` is off, or the other way
@@ -101,7 +105,8 @@ def train(
         checkpoints = Checkpoints(config, robot, out / LAST, out / BEST, out / KEPT, table, state)
         stack.callback(checkpoints.close)
         schedules = [CurriculumCallback(config), ExplorationCallback(config)]
-        callbacks = [Throughput(), *schedules, checkpoints]
+        given = [callback] if isinstance(callback, BaseCallback) else list(callback)
+        callbacks = [Throughput(), RewardTerms(), *schedules, checkpoints, *given]
         bar = Progress(config.steps)
         stack.callback(bar.close)
         if progress:

@@ -26,6 +26,7 @@ class ThreadedVecEnv(Copyable, VecEnv):
         super().__init__(len(envs), first.observation_space, first.action_space)
         self._returns = np.zeros(len(envs))
         self._actions: np.ndarray | None = None
+        self.reward_terms = self.batch.episodes.reward_terms.copy()  #: (n, terms) of the last step
 
     def reset(self) -> np.ndarray:
         """Start all episodes, with what was last given to `seed` and `set_options`."""
@@ -42,8 +43,10 @@ class ThreadedVecEnv(Copyable, VecEnv):
     def step_wait(self):
         """Step all environments."""
         infos: list[dict[str, object]] = [{} for _ in range(self.num_envs)]
+        last: dict[int, np.ndarray] = {}  # of episodes that end: the next one clears the record
 
         def at_end(i: int, env: BalanceEnv) -> None:
+            last[i] = env.episode.reward_terms.copy()
             infos[i] = {
                 "episode": {
                     "r": float(self._returns[i] + batch.rewards[i]),
@@ -58,6 +61,9 @@ class ThreadedVecEnv(Copyable, VecEnv):
         batch = self.batch
         assert self._actions is not None  # step_async came first
         batch.step(self._actions, at_end)
+        self.reward_terms = batch.episodes.reward_terms.copy()
+        for i, terms in last.items():
+            self.reward_terms[i] = terms
         dones = batch.ended
         self._returns += batch.rewards
         self._returns[dones] = 0.0

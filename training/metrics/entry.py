@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from poise.training.diagnosis.words import losses
 from poise.training.running.summary import (
     Counts,
     Direction,
@@ -49,6 +50,8 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
         "played": len(played),
         "errors": sum(outcome.error is not None for _, outcome in played),
     }
+    if found := losses((outcome.diagnosis, outcome.steps) for _, outcome in played):
+        entry["losses"] = found
     if directional := part(played, *DIRECTIONAL):
         entry.update(envelope(directional, plan.limits, steps))
     if pushed := part(played, "walk_push"):

@@ -19,6 +19,8 @@ from poise.training.trials.push_limits import PushLimits
 
 from .played import Played, part, pushes, rate, won
 
+NAMED = ("body", "realism")  # factors whose levels are names, not numbers
+
 
 def factor_figures(played: Played, standard: Mapping[str, str]) -> list[Factor]:
     """Recovered rate of every level, and what it lost and won against the standard case."""
@@ -31,7 +33,7 @@ def factor_figures(played: Played, standard: Mapping[str, str]) -> list[Factor]:
         found.setdefault(factor, []).append(_level(level, recovered, base))
     for factor, levels in found.items():
         levels.append({**_level(standard[factor], base, base), "standard": True})
-        if factor != "body":
+        if factor not in NAMED:
             levels.sort(key=lambda entry: float(entry["level"]))
     return [{"factor": factor, "standard": standard[factor], "levels": levels}
             for factor, levels in found.items()]  # fmt: skip

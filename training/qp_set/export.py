@@ -164,8 +164,8 @@ def write_qp_set(
     }  # fmt: skip
     with new_folder(out) as part:
         _write_problems(part, manifest, recoveries(body, controller, limits, seed), writer)
-        (part / "README.md").write_text(README)
-        (part / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
+        (part / "README.md").write_text(README, "utf-8")
+        (part / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", "utf-8")
     return manifest
 
 

@@ -18,6 +18,8 @@ from .svg import Chart, Svg, colour, dash, right_angle, ticks
 
 RADIUS, MIDDLE = 150.0, (200.0, 196.0)  # of the polar plot
 SMALL = (312.0, 312.0)  # of one controller's own picture
+ARROW = 11.0  # of a bound's mark, towards where the true value is
+BOUNDS = {1: "at least ", -1: "at most ", 0: ""}  # side → how a value is told
 OUT = 1.0 + 16.0 / RADIUS  # where the names of directions stand
 
 
@@ -29,6 +31,7 @@ class Series:
         name, index: of the controller; the index chooses its look.
         x: directions [deg], impulses, levels.
         y, low, high: the values there and their 95 % intervals; NaN where there is none.
+        side: 1 where a value is only a lower bound, −1 where an upper one, else 0; none: all are 0.
     """
 
     name: str
@@ -37,6 +40,12 @@ class Series:
     y: np.ndarray
     low: np.ndarray
     high: np.ndarray
+    side: np.ndarray | None = None
+
+    @property
+    def sides(self) -> np.ndarray:
+        """`side`, an entry for each value."""
+        return np.zeros(len(self.x)) if self.side is None else self.side
 
 
 def forest(series: Sequence[Series], title: str, form: str, scale: float = 1.0) -> Markup:
@@ -129,8 +138,16 @@ def polar(
                              "band", close=True)  # fmt: skip
             svg.path(x, y, "line", close=True, dash=dash(s.index))
             for k in range(len(x) if marked is None else 0):
-                tip = f"{s.name}, {s.x[k]:g}°: {_with_ends(s, k, '.3g')} {unit}"
-                svg.marker(x[k], y[k], s.index, tip)
+                which = int(s.sides[k])
+                tip = f"{s.name}, {s.x[k]:g}°: {BOUNDS[which]}{_with_ends(s, k, '.3g')} {unit}"
+                if not which:
+                    svg.marker(x[k], y[k], s.index, tip)
+                    continue
+                ray = np.array([x[k], y[k]]) - middle
+                end = (x[k], y[k]) + which * ARROW * ray / max(float(np.hypot(*ray)), 1e-9)
+                with svg.group(class_="bound"):
+                    svg.line(x[k], y[k], float(end[0]), float(end[1]), "whisker")
+                    svg.marker(x[k], y[k], s.index, tip)
     for ring in rings if marked is None else ():
         x, y = place(22.5, ring)
         svg.text(float(x), float(y) + 4, f"{ring:g}", "tick ring middle")

@@ -11,7 +11,7 @@ from pathlib import Path
 import jinja2
 from rich.console import Console
 
-from poise.baselines.allowance import allowing
+from poise.baselines.allowance import allowing, named
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
@@ -95,6 +95,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         "motions": motions.motion_table(results, order),
         "in_motion": motions.in_motion_table(results, order),
         "smallest": report_tables.smallest(results, order),
+        "losses": report_tables.losses(results, order),
     }
     cases, notes = _cases(results, baseline, order, films, console)
     envelope, own_envelopes = plots.envelopes(results)
@@ -211,10 +212,16 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
         "case": case,
         "facts": words.push_text(record, trial),
         "end": _ending(record),
+        "why": record.why,
         "films": parts,
         "command": f"poise replay {shlex.quote(str(results.folder))} --trial {record.trial} "
-        f"--controller {shlex.quote(record.controller)} --video trial.mp4",
+        f"--controllers {shlex.quote(record.controller)} --video trial.mp4{_allowed(record)}",
     }
+
+
+def _allowed(record: Record) -> str:
+    """What a command needs besides that names the controller of a record in a folder."""
+    return "".join(f" --allow {shlex.quote(name)}" for name in named(record.controller))
 
 
 def _end(record: Record, start: float) -> float:

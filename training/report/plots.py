@@ -17,7 +17,7 @@ from poise.training.trials.step_limits import DRAWN, line_name
 
 from .cells import Download, csv_text, download
 from .charts import Series, fall_curves, forest, polar, rate_series
-from .tables import per_direction
+from .tables import bound_of, per_direction
 
 BINS = 8
 PARTS = {"envelope": "Standard pushes", "grid": "Grid of pushes", "random": "Random pushes",
@@ -137,7 +137,8 @@ def _envelopes(
         measured = measured or "j50" in entry
         key = "j50" if measured else "fraction50"
         value, around = cast(float, entry.get(key)), cast(Interval, entry.get(f"{key}_ci95"))
-        row = (entry["direction"], value, *(both_ends(around) or NONE))
+        side = {"lower": 1.0, "upper": -1.0}.get(bound_of(entry) or "", 0.0)
+        row = (entry["direction"], value, *(both_ends(around) or NONE), side)
         rows.setdefault((name, index), []).append(row)
     order = results.summary["ranking"]
     series = [

@@ -13,10 +13,9 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import ArrayLike
 
+from poise.training.diagnosis.words import towards
 from poise.training.figures.style import MANY
 
-DIRECTIONS = ("forward", "forward left", "left", "backward left", "backward", "backward right",
-              "right", "forward right")  # fmt: skip
 COLOURS = len(MANY)  # classes s0, s1, … of the style sheet
 DASHES = ("", "7 3", "2 3")  # of the first eight series, the next eight, …
 MARKERS = ("circle", "square", "up", "diamond", "down", "plus")
@@ -159,11 +158,6 @@ def number_text(value: float, form: str) -> str:
     """A number for people: with a real minus, and none before a zero."""
     text = format(value, form)
     return (text if set(text) & set("123456789") else text.lstrip("-")).replace("-", "−")
-
-
-def towards(direction: float) -> str:
-    """The nearest of the eight `DIRECTIONS`; `direction` in degrees."""
-    return DIRECTIONS[round(direction % 360.0 / 45.0) % 8]
 
 
 def right_angle(direction: float) -> str:

@@ -123,7 +123,7 @@ def directions(results: Results) -> Table | None:
         columns.append(Column(f"step_share_{name}", "of it", "fraction of that limit that J50 is"))
     rows: list[list[Cell]] = []
     for name, index, entry in per_direction(results):
-        bound = BOUNDS[_bound(entry)]
+        bound = BOUNDS[bound_of(entry)]
         rows.append([
             name_cell(name, index),
             *(figure_cell(entry, key, "g") for key in ("direction", "trials", "recovered")),
@@ -150,7 +150,8 @@ def per_direction(results: Results) -> list[tuple[str, int, Direction | Sector]]
     ]
 
 
-def _bound(entry: Direction | Sector) -> Bound:
+def bound_of(entry: Direction | Sector) -> Bound:
+    """What a figure is only a bound of, if so."""
     bound = entry.get("j50_bound") or entry.get("fraction50_bound")
     return cast(Bound, bound)
 
@@ -168,6 +169,23 @@ def _against(results: Results, baseline: str) -> dict[str, tuple[int, int, float
     return found
 
 
+def losses(results: Results, order: Sequence[str]) -> Table | None:
+    """How often what was the cause of a loss; None in older results, and where nothing was lost."""
+    columns = [
+        Column("controller", "Controller"),
+        Column("trials", "Losses"),
+        Column("cause", "Cause"),
+    ]
+    rows = [
+        [name_cell(name, results.controllers.index(name)), cell(loss["trials"], "d"),
+         Cell(loss["cause"], loss["cause"])]
+        for name in order
+        for loss in results.summary["controllers"][name].get("losses", [])
+    ]  # fmt: skip
+    caption = "Causes of lost trials, the most frequent one of each controller first."
+    return Table("losses", caption, columns, rows) if rows else None
+
+
 def smallest(results: Results, order: Sequence[str]) -> Table:
     """The smallest pushes that each controller did not recover."""
     columns = [
@@ -179,6 +197,7 @@ def smallest(results: Results, order: Sequence[str]) -> Table:
         Column("duration", "Duration [s]"),
         Column("body", "Body"),
         Column("fall_time", "Fell at [s]", "after the reset; none: stood, but not quiet"),
+        Column("why", "Why"),
     ]
     rows = []
     for name in order:
@@ -193,6 +212,7 @@ def smallest(results: Results, order: Sequence[str]) -> Table:
                 _number_cell(record.duration, ".2f"),
                 Cell(body or None, body or "–"),
                 _number_cell(record.fall_time, ".2f"),
+                Cell(record.why or None, record.why or "–"),
             ])  # fmt: skip
     caption = f"The {SMALLEST} smallest pushes that each controller did not recover."
     return Table("smallest_lost", caption, columns, rows).without_empty()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 
-from poise.training.evaluation.tables import assisted
+from poise.training.diagnosis.words import towards
+from poise.training.evaluation.tables import assisted, places
 from poise.training.results.read import Record, Results
 from poise.training.running.summary import both_ends
 from poise.training.trials.trial import Trial
 
-from .svg import number_text, towards
+from .svg import number_text
 
 
 def lead(results: Results) -> list[str]:
@@ -21,7 +22,10 @@ def lead(results: Results) -> list[str]:
     unfair = len(fair) < len(results.controllers)
     alone = " of those that take no force from outside" if unfair else ""
     what = "random trials" if summary["rated"] else "trials"
-    said = [f"{first} comes first{alone}: it recovers {best['recovered_rate']:.1%} of "
+    ranks = places(summary["controllers"])
+    tied = [name for name in fair if ranks[name] == 1 and name != first]
+    place = f"ties with {' and '.join(tied)} for the first place" if tied else "comes first"
+    said = [f"{first} {place}{alone}: it recovers {best['recovered_rate']:.1%} of "
             f"{best['trials']} {what}."]  # fmt: skip
     if "j50_mean" in best:
         around = both_ends(best["j50_mean_ci95"])

@@ -84,6 +84,9 @@ def print_comparison(found: Comparison, a: str | Path, b: str | Path, console: C
     """The comparison as a table; changes whose interval leaves zero out are marked."""
     for key in found.settings:
         console.print(f"settings differ: {key}", markup=False)
+    if found.settings:
+        console.print("so the trials are not the same: figures are compared by their intervals, "
+                      "not in pairs", soft_wrap=True)  # fmt: skip
     for names, text in (
         (found.only_a, f"only in {a}"),
         (found.only_b, f"only in {b}"),
@@ -92,6 +95,8 @@ def print_comparison(found: Comparison, a: str | Path, b: str | Path, console: C
     ):
         if names:
             console.print(f"{text}: {', '.join(names)}", markup=False)
+    if not (found.changes or found.identical):
+        console.print("nothing to compare: the two results have no controller and figure in common")
     if not found.changes:
         return
     table = Table(title=escape(f"{b} against {a}"), title_justify="left")

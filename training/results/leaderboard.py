@@ -9,6 +9,7 @@ from typing import Final
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_folder
+from poise.configs.texts import code, plain
 from poise.training.evaluation.tables import places, ranked, table_columns
 from poise.training.metrics.seed_groups import seed_lines
 from poise.training.running.files import SUMMARY
@@ -22,9 +23,9 @@ HEAD = """# Leaderboard{of}
 
 <!-- Written by `poise leaderboard {source}`: change the result, not this page. -->
 
-Suite `{suite}`, robot `{robot}`, seed {seed}; Poise {poise}, MuJoCo {mujoco}, commit `{commit}`;
+Suite {suite}, robot {robot}, seed {seed}; Poise {poise}, MuJoCo {mujoco}, commit {commit};
 {processor}, {cores} cores. Intervals are 95 %; what the columns mean: [benchmark.md](benchmark.md).
-`lost, won` and McNemar's p are against `{reference}` on the {paired}. `root [N]` is the largest
+`lost, won` and McNemar's p are against {reference} on the {paired}. `root [N]` is the largest
 force that a controller took from nowhere: only those with 0 obey physics, the others have no rank.
 Equal results share a rank. η is J50 over the robot's own ankle limit.
 
@@ -122,23 +123,24 @@ def leaderboard(summaries: Mapping[str, Summary]) -> str:
     summary, origin = merged(summaries)
     versions, machine = summary["versions"], summary["machine"]
     text = HEAD.format(
-        of="" if summary["robot"]["name"] == HUMANOID else f": `{summary['robot']['name']}`",
-        paired=summary["rated"] or "pushes that both met",
-        source=" ".join(summaries),
-        suite=summary["suite"],
-        robot=summary["robot"]["name"],
+        of="" if summary["robot"]["name"] == HUMANOID else f": {code(summary['robot']['name'])}",
+        paired=plain(summary["rated"] or "pushes that both met"),
+        source=plain(" ".join(summaries)),
+        suite=code(summary["suite"]),
+        robot=code(summary["robot"]["name"]),
         seed=summary["seed"],
-        poise=versions.get("poise"),
-        mujoco=versions.get("mujoco"),
-        commit=(summary["commit"] or "unknown")[:10],
-        processor=machine["processor"],
+        poise=plain(versions.get("poise")),
+        mujoco=plain(versions.get("mujoco")),
+        commit=code((summary["commit"] or "unknown")[:10]),
+        processor=plain(machine["processor"]),
         cores=machine["cores"],
-        reference=summary["reference"],
+        reference=code(summary["reference"]),
     )
     for source, other in list(summaries.items())[1:]:
-        names = ", ".join(f"`{name}`" for name in summary["ranking"] if origin[name] == source)
-        text += f"Played later, commit `{(other['commit'] or 'unknown')[:10]}`, "
-        text += f"{other['machine']['processor']}, {other['machine']['cores']} cores: {names}.\n\n"
+        names = ", ".join(code(name) for name in summary["ranking"] if origin[name] == source)
+        text += f"Played later, commit {code((other['commit'] or 'unknown')[:10])}, "
+        text += f"{plain(other['machine']['processor'])}, {other['machine']['cores']} cores: "
+        text += f"{names}.\n\n"
     text += _table(*_ranked(summary))
     if lines := seed_lines(summary["seeds"]):
         text += "\n" + "\n".join(f"- {line}" for line in lines) + "\n"
@@ -162,7 +164,7 @@ def _ranked(summary: Summary) -> tuple[list[str], Cells]:
     ]  # else each of its own pushes
     columns.insert(1, ("N·s/kg", lambda name: f"{entries[name]['j50_mean_per_mass']:.2f}"))
     rank = places(entries)
-    rows = [[str(rank[name] or "–"), f"`{name}`", *(text(name) for _, text in columns)]
+    rows = [[str(rank[name] or "–"), code(name), *(text(name) for _, text in columns)]
             for name in summary["ranking"]]  # fmt: skip
     return ["", "controller", *(heading for heading, _ in columns)], rows
 
@@ -171,7 +173,7 @@ def _directions(summary: Summary) -> tuple[list[str], Cells]:
     entries = summary["controllers"]
     angles = [d["direction"] for d in entries[summary["ranking"][0]]["directions"]]
     rows = [
-        [f"`{name}`", *(f"{d['eta']:.2f}" for d in entries[name]["directions"])]
+        [code(name), *(f"{d['eta']:.2f}" for d in entries[name]["directions"])]
         for name in summary["ranking"]
     ]
     limit = {angle: impulse for angle, impulse in summary["robot"]["ankle_limit"]}
@@ -188,8 +190,8 @@ def _factors(summary: Summary) -> tuple[list[str], Cells] | None:
             here = [entries[name]["factors"][k]["levels"][i] for name in names]
             mark = " (standard)" if level["standard"] else ""
             rates = (f"{cell['recovered_rate']:.0%}" for cell in here)
-            rows.append([factor["factor"], f"{level['level']}{mark}", *rates])
-    return (["factor", "level", *(f"`{name}`" for name in names)], rows) if rows else None
+            rows.append([plain(factor["factor"]), f"{plain(level['level'])}{mark}", *rates])
+    return (["factor", "level", *(code(name) for name in names)], rows) if rows else None
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

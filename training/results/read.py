@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,6 +10,8 @@ from pathlib import Path
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import is_file, is_folder, read_table
+from poise.training.diagnosis.diagnosis import COLUMNS as DIAGNOSIS_COLUMNS
+from poise.training.diagnosis.words import diagnosis_of, why
 from poise.training.evaluation.folder import Settings, read_settings
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS
 from poise.training.running.summary import Summary
@@ -48,6 +51,12 @@ class Record:
     def part(self) -> str:
         """The part of the suite."""
         return self.line["part"]
+
+    @property
+    def why(self) -> str:
+        """Why it was lost, in words; empty of a trial that was recovered, and of older results."""
+        fell = self.fall_time if math.isfinite(self.fall_time) else None
+        return why(diagnosis_of(self.line), fell)
 
     @property
     def error(self) -> str:
@@ -139,7 +148,7 @@ def load_results(folder: str | Path) -> Results:
 def _records(path: Path) -> tuple[Record, ...]:
     columns, lines = read_table(path, ": run the same command again, it writes the file anew "
                                 "without playing a trial")  # fmt: skip
-    lacking = [name for name in COLUMNS if name not in columns]
+    lacking = [name for name in COLUMNS if name not in (*columns, *DIAGNOSIS_COLUMNS)]
     if lacking:
         raise ConfigError(f"lacks the columns {', '.join(lacking)}", source=path)
     return tuple(_record(line, number, path) for number, line in enumerate(lines, 2))

@@ -75,7 +75,8 @@ def replay(
     differences = {
         key: (record.line[key], text)
         for key, value in outcome_cells(outcome).items()
-        if record.line[key] != (text := "" if value is None else str(value))
+        if record.line.get(key, "") != (text := "" if value is None else str(value))
+        and key in record.line  # older results say less
     }
     if plot is not None and signals is not None:
         _draw(signals, Path(plot), again, f"Trial {trial}, {name}")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import is_file, read_json
 from poise.configs.schema import checked
+from poise.configs.texts import check_shown
 from poise.training.running.summary import Rate, Summary, check_format
 
 #: keys of an entry that are there together or not at all
@@ -16,6 +18,7 @@ ENTRY = (
      "eta_mean", "eta_mean_ci95", "eta_min"),
     ("sectors", "fraction_of", "fraction50"),
 )  # fmt: skip
+LARGEST = 2**53  # whole number, besides seeds: up to here a float holds each
 PAIR = (("both", "only_a", "only_b", "neither", "p_mcnemar"),)  # the same, of a pair
 
 
@@ -26,6 +29,8 @@ def read_summary(path: str | Path) -> Summary:
         raise ConfigError("cannot be read (no such file): not a finished result", source=path)
     data = read_json(path)
     check_format(data.get("format"), path)
+    for field, value in _values(data):
+        _check_value(field, value, path)
     summary = checked(Summary, data, path)
     entries = summary["controllers"]
     if not entries or sorted(summary["ranking"]) != sorted(entries):
@@ -49,6 +54,28 @@ def read_summary(path: str | Path) -> Summary:
             raise ConfigError("must have as many values as directions", source=path,
                               field=f"step_limits[{k}].curves")  # fmt: skip
     return summary
+
+
+def _values(data: Any, field: str = "") -> Iterator[tuple[str, object]]:
+    """The texts and whole numbers in plain data, keys among them, each with its dotted field."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield field, key
+            yield from _values(value, f"{field}.{key}" if field else key)
+    elif isinstance(data, list):
+        for k, value in enumerate(data):
+            yield from _values(value, f"{field}[{k}]")
+    elif isinstance(data, (str, int)):
+        yield field, data
+
+
+def _check_value(field: str, value: object, path: Path) -> None:
+    """Raise ConfigError for a text that is none to show, and a number that nobody has counted."""
+    if isinstance(value, str):
+        check_shown(value, path, field)
+    elif abs(value) > LARGEST and not field.endswith(("seed", "]")):  # type: ignore[arg-type]
+        raise ConfigError(f"must be at most {LARGEST}, not {shown(value)}", source=path,
+                          field=field)  # fmt: skip
 
 
 def _check_together(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from poise.configs.errors import ConfigError
+from poise.configs.texts import code, plain
 from poise.training.evaluation.tables import assisted
 from poise.training.running.summary import Entry, Interval, Number, Summary, WalkLevel
 from poise.training.statistics.rates import poisson_interval
@@ -13,7 +14,7 @@ HEAD = """# Leaderboard of walks
 
 <!-- Written by `poise leaderboard {source}`: change the results, not this page. -->
 
-Suite `{suite}`, robot `{robot}`, seed {seed}; Poise {poise}, MuJoCo {mujoco}. Intervals are 95 %;
+Suite {suite}, robot {robot}, seed {seed}; Poise {poise}, MuJoCo {mujoco}. Intervals are 95 %;
 what the columns mean: [walking.md](walking.md#figures). Falls a minute are of walks without a push.
 A controller that took a force from nowhere has no rank.
 
@@ -52,12 +53,12 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
     names = sorted(entries, key=lambda name: _order(entries[name]))
     versions = summary["versions"]
     text = HEAD.format(
-        source=" ".join(summaries),
-        suite=summary["suite"],
-        robot=summary["robot"]["name"],
+        source=plain(" ".join(summaries)),
+        suite=code(summary["suite"]),
+        robot=code(summary["robot"]["name"]),
         seed=summary["seed"],
-        poise=versions.get("poise"),
-        mujoco=versions.get("mujoco"),
+        poise=plain(versions.get("poise")),
+        mujoco=plain(versions.get("mujoco")),
         j50=_pushed(entries),
     )
     text += _table(*_ranking(entries, names))
@@ -86,9 +87,11 @@ def _pushed(entries: Mapping[str, Entry]) -> str:
     told = {level["level"] for entry in entries.values() for level in _levels(entry, PUSHED)}
     known = {name: each["push_duration"] for name, each in entries.items()
              if "push_duration" in each}  # fmt: skip
-    text = "J50 is of pushes while it walks" + (f" ({', '.join(sorted(told))})" if told else "")
+    text = "J50 is of pushes while it walks" + (
+        f" ({plain(', '.join(sorted(told)))})" if told else ""
+    )
     for duration in sorted(set(known.values())):
-        names = [f"`{name}`" for name, its in known.items() if its == duration]
+        names = [code(name) for name, its in known.items() if its == duration]
         whose = "" if len(names) == sum("j50_mean" in each for each in entries.values()) else (
             f" for {', '.join(names)}")  # fmt: skip
         text += f", of {duration:g} s{whose}"
@@ -120,7 +123,7 @@ def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> tuple[list[s
             rank = str(1 + sum(float(other) > float(shown[name]) for other in shown.values()))
         rate = (f"{fallen / minutes:.2f} [{low / minutes:.2f}, {high / minutes:.2f}]"
                 if minutes else NONE)  # fmt: skip
-        rows.append([rank, f"`{name}`", *_j50(entry), _pushes(entry), f"{fallen} of {trials}",
+        rows.append([rank, code(name), *_j50(entry), _pushes(entry), f"{fallen} of {trials}",
                      rate, f"{told} of {trials}"])  # fmt: skip
     return head, rows
 
@@ -176,7 +179,7 @@ def _walks(
     rows = []
     for name in names:
         (level,) = (w for w in _levels(entries[name], UNPUSHED) if w["level"] == command)
-        rows.append([f"`{name}`", *(form(level) for _, form in WALKS)])
+        rows.append([code(name), *(form(level) for _, form in WALKS)])
     return ["controller", *(heading for heading, _ in WALKS)], rows
 
 
@@ -187,7 +190,7 @@ def _directions(
              for name in names}  # fmt: skip
     angles = sorted({angle for each in found.values() for angle in each})
     rows = [
-        [f"`{name}`", *(f"{each[a]['j50']:.1f} {_interval(each[a]['j50_ci95'], '.1f')}"
+        [code(name), *(f"{each[a]['j50']:.1f} {_interval(each[a]['j50_ci95'], '.1f')}"
                         if a in each else NONE for a in angles)]
         for name, each in found.items() if each
     ]  # fmt: skip
@@ -195,12 +198,12 @@ def _directions(
 
 
 def _played(source: str, summary: Summary, origin: Mapping[str, str]) -> str:
-    names = ", ".join(f"`{name}`" for name in summary["controllers"] if origin[name] == source)
+    names = ", ".join(code(name) for name in summary["controllers"] if origin[name] == source)
     if not names:
         return ""
     machine = summary["machine"]
-    return (f"- {names}: commit `{(summary['commit'] or 'unknown')[:10]}`, "
-            f"{machine['processor']}, {machine['cores']} cores.\n")  # fmt: skip
+    return (f"- {names}: commit {code((summary['commit'] or 'unknown')[:10])}, "
+            f"{plain(machine['processor'])}, {machine['cores']} cores.\n")  # fmt: skip
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

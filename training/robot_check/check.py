@@ -13,10 +13,13 @@ from poise.envs.robots.robot import Robot, load_robot
 from poise.training.running.files import plain
 from poise.training.trials.push_limits import PushLimits
 
+from .dynamics import Dynamics, dynamics
 from .faults import Fault, find_faults
 from .holding import Holding, holding
 from .one_leg import one_leg_qpos
+from .physics_faults import unlike_the_file, unrest
 from .posture import PostureFigures, posture_figures
+from .rest import Rest, stand_at_rest
 from .stability import DirectionFigures, by_direction
 from .touching import SelfContact, self_contacts, sole_contacts
 from .uses import STEPPING, Uses, controllers_for
@@ -52,6 +55,9 @@ class RobotCheck:
         sole_contacts: foot → at how many points it touches the ground in MuJoCo.
         self_contacts: bodies that are inside each other while it stands.
         directions: margins, and pushes that a pendulum stops.
+        dynamics: light joints, friction, flags.
+        rest: two seconds at rest with momentum-qp.
+        notes: what was changed of the model so that it can be played.
         controllers: "in place" and "stepping" → which packaged ones take the robot.
         faults: what will go wrong.
     """
@@ -72,6 +78,9 @@ class RobotCheck:
     sole_contacts: dict[str, int]
     self_contacts: tuple[SelfContact, ...]
     directions: tuple[DirectionFigures, ...]
+    dynamics: Dynamics
+    rest: Rest
+    notes: tuple[str, ...]
     controllers: dict[str, Uses]
     faults: tuple[Fault, ...]
 
@@ -99,6 +108,7 @@ def check_robot(robot: Robot | str | Path) -> RobotCheck:
     one = {sole.name: _on_one_foot(robot, i) for i, sole in enumerate(robot.soles)}
     directions, uses = by_direction(PushLimits(robot)), controllers_for(robot)
     never_step = uses[STEPPING].never_step
+    model, rest = dynamics(robot), stand_at_rest(robot)
     return RobotCheck(
         name=robot.name,
         fingerprint=robot.fingerprint,
@@ -124,8 +134,15 @@ def check_robot(robot: Robot | str | Path) -> RobotCheck:
         sole_contacts=contacts,
         self_contacts=touching,
         directions=directions,
+        dynamics=model,
+        rest=rest,
+        notes=robot.notes,
         controllers=uses,
-        faults=find_faults(legs, touching, contacts, both, one, directions, never_step),
+        faults=(
+            *unlike_the_file(robot.notes, model),
+            *find_faults(legs, touching, contacts, both, one, directions, never_step),
+            *unrest(rest, model),
+        ),
     )
 
 

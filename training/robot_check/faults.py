@@ -14,6 +14,7 @@ from .touching import SelfContact
 STRAIGHT = 10.0  # [deg] a knee that is bent less
 POINTS = 3  # at which a sole must touch the ground to stand flat
 SHOWN = 3  # pairs of bodies that a fault names
+NEAR = 0.15  # of the support in a direction and its opposite: a CoM closer to an edge
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,18 @@ def _soles(contacts: Mapping[str, int]) -> Iterator[Fault]:
 
 def _support(directions: Sequence[DirectionFigures]) -> Iterator[Fault]:
     worst = min(directions, key=lambda each: each.margin)
+    opposite = (worst.direction + 180.0) % 360.0
+    across = worst.margin + sum(d.margin for d in directions if d.direction == opposite)
     if worst.margin == 0.0:
-        yield Fault("CoM", "standing, the CoM is not above the soles: change the posture")
+        yield Fault("CoM", "standing, the CoM is not above the soles: change the posture, or say "
+                           "posture.com: middle")  # fmt: skip
+    elif worst.margin < NEAR * across:
+        yield Fault(
+            "CoM near an edge",
+            f"standing, the CoM is {1000.0 * worst.margin:.0f} mm from the edge of the soles at "
+            f"{worst.direction:g}° from ahead, of {1000.0 * across:.0f} mm across: change the "
+            "posture, or say posture.com: middle",
+        )
 
 
 def _both_feet(holding: Holding) -> Iterator[Fault]:

@@ -1,4 +1,4 @@
-"""A robot in its standing posture, from in front and from its left, and its soles from above."""
+"""A robot in its standing posture, from three sides with its CoM and support, and its soles."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from poise.envs.viewing.renderer import SceneRenderer
 from poise.training.figures.style import BLUE, GREEN, INK, PALE, legend_below, saved_figure
 
 SIZE = (420, 620)  # of a view [pixels]
-VIEWS = {"in front": 0.0, "left": 90.0}  # name → azimuth [deg]
-ELEVATION = 6.0  # [deg]
+VIEWS = {"in front": (0.0, 6.0), "left": (90.0, 6.0), "obliquely": (40.0, 30.0)}  # [deg]
 
 
 def draw_robot(robot: Robot, path: str | Path) -> None:
@@ -26,19 +25,19 @@ def draw_robot(robot: Robot, path: str | Path) -> None:
         PoiseError: there is no OpenGL to draw with, or the file cannot be written.
     """
     simulation = Simulation(robot)
-    views = {name: _view(simulation, azimuth) for name, azimuth in VIEWS.items()}
-    with saved_figure(path, 11.0, 5.0) as figure:
-        axes = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.3))
+    views = {name: _view(simulation, *angles) for name, angles in VIEWS.items()}
+    with saved_figure(path, 14.0, 5.0) as figure:
+        axes = figure.subplots(1, 4, width_ratios=(1.0, 1.0, 1.0, 1.3))
         for ax, (name, frame) in zip(axes, views.items(), strict=False):
             ax.imshow(frame)
             ax.set_axis_off()
             ax.set_title(f"{robot.name}, {name}" if ax is axes[0] else name)
-        _soles(axes[2], simulation)
+        _soles(axes[3], simulation)
         legend_below(figure)
 
 
-def _view(simulation: Simulation, azimuth: float) -> np.ndarray:
-    camera = Camera(azimuth=azimuth, elevation=ELEVATION)
+def _view(simulation: Simulation, azimuth: float, elevation: float) -> np.ndarray:
+    camera = Camera(azimuth=azimuth, elevation=elevation)
     renderer = SceneRenderer(simulation, human=False, width=SIZE[0], height=SIZE[1], camera=camera)
     try:
         frame = renderer.render()

@@ -13,6 +13,7 @@ from poise.envs.physics.legs import Leg
 from .check import RobotCheck
 from .holding import Holding
 from .posture import Difference
+from .rest import CONTROLLER, Rest
 
 EVERY = 2  # of the directions, in the table
 
@@ -66,10 +67,23 @@ def _rows(check: RobotCheck) -> Iterator[tuple[str, str]]:
     for foot, holding in check.one_foot.items():
         text = "no posture found" if holding is None else _holding(holding)
         yield f"on {escape(foot)} alone", text
+    yield "at rest", _rest(check.rest)
+    model = check.dynamics
+    yield "physics", (f"steps of {1000 * model.timestep:g} ms; friction of soles and ground "
+                      f"{model.friction:g}")  # fmt: skip
     depth = max((each.depth for each in check.self_contacts), default=0.0)
     pairs = len(check.self_contacts)
     yield "self-contacts", f"{pairs}, up to {1000 * depth:.1f} mm deep" if pairs else "none"
     yield "licence", check.licence or "not said"
+
+
+def _rest(rest: Rest) -> str:
+    if rest.refused:
+        return f"not played: {rest.refused}"
+    end = f"falls after {rest.duration:.2f} s" if rest.fallen else f"stands {rest.duration:.1f} s"
+    return (f"{end} with {CONTROLLER}; torques change by {rest.chatter:.1f} limits/s, feet drift "
+            f"{1000 * rest.foot_drift:.1f} mm, the CoM {1000 * rest.com_drift:.1f} mm, the root "
+            f"leans {rest.lean:.1f}°, {rest.unsolved} of {rest.ticks} ticks unsolved")  # fmt: skip
 
 
 def _leg(leg: Leg) -> str:

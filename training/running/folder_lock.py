@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import os
 import re
@@ -15,6 +16,11 @@ from types import TracebackType
 from poise.configs.errors import PoiseError
 
 HOLDER = ".poise.lock"  # who holds the lock: of a process that was killed it says nothing
+ARRAY = (
+    "SLURM_ARRAY_TASK_ID"  # of the environment: the number of a run among several of one command
+)
+#: what file systems of clusters say that do not lock a folder, or nothing at all
+NO_LOCKS = (errno.EBADF, errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 
 class FolderLock:
@@ -22,7 +28,8 @@ class FolderLock:
 
     The folder is made if missing, and an empty one that it has made goes again. The system keeps
     the lock, so that one of a dead process blocks nobody. Files that a killed process has left
-    half-written go.
+    half-written go. Where a file system locks no folder, a file in it is locked; where it locks
+    nothing, a line says so.
 
     Raises PoiseError when another process holds it, which it names, or the folder cannot be made.
     """
@@ -33,16 +40,34 @@ class FolderLock:
         try:
             path.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_RDONLY)
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._lock()
         except BlockingIOError:
             os.close(self._file)
             self._file = -1
-            raise PoiseError(f"{path}: {_holder(path)} is writing there") from None
+            raise PoiseError(f"{path}: {_holder(path)} is writing there{_of_array()}") from None
         except OSError as error:
             raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
         with contextlib.suppress(OSError):  # a full disk: the run says so where it matters
-            (path / HOLDER).write_text(f"{os.getpid()}\n{_command()}\n{socket.gethostname()}\n")
+            (path / HOLDER).write_text(
+                f"{os.getpid()}\n{_command()}\n{socket.gethostname()}\n", "utf-8", "replace"
+            )
         _remove_parts(path)
+
+    def _lock(self) -> None:
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno not in NO_LOCKS:
+                raise
+            os.close(self._file)
+            self._file = os.open(self.path / HOLDER, os.O_RDWR | os.O_CREAT, 0o644)
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as second:
+                if second.errno not in NO_LOCKS:
+                    raise
+                print(f"poise: {self.path}: the file system has no locks ({second.strerror}): see "
+                      "to it that no other run writes there", file=sys.stderr)  # fmt: skip
 
     def __enter__(self) -> FolderLock:
         return self
@@ -69,6 +94,15 @@ class FolderLock:
             self.release()
 
 
+def _of_array() -> str:
+    """What a run of a job array is to do that shares its folder with the others."""
+    index = os.environ.get(ARRAY)
+    return "" if index is None else (
+        f"; this is run {index} of a job array: give each a folder and a seed of its own, such as "
+        f"--out DIR/${ARRAY} --seed ${ARRAY}"
+    )  # fmt: skip
+
+
 def _command() -> str:
     return shlex.join([os.path.basename(sys.argv[0]), *sys.argv[1:]]).replace("\n", " ")
 
@@ -76,7 +110,7 @@ def _command() -> str:
 def _holder(path: Path) -> str:
     """The process that holds the lock, in words."""
     try:
-        process, command, host = (path / HOLDER).read_text().splitlines()
+        process, command, host = (path / HOLDER).read_text("utf-8").splitlines()
     except (OSError, ValueError):
         return "another process"
     elsewhere = f" on {host}" if host != socket.gethostname() else ""

@@ -16,12 +16,13 @@ import signal
 import sys
 import threading
 import traceback
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
-from poise.configs.errors import PoiseError
+from poise.configs.errors import PoiseError, PoiseWarning
 
 from .stopping import uninterrupted
 
@@ -184,6 +185,7 @@ def _result(answer: bytes) -> Any:
 def _serve(connection: multiprocessing.connection.Connection) -> None:
     """Does tasks until the main process closes the pipe, or ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    warnings.simplefilter("ignore", PoiseWarning)  # the main process has said it
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(EOFError, OSError):  # the main process has closed the pipe, or died
         while True:

@@ -286,8 +286,18 @@ class Played(Rate):
     errors: int
 
 
+class Loss(TypedDict):
+    """How many of the lost trials have a cause, see `training/diagnosis`."""
+
+    cause: str
+    trials: int
+
+
 class Entry(Played, Counts, EnvelopeFigures, Fractions, total=False):
-    """A controller. The counts are of the part that is rated, else of all trials."""
+    """A controller. The counts are of the part that is rated, else of all trials; `losses` are of
+    all trials, the most frequent cause first."""
+
+    losses: list[Loss]
 
     tick_us: Number
     fingerprint: str

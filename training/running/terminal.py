@@ -1,11 +1,14 @@
 """The terminal, and what it shows while an evaluation runs."""
 
+import codecs
+import sys
 import time
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -14,24 +17,68 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
+from rich.segment import Segment
 
+from poise.configs.errors import PoiseWarning
+from poise.configs.texts import printable
+
+#: what a terminal prints whose encoding lacks the sign; "?" for any other
+PLAIN = {"°": "deg", "·": "*", "×": "x", "≤": "<=", "≥": ">=", "–": "-", "−": "-", "…": "...",
+         "→": "->", "±": "+-", "²": "2", "³": "3", "⁻": "-", "Δ": "d"}  # fmt: skip
 WIDTH = 120  # of tables that no terminal shows
 BESIDE = 3  # characters of a table's column besides its text
 SHORTEST, LONGEST = 10.0, 300.0  # [s] between lines of progress, where no terminal shows a bar
 GROWTH = 0.1  # the time between lines, over the time that has passed
 
 
+def speak_plainly() -> None:
+    """Let no encoding of a terminal, or of a path, end a command: what it lacks is written out.
+
+    What is read otherwise than it is written, a `PoiseWarning`, is one line like an error.
+    """
+    codecs.register_error("poise.plain", _plain)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="poise.plain")
+    others = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        if issubclass(category, PoiseWarning):
+            print(f"poise: warning: {message}", file=sys.stderr)
+        else:
+            others(message, category, *where, **more)
+
+    warnings.showwarning = show
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    lost = error.object[error.start : error.end]
+    return "".join(PLAIN.get(sign, "?") for sign in lost), error.end
+
+
 class Terminal(Console):
-    """A console that leaves a pipe that nobody reads to `cli.main`; Rich would exit with 1."""
+    """A console that leaves a pipe that nobody reads to `cli.main`; Rich would exit with 1.
+
+    Texts that it is given hold no commands to the terminal, whoever has written them.
+    """
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """As of `Console`."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else printable(text), style, control)
 
     def on_broken_pipe(self) -> None:
         raise  # what Rich has just caught
 
 
-def terminal() -> Console:
-    """The console that a command prints to."""
-    console = Terminal(emoji=False)  # a controller may be called mine.py:B
-    return console if console.is_terminal else Terminal(width=WIDTH, emoji=False)
+def terminal(stderr: bool = False) -> Console:
+    """The console that a command prints to; the other stream where a result is to be piped."""
+    console = Terminal(emoji=False, stderr=stderr)  # a controller may be called mine.py:B
+    return console if console.is_terminal else Terminal(width=WIDTH, emoji=False, stderr=stderr)
 
 
 class ProgressLines(Progress):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Protocol
 
 from poise.baselines.motions.reference_motion import ReferenceMotion
@@ -32,6 +33,7 @@ class Play(Protocol):
     period: float  #: between two frames [s]
     at: int
     live: bool  #: whether it can be pushed
+    reasons: Mapping[str, str]  #: controller → why it lost a recorded trial
 
     @property
     def history(self) -> Sequence[Frames]:
@@ -86,6 +88,7 @@ class Live:
     """
 
     live, ended = True, False
+    reasons: Mapping[str, str] = MappingProxyType({})
 
     def __init__(
         self,
@@ -149,7 +152,7 @@ class Live:
             raise PoiseError("nothing has been played that a video could show")
         if time > LONGEST_FILM:
             raise PoiseError(f"a video is of at most {LONGEST_FILM:g} s, begin anew by Reset")
-        agent = load_player(name, self.robot, self._motion, time)
+        agent = load_player(name, self.robot, self._motion, time, self.spec.realism)
         trial = self.session.sides[self.names.index(name)].own(self.session.trial)
         if agent.begin is not None:
             agent.begin()
@@ -170,14 +173,16 @@ class Recorded:
     """Frames that were recorded before; see `recorded_trial`."""
 
     live, yaw, gait, reach = False, 0.0, None, None
+    reasons: Mapping[str, str]
 
     def __init__(
         self, spec: TrialSpec, robot: Robot, history: Sequence[Frames], period: float,
-        film: Callable[[str, Path], object],
+        film: Callable[[str, Path], object], reasons: Mapping[str, str] | None = None,
     ):  # fmt: skip
         self.spec, self.names = spec, list(spec.controllers)
         self.robot, self.period = robot, period
         self.history, self.at, self._film = history, 0, film
+        self.reasons = reasons or {}
 
     @property
     def ended(self) -> bool:

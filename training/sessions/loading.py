@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import yaml
@@ -12,11 +13,14 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.yaml_loader import Loader
 from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import Push
+from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 
 from .live import Live
 from .session import load_session
 from .spec import STANDING, SessionSpec
+
+SHORT = re.compile(r"(?P<impulse>[^@{]+)@(?P<direction>[^@]+)(?:@(?P<start>[^@]+))?")
 
 
 def load_live(spec: SessionSpec, say: Callable[[str], object] = lambda line: None) -> Live:
@@ -31,14 +35,29 @@ def load_live(spec: SessionSpec, say: Callable[[str], object] = lambda line: Non
     motion = None if spec.motion == STANDING else load_motion(spec.motion, robot)
     say(f"loading {', '.join(spec.controllers)}")
     session = load_session(
-        spec.controllers, robot, spec.seed, pushes, commands=commands, motion=motion
-    )
+        spec.controllers, robot, spec.seed, pushes, commands=commands, motion=motion,
+        realism=spec.realism,
+    )  # fmt: skip
     return Live(session, spec, motion)
 
 
 def read_pushes(text: str, robot: Robot) -> list[Push]:
-    """The pushes of a flag `--push`; raises ConfigError for what is none."""
-    parsed = parse_pushes(read_mapping(text, "push"), robot)
+    """The pushes of a flag `--push`; raises ConfigError for what is none.
+
+    That is impulse [N·s] @ direction [deg] and, if not at 1 s, @ start [s], of the robot's first
+    push body, such as 20@90@1.5; or a YAML mapping with the fields of a push.
+    """
+    if found := SHORT.fullmatch(text.strip()):
+        texts = {name: value for name, value in found.groupdict("1").items()}
+        try:
+            fields: object = {**{name: float(value) for name, value in texts.items()},
+                              "body": push_bodies(robot)[0]}  # fmt: skip
+        except ValueError:
+            raise ConfigError(f"must be such as 20@90 or 20@90@1.5, not {shown(text)}",
+                              field="push") from None  # fmt: skip
+    else:
+        fields = read_mapping(text, "push")
+    parsed = parse_pushes(fields, robot)
     pushes = [push for push in parsed if isinstance(push, Push)]
     if len(pushes) != len(parsed):
         raise ConfigError("a kick (delta_v) is no push of a trial; give an impulse", field="push")

@@ -9,6 +9,7 @@ import numpy as np
 
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
+from poise.training.diagnosis.words import why
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
 from poise.training.trials.trial import Outcome
@@ -58,10 +59,14 @@ def recorded_trial(
     for name in names:  # before the first is played
         results.record(name, trial)
     recorders, lines = [Recorder() for _ in names], []
+    reasons: dict[str, str] = {}
     for name, recorder in zip(names, recorders, strict=True):
         done = replay(results, trial, name, watch=recorder, allow=allow)
         differs = "differs from the record" if done.differences else "exactly as recorded"
         lines.append(f"trial {trial}, {name}: {_end(done.outcome)}, {differs}")
+        if reason := why(done.outcome.diagnosis, done.outcome.fall_time):
+            reasons[name] = reason
+            lines.append(f"  {reason}")
     envs = [recorder.env for recorder in recorders if recorder.env is not None]
     period = min(env.config.policy_period for env in envs)
 
@@ -70,7 +75,7 @@ def recorded_trial(
 
     history = _side_by_side([recorder.frames for recorder in recorders], period)
     spec = TrialSpec(str(folder), trial, tuple(names))
-    return Recorded(spec, envs[0].robot, history, period, film), lines
+    return Recorded(spec, envs[0].robot, history, period, film, reasons), lines
 
 
 def _end(outcome: Outcome) -> str:

@@ -17,6 +17,7 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import Robot
+from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.following.follow import performer
 from poise.training.trials.agents import Agent, load_agent
 from poise.training.trials.play import SteppedTrial
@@ -187,6 +188,7 @@ def load_session(
     *,
     commands: Sequence[TimedCommand] = (),
     motion: ReferenceMotion | None = None,
+    realism: str = IDEAL,
 ) -> Session:
     """A session of these controllers in the standard conditions of an evaluation.
 
@@ -195,12 +197,19 @@ def load_session(
     Raises ConfigError for a controller that is not valid, is for another robot, or plays no
     motions; for commands where none of them walks.
     """
-    agents = [load_player(name, robot, motion, LONGEST) for name in names]
+    agents = [load_player(name, robot, motion, LONGEST, realism) for name in names]
     return Session(agents, seed, pushes, commands)
 
 
-def load_player(name: str, robot: Robot, motion: ReferenceMotion | None, duration: float) -> Agent:
+def load_player(
+    name: str,
+    robot: Robot,
+    motion: ReferenceMotion | None,
+    duration: float,
+    realism: str = IDEAL,
+) -> Agent:
     """A controller of a session that lasts `duration` [s]; errors as of `load_session`."""
     if motion is None:
-        return load_agent(name, robot, duration=duration, pushes=None)
-    return performer(name, robot, motion, duration)
+        level = load_realism(realism)
+        return load_agent(name, robot, duration=duration, pushes=None, realism=level)
+    return performer(name, robot, motion, duration, realism=realism)

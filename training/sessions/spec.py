@@ -7,7 +7,9 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from urllib.parse import parse_qs, urlencode
 
+from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError, shown
+from poise.envs.sensing.realism import IDEAL
 
 STANDING = "standing"  # the motion of a session that names none
 MOST = 3  # controllers side by side
@@ -20,6 +22,7 @@ class SessionSpec:
     Attributes:
         controllers, robot, motion: names and paths, as a user writes them.
         seed: of the disturbed start.
+        realism: a packaged level or a path to one.
         pushes, commands: YAML mappings, as `parse_pushes` and `parse_commands` take them.
     """
 
@@ -29,6 +32,7 @@ class SessionSpec:
     seed: int = 0
     pushes: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
+    realism: str = IDEAL
 
     @property
     def command(self) -> str:
@@ -36,6 +40,8 @@ class SessionSpec:
         words = ["poise", "view", *self.controllers, "--robot", self.robot]
         if self.motion != STANDING:
             words += ["--motion", self.motion]
+        if self.realism != IDEAL:
+            words += ["--realism", self.realism]
         words += ["--seed", str(self.seed)]
         words += [word for text in self.pushes for word in ("--push", text)]
         return shlex.join(words + [word for text in self.commands for word in ("--command", text)])
@@ -60,7 +66,8 @@ class TrialSpec:
     def command(self) -> str:
         """The command line that shows the same."""
         words = ["poise", "view", self.folder, "--trial", str(self.trial)]
-        return shlex.join([*words, "--controllers", *self.controllers])
+        allowed = [word for name in named(*self.controllers) for word in ("--allow", name)]
+        return shlex.join([*words, "--controllers", *self.controllers, *allowed])
 
     @property
     def link(self) -> str:

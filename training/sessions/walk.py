@@ -20,6 +20,7 @@ from poise.envs.pushes.options import parse_pushes
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.sensing.realism import load_realism
 from poise.envs.terrain.terrain import Terrain, make_terrain
 from poise.envs.viewing.camera import Camera, beside
 from poise.training.figures.encoder import FORMS
@@ -27,6 +28,8 @@ from poise.training.figures.video import record
 from poise.training.trials.agents import Agent, check_may_walk, check_walks, load_agent
 from poise.training.trials.play import run_trial
 from poise.training.trials.trial import Outcome, Trial
+
+from .loading import read_pushes
 
 EVERY = 5.0  # [s] between lines about a walk
 PUSH = re.compile(r"(?P<impulse>[^@]+)@(?P<direction>[^@]+)")
@@ -48,6 +51,7 @@ def walk(
     controller: str = "walk",
     robot: str = "humanoid",
     terrain: str | Mapping[str, object] = "flat",
+    realism: str | Path | None = None,
     push: str | None = None,
     push_at: float = 6.0,
     seed: int = 0,
@@ -65,6 +69,7 @@ def walk(
         controller: one that walks, as `load_agent` takes it.
         robot: a packaged robot or a path to its description.
         terrain: a kind of terrain, or a mapping with its `kind`, see `make_terrain`.
+        realism: a packaged level of realism or a path to one; None: ideal.
         push: impulse [N·s] and direction [deg], such as "20@90", of a push of 0.1 s; None: none.
         push_at: the start of the push [s].
         seed: of the start, which is a little disturbed.
@@ -90,7 +95,10 @@ def walk(
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
     ground = make_terrain(terrain, "walk")
     check_asked(controller, loaded, commands, ground)  # a controller takes long to be made
-    agent = load_agent(controller, loaded, duration=duration, pushes=None, terrain=ground)
+    agent = load_agent(
+        controller, loaded, duration=duration, pushes=None, terrain=ground,
+        realism=load_realism(realism),
+    )  # fmt: skip
     check_walks(controller, agent, "walk")
     trial = Trial(0, seed, pushes, commands=commands)
     command = commands[0]
@@ -121,8 +129,12 @@ def check_asked(
 def parse_push(text: str, start: float, duration: float, robot: Robot) -> Push:
     """The push of 0.1 s that "20@90" means: 20 N·s towards 90°, of the robot's first push body.
 
+    A YAML mapping of a push's fields is taken, too, with its own start.
+
     Raises ConfigError for another form, numbers out of range, and a start after the `duration`.
     """
+    if text.lstrip().startswith("{"):
+        return read_pushes(text, robot)[0]
     found = PUSH.fullmatch(text.strip())
     try:
         numbers = {name: float(value) for name, value in found.groupdict().items()} if found else {}

@@ -145,6 +145,8 @@ def _newton(
         g_b = -(residual @ x) + 1 / bi - 1
         h_aa, h_ab = curvature.sum(axis=1), -(curvature @ x)
         h_bb = curvature @ x**2 + 1 / bi**2
+        # a few trials that are recovered the more the harder they are saturate the curve
+        h_aa = h_aa + (h_aa * h_bb - h_ab**2 <= 0.0)
         det = h_aa * h_bb - h_ab**2
         step_a, step_b = (h_bb * g_a - h_ab * g_b) / det, (h_aa * g_b - h_ab * g_a) / det
         decrement = g_a * step_a + g_b * step_b

@@ -24,7 +24,8 @@ CLIPS = ("stand", "squat", "reach_down", "reach_up", "punch")
 
 def label(name: str) -> str:
     """What a motion is called in trials: its name, or that of its file."""
-    return Path(name).stem if Path(name).suffix in (".npz", ".bvh", ".yaml", ".yml") else name
+    of_file = Path(name).suffix.lower() in (".npz", ".bvh", ".yaml", ".yml")
+    return Path(name).stem if of_file else name
 
 
 class Cell(NamedTuple):

@@ -30,8 +30,6 @@ from poise.envs.robots.robot import Robot
 
 from .names import NO_CONTROL, check_name
 
-SHIPPED = "residual"
-
 
 @dataclass(frozen=True, eq=False)
 class Agent:

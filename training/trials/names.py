@@ -8,6 +8,7 @@ from poise.baselines.policy_files.reading import RIVALS, is_policy
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder
+from poise.configs.texts import check_shown
 
 NO_CONTROL = "zero"
 
@@ -46,6 +47,7 @@ def check_name(name: str) -> None:
             field="controller",
             choices=names,
         )
+    check_shown(name, field="controller")
 
 
 def check_policy_name(name: str) -> None:

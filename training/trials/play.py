@@ -14,6 +14,9 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.motions.feet import foot_signs
 from poise.envs.balance import episode
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.pushes.push import Kick, Push
+from poise.training.diagnosis.diagnosis import diagnose
+from poise.training.diagnosis.record import CourseRecord
 from poise.training.tracking.record import Tracking
 
 from .agents import Agent
@@ -60,12 +63,12 @@ class SteppedTrial:
 def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome:
     """Play a trial to its end in the environment that the agent has."""
     env, stepped = agent.env, SteppedTrial(agent, trial)
-    settled = Settled()
+    settled, course = Settled(), CourseRecord()
     touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
     stands = not trial.commands and stepped.tracking is None
     sway = Sway() if trial.pushes and stands else None
     walk = WalkRecord() if trial.commands else None
-    watches = [each for each in (sway, walk, watch) if each is not None]
+    watches = [each for each in (course, sway, walk, watch) if each is not None]
     while not stepped.done:
         for each in watches:
             each(env)
@@ -74,15 +77,23 @@ def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome
         settled.update(env, action)
     for each in watches:
         each(env)
-    outcome = _outcome(env, trial, settled, touchdowns.count)
+    outcome, loss = _outcome(env, trial, settled, touchdowns.count), "not quiet"
     if walk is not None:
-        return walked(env, trial, outcome, walk)
-    if stepped.tracking is not None:
-        return followed(env, outcome, stepped.tracking)
-    if sway is None or not outcome.recovered:
+        outcome, loss = walked(env, trial, outcome, walk), "off command"
+    elif stepped.tracking is not None:
+        outcome, loss = followed(env, outcome, stepped.tracking), "motion"
+    elif sway is not None and outcome.recovered:
+        body, recovery = sway.of(trial.pushes[0], env.config.policy_period)
+        outcome = replace(outcome, sway=body, sway_recovery=recovery)
+    if outcome.recovered:
         return outcome
-    body, recovery = sway.of(trial.pushes[0], env.config.policy_period)
-    return replace(outcome, sway=body, sway_recovery=recovery)
+    return replace(outcome, **asdict(diagnose(env, course.course(), first_start(trial), loss)))
+
+
+def first_start(trial: Trial) -> float:
+    """When the first push or kick begins [s]; 0 without one."""
+    events: list[Push | Kick] = [*trial.pushes, *trial.kicks]
+    return min((each.start for each in events), default=0.0)
 
 
 def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:

@@ -8,6 +8,8 @@ from typing import Any
 from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.pushes.push import Kick, Push
 from poise.envs.terrain.terrain import Terrain
+from poise.training.diagnosis.diagnosis import COLUMNS as DIAGNOSIS_COLUMNS
+from poise.training.diagnosis.diagnosis import Diagnosis
 
 
 @dataclass(frozen=True)
@@ -149,6 +151,7 @@ class Outcome:
             that is performed, see `TrackingFigures`.
         drawn: of a robot that is drawn, its numbers as JSON, see `DrawnRobot.summary`.
         error: what the controller raised, on one line; the trial then counts as not recovered.
+        loss … hardware: why it was lost, see `Diagnosis`; None of a trial that was recovered.
     """
 
     recovered: bool
@@ -210,9 +213,26 @@ class Outcome:
     interruptions: float | None = None
     drawn: str | None = None
     error: str | None = None
+    loss: str | None = None
+    loss_body: str | None = None
+    full_motor: str | None = None
+    full_from: float | None = None
+    full_time: float | None = None
+    capture_left: float | None = None
+    capture_outside: float | None = None
+    foothold: str | None = None
+    foothold_time: float | None = None
+    foothold_error: float | None = None
+    failures_from: float | None = None
+    hardware: str | None = None
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """Why it was lost."""
+        return Diagnosis(**{name: getattr(self, name) for name in DIAGNOSIS_COLUMNS})
 
 
 def failed(error: Exception) -> Outcome:
     """The outcome of a trial in which the controller raised."""
     text = " ".join(f"{type(error).__name__}: {error}".split())
-    return Outcome(recovered=False, fallen=False, error=text)
+    return Outcome(recovered=False, fallen=False, error=text, loss="error")

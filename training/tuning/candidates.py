@@ -12,6 +12,7 @@ from poise.baselines.registry import controller_config
 from poise.envs.pushes.push import Push
 from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.trials.agents import Agent
 from poise.training.trials.play import run_trial
 from poise.training.trials.trial import Trial
@@ -74,6 +75,8 @@ class Candidate:
     alone: tuple[Trial, ...]
     policy: str | None = None
     below: tuple[Trial, ...] = ()  # met by the policy on top of the controller
+    realism: str = IDEAL
+    chatter: float = 0.0  # the price of torques that jump, see `TuneConfig`
 
 
 def play(candidate: Candidate) -> tuple[list[float], list[float]]:
@@ -82,29 +85,38 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
     settings: dict[str, Any] = {
         "controller": controller_config(candidate.controller),
         "duration": candidate.seconds, "pushes": None,
+        "realism": load_realism(candidate.realism),
     }  # fmt: skip
     alone, below = [], []
     if candidate.alone:
         env = ResidualBalanceEnv(robot, **settings)
         action = np.zeros(len(env.action_names))
         agent = Agent("alone", env, lambda observation: action, "")
-        alone = [worth(agent, trial, candidate.in_place) for trial in candidate.alone]
+        alone = [
+            worth(agent, trial, candidate.in_place, candidate.chatter) for trial in candidate.alone
+        ]
     if candidate.policy is not None and candidate.below:
         policy = _policy(candidate.policy, candidate.robot)
         agent = Agent("policy", policy.make_env(robot=robot, **settings), policy.act, "")
-        below = [worth(agent, trial, candidate.in_place) for trial in candidate.below]
+        below = [
+            worth(agent, trial, candidate.in_place, candidate.chatter) for trial in candidate.below
+        ]
     return alone, below
 
 
-def worth(agent: Agent, trial: Trial, in_place: bool) -> float:
+def worth(agent: Agent, trial: Trial, in_place: bool, chatter: float = 0.0) -> float:
     """1 for a recovery, 0.6 for one that does not come to rest, at most 0.3 for a fall, by the time
-    until then. With `in_place` one whose foot moved (`Outcome.foot_displaced`) is no recovery.
+    until then; less `chatter` times |Δτ|/τ_max a tick, see `TuneConfig`.
+
+    With `in_place` one whose foot moved (`Outcome.foot_displaced`) is no recovery.
     """
     outcome, env = run_trial(agent, trial), agent.env
+    period = env.controller.period if isinstance(env, ResidualBalanceEnv) else env.arrays.timestep
+    price = chatter * period * (outcome.torque_variation or 0.0)
     if outcome.fallen:
-        return FALLEN * env.steps / env.max_steps
+        return FALLEN * env.steps / env.max_steps - price
     moved = in_place and outcome.foot_displaced
-    return 1.0 if outcome.recovered and not moved else UNQUIET
+    return (1.0 if outcome.recovered and not moved else UNQUIET) - price
 
 
 def follow(limits: np.ndarray, values: np.ndarray, speed: float = 0.1) -> np.ndarray:
@@ -112,7 +124,7 @@ def follow(limits: np.ndarray, values: np.ndarray, speed: float = 0.1) -> np.nda
 
     `values` (candidates, directions, levels) is `worth`.
     """
-    recovered = (values == 1.0).mean(axis=(0, 2))
+    recovered = (values > UNQUIET).mean(axis=(0, 2))
     return limits * np.exp(speed * (recovered - 0.5))
 
 

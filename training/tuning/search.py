@@ -21,6 +21,7 @@ from poise.configs.outputs import check_out_folder
 from poise.configs.reading import is_file, parse_json, read_lines
 from poise.configs.schema import build, on_base, read_yaml, to_dict, to_yaml
 from poise.envs.robots.robot import load_robot
+from poise.envs.sensing.realism import IDEAL
 from poise.training.running.executor import Executor
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
@@ -43,6 +44,8 @@ class TuneConfig:
             configuration (``com.weight``); on a log scale if both ends are above 0.
         policy: a policy on top of the candidates counts too, by `policy_share` of the whole.
         in_place: a foot that moves is no recovery.
+        realism: name or file of the level that trials are played at.
+        chatter: what a trial's worth loses for torques that change by their limit in every tick.
         generations, population, spread: of CMA-ES; spread is the first standard deviation, as a
             fraction of each range.
     """
@@ -54,6 +57,8 @@ class TuneConfig:
     policy: str | None = None
     policy_share: float = field(default=0.4, metadata={"min": 0.0, "max": 1.0})
     in_place: bool = False
+    realism: str = field(default=IDEAL, metadata={"omit": "default"})
+    chatter: float = field(default=0.0, metadata={"min": 0.0, "omit": "default"})
     generations: int = field(default=60, metadata={"min": 1})
     population: int = field(default=14, metadata={"min": 4})
     spread: float = field(default=0.15, metadata={"above": 0.0, "max": 1.0})
@@ -207,6 +212,7 @@ class _Search:
             Candidate(
                 number, config.robot, self.gains.at(u), config.pushes.seconds, config.in_place,
                 alone, config.policy if with_policy else None, below if with_policy else (),
+                config.realism, config.chatter,
             )
             for number, u in enumerate(units)
         ]  # fmt: skip

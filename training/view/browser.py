@@ -66,6 +66,8 @@ class BrowserView:
         beside.set_width(300)
         server.gui.main_panel.dock_right()
         self._pages = Pages(server, lambda: self.stage)
+        self._seen = False  # by anybody
+        server.on_client_connect(lambda _: self.ask(self._looked_at))
         self._set_play(play)
 
     def _set_play(self, play: Play) -> None:
@@ -163,6 +165,13 @@ class BrowserView:
         self.paused, self._sliders.waiting = False, None
         self.pace.rest()
 
+    def _looked_at(self) -> None:
+        """A recorded trial begins when the first page is opened: it may be over before."""
+        if not self._seen and not self.play.live:
+            self.paused = False
+            self.reset()
+        self._seen = True
+
     def _advance(self) -> None:
         """The steps that are due."""
         if self.paused:
@@ -200,7 +209,8 @@ class BrowserView:
             self._told = now
             history = self.play.history
             at, first, last = (history[k][0].time for k in (self.play.at, 0, -1))
-            self.panel.tell(status(self.play, self.paused, self.pace), self.paused, at, first, last)
+            text = status(self.play, self.paused, self.pace, self._pulled_now())
+            self.panel.tell(text, self.paused, at, first, last)
             waits = self._sliders.waiting is not None
             self.panel.tell_how(self.play.spec, None if waits else self.play.gait)
             self.plots.show(history, self.play.at, self.play.period)
@@ -233,6 +243,13 @@ class BrowserView:
     def _grabbed(self, phase: str, pulled: Pull) -> None:
         """In the server's thread, while a body is dragged."""
         self.ask(self._pulled, phase, pulled)
+
+    def _pulled_now(self) -> dict[str, object] | None:
+        """The push that the arrow of the mouse would be now."""
+        if self.stage.pull is None:
+            return None
+        duration = float(self.panel.duration.value)
+        return self.stage.pull.fields(self.play.robot, self.play.yaw, duration)
 
     def _pulled(self, phase: str, pulled: Pull) -> None:
         if phase != "end":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import viser
 
 from poise.baselines.walking.command import GaitCommand
+from poise.configs.texts import code, plain
 from poise.envs.pushes.options import body_names
 from poise.envs.viewing.quantities import Quantity
 from poise.training.sessions.choices import NOBODY, Choices
@@ -117,7 +118,7 @@ class Panel:
 
     def tell_how(self, spec: Spec, gait: GaitCommand | None) -> None:
         """Bring the command line, the link and, with a `gait`, its sliders up to date."""
-        self.command.content = f"`{spec.command}`"
+        self.command.content = code(spec.command)
         self.link.content = LINK.format(link=html.escape(spec.link))
         if gait is not None:
             self.walk.tell(gait)
@@ -231,8 +232,11 @@ class Panel:
         return callback
 
 
-def status(play: Play, paused: bool, pace: Pace) -> str:
-    """What stands above the controls: time, how near to real time it is, who has fallen."""
+def status(play: Play, paused: bool, pace: Pace, pulled: Mapping[str, object] | None = None) -> str:
+    """What stands above the controls: time, how near to real time it is, who has fallen, and why.
+
+    While a body is dragged, `pulled` are the fields of the push that it would be.
+    """
     frames = play.history[play.at]
     factor = "paused" if paused else f"**{pace.factor:.2f} × real time**"
     if pace.speed != 1.0:
@@ -240,7 +244,11 @@ def status(play: Play, paused: bool, pace: Pace) -> str:
     lines = [f"{frames[0].time:.2f} s, {factor}"]
     for name, frame in zip(play.names, frames, strict=True):
         fell = None if frame.fall_time is None else f"fell at {frame.fall_time:.2f} s"
-        lines.append(f"`{name}`: {fell or 'on its feet'}")
+        lines.append(f"{code(name)}: {fell or 'on its feet'}")
+        if play.ended and name in play.reasons:
+            lines.append(f"*{plain(play.reasons[name])}*")
+    if pulled is not None:
+        lines.append(f"**{pulled['impulse']} N·s** towards {pulled['direction']}°")
     return "  \n".join(lines)
 
 

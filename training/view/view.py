@@ -7,6 +7,7 @@ from pathlib import Path
 
 from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError
+from poise.envs.sensing.realism import IDEAL
 from poise.training.sessions.live import Play
 from poise.training.sessions.loading import load_live
 from poise.training.sessions.recorded import recorded_trial
@@ -31,6 +32,7 @@ def view(
     seed: int = 0,
     pushes: Sequence[str] = (),
     commands: Sequence[str] = (),
+    realism: str = IDEAL,
     native: bool = False,
     seconds: float | None = None,
     dark: bool = False,
@@ -47,6 +49,7 @@ def view(
         seed: of the start.
         pushes: scheduled ones, each a YAML mapping as `parse_pushes` takes it.
         commands: of controllers that walk, each a YAML mapping as `parse_commands` takes it.
+        realism: a packaged level of realism or a path to one.
         native: MuJoCo's own window instead of a page, of one controller.
         seconds: of the wall clock after which it ends; None: when the process is stopped.
         dark: whether the page is dark.
@@ -58,7 +61,7 @@ def view(
         PoiseError: viser is not installed, or there is no display.
     """
     spec = SessionSpec(tuple(controllers) or (DEFAULT,), robot, motion, seed, tuple(pushes),
-                       tuple(commands))  # fmt: skip
+                       tuple(commands), realism)  # fmt: skip
     _check(spec, seconds, native)
     if not native:
         check_port(host, port)

@@ -98,11 +98,21 @@ def test_a_fault_has_the_number_of_its_line(old: str, tmp_path: Path) -> None:
     assert "\n" not in str(error.value)
 
 
-def test_unknown_legs_need_unit_and_axes(small: Path) -> None:
-    small.write_text(small.read_text().replace("UpLeg", "Tentacle"))
-    with pytest.raises(ConfigError, match="no joint is called as 'hip_left' is: name unit, up"):
+def test_unknown_legs_are_named_or_need_unit_and_axes(small: Path) -> None:
+    """Where neither names nor structure tell: here one leg is longer."""
+    text = small.read_text().replace("UpLeg", "Tentacle").replace("-0.4 0", "-0.3 0", 1)
+    small.write_text(text)
+    with pytest.raises(ConfigError, match="no joint is called as 'hip_left' is, .*hip_left=JOINT"):
         read_bvh(small)
     assert len(read_bvh(small, "m", "y", "z").clip) == FRAMES
+    joints = {"hip_left": "LeftTentacle", "hip_right": "RightTentacle"}
+    named, axes = read_bvh(small, joints=joints)
+    assert axes.names == ("y", "z") and axes.unit == 1.0
+    assert named.skeleton.names[named.skeleton.roles["hip_left"]] == "LeftTentacle"
+    with pytest.raises(ConfigError, match="joints: no such role: 'wing' .choices: hip_left"):
+        read_bvh(small, joints={"wing": "LeftLeg"})
+    with pytest.raises(ConfigError, match="joints.hip_left: no joint is called 'x'"):
+        read_bvh(small, joints={"hip_left": "x"})
 
 
 @pytest.mark.parametrize(
@@ -122,8 +132,9 @@ def test_without_the_library_the_error_says_how_to_get_it(
     small: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pybvh", None)
+    clip = read_bvh(small).clip
     with pytest.raises(ConfigError, match=r"pip install 'poise\[motion\]'"):
-        read_bvh(small)
+        write_bvh(clip, small)
 
 
 def test_mutated_files_are_read_or_refused_in_one_line(tmp_path: Path) -> None:

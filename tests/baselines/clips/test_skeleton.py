@@ -6,7 +6,8 @@ import pytest
 from poise.baselines.clips.bvh import read_bvh
 from poise.baselines.clips.groups import GROUPS, LinkGroup
 from poise.baselines.clips.library import find_bvh
-from poise.baselines.clips.skeleton import ROLES, Skeleton, find_roles
+from poise.baselines.clips.names import ROLES, find_roles
+from poise.baselines.clips.skeleton import Skeleton
 from poise.configs.errors import ConfigError
 
 FAMILIES = {

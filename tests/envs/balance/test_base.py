@@ -1,5 +1,6 @@
 """What both environments promise: start, pushes, rewards, end, info, errors."""
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -9,8 +10,10 @@ from poise.envs.balance.base import EnvConfig, env_config
 from poise.envs.balance.reward import REWARD_TERMS
 from poise.envs.balance.start import RESET_OPTIONS
 from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.plain_info import PlainInfo
 from poise.envs.pushes.push import Kick, Push
 from poise.envs.pushes.sampler import PushSampler
+from poise.envs.vector.batch import EnvBatch
 from tests.support.shared import robot
 
 BOTH = pytest.mark.parametrize("make", [ResidualBalanceEnv, TorqueBalanceEnv])
@@ -80,6 +83,51 @@ def test_reset_sets_exactly_the_push_of_its_options(make):
     assert info["push"][1]["impulse"] == pytest.approx(0.5 * robot().mass)
     _, info = env.reset(seed=0, options={"push": []})
     assert env.simulation.pushes == () and info["push"] == []
+
+
+def test_actions_beyond_1_are_refused_or_clipped():
+    """As Gaussian policies give them; alone and among others. A NaN is refused either way."""
+    env, clipping = TorqueBalanceEnv(robot()), TorqueBalanceEnv(robot(), clip_action=True)
+    many = EnvBatch([TorqueBalanceEnv(robot(), clip_action=True) for _ in range(2)])
+    many.reset([0, 0])
+    for each in (env, clipping):
+        each.reset(seed=0)
+    wide = np.full(env.action_space.shape, 1.7)
+    with pytest.raises(ConfigError, match="must lie in"):
+        env.step(wide)
+    env.step(np.ones_like(wide))
+    clipping.step(wide)
+    many.step(np.stack([wide, wide]))
+    assert np.array_equal(clipping.episode.action, np.ones_like(wide))
+    assert np.array_equal(clipping.simulation.data.qpos, env.simulation.data.qpos)
+    assert np.array_equal(many.envs[1].simulation.data.qpos, env.simulation.data.qpos)
+    with pytest.raises(ConfigError, match="must lie in"):
+        clipping.step(np.full_like(wide, np.nan))
+
+
+def test_the_specification_has_the_steps_of_an_episode():
+    """Of this environment, without a wrapper that cuts it off."""
+    for duration, steps in ((6.0, 300), (8.0, 400)):
+        env = gymnasium.make("poise/TorqueBalance-v0", duration=duration)
+        assert env.spec.max_episode_steps == steps == env.unwrapped.max_steps
+        again = gymnasium.make(env.spec)
+        assert again.unwrapped.max_steps == steps
+        env.close()
+
+
+def test_the_push_as_arrays():
+    """An entry for each push; everything else of `info` is as it was."""
+    env = PlainInfo(TorqueBalanceEnv(robot()))
+    push = [PUSH, {"delta_v": 0.5, "start": 1.0}]
+    _, info = env.reset(seed=0, options={"push": push})
+    told, plain = info["push"], env.unwrapped.info()
+    assert {key: each.shape for key, each in told.items()} == dict.fromkeys(plain["push"][0], (2,))
+    assert told["body"][0] == robot().model.body("torso").id and told["impulse"][0] == 12.0
+    *_, info = env.step(zero(env))
+    assert set(info) == set(plain) and info["push"]["start"].tolist() == [0.5, 1.0]
+    assert env.reset(options={"push": []})[1]["push"]["impulse"].shape == (0,)
+    with pytest.raises(ConfigError, match="no environment of Poise"):
+        PlainInfo(gymnasium.make("CartPole-v1"))
 
 
 @BOTH

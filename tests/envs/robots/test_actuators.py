@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
+from poise.envs.robots.actuators import proposed_armature
 from poise.envs.robots.robot import Robot, load_robot
 from tests.support.small_biped import JOINTS, LEG, motors, write_biped
 
@@ -149,3 +150,28 @@ def test_force_ranges_without_actuators_are_motors(tmp_path: Path) -> None:
     extra = '<actuator><motor joint="left_hip" ctrlrange="-5 5"/></actuator>'
     robot = load_robot(write_biped(tmp_path, leg=leg, extra=extra))
     assert robot.torque_limit.tolist() == [5.0]
+
+
+PASSIVE = {"armature": "dof_armature", "damping": "dof_damping", "frictionloss": "dof_frictionloss"}
+
+
+@pytest.mark.parametrize("field", PASSIVE)
+def test_what_a_description_gives_joints_wins(tmp_path: Path, field: str) -> None:
+    """By pattern, an exact name first; other joints keep what the model gives them."""
+    leg = LEG.replace('axis="0 1 0"', f'axis="0 1 0" {field}="0.5"')
+    given = {"left_knee": 0.25, "*_knee": 0.125, "*_roll": 2}
+    robot = load_robot(write_biped(tmp_path, leg=leg, **{field: given}))
+    values = dict(zip(robot.joint_names, getattr(robot.model, PASSIVE[field])[6:], strict=True))
+    assert values["left_knee"] == 0.25 and values["right_knee"] == 0.125
+    assert values["left_ankle_roll"] == 2.0 and values["left_hip"] == 0.5
+    (tmp_path / "plain").mkdir()
+    plain = load_robot(write_biped(tmp_path / "plain", leg=leg))
+    assert robot.fingerprint != plain.fingerprint
+    for wrong, text in (({"tail": 1}, "no joint is called 'tail'"), ({"*": -1}, "at least 0")):
+        with pytest.raises(ConfigError, match=rf"{field}.*{text}"):
+            load_robot(write_biped(tmp_path, **{field: wrong}))
+
+
+@pytest.mark.parametrize(("limit", "mass", "armature"), [(30, 40, 0.009), (300, 40, 0.02)])
+def test_a_rotor_is_proposed_by_torque_and_mass(limit: float, mass: float, armature: float) -> None:
+    assert proposed_armature(limit, mass) == armature

@@ -1,4 +1,4 @@
-"""The ground plane and friction."""
+"""Friction, options and flags; envs/robots/ground.py."""
 
 from __future__ import annotations
 
@@ -8,40 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.configs.errors import ConfigError
+from poise.configs.errors import PoiseWarning
+from poise.envs.robots.ground import contact_friction
 from poise.envs.robots.robot import load_robot
 from tests.support.small_biped import BOX_FOOT, motors, write_biped
 
 FLOOR = '<geom name="floor" type="plane" size="1 1 1"/>'
-
-
-def ground_name(path: Path) -> str:
-    robot = load_robot(path)
-    return robot.model.geom(robot.ground_geom_id).name
-
-
-def test_added_where_there_is_none(tmp_path: Path) -> None:
-    """A model without a plane gets one, called as the description says."""
-    assert ground_name(write_biped(tmp_path)) == "ground"
-    assert ground_name(write_biped(tmp_path, ground="lawn")) == "lawn"
-
-
-def test_added_ground_touches_unusual_masks(tmp_path: Path) -> None:
-    """The added ground collides with whatever collides at all."""
-    foot = BOX_FOOT.replace("/>", ' contype="4" conaffinity="0"/>')
-    load_robot(write_biped(tmp_path, foot=foot))
-    foot = BOX_FOOT.replace("/>", ' contype="0" conaffinity="8"/>')
-    load_robot(write_biped(tmp_path, foot=foot))
-
-
-def test_models_own_plane(tmp_path: Path) -> None:
-    """The model's plane is the ground: the first one, the named one, or one without a name."""
-    other = '<geom name="other" type="plane" size="1 1 1"/>'
-    picture = '<geom type="plane" size="1 1 1" contype="0" conaffinity="0" pos="0 0 -1"/>'
-    assert ground_name(write_biped(tmp_path, world=picture + FLOOR + other)) == "floor"
-    path = write_biped(tmp_path, world=FLOOR + other, ground="other")
-    assert ground_name(path) == "other"
-    assert ground_name(write_biped(tmp_path, world=FLOOR.replace('name="floor"', ""))) == "ground"
 
 
 def test_contact_pairs(tmp_path: Path) -> None:
@@ -53,8 +25,8 @@ def test_contact_pairs(tmp_path: Path) -> None:
         write_biped(tmp_path, foot=foot, extra=extra, world=FLOOR, options={"friction": 0.6})
     )
     np.testing.assert_array_equal(robot.model.pair_friction[:, :2], 0.6)
-    path = write_biped(tmp_path, foot=foot, extra=extra, ground="floor")
-    assert ground_name(path) == "floor", "a ground that only the pairs name is added"
+    robot = load_robot(write_biped(tmp_path, foot=foot, extra=extra, ground="floor"))
+    assert robot.model.geom(robot.ground_geom_id).name == "floor", "only the pairs name it"
 
 
 def test_friction(tmp_path: Path) -> None:
@@ -64,26 +36,26 @@ def test_friction(tmp_path: Path) -> None:
     assert np.all(load_robot(path).model.geom_friction[:, 0] == 0.7)
 
 
-WRONG = {
-    "unknown name": ({"world": FLOOR, "ground": "lawn"}, ["ground", "'lawn'", "choices: floor"]),
-    "raised": ({"world": FLOOR.replace("/>", ' pos="0 0 0.1"/>')}, ["ground", "z = 0"]),
-    "slope": ({"world": FLOOR.replace("/>", ' euler="5 0 0"/>')}, ["ground", "z = 0"]),
-    "masks": (
-        {"world": FLOOR, "foot": BOX_FOOT.replace("/>", ' contype="2" conaffinity="2"/>')},
-        ["feet[0]", "collision geometry"],
-    ),
-    "friction": ({"options": {"friction": 0}}, ["options.friction", "above 0"]),
-}
+FLAGS = ("contact", "gravity", "actuation", "constraint", "sensor")
 
 
-@pytest.mark.parametrize(("change", "words"), WRONG.values(), ids=WRONG)
-def test_wrong_ground(tmp_path: Path, change: dict, words: list[str]) -> None:
-    """A ground on which the robot cannot stand is refused with the file and the field."""
-    path = write_biped(tmp_path, **change)
-    with pytest.raises(ConfigError) as caught:
-        load_robot(path)
-    for word in [str(path), *words]:
-        assert word in str(caught.value)
+@pytest.mark.parametrize("flag", FLAGS)
+def test_flags_that_no_robot_stands_without_are_turned_on(tmp_path: Path, flag: str) -> None:
+    """Files for inverse kinematics have them; it is said, and the robot is the same."""
+    option = f'<option><flag {flag}="disable"/></option>'
+    path = write_biped(tmp_path, extra=motors(ctrlrange="-50 50") + option)
+    with pytest.warns(PoiseWarning, match=f"flags disable {flag}: turned on"):
+        robot = load_robot(path)
+    assert robot.notes == (f"the model's flags disable {flag}: turned on",)
+    (tmp_path / "plain").mkdir()
+    assert robot.fingerprint == load_robot(write_biped(tmp_path / "plain")).fingerprint
+
+
+def test_an_override_of_contacts_is_the_friction(tmp_path: Path) -> None:
+    """Whatever the geoms say."""
+    option = '<option o_friction="0.2 0.2 0 0 0"><flag override="enable"/></option>'
+    robot = load_robot(write_biped(tmp_path, extra=motors(ctrlrange="-50 50") + option))
+    assert contact_friction(robot.model, robot.ground_geom_id, robot.soles[0].geom_ids) == 0.2
 
 
 def test_friction_may_be_stiffer_than_the_contact(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def test_where_there_is_none_one_line_says_how_to_get_it(nothing: Path) -> None:
         load_robot("unitree_g1")
     text = str(error.value)
     assert text.startswith(str(resolve("robots", "unitree_g1"))) and "source.menagerie" in text
-    assert "pip install 'poise[robots]'" in text and "POISE_MENAGERIE" in text and "\n" not in text
+    assert "pip install -e '.[robots]'" in text and "POISE_MENAGERIE" in text and "\n" not in text
 
 
 @pytest.mark.parametrize("variable", VARIABLES)

@@ -256,7 +256,10 @@ WRONG = [
     ({"root_joint": ""}, ["root", "free joint"]),
     ({"trunk": BALL}, ["ball joints"]),
     ({"extra": WELD}, ["closed kinematic loops"]),
-    ({"world": "<body><joint/><geom size='0.02'/></body>"}, ["root", "before all other"]),
+    (
+        {"world": "<body><joint/><geom size='0.02'/></body>"},
+        ["root", "other things that move", "hinge joint"],
+    ),
     ({"world": BALL.replace("<joint type='ball'/>", "<freejoint/>")}, ["root"]),
     ({"leg": LEG.replace('axis="0 1 0"', 'axis="0 0 0"')}, ["does not compile"]),
     ({"feet": []}, ["feet", "two feet"]),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -125,3 +126,47 @@ def test_wrong_postures(tmp_path: Path, change: dict, words: list[str]) -> None:
         load_robot(path)
     for word in [str(path), *words]:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_the_com_goes_over_the_middle(tmp_path: Path, single: bool) -> None:
+    """By the legs alone, also where their ankles do not roll; the soles stay flat and apart."""
+    leg = LEG.replace('<joint name="{side}_ankle_roll" axis="1 0 0" range="-30 30"/>', "")
+    change: dict = {"leg": leg, "extra": "", "torque_limits": {"*": 50}} if single else {}
+    (tmp_path / "plain").mkdir()
+    plain = load_robot(write_biped(tmp_path / "plain", **change))
+    assert abs(plain.com_ahead) > 0.01
+    middle = {"joints": {"*_hip": -20, "*_knee": 40, "*_ankle": -20}, "com": "middle"}
+    robot = load_robot(write_biped(tmp_path, posture=middle, **change))
+    assert robot.com_ahead == pytest.approx(0.0, abs=1e-6)
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing_qpos
+    mujoco.mj_forward(robot.model, data)
+    for sole, old in zip(robot.soles, plain.soles, strict=True):
+        turn = data.xmat[sole.body_id].reshape(3, 3) @ sole.rotation
+        np.testing.assert_allclose(turn, np.eye(3), atol=1e-9)
+        np.testing.assert_allclose(sole.polygon, old.polygon, atol=1e-9)
+    left, right = (data.xpos[s.body_id] for s in robot.soles)
+    np.testing.assert_allclose((left - right)[:2], [0.0, 0.2], atol=1e-6)
+
+
+def test_a_com_that_legs_cannot_bring_there(tmp_path: Path) -> None:
+    """How far it is away, in millimetres."""
+    weight = '<geom size="0.05" pos="0.9 0 0" mass="60"/>'
+    path = write_biped(tmp_path, trunk=weight, posture={**posture(), "com": "middle"})
+    with pytest.raises(ConfigError, match=r"posture.com: the legs do not bring .* \d+ mm away"):
+        load_robot(path)
+
+
+def test_straight_legs_do_not_throw_the_levelling(tmp_path: Path) -> None:
+    """A knee that does not lengthen its leg is not turned by millions of degrees."""
+    leg = LEG.replace('range="5 150"', 'range="0 150"')
+    thicker = BOX_FOOT.replace("-0.04", "-0.042")
+    path = write_biped(
+        tmp_path, leg=leg, right_foot=thicker, posture=posture(hip=0, knee=0, ankle=0)
+    )
+    with pytest.raises(ConfigError) as caught:
+        load_robot(path)
+    assert "tilted, 'left_foot' by 0.0° and 'right_foot' by 0.0°, and one is 2.0 mm higher" in str(
+        caught.value
+    )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from poise.envs.sensing.drawn import NOISES, DrawnRobot
-from poise.envs.sensing.realism import Sensors
+from poise.envs.sensing.realism import SensorErrors
 from tests.support.sensing import drawn_of
 from tests.support.shared import robot
 
@@ -56,10 +56,10 @@ def test_measured_means_that_a_sensor_errs():
     """Delays, motors, bodies and ground are no errors of measurement; each noise and bias is."""
     level = {"latency": {"sense": 0.01}, "motors": {"lag": 0.01}, "body": {"mass": 0.1}}
     assert not drawn_of(level).measured
-    for sensor in fields(Sensors):
+    for sensor in fields(SensorErrors):
         assert drawn_of({"sensors": {sensor.name: 0.01}}).measured, sensor.name
     assert drawn_of({"motors": {"backlash": 0.01}}).measured
-    assert set(NOISES) <= {sensor.name for sensor in fields(Sensors)}
+    assert set(NOISES) <= {sensor.name for sensor in fields(SensorErrors)}
 
 
 def test_the_summary_is_in_units():

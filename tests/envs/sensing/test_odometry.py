@@ -7,7 +7,7 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.sensing.estimator import EstimatedState, EstimatorConfig
-from poise.envs.sensing.odometry import filter_gains, rate_gain
+from poise.envs.sensing.odometry import LEAST, filter_gains, rate_gain
 from tests.support.sensing import PLAIN, estimated, start
 from tests.support.shared import robot
 
@@ -77,7 +77,7 @@ def test_joint_gains_are_those_of_a_filter_that_has_run_long(noises):
     """A Kalman recursion from a wide start."""
     dt, stir = 0.002, 15.0
     A, B = np.array([[1.0, dt], [0.0, 1.0]]), np.array([[0.5 * dt * dt], [dt]])
-    R, P = np.diag(np.maximum(noises, 1e-6) ** 2.0), np.diag([1.0, 100.0])
+    R, P = np.diag(np.maximum(noises, LEAST) ** 2.0), np.diag([1.0, 100.0])
     for _ in range(20_000):
         P = A @ P @ A.T + stir**2 * B @ B.T + 1e-18 * np.eye(2)
         K = P @ np.linalg.inv(P + R)

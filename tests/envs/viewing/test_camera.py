@@ -96,9 +96,9 @@ def test_the_model_and_the_data_are_those_of_mujoco() -> None:
 
 
 def test_a_time_limit_of_gymnasium_s_own_comes_on_top() -> None:
-    """The spec has none, so that a longer `duration` holds; whoever wants one names it."""
+    """No wrapper cuts off a longer `duration`, which the spec tells; whoever wants one names it."""
     long = gymnasium.make(TORQUE, duration=7.0)
-    assert long.spec.max_episode_steps is None and long.unwrapped.max_steps == 350
+    assert long.spec.max_episode_steps == long.unwrapped.max_steps == 350
     short: Any = gymnasium.make(TORQUE, pushes=None, max_episode_steps=2)
     short.reset(seed=0)
     zero = np.zeros(short.action_space.shape, dtype=np.float32)

@@ -47,7 +47,7 @@ def test_a_table_two_plots_and_a_video(can_render: None, tmp_path: Path) -> None
     trial = demo.hardest(results)
     won = {r.trial: r.fraction for r in results.of("momentum-qp") if r.recovered}
     assert trial in won and won[trial] == max(won.values())
-    assert command == (f"poise replay {tmp_path / 'demo'} --trial {trial} --controller zero "
+    assert command == (f"poise replay {tmp_path / 'demo'} --trial {trial} --controllers zero "
                        f"momentum-qp --video {video}")  # fmt: skip
     assert next(imageio_ffmpeg.read_frames(video))["size"] == (960, 480)
 

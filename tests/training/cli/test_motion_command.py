@@ -111,7 +111,7 @@ def test_steps_are_joined_and_put_together(
     [
         (
             ["jump"],
-            "no such command: motion jump (choices: info, convert, import, follow, join, check,",
+            "no such command: motion 'jump' (choices: info, convert, import, follow, join, check,",
         ),
         (["info", "nothing"], "clip: no such name: 'nothing'; give a path to a .bvh file or a"),
         (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),

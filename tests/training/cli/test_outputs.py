@@ -67,5 +67,5 @@ def test_a_result_of_something_else(cold: Path, capsys: pytest.CaptureFixture[st
     (cold / "mine/trials.csv").write_text("of something else")
     assert "mine: out: holds files of something else" in refused("evaluate zero --out mine", capsys)
     ResultFolder(cold / "other", SETTINGS).close()
-    error = refused("evaluate zero --out other --seed 7", capsys)
+    error = refused("evaluate zero --suite random --out other --seed 7", capsys)
     assert "settings.yaml: suite: holds a result with other suite" in error

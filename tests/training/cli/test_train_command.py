@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.cli.train import last_words, steps_note
+from poise.training.cli.train import gained, last_words, steps_note
 from poise.training.learning.callbacks import Progress
 from tests.support.shared import finished_run, tiny_config
 
@@ -40,25 +40,34 @@ def test_a_run_ends_with_what_it_measured_and_what_comes_next() -> None:
     with (out / "evaluations.csv").open(newline="") as file:
         first, *trained = list(csv.DictReader(file))
     best = max(trained, key=lambda row: float(row["recovered"]))
-    measured, evaluate, view = last_words(tiny_config(), out)
+    measured, gain, evaluate, view = last_words(tiny_config(), out)
     assert measured == (
         f"of 5 held-out pushes recovered: {float(first['recovered']):.1%} by momentum-qp, "
         f"{float(best['recovered']):.1%} by {out}/best (at step {best['timesteps']})"
     )
+    assert gain.startswith("gain: ") and gain.endswith(
+        "0 is within: train on, or evaluate on more pushes"
+    )
     assert evaluate == f"next: poise evaluate momentum-qp {out} --out out/run"
     assert view == f"      poise view {out}"
+
+
+def test_a_gain_is_told_with_its_interval() -> None:
+    """Of the first evaluation and the best, as independent rates [Newcombe98]."""
+    start, best = ({"recovered": rate, "timesteps": 0.0} for rate in (0.5625, 0.765625))
+    assert gained(start, best, 256) == "gain: +20.3 points, 95 % +12.2 to +28.1"
 
 
 def test_what_comes_next_fits_the_run() -> None:
     """Its robot, a controller from outside, a walk; a policy alone is compared with nothing."""
     out = finished_run()
     other = replace(tiny_config(), robot="tall", controller="mine.py:Mine")
-    _, evaluate, view = last_words(other, out)
+    *_, evaluate, view = last_words(other, out)
     assert evaluate.endswith(f"evaluate mine.py:Mine {out} --robot tall --out out/run "
                              "--allow mine.py:Mine")  # fmt: skip
     assert view.endswith(f"view {out} --robot tall --allow mine.py:Mine")
-    assert "--suite walk-push" in last_words(replace(tiny_config(), action="walk"), out)[1]
-    first, evaluate, _ = last_words(replace(tiny_config(), action="position"), out)
+    assert "--suite walk-push" in last_words(replace(tiny_config(), action="walk"), out)[2]
+    first, _, evaluate, _ = last_words(replace(tiny_config(), action="position"), out)
     assert "by the first policy" in first and f"evaluate {out} --out" in evaluate
     assert last_words(tiny_config(), Path("nowhere")) == []
 

@@ -20,6 +20,7 @@ from poise.envs.sensing.estimator import EstimatedState
 from poise.training.cli.entry import main
 from poise.training.evaluation import run
 from poise.training.evaluation.evaluate import benchmark, default_controllers, packaged_policies
+from poise.training.evaluation.run import compared
 from poise.training.learning.policy import load_policy
 from poise.training.results.read import load_results
 from poise.training.results.replay import replay
@@ -286,7 +287,9 @@ def test_everyone_takes_part_by_default() -> None:
     assert {"pd", "macchietto09", "moskalev24", "lip-mpc"} <= set(names)
 
 
-@pytest.mark.parametrize("backend", ["local", "joblib", "ray"])
+@pytest.mark.parametrize(
+    "backend", ["local", pytest.param("joblib", marks=pytest.mark.weekly), "ray"]
+)
 def test_every_backend_gives_the_same_trials(
     backend: str, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -315,3 +318,9 @@ def test_progress_and_ranking_are_printed(
     show(json.loads((finished / "summary.json").read_text()), Console(width=140))
     text = capsys.readouterr().out
     assert "momentum-qp" in text and "η mean" in text and "small.yaml" in text
+
+
+def test_neighbours_of_a_ranking_are_compared_too() -> None:
+    """Not only each with the reference, which all of the best may beat."""
+    found = list(compared("qp", ["qp", "a", "b", "c"], ["b", "a", "qp", "c"]))
+    assert found == [("qp", "a"), ("qp", "b"), ("qp", "c"), ("a", "b")]

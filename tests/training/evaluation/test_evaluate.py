@@ -228,6 +228,7 @@ def test_bad_input_is_refused_and_nothing_is_written(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.weekly
 def test_a_dead_worker_costs_nothing_that_is_finished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -119,8 +119,11 @@ def test_figures_of_a_result(
     assert "differs from the policy by" in capsys.readouterr().out
     head, _ = head_of(tmp_path / "out")
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
-    metrics = {m["type"]: m["value"] for m in head["model-index"][0]["results"][0]["metrics"]}
+    told = head["model-index"][0]["results"][0]["metrics"]
+    metrics = {m["type"]: m["value"] for m in told}
     assert metrics["recovered_rate"] == summary["controllers"][run]["recovered_rate"]
+    place = f"suite {suite}, seed 0, robot humanoid"  # names, not all that is known of the robot
+    assert {m["name"] for m in told if m["type"] == "recovered_rate"} == {f"recovered, {place}"}
     assert head["license"] == "mit"
     assert main(["export", "residual", "--out", str(tmp_path / "no"), *given]) == 2
     error = capsys.readouterr().err
@@ -163,7 +166,7 @@ def test_a_missing_library_is_one_line(
     monkeypatch.setitem(sys.modules, name, None)
     assert main(["export", "residual", "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
-    assert f"needs the package {name}: pip install 'poise[export]'" in error
+    assert f"needs the package {name}: pip install -e '.[export]'" in error
     assert error.count("\n") == 1 and not (tmp_path / "out").exists()
 
 

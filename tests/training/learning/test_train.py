@@ -14,12 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.stepping.capture_step import CaptureStep
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, read_yaml
+from poise.envs.balance.reward import REWARD_TERMS
 from poise.envs.pushes.sampler import PushSampler
 from poise.envs.vector.batch import EnvBatch
 from poise.training.learning import callbacks, curriculum
@@ -76,7 +78,31 @@ def test_a_run_writes_everything():
     tags = events.Tags()["scalars"]
     for tag in ("evaluation/recovered", "train/loss", "rollout/ep_rew_mean", "curriculum/largest"):
         assert tag in tags
+    terms = {tag.removeprefix("reward/") for tag in tags if tag.startswith("reward/")}
+    assert {"alive", "com", "effort"} < terms <= set(REWARD_TERMS)
+    alive = [event.value for event in events.Scalars("reward/alive")]
+    assert len(alive) == 3 and all(0.0 < value <= tiny_config().env.reward.alive for value in alive)
     assert [s.step for s in events.Scalars("evaluation/recovered")] == [0, 128, 192]
+
+
+class Counter(BaseCallback):
+    """Counts the steps that it is told of."""
+
+    steps = 0
+
+    def _on_step(self):
+        self.steps += self.training_env.num_envs
+        return True
+
+
+def test_a_callback_of_the_user_is_called_and_changes_nothing(tmp_path):
+    counter = Counter()
+    out = tmp_path / "run"
+    train(replace(tiny_config(), steps=64), out, progress=False, callback=counter)
+    assert counter.steps == 64
+    train(replace(tiny_config(), steps=64), tmp_path / "plain", progress=False)
+    for a, b in zip(weights(out), weights(tmp_path / "plain"), strict=True):
+        assert np.array_equal(a[0], b[0])
 
 
 def test_policies_are_kept_when_told(tmp_path):

@@ -197,6 +197,7 @@ def heed_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+@pytest.mark.weekly
 def test_ctrl_c_ends_all_processes_at_once_and_loses_nothing(tmp_path: Path) -> None:
     """The command ends with 130 in seconds, though its runs have hours to go; --resume goes on."""
     config = tmp_path / "tiny.yaml"

@@ -6,6 +6,7 @@ import base64
 import csv
 import io
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -54,6 +55,21 @@ def test_directions_are_seen_from_above() -> None:
     (limit,) = of_class(root, "limit")
     assert np.hypot(*(points(limit) - np.array(MIDDLE)).T) == pytest.approx(-left[0], abs=0.2)
     assert -left[0] <= RADIUS and "a 1 to 2" in root.get("aria-label", "")
+
+
+def test_a_bound_is_a_hollow_mark_with_a_line_to_where_the_value_is() -> None:
+    """Outwards of a lower bound, inwards of an upper one; it is told as one."""
+    series = replace(one("a", 0, 1.0, 2.0, 1.0, 2.0), side=np.array([1.0, 0.0, -1.0, 0.0]))
+    root = ElementTree.fromstring(polar([series], "N·s"))
+    lower, upper = of_class(root, "bound")
+    for group, longer in ((lower, True), (upper, False)):
+        line, mark = group
+        starts, ends = ([float(line.get(f"{axis}{k}", "")) for axis in "xy"] for k in (1, 2))
+        radii = [np.hypot(*(np.array(end) - np.array(MIDDLE))) for end in (starts, ends)]
+        assert bool(radii[1] > radii[0]) is longer and mark.get("class") == "mark"
+    told = [element.text or "" for element in root.iter() if element.tag.endswith("title")]
+    first = [text.split(": ")[1].split(" (")[0] for text in told]
+    assert first == ["at least 1", "2", "at most 1", "2"]
 
 
 def test_one_of_many_stands_out() -> None:

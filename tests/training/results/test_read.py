@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 import pytest
 
 from poise.configs.errors import ConfigError
+from poise.training.diagnosis.diagnosis import COLUMNS as DIAGNOSIS
 from poise.training.results.leaderboard import leaderboard
 from poise.training.results.read import load_results
 from poise.training.results.summary import read_summary
@@ -28,6 +30,26 @@ def test_the_files_are_read_back() -> None:
         assert sum(r.recovered for r in records) == summary["controllers"][name]["recovered"]
         assert all(math.isnan(r.fall_time) != r.fallen for r in records)
         assert all(float(r.line["impulse"]) == r.impulse for r in records)
+
+
+def test_what_was_lost_says_why_and_older_results_say_nothing(tmp_path: Path) -> None:
+    """Every lost trial; the causes are counted in the summary."""
+    results = load_results(finished("random"))
+    for record in results.records:
+        assert bool(record.why) is not record.recovered
+    for name, entry in results.summary["controllers"].items():
+        lost = sum(not record.recovered for record in results.of(name))
+        assert sum(loss["trials"] for loss in entry.get("losses", [])) == lost
+    old = copied("random", tmp_path)
+    with (old / "trials.csv").open(newline="") as file:
+        rows = [
+            {k: v for k, v in row.items() if k not in DIAGNOSIS} for row in csv.DictReader(file)
+        ]
+    with (old / "trials.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    assert {record.why for record in load_results(old).records} == {""}
 
 
 def edit(name: str, old: str, new: str) -> Callable[[Path], None]:

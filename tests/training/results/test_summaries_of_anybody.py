@@ -9,11 +9,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import pytest
+import yaml
 from rich.console import Console
 
-from poise.configs.errors import PoiseError
+from poise.configs.errors import ConfigError, PoiseError
+from poise.training.evaluation.folder import read_settings
 from poise.training.evaluation.tables import print_summary
 from poise.training.report.factors import indicators, seed_table
+from poise.training.report.page import write_report
 from poise.training.report.plots import step_lines
 from poise.training.results.compare import compare, print_comparison
 from poise.training.results.leaderboard import write_leaderboard
@@ -87,3 +91,43 @@ def test_wrong_entries_are_refused_in_one_line(tmp_path: Path) -> None:
                 with contextlib.suppress(PoiseError):
                     read()
     assert refused > 600 and accepted > 50
+
+
+@pytest.mark.parametrize("text", ["a\nb", "\x1b]0;a\x07", "\u202ea", "x" * 5000])
+def test_texts_that_act_are_refused(tmp_path: Path, text: str) -> None:
+    """Wherever a text stands in a summary, names of controllers and of keys among them."""
+    folder = write_result(tmp_path / "a", {"pd": YES})
+    path, settings = folder / "summary.json", folder / "settings.yaml"
+    summary = json.loads(path.read_text())
+    texts = [place for place in places(summary) if isinstance(at(summary, place), str)]
+    assert len(texts) > 5
+    for place in texts:
+        path.write_text(json.dumps(changed(summary, place, text)))
+        with pytest.raises(ConfigError, match="summary.json: .*"):
+            read_summary(path)
+    path.write_text(json.dumps({**summary, text: 1}))
+    with pytest.raises(ConfigError, match="summary.json: "):
+        read_summary(path)
+    path.write_text(json.dumps(summary))
+    data = yaml.safe_load(settings.read_text())
+    settings.write_text(yaml.safe_dump({**data, "controllers": {**data["controllers"], text: "1"}}))
+    with pytest.raises(ConfigError, match="settings.yaml: controllers: "):
+        read_settings(folder)
+
+
+def at(value: Any, place: tuple) -> Any:
+    """What stands in a place."""
+    for key in place:
+        value = value[key]
+    return value
+
+
+@pytest.mark.parametrize("key", ["trials", "recovered", "fallen", "played"])
+def test_a_report_counts_no_more_than_there_can_be(tmp_path: Path, key: str) -> None:
+    """Statistics of larger numbers end in an error of their own."""
+    folder = write_result(tmp_path / "a", {"pd": YES})
+    path = folder / "summary.json"
+    summary = json.loads(path.read_text())
+    path.write_text(json.dumps(changed(summary, ("controllers", "pd", key), 10**300)))
+    with pytest.raises(ConfigError, match=f"controllers.pd.{key}: must be at most"):
+        write_report(folder, films=False)

@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
+from poise.configs.errors import PoiseWarning
 from poise.envs.maths.pendulum import ankle_limit
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
@@ -20,13 +21,13 @@ from poise.training.robot_check.faults import find_faults
 from poise.training.robot_check.tables import print_check
 from poise.training.robot_check.uses import IN_PLACE, STEPPING, Uses
 from tests.support.small_biped import LEG, motors, write_biped
-from tests.support.small_urdf import write_urdf
+from tests.support.small_urdf import INERTIAL, write_urdf
 
 
 @pytest.fixture(scope="module")
 def check(tmp_path_factory: pytest.TempPathFactory) -> RobotCheck:
     """Of a robot with nothing wrong."""
-    return check_robot(write_urdf(tmp_path_factory.mktemp("robot")))
+    return check_robot(write_urdf(tmp_path_factory.mktemp("robot"), armature={"*": 0.01}))
 
 
 def kinds(check: RobotCheck) -> list[tuple[str, bool]]:
@@ -59,7 +60,7 @@ def test_figures(check: RobotCheck) -> None:
 
 def test_margins_are_the_support_polygon_s(check: RobotCheck, tmp_path: Path) -> None:
     """From the CoM to the toes, the heels and the sides."""
-    state = Simulation(load_robot(write_urdf(tmp_path))).state
+    state = Simulation(load_robot(write_urdf(tmp_path, armature={"*": 0.01}))).state
     edges = {0.0: (0, 1), 90.0: (1, 1), 180.0: (0, -1), 270.0: (1, -1)}
     for each in check.directions:
         if each.direction in edges:
@@ -131,11 +132,13 @@ def test_a_sole_that_rocks_is_warned_of(tmp_path: Path) -> None:
 
 def test_weak_motors_are_warned_of(check: RobotCheck, tmp_path: Path) -> None:
     """Standing, or with one foot lifted; the joint is named."""
-    weak = check_robot(write_urdf(tmp_path, torque_limits={"*_knee": 2}))
+    rotors = {"*": 0.01}
+    weak = check_robot(write_urdf(tmp_path, torque_limits={"*_knee": 2}, armature=rotors))
     assert ("torque", False) in kinds(weak) and "_knee" in weak.faults[0].text
     needed = max(h.torque_fraction or 0 for h in check.one_foot.values())
     assert needed > 1.3 * (check.both_feet.torque_fraction or 0)
-    enough = check_robot(write_urdf(tmp_path, torque_limits={"*": 60 * needed / 1.2}))
+    limits = {"*": 60 * needed / 1.2}
+    enough = check_robot(write_urdf(tmp_path, torque_limits=limits, armature=rotors))
     assert {kind for kind, _ in kinds(enough)} == {"one foot"} and enough.both_feet.possible
     assert "120% of the torque limit of" in enough.faults[0].text
 
@@ -175,7 +178,8 @@ def test_the_command_writes_figures_and_a_picture(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], can_render: None
 ) -> None:
     """JSON that strict readers take, and a PNG in which something is drawn."""
-    path, out, picture = write_urdf(tmp_path), tmp_path / "a/b.json", tmp_path / "biped.png"
+    path = write_urdf(tmp_path, armature={"*": 0.01})
+    out, picture = tmp_path / "a/b.json", tmp_path / "biped.png"
     assert main(["robot", str(path), "--out", str(out), "--picture", str(picture)]) == 0
     assert capsys.readouterr().out.endswith(f"{out}\n{picture}\n")
     figures = json.loads(out.read_text(), parse_constant=lambda text: pytest.fail(text))
@@ -199,3 +203,83 @@ def test_legs_that_are_too_slow_for_a_step_are_warned_of(tmp_path: Path) -> None
     assert fault.stepping and "capture-step" in never and "simbicon" not in never
     assert all(name in fault.text for name in never)
     assert set(never) <= set(found.controllers[STEPPING].takes)
+
+
+FEATHER = INERTIAL.format(z=0.0, mass=0.015, i=1e-5)
+
+
+def texts(check: RobotCheck) -> dict[str, str]:
+    return {fault.kind: fault.text for fault in check.faults}
+
+
+def test_joints_that_are_too_light_are_warned_of_before_they_fall(tmp_path: Path) -> None:
+    """Feet of 15 g on motors of 60 N·m, as in URDF files; armature by pattern mends it."""
+    limb = INERTIAL.format(z=-0.1, mass=2.0, i=0.01)
+    foot = '<link name="{side}_foot">'
+    light = {side: (foot.format(side=side) + limb, foot.format(side=side) + FEATHER)
+             for side in ("left", "right")}  # fmt: skip
+    path = write_urdf(tmp_path)
+    model = path.with_suffix(".urdf")
+    for old, new in light.values():
+        assert old in model.read_text()
+        model.write_text(model.read_text().replace(old, new))
+    fallen = check_robot(path)
+    found = texts(fallen)
+    assert "left_ankle" in found["light joints"] and "armature: {" in found["light joints"]
+    assert fallen.rest.fallen and "give its joints armature" in found["falls"]
+    path.write_text(path.read_text() + "armature: {'*': 0.012}\n")
+    mended = check_robot(path)
+    assert not mended.rest.fallen and mended.rest.unsolved == 0 and mended.faults == ()
+    assert mended.rest.chatter < 2.0 and mended.rest.foot_drift < 0.001
+
+
+def test_motors_without_rotors_are_warned_of(tmp_path: Path) -> None:
+    found = texts(check_robot(write_urdf(tmp_path)))
+    assert found["no armature"].startswith("10 of 10 motors") and set(found) == {"no armature"}
+
+
+def test_friction_flags_and_scenery_that_are_not_what_they_seem(tmp_path: Path) -> None:
+    """MuJoCo takes the larger friction; limits are off; there is a wall."""
+    floor = '<geom name="floor" type="plane" size="9 9 1" friction="0.2"/>'
+    wall = '<geom name="wall" type="box" size="0.1 1 1" pos="2 0 1"/>'
+    option = '<option><flag limit="disable" gravity="disable"/></option>'
+    path = write_biped(
+        tmp_path, world=floor + wall, extra=motors(ctrlrange="-60 60") + option,
+        armature={"*": 0.02},
+    )  # fmt: skip
+    with pytest.warns(PoiseWarning, match="gravity: turned on"):
+        found = check_robot(path)
+    text = texts(found)
+    assert "a friction of 1, though the ground has 0.2" in text["friction"]
+    assert "disable limit:" in text["flags"] and "wall" in text["scenery"]
+    assert "gravity: turned on" in text["changed"] and found.dynamics.friction == 1.0
+
+
+def test_a_com_near_an_edge_is_warned_of(tmp_path: Path) -> None:
+    """And goes to the middle by one word."""
+    joints = {"*_hip": -12, "*_knee": 40, "*_ankle": -28}
+    lean = {"posture": {"joints": joints}, "armature": {"*": 0.01}}
+    assert (
+        "posture.com: middle"
+        in texts(check_robot(write_urdf(tmp_path, **lean)))["CoM near an edge"]
+    )
+    lean["posture"] = {"joints": joints, "com": "middle"}
+    assert "CoM near an edge" not in texts(check_robot(write_urdf(tmp_path, **lean)))
+
+
+def test_the_command_writes_the_description_of_a_model(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In the current folder, once; it gives the same robot."""
+    path = write_urdf(tmp_path / "maker").with_suffix(".urdf")
+    monkeypatch.chdir(tmp_path)
+    assert main(["robot", str(path)]) == 0
+    printed = capsys.readouterr()
+    assert printed.out.startswith("biped.yaml: a guessed") and "no warnings" in printed.out
+    described = load_robot("biped.yaml")
+    with pytest.warns(PoiseWarning):
+        assert described.fingerprint == load_robot(path).fingerprint
+    Path("biped.yaml").write_text("mine")
+    assert main(["robot", str(path)]) == 0
+    assert "poise: warning: " in (err := capsys.readouterr().err) and "guessed: root" in err
+    assert Path("biped.yaml").read_text() == "mine"

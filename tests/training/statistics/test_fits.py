@@ -1,5 +1,7 @@
 """Logistic fit of recovery against impulse, on synthetic data and against statsmodels."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -112,6 +114,17 @@ def test_recovery_that_rises_with_the_impulse_stays_finite():
     fit = fit_logistic(impulse, impulse > 15)
     assert np.isfinite([fit.j50, fit.j90, fit.scale]).all()
     assert fit.scale > 0 and 10 <= fit.j50 <= 20
+
+
+def test_a_few_trials_that_rise_with_the_impulse_are_solved_without_a_warning():
+    """Replicates of five such trials saturate the curve; each has a J50 within what was tried."""
+    impulse = np.array([0.375, 3.021, 6.928, 34.059, 35.562])
+    recovered = np.array([False, True, False, False, True])
+    weights = np.random.default_rng(0).multinomial(5, np.full(5, 0.2), size=3000).astype(float)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        j50 = solve_weighted(impulse, recovered, weights)[0]
+    assert np.all((j50 >= 0.375) & (j50 <= 35.562))
 
 
 def test_one_impulse_only():

@@ -120,6 +120,51 @@ def test_a_browser_shows_it_and_pushes_it(
     assert page["link"] == url + view.play.spec.link
 
 
+#: a name that springs in the page if it is taken for Markdown, HTML, MDX or a link
+TRAP = (
+    "x`<img src=q onerror='window.sprung=1'>`<svg onload='window.sprung=1'>"
+    "{(window.sprung=1)}${window.sprung=1}[a](javascript:window.sprung=1)"
+)
+
+IN_CODE = TRAP.replace("`", "")  # which is shown as code
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
+def test_no_name_runs_in_the_page(
+    server: viser.ViserServer, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a controller, robot, motion or error: in labels, plots, lists, Markdown, messages."""
+    session.reset()
+    server.scene.reset()
+    server.gui.reset()
+    play = Live(session, SessionSpec((TRAP,), TRAP, TRAP))
+    play.names = [IN_CODE]
+    view = BrowserView(server, play, load)
+    monkeypatch.setattr(browser, "FRAME", 0.2)
+    url = f"http://127.0.0.1:{server.get_port()}"
+    page: dict[str, Any] = {}
+
+    def look() -> None:
+        with Browser(webgl=True, origin=url) as chromium:
+            chromium.open(url, width=900, height=460)
+            chromium.wait("document.querySelectorAll('.uplot').length == 4", 100.0)
+            chromium.wait("document.body.innerText.includes('onerror')")
+            view.ask(view._pages.say, TRAP)
+            chromium.press("Save", "*")
+            chromium.wait("document.body.innerText.split('onerror').length > 4")
+            page["sprung"] = chromium.run("window.sprung === undefined ? 'no' : 'yes'")
+            page["shown"] = chromium.run("document.body.innerText")
+            page["links"] = chromium.run(
+                "[...document.querySelectorAll('a')].filter(a => a.href.startsWith('j')).length"
+            )
+
+    thread = threading.Thread(target=look, daemon=True)
+    thread.start()
+    run_until(view, lambda: not thread.is_alive(), 300.0)
+    assert page["sprung"] == "no" and page["links"] == 0
+    assert f"{IN_CODE}: on its feet" in page["shown"] and TRAP in page["shown"]  # as they are
+
+
 def use(url: str, view: BrowserView, page: dict[str, Any], folder: Path) -> None:
     """What a user does, from a thread."""
     session = view.play.session

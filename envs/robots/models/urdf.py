@@ -53,7 +53,7 @@ def read_urdf(path: Path, source: str, srdf: Path | None = None) -> mujoco.MjSpe
     except Exception as error:  # of MuJoCo, of the text in the file
         raise _wrong(f"{path} is not valid URDF: {error}", source) from None
     _take_meshes(spec, files, path, source)
-    check_spec(spec, path.parent, source, FIELD)
+    check_spec(spec, {path.parent}, source, FIELD)
     for geom in spec.geoms:
         geom.mass = geom.density = 0.0
         geom.group = HIDDEN if geom.contype or geom.conaffinity else geom.group
@@ -160,7 +160,7 @@ def _take_meshes(spec: mujoco.MjSpec, files: dict[str, str], path: Path, source:
 def _unread(name: str, link: str, path: Path, source: str) -> ConfigError:
     """A mesh with which a link collides, and that there is not, or not in a form for MuJoCo."""
     if find_file(name, path) is not None:
-        reason = f"is not of a form that MuJoCo reads ({', '.join(MESHES)})"
+        reason = f"is not of a form that MuJoCo reads ({', '.join(MESHES)}): convert it to one"
     elif name.startswith(PACKAGE):
         reason = f"is missing: its package is looked for above {path.parent} and in {PACKAGES}"
     else:

@@ -1,17 +1,18 @@
 """Models larger than a robot's are refused before MuJoCo builds them;
-envs/robots/mjcf_bounds.py.
+envs/robots/models/mjcf_bounds.py.
 """
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import mujoco
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.envs.robots.mjcf import read_mjcf
-from poise.envs.robots.mjcf_bounds import ASSET_BYTES, MJCF_BYTES
+from poise.envs.robots.models.mjcf import read_mjcf
+from poise.envs.robots.models.mjcf_bounds import ASSET_BYTES, MJCF_BYTES
 from tests.support.hangs import no_hang
 
 BODY = '<body><joint/><geom size="1"/></body>'
@@ -26,6 +27,7 @@ def asset(inside: str) -> str:
     return f"<asset>{inside}</asset>"
 
 
+PIPE = "pipe is not a regular file"
 BOMBS = {
     "elements": (world('<geom size="1"/>' * 20_001), "20000 elements"),
     "copies": (world(f'<replicate count="30000">{BODY}</replicate>'), "replicate would make"),
@@ -57,7 +59,20 @@ BOMBS = {
     "camera": (world('<camera name="c" resolution="100000 100000"/>'), "a camera"),
     "picture": ('<visual><global offwidth="100000" offheight="100000"/></visual>', "a picture"),
     "size": (f"<!-- {'x' * MJCF_BYTES} -->", "larger than 4 MiB"),
-    "device": ('<include file="/dev/zero"/>', "not valid MJCF|zero"),
+    "device": ('<include file="/dev/zero"/>', "/dev/zero is not a regular file"),
+    "pipe": ('<include file="sub/pipe"/>', PIPE),
+    "pipe beside an included file": ('<include file="sub/more.xml"/>', PIPE),
+    "pipe as a model": (asset('<model name="m" file="sub/pipe"/>'), PIPE),
+    "pipe as a field": (asset('<hfield name="h" file="sub/pipe" size="1 1 1 1"/>'), PIPE),
+    "pipe as a mesh": ('<compiler meshdir="sub"/>' + asset('<mesh name="m" file="pipe"/>'), PIPE),
+    "pipe as a side": ('<compiler assetdir="sub"/>'
+                       + asset('<texture name="t" type="cube" fileleft="pipe"/>'), PIPE),
+    "pipe as a skin": ('<deformable><skin name="s" file="sub/pipe"/></deformable>', PIPE),
+    "pipe as a flex": (world('<body name="b"><flexcomp type="mesh" file="sub/pipe" name="f"/>'
+                             "</body>"), PIPE),
+    "many files": (asset("".join(f'<mesh file="{k}.stl"/>' for k in range(400)))
+                   + "".join(f'<compiler meshdir="{k}"/>' for k in range(400)), "too many files"),
+    "bomb beside an included file": ('<include file="sub/bomb.xml"/>', "20000 elements"),
     "itself": (world('<replicate count="2"><include file="bomb.xml"/></replicate>'), "include"),
     "parts": ('<include file="part0.xml"/>' + '<include file="part1.xml"/>', "together larger"),
     "attached": (asset('<model name="m" file="model.xml"/>')
@@ -76,6 +91,11 @@ def write_parts(folder: Path) -> None:
     for k in range(2):
         (folder / f"part{k}.xml").write_text(f"<mujoco><!-- {'x' * (MJCF_BYTES // 2)} --></mujoco>")
     (folder / "model.xml").write_text(f"<mujoco>{world('<site/>' * 300)}</mujoco>")
+    (folder / "sub").mkdir()
+    os.mkfifo(folder / "sub/pipe")
+    (folder / "sub/more.xml").write_text('<mujoco><include file="pipe"/></mujoco>')
+    (folder / "sub/bomb.xml").write_text('<mujoco><include file="many.xml"/></mujoco>')
+    (folder / "sub/many.xml").write_text(f"<mujoco>{world('<site/>' * 20_001)}</mujoco>")
 
 
 @pytest.mark.parametrize("what", BOMBS)

@@ -6,16 +6,19 @@ import html
 import math
 import re
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import mujoco
 
 from poise.configs.errors import ConfigError
-from poise.configs.reading import MIB, is_file, read_text
+from poise.configs.reading import MIB, exists, is_file, is_folder, read_text
 
 MJCF_BYTES = 4 * MIB  # of all files of a model together
 ELEMENTS = 20_000  # of the XML, copies counted
 NESTED = 8  # files that include each other
+DIRS = ("assetdir", "meshdir", "texturedir")  # in which files may be
+NAMED = 100_000  # places where the files may be that a model names
 #: copies that an element may make; MuJoCo's time for the last two grows faster than the square
 COPIES = {"replicate": ELEMENTS, "composite": 200, "flexcomp": 1000}
 BUILTIN = 200.0  # resolution of a mesh that MuJoCo makes
@@ -23,6 +26,7 @@ ASSET_BYTES = 16 * MIB  # of a file of a mesh, a texture or a height field
 PIXELS = 10_000_000  # of all textures and height fields together, and of a camera
 LISTS = {"bodies": 1000, "joints": 1000, "geoms": 5000, "keys": 1000, "sensors": 5000}
 MEMORY = 256 * MIB  # of a simulation's stack
+POINTER = b"version https://git-lfs"  # what a file of Git LFS begins with before it is fetched
 LONGEST = 10_000  # of what elements may reserve: user data, keyframes, dimensions of a sensor
 _RESERVED = ("nkey", "nuserdata", "nuser_actuator", "nuser_body", "nuser_cam", "nuser_geom",
              "nuser_jnt", "nuser_sensor", "nuser_site", "nuser_tendon")  # fmt: skip
@@ -36,6 +40,11 @@ _ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 class MjcfText:
     """Counts the elements of MJCF files, with what replicate, include and attach make of them.
 
+    Of the files that they name, none is a pipe or a device: MuJoCo would wait for it for ever.
+
+    Attributes:
+        folders: in which MuJoCo may look for the files of meshes and textures.
+
     Args:
         path: the main file.
         source: the description file, for errors.
@@ -43,9 +52,13 @@ class MjcfText:
     """
 
     def __init__(self, path: Path, source: str, field: str = "source.mjcf"):
-        self._folder, self._source, self._field = path.parent, source, field
+        self._main, self._source, self._field = path.parent, source, field
+        self.folders: set[Path] = set()
         self._elements = self._attached = self._models = self._size = 0
+        self._folders = {path.parent, path.parent.resolve()}
+        self._within, self._names = {""}, set[str]()
         self._walk(path, 1, 0)
+        self._check_regular()
         if self._elements + self._attached * self._models > ELEMENTS:
             raise self._wrong(f"the model has more than {ELEMENTS} elements, with their copies")
 
@@ -57,16 +70,21 @@ class MjcfText:
         self._size += len(text)
         if self._size > MJCF_BYTES:
             raise self._wrong(f"its files are together larger than {MJCF_BYTES / MIB:g} MiB")
+        self._folders.add(path.parent)
         factors = [factor]
+        self.folders.add(path.parent)
         for closing, name, attributes, empty in tags(text):
             if not closing:
-                self._count(name, attributes, factors, depth)
+                self._count(name, attributes, factors, depth, path.parent)
+                self._note_files(attributes)
                 if name == "replicate" and not empty:
                     factors.append(factors[-1] * _whole(attributes.get("count", "1")))
             elif name == "replicate":
                 factors = factors[:-1] or [factor]
 
-    def _count(self, name: str, attributes: dict[str, str], factors: list[int], depth: int) -> None:
+    def _count(
+        self, name: str, attributes: dict[str, str], factors: list[int], depth: int, folder: Path
+    ) -> None:
         factor, count = factors[-1], _whole(attributes.get("count", "1"))
         if count > COPIES.get(name, ELEMENTS):
             raise self._wrong(f"{name} would make more than {COPIES.get(name, ELEMENTS)} copies")
@@ -79,20 +97,42 @@ class MjcfText:
             raise self._wrong(f"a height field may have at most {PIXELS} points")
         if name == "attach":
             self._attached += factor
+        if name == "compiler":
+            named = (attributes.get(each, "") for each in ("meshdir", "texturedir", "assetdir"))
+            self.folders |= {base / each for base in (folder, self._main) for each in named if each}
         if "file" in attributes and name in ("include", "model"):
             before = self._elements
-            for folder in {self._folder, self._folder.resolve()}:
-                if is_file(file := folder / attributes["file"]):
+            for base in dict.fromkeys((folder, self._main, self._main.resolve())):
+                if is_file(file := base / attributes["file"]):
                     self._walk(file, factor, depth + 1)
                     break
             self._models += self._elements - before if name == "model" else 0
+
+    def _note_files(self, attributes: dict[str, str]) -> None:
+        """Remember what an element names as a file, and as a folder of such."""
+        self._names.update(value for key, value in attributes.items() if key.startswith("file"))
+        self._within.update(attributes[key] for key in DIRS if key in attributes)
+
+    def _check_regular(self) -> None:
+        """Raise ConfigError where a name may be that of what is no regular file."""
+        names = self._names | {name.replace("\\", "/").rpartition("/")[2] for name in self._names}
+        if len(self._folders) * len(self._within) * len(names) > NAMED:
+            raise self._wrong("it names too many files in too many folders")
+        for parts in product(self._folders, self._within, names):
+            if exists(path := Path(*parts)) and not (is_file(path) or is_folder(path)):
+                raise self._wrong(f"{path} is not a regular file")
 
     def _wrong(self, problem: str) -> ConfigError:
         return _wrong(problem, self._source, self._field)
 
 
-def check_spec(spec: mujoco.MjSpec, folder: Path, source: str, field: str = "source.mjcf") -> None:
-    """Raise ConfigError for a model that is larger than a robot is, before it is compiled."""
+def check_spec(
+    spec: mujoco.MjSpec, folders: set[Path], source: str, field: str = "source.mjcf"
+) -> None:
+    """Raise ConfigError for a model that is larger than a robot is, before it is compiled.
+
+    The `folders` are those in which its meshes and textures may lie.
+    """
     for name, most in LISTS.items():
         if len(getattr(spec, name)) > most:
             raise _wrong(f"the model has more than {most} {name}", source, field)
@@ -111,28 +151,32 @@ def check_spec(spec: mujoco.MjSpec, folder: Path, source: str, field: str = "sou
         raise _wrong(f"a camera may have at most {PIXELS} pixels", source, field)
     if spec.visual.global_.offwidth * spec.visual.global_.offheight > PIXELS:
         raise _wrong(f"visual: a picture may have at most {PIXELS} pixels", source, field)
-    _check_assets(spec, folder, source, field)
+    _check_assets(spec, folders, source, field)
 
 
-def _check_assets(spec: mujoco.MjSpec, folder: Path, source: str, field: str) -> None:
+def _check_assets(spec: mujoco.MjSpec, folders: set[Path], source: str, field: str) -> None:
     """Sizes of textures, height fields and the files of these and of meshes."""
     sides = [t.width * (t.height or t.width) * (1 if t.height else 6) for t in spec.textures]
     sides += [h.nrow * h.ncol for h in spec.hfields]
-    textures = [name for t in spec.textures for name in (t.file, *t.cubefiles)]
-    files = [folder / spec.texturedir / name for name in textures if name]
-    files += [folder / spec.meshdir / x.file for x in (*spec.meshes, *spec.hfields) if x.file]
-    for file in filter(is_file, files):
+    names = [name for t in spec.textures for name in (t.file, *t.cubefiles)]
+    names += [each.file for each in (*spec.meshes, *spec.hfields, *spec.skins)]
+    tried = {folder / way for name in names if name for way in (name, Path(name).name)
+             for folder in folders}  # fmt: skip
+    for file in {file.resolve() for file in tried if is_file(file)}:
+        with file.open("rb") as opened:
+            head = opened.read(24)
         if file.stat().st_size > ASSET_BYTES:
             raise _wrong(f"{file} is larger than {ASSET_BYTES / MIB:g} MiB", source, field)
-        sides.append(_pixels(file))
+        if head.startswith(POINTER):
+            raise _wrong(f"{file} is the pointer that Git LFS leaves where a file is to be fetched "
+                         "still: git lfs pull", source, field)  # fmt: skip
+        sides.append(_pixels(head))
     if sum(sides) > PIXELS:
         raise _wrong(f"textures and height fields may have at most {PIXELS} pixels", source, field)
 
 
-def _pixels(file: Path) -> int:
-    """The pixels that a PNG file says to have: a few bytes may unpack to many; else 0."""
-    with file.open("rb") as opened:
-        head = opened.read(24)
+def _pixels(head: bytes) -> int:
+    """The pixels that a PNG file begins by naming: a few bytes may unpack to many; else 0."""
     if head[:8] != b"\x89PNG\r\n\x1a\n":
         return 0
     return int.from_bytes(head[16:20]) * int.from_bytes(head[20:24])

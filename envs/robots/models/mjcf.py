@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import warnings
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import mujoco
-import numpy as np
 
 from poise.configs.errors import ConfigError
 from poise.configs.reading import is_file, read_text
 
+from .missing import drop_missing
 from .mjcf_bounds import MJCF_BYTES, MjcfText, check_spec, tags
 
 SCENE_ELEMENTS = {"pair": "contact pairs", "key": "keyframes"}  # that a scene file often holds
 
 
 def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
-    """The model in an MJCF file, without meshes and textures whose files are missing.
+    """The model in an MJCF file, as MuJoCo reads it by its absolute path.
 
-    A geom with a missing mesh is dropped, with a warning if it would have collided. That is refused
-    for a foot, and for a geom that gives its body mass.
+    What needs a missing file is dropped with a warning, see `drop_missing`. That is refused for a
+    mesh that a foot collides with, or that gives a body its mass.
 
     Args:
         path: the MJCF file.
@@ -35,16 +35,16 @@ def read_mjcf(path: Path, feet: tuple[str, ...], source: str) -> mujoco.MjSpec:
     """
     if not is_file(path):
         raise ConfigError(f"no such file: {path}", source=source, field="source.mjcf")
-    MjcfText(path, source)
+    path = Path(os.path.abspath(path))  # by a relative one MuJoCo misses what an include names;
+    text = MjcfText(path, source)  # and links stay, beside which a package keeps the meshes
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except Exception as error:  # of the XML, of MuJoCo, of the text in it
         raise ConfigError(
             f"{path} is not valid MJCF: {error}", source=source, field="source.mjcf"
         ) from None
-    check_spec(spec, path.parent, source)
-    _drop_missing_textures(spec, path)
-    _drop_missing_meshes(spec, path, feet, source)
+    check_spec(spec, text.folders, source)
+    drop_missing(spec, path, feet, source)
     return spec
 
 
@@ -88,50 +88,3 @@ def scenes_with(path: Path, element: str) -> list[str]:
         if includes and any(name == element for _, name, _, _ in held):
             found.append(beside.name)
     return found
-
-
-def _drop_missing_meshes(
-    spec: mujoco.MjSpec, path: Path, feet: tuple[str, ...], source: str
-) -> None:
-    folder = path.parent / spec.meshdir
-    missing = {m.name for m in spec.meshes if m.file and not (folder / m.file).is_file()}
-    lost = []
-    for geom in [g for g in spec.geoms if g.meshname in missing]:
-        body = geom.parent
-        solid = bool(geom.contype or geom.conaffinity)
-        massive = geom.mass > 0 if np.isfinite(geom.mass) else geom.density > 0
-        if solid and body.name in feet:
-            reason = f"the foot {body.name!r} collides with it"
-        elif massive and not body.explicitinertial and body.name != "world":
-            reason = f"it gives the body {body.name!r} its mass"
-        else:
-            if solid:
-                lost.append(body.name)
-            spec.delete(geom)
-            continue
-        raise ConfigError(
-            f"the file of mesh {geom.meshname!r} is missing in {folder}, and {reason}",
-            source=source,
-            field="source.mjcf",
-        )
-    for mesh in [m for m in spec.meshes if m.name in missing]:
-        spec.delete(mesh)
-    if lost:
-        warnings.warn(
-            f"{path}: mesh files are missing; these bodies lose collision geometry: "
-            + ", ".join(dict.fromkeys(lost)),
-            stacklevel=2,
-        )
-
-
-def _drop_missing_textures(spec: mujoco.MjSpec, path: Path) -> None:
-    folder = path.parent / spec.texturedir
-    missing = {
-        t.name
-        for t in spec.textures
-        if any(f and not (folder / f).is_file() for f in [t.file, *t.cubefiles])
-    }
-    for material in spec.materials:
-        material.textures = ["" if name in missing else name for name in material.textures]
-    for texture in [t for t in spec.textures if t.name in missing]:
-        spec.delete(texture)

@@ -1,0 +1,110 @@
+"""Roles of joints, such as the left knee, by the names that programs give them."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+SIDES = ("left", "right")
+#: role of a joint on either side → names that files have for it, the most certain one first
+SIDED = {
+    "hip": ("upleg", "upperleg", "upperleg01", "thigh", "thighbend", "thighstretch", "legupper",
+            "femur", "hip", "hipjoint", "足"),
+    "knee": ("leg", "lowerleg", "lowerleg01", "lowleg", "loleg", "leglower", "shin", "calf",
+             "legstretch", "tibia", "knee", "ひざ"),
+    "ankle": ("ankle", "foot", "talus", "足首"),  # where a file has both, its foot is the ball
+    "toe": ("toebase", "toes", "toes01", "toe", "toe0", "toe11", "bigtoe", "ball", "ballfoot",
+            "foot", "つま先"),
+    "shoulder": ("arm", "upperarm", "upperarm01", "uparm", "uarm", "armupper", "armstretch",
+                 "humerus", "shldr", "shldrbend", "shoulder", "腕"),
+    "elbow": ("forearm", "lowerarm", "lowerarm01", "lowarm", "loarm", "farm", "armlower",
+              "forearmbend", "forearmstretch", "radius", "ulna", "elbow", "ひじ"),
+    "wrist": ("wrist", "hand", "手首"),
+}  # fmt: skip
+MIDDLE = {
+    "head": ("head", "1head", "skull", "頭"),  # 1head: of jC1Head
+    "neck": ("neck", "neck1", "neck01", "lowerneck", "necklower", "necktwist01", "首"),
+}
+ROLES = (*(f"{role}_{side}" for role in SIDED for side in SIDES), *MIDDLE)
+LETTERS = {"left": "left", "right": "right", "l": "left", "r": "right", "左": "left", "右": "right"}
+CENTRE = ("c", "m", "x")  # of joints that are on no side
+COMMON = 0.6  # of the names that share a first or a last word, which then says nothing
+_BRACKETS = re.compile(r"\[.*?\]|\(.*?\)")
+_WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|左|右|[^\W\d_a-zA-Z左右]+")
+_WHOLE = frozenset(word for words in SIDED.values() for word in words)
+
+
+def find_roles(names: Sequence[str]) -> dict[str, int]:
+    """Role → index among `names`; of several names for a role the most certain one wins.
+
+    What a prefix or a suffix of all names says does not count (``mixamorig:LeftUpLeg``,
+    ``DEF-thigh.L``, ``Bip01 L Thigh``, ``left_leg_joint``); a side is a word of its own, before or
+    after the rest, or a first letter (``rfemur``).
+    """
+    exact: dict[tuple[str, str], int] = {}
+    bare: dict[tuple[str, str], int] = {}  # without a number behind it: head1, leftarm09
+    for i, (base, side) in reversed(list(enumerate(sided(names)))):
+        exact[base, side] = bare[base.rstrip("0123456789"), side] = i
+    found: dict[str, int] = {}
+    for role, words in SIDED.items():
+        for side in SIDES:
+            taken = found.get(f"ankle_{side}")
+            hits = [known[word, side] for known in (exact, bare) for word in words
+                    if (word, side) in known]  # fmt: skip
+            if free := [hit for hit in hits if hit != taken]:
+                found[f"{role}_{side}"] = free[0]
+    for role, words in MIDDLE.items():
+        hits = [known[word, ""] for known in (exact, bare) for word in words
+                if (word, "") in known]  # fmt: skip
+        if hits:
+            found[role] = hits[0]
+    return found
+
+
+def sided(names: Sequence[str]) -> list[tuple[str, str]]:
+    """(base, side) of each name: ``mixamorig:LeftArm`` is (arm, left), ``Neck`` (neck, "")."""
+    words = [_words(name) for name in names]
+    words = _without_common(words, 0)
+    words = _without_common(words, -1)
+    found = [_base(each) for each in words]
+    plain = {base for base, side in found if not side}
+    for i, (base, side) in enumerate(found):
+        opposite = {"l": "r", "r": "l"}.get(base[:1], "") + base[1:]
+        if not side and base[1:] and opposite != base[1:] and opposite in plain:
+            found[i] = base[1:], LETTERS[base[0]]  # lfingers, where there are rfingers
+    return found
+
+
+def _words(name: str) -> list[str]:
+    """The words of a name, in small letters: at capitals, digits and signs."""
+    own = _BRACKETS.sub("", name).rpartition(":")[2].rpartition("|")[2]
+    return [word.lower() for word in _WORDS.findall(own)] or [own.lower()]
+
+
+def _without_common(words: list[list[str]], place: int) -> list[list[str]]:
+    """The words of all names without the first (0) or last (−1) ones that most share."""
+    while len(words) > 3:
+        counts = Counter(each[place] for each in words if len(each) > 1)
+        word, count = counts.most_common(1)[0] if counts else ("", 0)
+        if count < COMMON * len(words) or word in LETTERS:
+            return words
+        rest = slice(1, None) if place == 0 else slice(None, -1)
+        words = [each[rest] if each[place] == word and len(each) > 1 else each for each in words]
+    return words
+
+
+def _base(words: list[str]) -> tuple[str, str]:
+    """What is said besides the side: what follows it, or else what is before."""
+    places = [i for i, word in enumerate(words) if word in LETTERS]
+    if places and len(words) > 1:
+        i = places[0]
+        after, before = words[i + 1 :], words[:i]
+        base = "".join(after or before)
+        if not after or "".join([*before, *after]) in _WHOLE or base.isdigit():
+            base = "".join([*before, *after])
+        return base, LETTERS[words[i]]
+    base = "".join(word for word in words if word not in CENTRE) or "".join(words)
+    if base[:1] in ("l", "r") and base[1:] in _WHOLE and base not in _WHOLE:
+        return base[1:], LETTERS[base[0]]  # lfemur
+    return base, ""

@@ -1,0 +1,62 @@
+"""envs/compiled/warmup.py: parts are compiled again if a file has changed that they are made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from poise.envs.compiled import jit, warmup
+from poise.envs.maths import pendulum
+from poise.envs.maths.pendulum import compiled_rate
+from tests.envs.compiled import test_kernel_cache
+from tests.envs.compiled.test_kernel_cache import total
+
+MODULE = "poise.baselines.environments.kernels"
+
+
+@pytest.fixture
+def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """The parts that would be compiled, in turn; a cache that is empty."""
+    found: list[list[str]] = []
+
+    compiled_rate(9.81, 1.0), total(np.ones(2), np.ones(2))  # kernels of two files
+
+    def compile_apart(module: str, parts: list[str]) -> bool:
+        found.append(list(parts))
+        for part in parts:
+            warmup.end(module, part)
+        return True
+
+    monkeypatch.setattr(jit, "CACHE", tmp_path)
+    monkeypatch.setattr(warmup, "_compile_apart", compile_apart)
+    monkeypatch.setattr(warmup, "_tried", set())
+    monkeypatch.setattr(jit, "tell", lambda: None)
+    return found
+
+
+def test_a_part_is_compiled_once_for_its_sources(asked, monkeypatch) -> None:
+    """Then again when the digest of a file has changed whose kernels it has; others are not."""
+    warmup.fill_cache(MODULE, ("solver", "steps"))
+    monkeypatch.setattr(warmup, "_tried", set())
+    warmup.fill_cache(MODULE, ("solver", "steps"))
+    assert asked == [["solver", "steps"]]
+    files = [
+        line.split(" ", 1)[1] for line in warmup._record(MODULE, "steps").read_text().split("\n")
+    ]
+    assert {pendulum.__file__, test_kernel_cache.__file__} <= set(files)
+    (first, *_), before = files, warmup.source_digest
+    monkeypatch.setattr(warmup, "source_digest", lambda f: "" if f == first else before(f))
+    warmup._record(MODULE, "solver").write_text(f"{before(files[1])} {files[1]}")
+    warmup.fill_cache(MODULE, ("solver", "steps"))
+    assert asked[1:] == [["steps"]]
+
+
+@pytest.mark.parametrize("record", ["", "abc /nowhere.py", "garbage", None])
+def test_a_record_that_says_nothing_counts_for_nothing(asked, record: str | None) -> None:
+    """Empty, of a file that is gone, of no file, or missing."""
+    if record is not None:
+        warmup._record(MODULE, "solver").write_text(record)
+    warmup.fill_cache(MODULE, ("solver",))
+    assert asked == [["solver"]]

@@ -1,0 +1,100 @@
+"""What can be named, with a line on each: robots, controllers, policies, suites and the like."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any, TypedDict
+
+from poise.configs.files import packaged, packaged_folder
+from poise.configs.reading import read_yaml
+
+KINDS = {
+    "robots": "--robot",
+    "controllers": "where a CONTROLLER is named",
+    "policies": "where a CONTROLLER is named; poise.load_policy(NAME)",
+    "rivals": "someone else's policies, where a CONTROLLER is named",
+    "suites": "--suite",
+    "training": "poise train --config",
+    "tuning": "poise tune --config",
+    "motions": "--motion",
+    "constraints": "poise motion import --constraints",
+    "envs": "config of an environment",
+    "limits": "--limits",
+    "human": "poise gait --human",
+}
+# j50: robot → name → mean J50 [N·s] of the leaderboards in docs/results; policies: name → for what
+FIGURES = "packaged.json"
+MOVES = {
+    "residual": "targets",
+    "step": "targets, steps",
+    "walk": "a walk's steps",
+    "whole": "servos that take over",
+    "torque": "all torques",
+    "position": "all joints' servos",
+}
+
+
+class Named(TypedDict, total=False):
+    """One of the packaged names.
+
+    `j50` is the mean J50 of the leaderboard of `robot` [N·s]; `on` the controller below a policy,
+    whose action moves `action`.
+    """
+
+    name: str
+    robot: str
+    j50: float
+    action: str
+    on: str
+    about: str
+
+
+def named() -> dict[str, list[Named]]:
+    """Every packaged name by its kind, with what is known of it."""
+    known = json.loads((packaged_folder(".") / FIGURES).read_text())
+    return {kind: [_named(kind, name, known) for name in packaged(kind)] for kind in KINDS}
+
+
+def _named(kind: str, name: str, known: dict[str, dict[str, Any]]) -> Named:
+    entry: Named = {"name": name}
+    scores = known["j50"]
+    robots = [robot for robot in scores if name in scores[robot]]
+    if kind == "policies":
+        config = read_yaml(packaged_folder(kind) / name / "config.yaml")
+        robots = [config["robot"]] if config["robot"] in robots else []
+        entry |= {"robot": config["robot"], "action": MOVES[config["action"]]}
+        entry["about"] = known["policies"].get(name, "")
+        if config["action"] not in ("torque", "position"):
+            entry["on"] = config["controller"]
+    else:
+        entry["about"] = first_comment(packaged_folder(kind) / f"{name}.yaml")
+    if robots and kind in ("controllers", "policies", "rivals"):
+        entry["robot"] = robots[0]
+        entry["j50"] = scores[robots[0]][name]
+    return entry
+
+
+def first_comment(path: Path) -> str:
+    """The first sentence of the comment at the top of a file."""
+    lines: list[str] = []
+    for line in path.read_text().splitlines():
+        if not line.startswith("#"):
+            break
+        lines.append(line.lstrip("# "))
+    text = re.sub(
+        r" \((docs|see|`poise)[^)]*\)| by `poise tune.*|: `poise [^`]*`", "", " ".join(lines)
+    )
+    return re.split(r"(?<=[a-z)\]%0-9])\.(?: |$)", text)[0].strip()
+
+
+def columns(entries: list[Named]) -> list[str]:
+    """The keys that some of the entries have, in their order."""
+    return [key for key in Named.__annotations__ if any(key in entry for entry in entries)]
+
+
+def cell(entry: Named, key: str) -> str:
+    """The text of an entry in a table."""
+    value: Any = entry.get(key, "")
+    return f"{value:.1f}" if isinstance(value, float) else str(value)

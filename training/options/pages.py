@@ -1,0 +1,66 @@
+"""A page of help: options in groups, each with its sentence, default and range."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from rich.console import Console
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from .described import Option
+from .names import KINDS, Named, cell, columns
+
+HEADINGS = {"j50": "J50 [N·s]", "action": "moves", "on": "on top of", "about": ""}
+INDENT = 6  # of a sentence below its option
+
+
+def print_options(title: str, options: Iterable[Option], console: Console) -> None:
+    """Print a group of options below its title."""
+    console.print(Text(f"\n{title}", style="bold"))
+    for option in options:
+        console.print(Text(f"  {option.name} {option.kind}".rstrip()), soft_wrap=True)
+        default = f"default {option.default}" if option.default else ""
+        facts = "; ".join(filter(None, (default, option.bounds)))
+        told = f"{option.sentence} ({facts})" if facts else option.sentence
+        console.print(Padding(Text(told), (0, 0, 0, INDENT), expand=False))
+
+
+def grouped(options: Sequence[Option], titles: Mapping[str, str]) -> dict[str, list[Option]]:
+    """Options by the section that they belong to, with the sections' own titles where there are."""
+    found: dict[str, list[Option]] = {}
+    for option in options:
+        group = option.group
+        title = f"{group}: {titles[group]}" if group in titles else group
+        found.setdefault(title, []).append(option)
+    return found
+
+
+def print_commands(usage: str, commands: Mapping[str, Callable[..., object]],
+                   console: Console) -> None:  # fmt: skip
+    """Print what the commands do, each by the first sentence of its docstring."""
+    console.print(Text(usage))
+    table = Table.grid(padding=(0, 2))
+    for name, function in commands.items():
+        table.add_row(Text(f"  {name}"), Text(first_sentence(inspect.getdoc(function))))
+    console.print(table)
+
+
+def print_names(kinds: Mapping[str, list[Named]], console: Console) -> None:
+    """Print a table of each kind of names."""
+    for kind, entries in kinds.items():
+        console.print(Text(f"\n{kind} ({KINDS[kind]})", style="bold"))
+        table, keys = Table.grid(padding=(0, 2)), columns(entries)
+        if len(keys) > 2:
+            table.add_row(*(Text(HEADINGS.get(key, key), style="dim") for key in keys))
+        for entry in entries:
+            table.add_row(*(Text(cell(entry, key)) for key in keys))
+        console.print(table)
+
+
+def first_sentence(text: str | None) -> str:
+    """The first sentence of a text, which ends with its first paragraph at the latest."""
+    paragraph = " ".join((text or "").partition("\n\n")[0].split())
+    return paragraph.partition(". ")[0].rstrip(".") + "." if paragraph else ""

@@ -1,0 +1,119 @@
+"""Arguments read by a function's signature: what is wrong with them is an error of one line."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import inspect
+import io
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar
+
+import tyro
+
+from poise.configs.errors import ConfigError, shown
+
+from .spelling import suggestion
+
+T = TypeVar("T")
+NUMBERS = {"invalid literal for int() with base 10: ": "must be a whole number, not ",
+           "could not convert string to float: ": "must be a number, not "}  # fmt: skip
+WRONG = {r"invalid choice ('.*') for argument '(.*)'. Expected one of \((.*?),?\)":
+         "{1}: must be one of {2}, not {0}",
+         r"Missing value for argument '(.*)'. Expected (\d+) value": "{0}: needs {1} behind it",
+         }  # fmt: skip
+
+
+def parsed(function: Callable[..., T], args: Sequence[str], prog: str) -> Callable[[], T]:
+    """The call of a function that these arguments ask for, not yet made.
+
+    Raises:
+        ConfigError: an unknown option, with the one that it looks like; a value that does not
+            parse; something that is needed.
+        SystemExit: the help was asked for, and printed.
+    """
+
+    @functools.wraps(function)
+    def later(*given: Any, **named: Any) -> Callable[[], T]:
+        return functools.partial(function, *given, **named)
+
+    with one_line_errors(prog, option_names(function), args):
+        return tyro.cli(later, prog=prog, args=list(args))
+
+
+def option_names(function: Callable[..., object]) -> list[str]:
+    """The options that a function's parameters become."""
+    parameters = inspect.signature(function).parameters.values()
+    return [f"--{p.name.replace('_', '-')}" for p in parameters if p.kind is not p.POSITIONAL_ONLY]
+
+
+@contextlib.contextmanager
+def one_line_errors(prog: str, options: Iterable[str], args: Sequence[str]) -> Iterator[None]:
+    """Make a ConfigError of what tyro prints before it leaves with code 2."""
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            yield
+    except SystemExit as end:
+        if not end.code:
+            raise
+        raise _error(said.getvalue(), prog, list(options), args) from None
+
+
+def _error(said: str, prog: str, options: list[str], args: Sequence[str]) -> ConfigError:
+    """The error that a box of tyro tells, as one line."""
+    lines = _first_part(said)
+    text = " ".join(line.strip() for line in lines)
+    if "nrecognized" in text:
+        return _unknown(text, prog, options, args)
+    if lines and lines[0].lstrip().startswith("Missing from"):
+        needed = [line.strip() for line in lines if re.match(r" {4}\S", line)]
+        return ConfigError(f"needs {', '.join(needed)}", source=_command(prog))
+    if wrong := re.match(r"Error parsing ([^:]+): (.*)", text):
+        message = wrong[2]
+        for before, after in NUMBERS.items():
+            message = message.replace(before, after)
+        return ConfigError(message, source=_command(prog), field=wrong[1])
+    for pattern, message in WRONG.items():
+        if found := re.match(pattern, text):
+            return ConfigError(message.format(*found.groups()), source=_command(prog))
+    return ConfigError(text or "cannot be read", source=_command(prog))
+
+
+def _command(prog: str) -> str:
+    """The command as an error names it, whose line begins with `poise` already."""
+    return prog.removeprefix("poise ")
+
+
+def _first_part(said: str) -> list[str]:
+    """The lines of a box down to its first rule, without the box and its title.
+
+    A box is of lines, or, where the output takes ASCII alone, a title above a rule.
+    """
+    lines: list[str] = []
+    titled = "╭" in said
+    for line in said.splitlines():
+        inner = line[2:].rstrip("│ ") if line.startswith("│") else line.rstrip()
+        if line.startswith(("╭", "╰")) or not inner.strip():
+            continue
+        if not inner.strip(" ─-"):
+            if titled:
+                break
+            titled, lines = True, []
+            continue
+        lines.append(inner if line.startswith("│") else line[2:].rstrip())
+    return lines
+
+
+def _unknown(text: str, prog: str, options: list[str], args: Sequence[str]) -> ConfigError:
+    """The error of the first argument that tyro does not know."""
+    named = re.split(r"[,\s]+", text.partition(":")[2].strip())[0]
+    wrong = next((arg for arg in args if arg.partition("=")[0] == named), named)
+    flag = wrong.partition("=")[0]
+    if not flag.startswith("-"):
+        return ConfigError(f"takes no {shown(flag)}: see {prog} --help", source=_command(prog))
+    hint = suggestion(flag, options) or ";"
+    return ConfigError(
+        f"no such option{hint} {prog} --help lists them", source=_command(prog), field=flag
+    )
