@@ -47,7 +47,7 @@ class InvariantConfig:
     gyro_bias: float = field(default=0.02, metadata=NOT_NEGATIVE)
     gyro_bias_walk: float = field(default=0.001, metadata=NOT_NEGATIVE)
     attitude: float = field(default=0.01, metadata={"above": 0.0})
-    kinematics: float = field(default=0.0005, metadata={"above": 0.0})
+    kinematics: float = field(default=0.002, metadata={"above": 0.0})
     slide: float = field(default=0.02, metadata=NOT_NEGATIVE)
     roll: float = field(default=0.1, metadata=NOT_NEGATIVE)
     lift: float = field(default=5.0, metadata=NOT_NEGATIVE)
@@ -66,7 +66,7 @@ class Invariant(Block):
     noise: np.ndarray  # (3, 3) covariance of a measurement
     z: np.ndarray  # (3,) what is measured over what is expected
     B: np.ndarray  # (3, n) H P; in a step the gyro's columns Gᵀ
-    K: np.ndarray  # (3, n) Kᵀ
+    K: np.ndarray  # (3, n) Kᵀ; in a step ε of each column of P
     error: np.ndarray  # (n,) ξ̂, ζ̂
     seen: np.ndarray  # (3,) a sole from the root, root axes [m]
     quaternion: np.ndarray  # (4,)
@@ -120,6 +120,7 @@ def follow_invariant(f: Invariant, last: int, earlier: int):
         for i in range(f.place.shape[0] - 2):
             wander(f, row, i)
             see_sole(f, row, i)
+        make_symmetric(f.P)
     o.seen[0] = max(last, o.seen[0])
     quaternion_of(o.axes, f.quaternion)
     axes_of(f.quaternion, o.axes)
@@ -164,28 +165,30 @@ def _lead_errors(f: Invariant):
     ξ_R ← ξ_R + ε,   ξ_v ← ξ_v + g × ξ_R dt + (v + g dt) × ε − R ζ_a dt,
     ξ_p ← ξ_p + p × ε + ξ_v dt with the new ξ_v,   ξ_d ← ξ_d + d × ε
     """
-    P, R, mean, x = f.P, f.odometry.axes, f.before, f.place
+    P, R, M, x, E = f.P, f.odometry.axes, f.before, f.place, f.K
     n, dt, g = P.shape[0], f.odometry.robot.timestep, f.odometry.robot.gravity
+    for a in range(3):
+        m0, m1, m2 = -dt * M[a, 0], -dt * M[a, 1], -dt * M[a, 2]
+        r0, r1, r2 = -dt * R[a, 0], -dt * R[a, 1], -dt * R[a, 2]
+        for c in range(n):
+            E[a, c] = m0 * P[n - 6, c] + m1 * P[n - 5, c] + m2 * P[n - 4, c]
+        for c in range(n):
+            P[3 + a, c] += r0 * P[n - 3, c] + r1 * P[n - 2, c] + r2 * P[n - 1, c]
     for c in range(n):
-        g0, g1, g2 = P[n - 6, c], P[n - 5, c], P[n - 4, c]
-        f0, f1, f2 = P[n - 3, c], P[n - 2, c], P[n - 1, c]
-        e0 = -dt * (mean[0, 0] * g0 + mean[0, 1] * g1 + mean[0, 2] * g2)
-        e1 = -dt * (mean[1, 0] * g0 + mean[1, 1] * g1 + mean[1, 2] * g2)
-        e2 = -dt * (mean[2, 0] * g0 + mean[2, 1] * g1 + mean[2, 2] * g2)
-        v0 = P[3, c] + dt * g * P[1, c] + x[V, 1] * e2 - x[V, 2] * e1
-        v1 = P[4, c] - dt * g * P[0, c] + x[V, 2] * e0 - x[V, 0] * e2
-        v2 = P[5, c] + x[V, 0] * e1 - x[V, 1] * e0
-        v0 -= dt * (R[0, 0] * f0 + R[0, 1] * f1 + R[0, 2] * f2)
-        v1 -= dt * (R[1, 0] * f0 + R[1, 1] * f1 + R[1, 2] * f2)
-        v2 -= dt * (R[2, 0] * f0 + R[2, 1] * f1 + R[2, 2] * f2)
-        P[0, c], P[1, c], P[2, c] = P[0, c] + e0, P[1, c] + e1, P[2, c] + e2
-        P[3, c], P[4, c], P[5, c] = v0, v1, v2
-        P[6, c], P[7, c], P[8, c] = P[6, c] + dt * v0, P[7, c] + dt * v1, P[8, c] + dt * v2
-        for i in range(1, x.shape[0]):  # the position and the soles
-            k = 3 + 3 * i
-            P[k, c] += x[i, 1] * e2 - x[i, 2] * e1
-            P[k + 1, c] += x[i, 2] * e0 - x[i, 0] * e2
-            P[k + 2, c] += x[i, 0] * e1 - x[i, 1] * e0
+        P[3, c] += dt * g * P[1, c]
+    for c in range(n):
+        P[4, c] -= dt * g * P[0, c]
+    for i in range(x.shape[0]):  # the velocity, the position and the soles
+        for a in range(3):
+            j, k = (a + 1) % 3, (a + 2) % 3
+            u, w, row = x[i, j], x[i, k], 3 + 3 * i + a
+            for c in range(n):
+                P[row, c] += u * E[k, c] - w * E[j, c]
+    for a in range(3):
+        for c in range(n):
+            P[a, c] += E[a, c]
+        for c in range(n):
+            P[6 + a, c] += dt * P[3 + a, c]
 
 
 @compiled
@@ -213,8 +216,9 @@ def _add_noise_of_imu(f: Invariant):
         for a in range(3):
             G[k, 6 + a] += dt * G[k, 3 + a]
     for r in range(n - 6):
+        g0, g1, g2 = G[0, r], G[1, r], G[2, r]
         for c in range(n - 6):
-            P[r, c] += G[0, r] * G[0, c] + G[1, r] * G[1, c] + G[2, r] * G[2, c]
+            P[r, c] += g0 * G[0, c] + g1 * G[1, c] + g2 * G[2, c]
     stir = (s[FORCE] * dt) ** 2
     for a in range(3):
         P[3 + a, 3 + a] += stir
@@ -335,17 +339,26 @@ def correct_error(f: Invariant, plus: int, minus: int):
             f.noise[a, b] += B[a, plus + b] - (B[a, minus + b] if minus >= 0 else 0.0)
     invert_symmetric(f.noise)
     S = f.noise
-    for c in range(n):
-        for k in range(3):
-            K[k, c] = S[k, 0] * B[0, c] + S[k, 1] * B[1, c] + S[k, 2] * B[2, c]
-        f.error[c] = K[0, c] * z[0] + K[1, c] * z[1] + K[2, c] * z[2]
-    for r in range(n):
+    for k in range(3):
+        s0, s1, s2 = S[k, 0], S[k, 1], S[k, 2]
         for c in range(n):
-            P[r, c] -= K[0, r] * B[0, c] + K[1, r] * B[1, c] + K[2, r] * B[2, c]
-    for r in range(n):  # rounding alone makes them differ
+            K[k, c] = s0 * B[0, c] + s1 * B[1, c] + s2 * B[2, c]
+    z0, z1, z2 = z[0], z[1], z[2]
+    for c in range(n):
+        f.error[c] = K[0, c] * z0 + K[1, c] * z1 + K[2, c] * z2
+    for r in range(n):
+        k0, k1, k2 = K[0, r], K[1, r], K[2, r]
+        for c in range(n):
+            P[r, c] -= k0 * B[0, c] + k1 * B[1, c] + k2 * B[2, c]
+    retract(f)
+
+
+@compiled
+def make_symmetric(P: np.ndarray):
+    """P ← ½ (P + Pᵀ), which differ by rounding alone."""
+    for r in range(P.shape[0]):
         for c in range(r):
             P[r, c] = P[c, r] = 0.5 * (P[r, c] + P[c, r])
-    retract(f)
 
 
 @compiled
