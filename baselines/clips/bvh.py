@@ -72,7 +72,8 @@ def read_bvh(
         sure = structural_roles(text.parents, text.offsets, text.end_parents, places, ends)
         known = {**sure, **known} if not known.keys() & set(LEGS) else known
     known |= _named(joints or {}, text.names, source)
-    posed = rigid(rooted_at_hips(whole, known), source)
+    legs = known.keys() >= set(LEGS)  # what hangs on a neck alone is no skeleton
+    posed = rigid(rooted_at_hips(whole, known if legs else {}), source)
     raw, places, turns = posed.skeleton, posed.root, posed.turns
     axes = _axes(raw, places, turns, unit, up, forward, source)
     skeleton = Skeleton(raw.names, raw.parents, axes.places(raw.offsets), raw.end_parents,

@@ -14,6 +14,7 @@ from poise.configs.files import packaged_folder
 from poise.configs.schema import to_yaml
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
+from poise.envs.sensing.realism import load_realism
 from poise.training.learning.config import train_config
 from poise.training.suites.plan import Plan
 from poise.training.suites.suite import load_suite
@@ -50,6 +51,7 @@ LOADERS: dict[str, Callable[[Path], Any]] = {
     "tuning": _tuning,
     "limits": lambda path: load_limits(robot(), path),
     "envs": env_config,
+    "realism": load_realism,
 }
 
 

@@ -143,6 +143,9 @@ def test_commands_of_sentences_parse(page: str, command: str, parsed: list[str])
     """Placeholders get a value; of `a|b|c` the first is taken; `--out` may be left out."""
     words = [PLACES.get(word, word) for word in re.sub(r"(\\\|\w+)+", "", command).split()[1:]]
     words = [word for word in words if word]
+    if words[:1] == ["policies"] and len(words) > 1:  # that one's own parser is not replaced
+        assert words[1] == "check", page
+        return
     if words[:1] == ["motion"] and len(words) == 2:
         assert words[1] in motion.MOTION, page
         return
@@ -170,6 +173,7 @@ def test_files_that_pages_name_exist() -> None:
             if "__pycache__" not in path and not (ROOT / path).exists():
                 wrong.append(f"{page.name}: {path}")
         for module in re.findall(r"`?python -m (tests[\w.]+)", text):
-            if not (ROOT / (module.replace(".", "/") + ".py")).exists():
+            place = ROOT / module.replace(".", "/")
+            if not (place.with_suffix(".py").exists() or (place / "__main__.py").exists()):
                 wrong.append(f"{page.name}: {module}")
     assert wrong == []

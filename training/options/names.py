@@ -16,6 +16,7 @@ KINDS = {
     "policies": "where a CONTROLLER is named; poise.load_policy(NAME)",
     "rivals": "someone else's policies, where a CONTROLLER is named",
     "suites": "--suite",
+    "realism": "--realism",
     "training": "poise train --config",
     "tuning": "poise tune --config",
     "motions": "--motion",

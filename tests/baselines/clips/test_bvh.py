@@ -133,7 +133,7 @@ def test_without_the_library_the_error_says_how_to_get_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pybvh", None)
     clip = read_bvh(small).clip
-    with pytest.raises(ConfigError, match=r"pip install 'poise\[motion\]'"):
+    with pytest.raises(ConfigError, match=r"pip install -e '\.\[motion\]'"):
         write_bvh(clip, small)
 
 

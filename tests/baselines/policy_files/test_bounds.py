@@ -78,7 +78,7 @@ def test_a_network_is_asked_apart_first(
 def test_the_same_within_the_bounds_is_played(tmp_path: Path) -> None:
     for path in (loop(tmp_path / "a.onnx", 2), constant(tmp_path / "b.onnx", 10)):
         try_network(path, str(path))
-        assert OnnxNetwork(path).act(np.ones(3, dtype=np.float32)).shape == (3,)
+        assert OnnxNetwork(path).act({"": np.ones(3)})["action"].shape == (3,)
 
 
 def test_one_digest_is_asked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

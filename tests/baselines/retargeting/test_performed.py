@@ -64,7 +64,7 @@ def test_a_join_is_planted_within_the_limits_and_led_from_standing() -> None:
     whole = insert(low, low.reversed(), 0.6)
     raw = robot_qpos(whole, robot)
     made = robot_clip_of(whole, robot, "twice", "a script")
-    assert sole_gap(made.qpos) < 1e-3 < sole_gap(raw)
+    assert sole_gap(made.qpos) < 0.02 * sole_gap(raw)
     assert np.array_equal(made.qpos[0], robot.standing_qpos)
     assert np.array_equal(made.qpos[-1], robot.standing_qpos)
     assert len(made.qpos) > len(raw) + 20  # two leads

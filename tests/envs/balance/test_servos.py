@@ -24,7 +24,7 @@ def test_the_law(name):
     q, v = simulation.state.qpos[r.motor_dofs + 1], simulation.state.qvel[r.motor_dofs]
     action = np.random.default_rng(2).uniform(-1.0, 1.0, r.model.nu)
     aim(servos, action)
-    drive(servos, simulation.views)
+    drive(servos, simulation.world())
     wanted = servos.stiffness * (servos.hold + 0.4 * action - q) - servos.damping * v
     expected = np.clip(wanted, -r.torque_limit, r.torque_limit)
     np.testing.assert_allclose(simulation.data.ctrl, expected, rtol=1e-12, atol=1e-9)

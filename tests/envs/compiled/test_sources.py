@@ -6,6 +6,7 @@ import ast
 import gc
 import importlib
 import inspect
+import os
 import sys
 from pathlib import Path
 from types import CodeType
@@ -63,11 +64,11 @@ def test_a_kernel_is_compiled_from_files_that_its_own_imports() -> None:
     for kernel in kernels:
         function = kernel.py_func
         cells = [cell.cell_contents for cell in function.__closure__ or ()]
-        own = sources.imported(inspect.getfile(function))
+        own = set(map(os.path.realpath, sources.imported(inspect.getfile(function))))
         for value in cells + globals_of(function.__code__, function.__globals__):
             value = getattr(value, "py_func", value)
             if str(getattr(value, "__module__", "")).startswith("poise."):
-                file = sys.modules[value.__module__].__file__
+                file = os.path.realpath(str(sys.modules[value.__module__].__file__))
                 compiled = file.startswith(str(ROOT / "envs/compiled"))
                 assert compiled or file in own, (kernel, value)
 

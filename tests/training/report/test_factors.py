@@ -94,13 +94,18 @@ def test_the_ranking_counts_the_mix(results: Results) -> None:
 def test_errors_are_listed_with_their_seeds(tmp_path: Path) -> None:
     """What a controller raised, and where."""
     folder = copied("benchmark", tmp_path)
-    lines = (folder / "trials.csv").read_text().splitlines()
+    with open(folder / "trials.csv", newline="") as file:
+        lines = list(csv.DictReader(file))
     last = lines[-1]
-    assert last.endswith(",") and ",False," in last
-    (folder / "trials.csv").write_text("\n".join([*lines[:-1], last + "ValueError: <no>"]) + "\n")
+    assert last["error"] == "" and last["recovered"] == "False"
+    last["error"] = "ValueError: <no>"
+    with open(folder / "trials.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, list(last))
+        writer.writeheader()
+        writer.writerows(lines)
     results = load_results(folder)
     (row,) = rows(factor_tables.error_table(results))
-    assert row["error"] == "ValueError: <no>" and row["seed"] == last.split(",")[2]
+    assert row["error"] == "ValueError: <no>" and row["seed"] == last["seed"]
     assert factor_tables.error_table(load_results(finished("benchmark"))) is None
 
 

@@ -169,8 +169,8 @@ with stoppable(), uninterrupted():
     ("code", "exit_code", "out", "told"),
     [
         (IMPORTING, None, "", "poise: stopped; the same command begins anew\n"),
-        (ENDING, 0, "robots: ", ""),
-        (LAST, 0, "robots: ", ""),
+        (ENDING, 0, "\nrobots ", ""),
+        (LAST, 0, "\nrobots ", ""),
         (STARTING, None, "started\n", None),
     ],
     ids=["importing", "ending", "last", "starting"],

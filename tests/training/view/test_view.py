@@ -133,7 +133,8 @@ def test_a_trial_of_a_result_is_shown_as_it_was() -> None:
     soft = str(next(folder.parent.glob("*.yaml")))
     assert soft.endswith(SOFT)
     play, lines = recorded_trial(folder, 2, [soft, "zero"])
-    assert [line.rsplit(", ", 1)[1] for line in lines] == ["exactly as recorded"] * 2
+    ends = [line.rsplit(", ", 1)[1] for line in lines if line.endswith("recorded")]
+    assert ends == ["exactly as recorded"] * 2
     lengths = []
     for side, name in enumerate((soft, "zero")):
         heights: list[float] = []
