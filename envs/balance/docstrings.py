@@ -47,7 +47,7 @@ ARGUMENTS = """
 (None for Poise's own, a `Camera`, or the name or id of one of the model's), and the fields of
 `EnvConfig` by name: policy_period, duration, pushes, noise, fall, reward, observation, realism (a
 level by name, file or fields; ideal by default), estimator, terrain (a kind or its fields; level by
-default). Fields may be plain mappings. Raises ConfigError naming what is wrong.
+default), clip_action. Fields may be plain mappings. Raises ConfigError naming what is wrong.
 """
 
 

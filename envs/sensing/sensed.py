@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import mujoco
 import numpy as np
 
@@ -118,12 +120,13 @@ class SensedRobot:
         Raises ConfigError for fields that are wrong, or that the ideal world does not have.
         """
         source = self._state_source
+        asked = given is not None and not (isinstance(given, Mapping) and not given)
         if not isinstance(source, EstimatedState):
-            if given:
+            if asked:
                 raise ConfigError("only where the environment's realism is not ideal",
                                   source="reset", field="realism")  # fmt: skip
             return
-        level = overlaid(self.realism, given, "reset: realism") if given else self.realism
+        level = overlaid(self.realism, given, "reset: realism") if asked else self.realism
         check_latency(level, self.robot.model.opt.timestep)
         self.drawn = draw_robot(level, self.robot, rng.spawn(1)[0])
         source.plant.become(self.drawn)
