@@ -41,6 +41,11 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    from poise.baselines.balance.references.motion import load_motion
+    from poise.baselines.balance.references.reference_motion import ReferenceMotion
+    from poise.baselines.balance.stepping.capture_step import CaptureStep
+    from poise.baselines.balance.stepping.config import CaptureStepConfig
+    from poise.baselines.balance.stepping.controller import SteppingController
     from poise.baselines.controller import (
         BaseController,
         CompiledController,
@@ -53,17 +58,15 @@ if TYPE_CHECKING:
     from poise.baselines.environments.stepping import ResidualStepEnv
     from poise.baselines.environments.walking import ResidualWalkEnv
     from poise.baselines.environments.whole import ResidualWholeEnv
-    from poise.baselines.inverse_kinematics.goals import IkGoal
-    from poise.baselines.inverse_kinematics.options import IkOptions, IkResult
-    from poise.baselines.inverse_kinematics.prior import PosePrior
-    from poise.baselines.inverse_kinematics.solve import InverseKinematics, solve_ik
-    from poise.baselines.motions.motion import load_motion
-    from poise.baselines.motions.reference_motion import ReferenceMotion
+    from poise.baselines.motion.retargeting.inverse_kinematics.goals import IkGoal
+    from poise.baselines.motion.retargeting.inverse_kinematics.options import IkOptions, IkResult
+    from poise.baselines.motion.retargeting.inverse_kinematics.prior import PosePrior
+    from poise.baselines.motion.retargeting.inverse_kinematics.solve import (
+        InverseKinematics,
+        solve_ik,
+    )
+    from poise.baselines.motion.space_time.retarget_clip import retarget_clip
     from poise.baselines.registry import load_controller
-    from poise.baselines.space_time.retarget_clip import retarget_clip
-    from poise.baselines.stepping.capture_step import CaptureStep
-    from poise.baselines.stepping.config import CaptureStepConfig
-    from poise.baselines.stepping.controller import SteppingController
     from poise.baselines.walking.command import GaitCommand
     from poise.baselines.walking.controller import WalkingController
     from poise.baselines.walking.schedule import CommandSampler
@@ -84,17 +87,17 @@ else:
             "environments.stepping": ("ResidualStepEnv",),
             "environments.walking": ("ResidualWalkEnv",),
             "environments.whole": ("ResidualWholeEnv",),
-            "inverse_kinematics.goals": ("IkGoal",),
-            "inverse_kinematics.options": ("IkOptions", "IkResult"),
-            "inverse_kinematics.prior": ("PosePrior",),
-            "inverse_kinematics.solve": ("InverseKinematics", "solve_ik"),
-            "motions.motion": ("load_motion",),
-            "motions.reference_motion": ("ReferenceMotion",),
+            "motion.retargeting.inverse_kinematics.goals": ("IkGoal",),
+            "motion.retargeting.inverse_kinematics.options": ("IkOptions", "IkResult"),
+            "motion.retargeting.inverse_kinematics.prior": ("PosePrior",),
+            "motion.retargeting.inverse_kinematics.solve": ("InverseKinematics", "solve_ik"),
+            "balance.references.motion": ("load_motion",),
+            "balance.references.reference_motion": ("ReferenceMotion",),
             "registry": ("load_controller",),
-            "space_time.retarget_clip": ("retarget_clip",),
-            "stepping.capture_step": ("CaptureStep",),
-            "stepping.config": ("CaptureStepConfig",),
-            "stepping.controller": ("SteppingController",),
+            "motion.space_time.retarget_clip": ("retarget_clip",),
+            "balance.stepping.capture_step": ("CaptureStep",),
+            "balance.stepping.config": ("CaptureStepConfig",),
+            "balance.stepping.controller": ("SteppingController",),
             "walking.command": ("GaitCommand",),
             "walking.controller": ("WalkingController",),
             "walking.schedule": ("CommandSampler",),

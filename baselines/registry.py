@@ -3,22 +3,25 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from poise.baselines.in_place.capture_point import CapturePoint, CapturePointConfig
-from poise.baselines.in_place.jacobian_transpose import JacobianTranspose, JacobianTransposeConfig
-from poise.baselines.in_place.kudoh02 import Kudoh02, Kudoh02Config
-from poise.baselines.in_place.lip_mpc import LIPMPC, LIPMPCConfig
-from poise.baselines.in_place.lqr_lip import LQRLIP, LQRLIPConfig
-from poise.baselines.in_place.macchietto09 import Macchietto09, Macchietto09Config
-from poise.baselines.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
-from poise.baselines.performing.config import MotionStepConfig
-from poise.baselines.performing.motion_step import MotionStep
+from poise.baselines.balance.in_place.capture_point import CapturePoint, CapturePointConfig
+from poise.baselines.balance.in_place.jacobian_transpose import (
+    JacobianTranspose,
+    JacobianTransposeConfig,
+)
+from poise.baselines.balance.in_place.kudoh02 import Kudoh02, Kudoh02Config
+from poise.baselines.balance.in_place.lip_mpc import LIPMPC, LIPMPCConfig
+from poise.baselines.balance.in_place.lqr_lip import LQRLIP, LQRLIPConfig
+from poise.baselines.balance.in_place.macchietto09 import Macchietto09, Macchietto09Config
+from poise.baselines.balance.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
+from poise.baselines.balance.stepping.capture_step import CaptureStep
+from poise.baselines.balance.stepping.config import CaptureStepConfig, IPMStepConfig
+from poise.baselines.balance.stepping.ipm_step import IPMStep
+from poise.baselines.motion.performing.config import MotionStepConfig
+from poise.baselines.motion.performing.motion_step import MotionStep
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.policy_files.known import RIVALS
 from poise.baselines.policy_files.reading import is_policy, policy_config, policy_file_config
-from poise.baselines.stepping.capture_step import CaptureStep
-from poise.baselines.stepping.config import CaptureStepConfig, IPMStepConfig
-from poise.baselines.stepping.ipm_step import IPMStep
 from poise.baselines.walking.config import WalkConfig
 from poise.baselines.walking.simbicon import Simbicon, SimbiconConfig
 from poise.baselines.walking.walk import Walk

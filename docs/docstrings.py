@@ -1,7 +1,7 @@
 """An extension of griffe: docstrings that Poise makes when it is imported, as they are then.
 
-The environments' tables are made of their terms (`poise.envs.balance.docstrings`); the source has
-marks in their place, such as <observation>.
+The environments' tables are made of their terms (`poise.envs.balance.mdp.docstrings`); the source
+has marks in their place, such as <observation>.
 """
 
 from __future__ import annotations

@@ -32,41 +32,41 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from poise.training.evaluation.evaluate import benchmark, evaluate
-    from poise.training.export.dataset import write_dataset
-    from poise.training.export.export import export_policy
-    from poise.training.figures.video import frame_strip, record
+    from poise.training.benchmark.evaluation.evaluate import benchmark, evaluate
+    from poise.training.benchmark.results.compare import compare
+    from poise.training.benchmark.results.read import load_results
+    from poise.training.benchmark.results.replay import replay
+    from poise.training.deploy.export.dataset import write_dataset
+    from poise.training.deploy.export.export import export_policy
+    from poise.training.deploy.standalone.controller import StandaloneController, load_standalone
+    from poise.training.deploy.standalone.readings import Readings
     from poise.training.learning.config import TrainConfig, train_config
     from poise.training.learning.policy import Policy, load_policy
     from poise.training.learning.train import train
     from poise.training.learning.train_seeds import train_seeds
+    from poise.training.learning.tuning.search import tune
     from poise.training.learning.vec_env import ThreadedVecEnv
-    from poise.training.report.page import write_report
-    from poise.training.results.compare import compare
-    from poise.training.results.read import load_results
-    from poise.training.results.replay import replay
-    from poise.training.standalone.controller import StandaloneController, load_standalone
-    from poise.training.standalone.readings import Readings
-    from poise.training.tuning.search import tune
+    from poise.training.pictures.figures.video import frame_strip, record
+    from poise.training.pictures.report.page import write_report
 else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
-            "evaluation.evaluate": ("benchmark", "evaluate"),
-            "export.dataset": ("write_dataset",),
-            "export.export": ("export_policy",),
-            "figures.video": ("frame_strip", "record"),
+            "benchmark.evaluation.evaluate": ("benchmark", "evaluate"),
+            "deploy.export.dataset": ("write_dataset",),
+            "deploy.export.export": ("export_policy",),
+            "pictures.figures.video": ("frame_strip", "record"),
             "learning.config": ("TrainConfig", "train_config"),
             "learning.policy": ("Policy", "load_policy"),
             "learning.train": ("train",),
             "learning.train_seeds": ("train_seeds",),
             "learning.vec_env": ("ThreadedVecEnv",),
-            "report.page": ("write_report",),
-            "results.compare": ("compare",),
-            "results.read": ("load_results",),
-            "results.replay": ("replay",),
-            "standalone.controller": ("StandaloneController", "load_standalone"),
-            "standalone.readings": ("Readings",),
-            "tuning.search": ("tune",),
+            "pictures.report.page": ("write_report",),
+            "benchmark.results.compare": ("compare",),
+            "benchmark.results.read": ("load_results",),
+            "benchmark.results.replay": ("replay",),
+            "deploy.standalone.controller": ("StandaloneController", "load_standalone"),
+            "deploy.standalone.readings": ("Readings",),
+            "learning.tuning.search": ("tune",),
         },
     )

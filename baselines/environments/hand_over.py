@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from poise.envs.balance.episode import record_tick
+from poise.envs.balance.mdp.termination import uprightness
 from poise.envs.balance.servos import Servos, aim, hand_to_motors, servo_torque
-from poise.envs.balance.termination import uprightness
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.callbacks import CallbackAddress, call_back
 from poise.envs.compiled.calls import call, run

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from poise.baselines.balance.stepping.blocks import CaptureTick
+from poise.baselines.balance.stepping.ipm_step import energy_foothold
+from poise.baselines.balance.stepping.swing import time_left
+from poise.baselines.balance.stepping.tick import capture_tick
 from poise.baselines.controller import Targets
-from poise.baselines.performing.motion_step import MotionStep
-from poise.baselines.performing.tick import perform_tick
-from poise.baselines.stepping.blocks import CaptureTick
-from poise.baselines.stepping.ipm_step import energy_foothold
-from poise.baselines.stepping.swing import time_left
-from poise.baselines.stepping.tick import capture_tick
+from poise.baselines.motion.performing.motion_step import MotionStep
+from poise.baselines.motion.performing.tick import perform_tick
 from poise.baselines.walking.tick import walk_tick
 from poise.baselines.walking.walk import Walk
 from poise.baselines.whole_body.momentum_qp import (
@@ -21,12 +21,12 @@ from poise.baselines.whole_body.momentum_qp import (
 )
 from poise.baselines.whole_body.tick import contact_tick
 from poise.configs.schema import build
+from poise.envs.balance.vector.scheduler import StepSchedule
+from poise.envs.balance.vector.threads import ThreadTeam
 from poise.envs.compiled.calls import NO_KERNEL, CompiledStep, Program, address_of, run
 from poise.envs.physics.kinematics import allocate_state
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import load_robot
-from poise.envs.vector.scheduler import StepSchedule
-from poise.envs.vector.threads import ThreadTeam
 
 from .hand_over import whole_tick
 from .policy_step import policy_tick

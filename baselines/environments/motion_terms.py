@@ -1,13 +1,13 @@
-"""The term that tells of the motion that is performed, besides those of `envs.balance.terms`."""
+"""The term that tells of the motion that is performed, besides `envs.balance.mdp.terms`."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.motions.targets import Motion
-from poise.baselines.motions.tempo import TIME
-from poise.envs.balance.observation import Terms, View
-from poise.envs.balance.terms import TERMS
+from poise.baselines.balance.references.targets import Motion
+from poise.baselines.balance.references.tempo import TIME
+from poise.envs.balance.mdp.observation import Terms, View
+from poise.envs.balance.mdp.terms import TERMS
 from poise.envs.compiled.block import Block
 
 

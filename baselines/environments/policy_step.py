@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from poise.baselines.balance.references.targets import Motion, update_targets
+from poise.baselines.balance.references.tempo import played_time
 from poise.baselines.controller import TargetArrays
-from poise.baselines.motions.targets import Motion, update_targets
-from poise.baselines.motions.tempo import played_time
 from poise.envs.balance.episode import (
     FAILURES,
     ROOT_FORCE,
@@ -19,7 +19,7 @@ from poise.envs.balance.episode import (
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Erased, Kernel, Program, call, run
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy_into
+from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.motor_bus import ask_servo

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import allowing, named
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.reference_motion import ReferenceMotion
+from poise.baselines.balance.references.targets import motion_arrays
+from poise.baselines.balance.references.tempo import TIME, Tempo
 from poise.baselines.controller import Controller, Targets
-from poise.baselines.motions.motion import load_motion
-from poise.baselines.motions.reference_motion import ReferenceMotion
-from poise.baselines.motions.targets import motion_arrays
-from poise.baselines.motions.tempo import TIME, Tempo
-from poise.baselines.performing.controller import Performer
+from poise.baselines.motion.performing.controller import Performer
 from poise.baselines.registry import (
     ControllerConfig,
     load_controller,
@@ -23,11 +23,11 @@ from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.base import EnvConfig
-from poise.envs.balance.observation import Term, View, mirror_terms
+from poise.envs.balance.mdp.observation import Term, View, mirror_terms
+from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
-from poise.envs.vector.vector_env import make_vector_env
 
 from .controlled import ControlledEnv
 from .motion_terms import MOTION_TERMS, MotionView

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from poise.baselines.motions.offsets import MOMENTUM_X, MOMENTUM_Y, STEPS, TARGETS
-from poise.envs.balance.observation import Term
+from poise.baselines.balance.references.offsets import MOMENTUM_X, MOMENTUM_Y, STEPS, TARGETS
+from poise.envs.balance.mdp.observation import Term
 from poise.envs.compiled.memory import guarded_zeros
 
 from .policy_step import Residual

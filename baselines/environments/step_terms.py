@@ -1,13 +1,13 @@
-"""The terms that tell of a controller's steps, besides those of `poise.envs.balance.terms`."""
+"""The terms that tell of a controller's steps, besides those of `poise.envs.balance.mdp.terms`."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.stepping.blocks import StepMemory, SwingArrays
-from poise.baselines.stepping.swing import time_left as remaining_time
-from poise.envs.balance.observation import GROUND, SPACE, Terms, View
-from poise.envs.balance.terms import put_local
+from poise.baselines.balance.stepping.blocks import StepMemory, SwingArrays
+from poise.baselines.balance.stepping.swing import time_left as remaining_time
+from poise.envs.balance.mdp.observation import GROUND, SPACE, Terms, View
+from poise.envs.balance.mdp.terms import put_local
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.balance.stepping.controller import SteppingController
 from poise.baselines.controller import Controller, as_base_controller
 from poise.baselines.registry import ControllerConfig
-from poise.baselines.stepping.controller import SteppingController
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
-from poise.envs.balance.observation import View
+from poise.envs.balance.mdp.observation import View
+from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
-from poise.envs.vector.vector_env import make_vector_env
 
 from .residual import ResidualBalanceEnv
 from .scales import StepScales

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.stepping.blocks import StepMemory
+from poise.baselines.balance.stepping.blocks import StepMemory
 from poise.baselines.walking.blocks import Gait
 from poise.baselines.walking.step import step_time
-from poise.envs.balance.observation import GROUND, Terms
+from poise.envs.balance.mdp.observation import GROUND, Terms
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import along
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.vectors import along
 from poise.envs.physics.kinematics import StateArrays
 
 from .step_terms import PHASE, STEP_TERMS, StepView

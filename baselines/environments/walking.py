@@ -14,11 +14,11 @@ from poise.baselines.walking.controller import WalkingController
 from poise.baselines.walking.schedule import CommandSampler, TimedCommand, command_sampler
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
-from poise.envs.balance.observation import View
+from poise.envs.balance.mdp.observation import View
+from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
-from poise.envs.vector.vector_env import make_vector_env
 
 from .commanded import check_reach
 from .step_terms import StepView

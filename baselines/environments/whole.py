@@ -13,15 +13,15 @@ from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.config import EnvConfig
-from poise.envs.balance.observation import Term, mirror_terms
+from poise.envs.balance.mdp.observation import Term, mirror_terms
 from poise.envs.balance.position import servo_config
 from poise.envs.balance.servos import ServoConfig, make_servos
+from poise.envs.balance.vector.vector_env import make_vector_env
 from poise.envs.compiled.callbacks import Callback
 from poise.envs.compiled.calls import CompiledStep, address_of
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
-from poise.envs.vector.vector_env import make_vector_env
 
 from .hand_over import AUTHORITY, HandOver, HandOverConfig, WholeStep, whole_tick
 from .policy_step import PolicyStep

@@ -11,10 +11,10 @@ ahead while its own foot is behind. Only the joints of the robot's roles `should
 
 import numpy as np
 
-from poise.baselines.motions.feet import foot_signs
+from poise.baselines.balance.references.feet import foot_signs
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import along, copy_into
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.vectors import along, copy_into
 from poise.envs.robots.description import match_names
 from poise.envs.robots.robot import Robot
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.stepping.blocks import CaptureTick, StepMemory, SwingArrays
+from poise.baselines.balance.stepping.blocks import CaptureTick, StepMemory, SwingArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 

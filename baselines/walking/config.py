@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from poise.baselines.stepping.config import CaptureStepConfig, StepLimits, SwingTask
+from poise.baselines.balance.stepping.config import CaptureStepConfig, StepLimits, SwingTask
 from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 
 from .models.lip import Lip

@@ -2,7 +2,7 @@
 
 from typing import Protocol, runtime_checkable
 
-from poise.baselines.stepping.blocks import StepMemory
+from poise.baselines.balance.stepping.blocks import StepMemory
 from poise.envs.terrain.terrain import Terrain
 
 from .blocks import Gait

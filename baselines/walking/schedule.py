@@ -11,7 +11,7 @@ from poise.configs.schema import build, to_dict
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.pushes.sampler import Range
+from poise.envs.physics.pushes.sampler import Range
 
 from .command import ENTRIES, GaitCommand
 

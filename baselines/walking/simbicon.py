@@ -5,13 +5,13 @@ from typing import Literal
 
 import numpy as np
 
+from poise.baselines.balance.in_place.pd import PDGains, joint_gains, motor_torques
+from poise.baselines.balance.references.feet import foot_signs
+from poise.baselines.balance.stepping.capture_step import allocate_step_memory
+from poise.baselines.balance.stepping.cop_region import CopRegion
 from poise.baselines.controller import BaseController, Targets
-from poise.baselines.in_place.pd import PDGains, joint_gains, motor_torques
-from poise.baselines.motions.feet import foot_signs
-from poise.baselines.stepping.capture_step import allocate_step_memory
-from poise.baselines.stepping.cop_region import CopRegion
 from poise.configs.errors import ConfigError
-from poise.envs.maths.vectors import rotation_between, turn
+from poise.envs.compiled.maths.vectors import rotation_between, turn
 from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot

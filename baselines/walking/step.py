@@ -5,7 +5,7 @@ The law of the footholds is that of `dcm.py`.
 
 import numpy as np
 
-from poise.baselines.motions.offsets import (
+from poise.baselines.balance.references.offsets import (
     COM_X,
     COM_Y,
     COM_Z,
@@ -15,15 +15,26 @@ from poise.baselines.motions.offsets import (
     FOOTHOLD_Y,
     TIME,
 )
-from poise.baselines.stepping.cop_region import single_support_region
-from poise.baselines.stepping.guidance import limit_posture
-from poise.baselines.stepping.search import clip_to_width, set_start, to_step_frame, to_world
-from poise.baselines.stepping.swing import FROZEN, advance_high, advance_over, aim_swing, time_left
-from poise.baselines.stepping.tick import solve_contacts
+from poise.baselines.balance.stepping.cop_region import single_support_region
+from poise.baselines.balance.stepping.guidance import limit_posture
+from poise.baselines.balance.stepping.search import (
+    clip_to_width,
+    set_start,
+    to_step_frame,
+    to_world,
+)
+from poise.baselines.balance.stepping.swing import (
+    FROZEN,
+    advance_high,
+    advance_over,
+    aim_swing,
+    time_left,
+)
+from poise.baselines.balance.stepping.tick import solve_contacts
 from poise.envs.compiled.calls import run
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.polygons import find_nearest
-from poise.envs.maths.vectors import turned
+from poise.envs.compiled.maths.polygons import find_nearest
+from poise.envs.compiled.maths.vectors import turned
 
 from .arms import swing_arms
 from .blocks import Gait, WalkTick

@@ -5,15 +5,20 @@
 
 import numpy as np
 
-from poise.baselines.stepping.cop_region import distance_beyond, double_support_region
-from poise.baselines.stepping.guidance import copy_reference
-from poise.baselines.stepping.recentring import set_level_frame, stop_recentring
-from poise.baselines.stepping.swing import LANDING, start_swing
-from poise.baselines.stepping.tick import FIRST_LOAD, capture_tick, has_landed, solve_contacts
+from poise.baselines.balance.stepping.cop_region import distance_beyond, double_support_region
+from poise.baselines.balance.stepping.guidance import copy_reference
+from poise.baselines.balance.stepping.recentring import set_level_frame, stop_recentring
+from poise.baselines.balance.stepping.swing import LANDING, start_swing
+from poise.baselines.balance.stepping.tick import (
+    FIRST_LOAD,
+    capture_tick,
+    has_landed,
+    solve_contacts,
+)
 from poise.baselines.whole_body.tick import go_on_from
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.polygons import find_nearest
-from poise.envs.maths.vectors import along, copy_into, turned
+from poise.envs.compiled.maths.polygons import find_nearest
+from poise.envs.compiled.maths.vectors import along, copy_into, turned
 
 from .blocks import Gait, WalkTick
 from .dcm import gait_offset, transfer_point

@@ -6,19 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from poise.baselines.balance.stepping.blocks import CaptureTick
+from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
+from poise.baselines.balance.stepping.config import StepLimits
+from poise.baselines.balance.stepping.planner import search_limits
+from poise.baselines.balance.stepping.swing import swing_gains, swing_task
+from poise.baselines.balance.stepping.swing_speed import possible_limits
 from poise.baselines.controller import Targets
-from poise.baselines.stepping.blocks import CaptureTick
-from poise.baselines.stepping.capture_step import CaptureStep, check_qps
-from poise.baselines.stepping.config import StepLimits
-from poise.baselines.stepping.planner import search_limits
-from poise.baselines.stepping.swing import swing_gains, swing_task
-from poise.baselines.stepping.swing_speed import possible_limits
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Kernel, address_of
+from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.pendulum import Units
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 from poise.envs.terrain.flat import Flat

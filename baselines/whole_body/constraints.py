@@ -3,7 +3,7 @@
 import numpy as np
 
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy_into
+from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 

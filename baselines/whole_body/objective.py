@@ -4,7 +4,7 @@ import numpy as np
 
 from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import cross, turn_error
+from poise.envs.compiled.maths.vectors import cross, turn_error
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 

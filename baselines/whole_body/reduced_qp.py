@@ -20,7 +20,7 @@ from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy_into
+from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 

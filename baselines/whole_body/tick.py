@@ -12,8 +12,8 @@ from poise.baselines.solvers.scaled_rows import INFEASIBLE
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Kernel, call
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.kinematics import StateArrays
 
 from .parameters import QPParameters

@@ -16,8 +16,8 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Program, run
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.pushes.push import PushInfo, push_info
 from poise.envs.physics.simulation import Simulation, World
-from poise.envs.pushes.push import PushInfo, push_info
 from poise.envs.robots.mirror import Mirror, mirror_robot
 from poise.envs.robots.robot import Robot, load_robot, on_terrain
 from poise.envs.sensing.sensed import SensedRobot
@@ -27,7 +27,6 @@ from poise.envs.viewing.rendered import RenderedEnv
 from .action import checked_action, take_action
 from .config import EnvConfig as EnvConfig
 from .config import env_config
-from .docstrings import filled
 from .episode import (
     FALLEN,
     QUIET_STEPS,
@@ -39,12 +38,13 @@ from .episode import (
     make_judge,
 )
 from .info import step_info
-from .observation import Term, Terms, View, mirror_terms, observer, scales
-from .reward import REWARD_TERMS
+from .mdp.docstrings import filled
+from .mdp.observation import Term, Terms, View, mirror_terms, observer, scales
+from .mdp.reward import REWARD_TERMS
+from .mdp.termination import episode_limits
+from .mdp.terms import TERMS
 from .servos import holding_torques
 from .start import RESET_OPTIONS, chosen_pushes, chosen_start, reset_options
-from .termination import episode_limits
-from .terms import TERMS
 
 
 class BalanceEnv(SensedRobot, RenderedEnv):

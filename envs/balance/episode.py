@@ -12,9 +12,9 @@ from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, support_distance, update_support
 from poise.envs.physics.simulation import World
 
-from .observation import Scales
-from .reward import Rewards, RewardView, RewardWeights, rewards, sum_rewards
-from .termination import Limits, has_diverged, has_fallen, uprightness
+from .mdp.observation import Scales
+from .mdp.reward import Rewards, RewardView, RewardWeights, rewards, sum_rewards
+from .mdp.termination import Limits, has_diverged, has_fallen, uprightness
 
 (
     QUIET_STEPS,  # policy steps in a row that were quiet, with feet at rest

@@ -10,7 +10,7 @@ import numpy as np
 from poise.envs.compiled.copies import Copyable
 
 from .episode import FAILURES, QUIET_STEPS, SATURATED, TICKS, EpisodeArrays
-from .reward import REWARD_TERMS
+from .mdp.reward import REWARD_TERMS
 
 if TYPE_CHECKING:
     from .base import BalanceEnv

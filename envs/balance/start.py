@@ -8,11 +8,11 @@ import numpy as np
 
 from poise.configs.errors import ConfigError
 from poise.configs.numbers import finite_array, option_mapping
+from poise.envs.physics.pushes.options import parse_pushes
+from poise.envs.physics.pushes.push import Kick, Push
+from poise.envs.physics.pushes.sampler import PushSampler
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
-from poise.envs.pushes.options import parse_pushes
-from poise.envs.pushes.push import Kick, Push
-from poise.envs.pushes.sampler import PushSampler
 from poise.envs.robots.robot import Robot
 
 RESET_OPTIONS = ("push", "noise", "qpos", "qvel", "realism")

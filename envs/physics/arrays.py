@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import as_strided
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.copies import portable
-from poise.envs.maths.pendulum import Units
+from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.robots.robot import Robot
 from poise.envs.robots.soles import MAX_VERTICES
 from poise.envs.terrain.arrays import surface_arrays

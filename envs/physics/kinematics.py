@@ -12,10 +12,10 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.pendulum import compiled_rate
+from poise.envs.compiled.maths.polygons import convex_hull
+from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.compiled.memory import GAP, guarded_zeros
-from poise.envs.maths.pendulum import compiled_rate
-from poise.envs.maths.polygons import convex_hull
-from poise.envs.maths.vectors import copy_into
 from poise.envs.robots.soles import MAX_VERTICES
 from poise.envs.terrain.arrays import ground_height, surface_below, surface_height
 from poise.envs.terrain.building import SLOTS

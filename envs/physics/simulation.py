@@ -12,8 +12,8 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1, mj_step2
-from poise.envs.pushes.push import Kick, Push
-from poise.envs.pushes.table import TABLE_COLUMNS, apply_kicks, apply_pushes, pack
+from poise.envs.physics.pushes.push import Kick, Push
+from poise.envs.physics.pushes.table import TABLE_COLUMNS, apply_kicks, apply_pushes, pack
 from poise.envs.robots.robot import Robot
 
 from .arrays import RobotArrays, SimViews, robot_arrays, sim_views

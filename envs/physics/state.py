@@ -3,7 +3,7 @@
 import numpy as np
 
 from poise.envs.compiled.copies import Copyable
-from poise.envs.maths.polygons import ray_to_edge
+from poise.envs.compiled.maths.polygons import ray_to_edge
 
 from .arrays import RobotArrays
 from .kinematics import StateArrays, support_distance, update_support

@@ -14,7 +14,7 @@ from poise.configs.errors import ConfigError, PoiseWarning
 from poise.configs.files import resolve
 from poise.configs.schema import build, read_yaml
 from poise.envs.compiled.copies import Copyable
-from poise.envs.maths.pendulum import Units
+from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.terrain.building import EDGE_SENSOR, add_terrain_sensors, build_terrain
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.terrain import Terrain

@@ -14,9 +14,9 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1
-from poise.envs.maths.vectors import axes_of, copy_into, quaternion_of
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, update_state
 from poise.envs.physics.simulation import Simulation

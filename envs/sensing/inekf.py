@@ -18,8 +18,8 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.vectors import axes_of, copy_into, quaternion_of
 
 from .odometry import LOAD, Odometry, copy_axes, keep_joints, place_pressure
 from .prediction import turn_axes

@@ -14,8 +14,8 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.motor_bus import MotorBus, motor_bus
 from poise.envs.physics.simulation import Simulation

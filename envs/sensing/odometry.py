@@ -9,8 +9,8 @@ from scipy.linalg import solve_discrete_are
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.vectors import copy_into
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
-from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot
 
 from .drawn import DrawnRobot

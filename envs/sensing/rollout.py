@@ -8,8 +8,8 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
 from poise.envs.compiled.mujoco_calls import mj_step1, mj_step2
-from poise.envs.maths.vectors import axes_of, copy_into, quaternion_of
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot, on_terrain

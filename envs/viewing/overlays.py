@@ -22,8 +22,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from poise.envs.physics.pushes.table import BODY, DURATION, FORCE, KICK, KIND, NOTHING, POINT, START
 from poise.envs.physics.simulation import Simulation
-from poise.envs.pushes.table import BODY, DURATION, FORCE, KICK, KIND, NOTHING, POINT, START
 
 from .quantities import CAPTURE_POINT, COM, COP, FOOTHOLD, PUSH, RGB, SUPPORT
 

@@ -44,12 +44,12 @@ if "numba" not in sys.modules:
 register(
     "poise/TorqueBalance-v0",
     entry_point="poise.envs.balance.torque:TorqueBalanceEnv",
-    vector_entry_point="poise.envs.vector.vector_env:torque_vector_env",
+    vector_entry_point="poise.envs.balance.vector.vector_env:torque_vector_env",
 )
 register(
     "poise/PositionBalance-v0",
     entry_point="poise.envs.balance.position:PositionBalanceEnv",
-    vector_entry_point="poise.envs.vector.vector_env:position_vector_env",
+    vector_entry_point="poise.envs.balance.vector.vector_env:position_vector_env",
 )
 register(
     "poise/ResidualBalance-v0",
@@ -78,9 +78,9 @@ if TYPE_CHECKING:
     from poise.baselines.registry import load_controller
     from poise.configs.errors import ConfigError, PoiseError
     from poise.envs.robots.robot import load_robot
-    from poise.training.evaluation.evaluate import benchmark, evaluate
+    from poise.training.benchmark.evaluation.evaluate import benchmark, evaluate
+    from poise.training.deploy.standalone.controller import load_standalone
     from poise.training.learning.policy import load_policy, make_env
-    from poise.training.standalone.controller import load_standalone
 else:
     __getattr__, __dir__ = lazy(
         __name__,
@@ -90,8 +90,8 @@ else:
             "baselines.registry": ("load_controller",),
             "configs.errors": ("ConfigError", "PoiseError"),
             "envs.robots.robot": ("load_robot",),
-            "training.evaluation.evaluate": ("benchmark", "evaluate"),
+            "training.benchmark.evaluation.evaluate": ("benchmark", "evaluate"),
             "training.learning.policy": ("load_policy", "make_env"),
-            "training.standalone.controller": ("load_standalone",),
+            "training.deploy.standalone.controller": ("load_standalone",),
         },
     )

@@ -28,7 +28,7 @@ from poise.configs.files import packaged
 from poise.envs import RobotState, Simulation, replicate
 from tests.support.shared import robot
 
-FOLDERS = ("baselines/environments", "training/trials", "training/evaluation")
+FOLDERS = ("baselines/environments", "training/benchmark/trials", "training/benchmark/evaluation")
 
 
 class Plain:

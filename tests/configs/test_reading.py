@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from poise.baselines.motions.motion import load_motion
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.motion.space_time.constraints.reading import read_constraints
 from poise.baselines.registry import controller_config
-from poise.baselines.space_time.constraints.reading import read_constraints
 from poise.configs.archives import MEMBERS, UNPACKED_BYTES, Archive, read_arrays
 from poise.configs.errors import ConfigError, PoiseError, shown
 from poise.configs.files import packaged, resolve
@@ -39,13 +39,13 @@ from poise.configs.yaml_loader import DEPTH, DIGITS, NODES
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
 from poise.envs.sensing.realism import load_realism
-from poise.training.gaits.human import load_knee_moment
+from poise.training.benchmark.suites.suite import load_suite
+from poise.training.benchmark.trials.agents import load_agent
+from poise.training.benchmark.trials.push_limits import load_limits
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
-from poise.training.suites.suite import load_suite
-from poise.training.trials.agents import load_agent
-from poise.training.trials.push_limits import load_limits
-from poise.training.tuning.search import tune_config
+from poise.training.learning.tuning.search import tune_config
+from poise.training.motion.gaits.human import load_knee_moment
 from tests.support.hangs import no_hang
 from tests.support.shared import robot
 

@@ -12,13 +12,13 @@ import pytest
 import stable_baselines3
 from hypothesis import strategies as st
 
+from poise.training.benchmark.evaluation import run
 from poise.training.cli import entry
-from poise.training.evaluation import run
-from poise.training.figures import video
+from poise.training.deploy.qp_set import export
 from poise.training.learning import train_seeds
-from poise.training.qp_set import export
-from poise.training.report import page
-from poise.training.tuning import search
+from poise.training.learning.tuning import search
+from poise.training.pictures.figures import video
+from poise.training.pictures.report import page
 
 from .samples import copy_sample
 from .texts import Draw

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from poise.configs.schema import to_dict
 from poise.envs.balance.config import EnvConfig
-from poise.envs.vector.vector_env import make_vector_env
+from poise.envs.balance.vector.vector_env import make_vector_env
 from tests.support.shared import robot
 
 from .texts import Draw, edit_tree

@@ -9,9 +9,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from poise.configs.schema import build
-from poise.envs.pushes.options import KICK_KEYS, PUSH_KEYS, parse_pushes
-from poise.envs.pushes.sampler import PushSampler
-from poise.envs.pushes.table import pack
+from poise.envs.physics.pushes.options import KICK_KEYS, PUSH_KEYS, parse_pushes
+from poise.envs.physics.pushes.sampler import PushSampler
+from poise.envs.physics.pushes.table import pack
 from tests.support.shared import robot
 
 from .resets import KICK, PUSH

@@ -7,7 +7,7 @@ from pathlib import Path
 from hypothesis import strategies as st
 
 from poise.envs.balance.start import RESET_OPTIONS
-from poise.envs.pushes.options import KICK_KEYS, PUSH_KEYS
+from poise.envs.physics.pushes.options import KICK_KEYS, PUSH_KEYS
 from tests.support.shared import robot
 
 from .texts import Draw, edit_tree

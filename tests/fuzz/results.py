@@ -12,12 +12,12 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from poise.training.evaluation.folder import read_settings
-from poise.training.report.page import write_report
-from poise.training.results.compare import compare, print_comparison
-from poise.training.results.leaderboard import write_leaderboard
-from poise.training.results.read import load_results
-from poise.training.results.replay import replay
+from poise.training.benchmark.evaluation.folder import read_settings
+from poise.training.benchmark.results.compare import compare, print_comparison
+from poise.training.benchmark.results.leaderboard import write_leaderboard
+from poise.training.benchmark.results.read import load_results
+from poise.training.benchmark.results.replay import replay
+from poise.training.pictures.report.page import write_report
 from poise.training.running.terminal import terminal
 
 from .samples import copy_sample, samples

@@ -12,7 +12,7 @@ from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
-from poise.envs.vector.vector_env import BalanceVectorEnv
+from poise.envs.balance.vector.vector_env import BalanceVectorEnv
 from tests.support.shared import robot
 
 CLASSES: dict[str, type[BalanceEnv]] = {

@@ -8,19 +8,19 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from poise.baselines.motions.motion import load_motion
+from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.registry import load_controller
 from poise.configs.files import packaged_folder
 from poise.configs.schema import to_yaml
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
 from poise.envs.sensing.realism import load_realism
+from poise.training.benchmark.suites.plan import Plan
+from poise.training.benchmark.suites.suite import load_suite
+from poise.training.benchmark.trials.push_limits import load_limits
 from poise.training.learning.config import train_config
-from poise.training.suites.plan import Plan
-from poise.training.suites.suite import load_suite
-from poise.training.trials.push_limits import load_limits
-from poise.training.tuning.gains import Gains
-from poise.training.tuning.search import tune_config
+from poise.training.learning.tuning.gains import Gains
+from poise.training.learning.tuning.search import tune_config
 from tests.support.shared import robot
 
 from .texts import Draw, changed

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import torch
 
+from poise.training.benchmark.evaluation import run
+from poise.training.benchmark.trials.agents import load_agent
 from poise.training.cli.entry import main
-from poise.training.evaluation import run
-from poise.training.trials.agents import load_agent
 from tests.support.benchmarks_small import TRIALS, play_in_process, write_small
 from tests.support.evaluations import InProcess, write_suite
 from tests.support.policies import linear, write_onnx, write_yaml

@@ -119,6 +119,6 @@ def test_a_deep_import_is_found() -> None:
     assert list(deep_names(text)) == [
         "poise.envs.robots.robot", "poise.envs.robots.robot Robot", "poise.envs Robots",
     ]  # fmt: skip
-    assert list(deep_names("`poise.training.evaluation.evaluate` and poise.envs.Robot")) == [
-        "poise.training.evaluation.evaluate"
-    ]
+    assert list(
+        deep_names("`poise.training.benchmark.evaluation.evaluate` and poise.envs.Robot")
+    ) == ["poise.training.benchmark.evaluation.evaluate"]

@@ -9,13 +9,13 @@ import pytest
 
 from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.files import packaged
-from poise.training.evaluation import run
-from poise.training.evaluation import run as evaluation
-from poise.training.evaluation.evaluate import benchmark, evaluate
+from poise.training.benchmark.evaluation import run
+from poise.training.benchmark.evaluation import run as evaluation
+from poise.training.benchmark.evaluation.evaluate import benchmark, evaluate
+from poise.training.benchmark.results.replay import replay
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train
-from poise.training.results.replay import replay
 from tests.support.benchmarks_small import InProcessExecutor, write_small
 from tests.support.evaluations import InProcess, random_suite, write_suite
 from tests.support.shared import tiny_config

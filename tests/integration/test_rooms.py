@@ -17,37 +17,42 @@ import pytest
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("configs", "envs", "baselines", "training")
 MOST = 14  # files in a room
+DOORS = 7  # folders in a folder
 
 # A room imports rooms of lower floors only; those of one floor do not know each other. A file that
 # is not in a room is one by itself.
 FLOORS = """
- 1 configs, training/statistics
- 2 envs/compiled, baselines/allowance, baselines/scripts
- 3 envs/maths, envs/robots/models, envs/terrain, baselines/solvers, baselines/warmup
- 3 training/options, training/running
- 4 envs/robots, baselines/clips
- 5 envs/pushes, baselines/joining
- 6 envs/physics, baselines/inverse_kinematics, baselines/matching, baselines/motion_graphs
- 7 envs/sensing, envs/viewing, baselines/controller
- 7 baselines/whole_body/contacts, baselines/whole_body/limits, baselines/whole_body/tasks
- 8 envs/balance, baselines/motions, baselines/plugins, baselines/whole_body
- 9 envs/plain_info, envs/vector, baselines/feasibility, baselines/in_place, baselines/policy_files
- 9 baselines/retargeting
- 9 baselines/stepping, baselines/walking/models
-10 baselines/performing, baselines/space_time/constraints, baselines/synthesis, baselines/walking
-11 baselines/registry, baselines/space_time
+ 1 configs, training/benchmark/statistics
+ 2 baselines/allowance, baselines/motion/synthesis/scripts, envs/compiled
+ 3 baselines/solvers, baselines/warmup, envs/compiled/maths, envs/robots/models, envs/terrain
+ 3 training/running, training/running/options
+ 4 baselines/motion/clips, envs/robots
+ 5 baselines/motion/graphs/joining, envs/physics/pushes
+ 6 baselines/motion/graphs, baselines/motion/graphs/matching
+ 6 baselines/motion/retargeting/inverse_kinematics, envs/physics
+ 7 baselines/controller, baselines/whole_body/contacts, baselines/whole_body/limits
+ 7 baselines/whole_body/tasks, envs/balance/mdp, envs/sensing, envs/viewing
+ 8 baselines/balance/references, baselines/plugins, baselines/whole_body, envs/balance
+ 9 baselines/balance/in_place, baselines/balance/stepping, baselines/motion/feasibility
+ 9 baselines/motion/retargeting, baselines/policy_files, baselines/walking/models
+ 9 envs/balance/vector
+10 baselines/motion/performing, baselines/motion/space_time/constraints
+10 baselines/motion/synthesis, baselines/walking
+11 baselines/motion/space_time, baselines/registry
 12 baselines/environments
-13 training/diagnosis, training/learning, training/tracking
-14 training/trials
-15 training/figures, training/following, training/open_loop, training/standalone
-15 training/suites, training/tuning
-16 training/metrics, training/policy_check, training/qp_set, training/robot_check
-17 training/evaluation
-18 training/gaits, training/results
-19 training/export, training/report, training/sessions
-20 training/motion_report, training/view
+13 training/benchmark/diagnosis, training/learning, training/motion/tracking
+14 training/benchmark/trials
+15 training/benchmark/suites, training/deploy/standalone, training/learning/tuning
+15 training/motion/following, training/motion/open_loop, training/pictures/figures
+16 training/benchmark/metrics, training/deploy/policy_check, training/deploy/qp_set
+16 training/deploy/robot_check
+17 training/benchmark/evaluation
+18 training/benchmark/results, training/motion/gaits
+19 training/deploy/export, training/pictures/report, training/pictures/sessions
+20 training/pictures/motion_report, training/pictures/view
 21 training/cli
-22 envs, baselines, training
+22 baselines, baselines/balance, baselines/motion, envs, training, training/benchmark
+22 training/deploy, training/motion, training/pictures
 """
 FLOOR = {
     room: int(line.split()[0])
@@ -60,8 +65,8 @@ ALONE = {
     "llvmlite": "envs/compiled",
     "numba.core": "envs/compiled",
     "numba.extending": "envs/compiled",
-    "pybvh": "baselines/clips",
-    "mink": "baselines/retargeting",
+    "pybvh": "baselines/motion/clips",
+    "mink": "baselines/motion/retargeting",
     "torch": "training/learning",
     "stable_baselines3": "training/learning",
 }
@@ -191,6 +196,11 @@ def test_rooms_are_small_and_say_what_is_in_them() -> None:
     ] == []
 
 
+def test_a_floor_has_few_doors() -> None:
+    doors = Counter(str(Path(room).parent) for room in FLOOR if (ROOT / room).is_dir())
+    assert {folder: n for folder, n in doors.items() if n > DOORS and folder != "."} == {}
+
+
 def test_tests_stand_in_the_rooms_of_what_they_test() -> None:
     """tests/ has the folders of the package, and three of its own."""
     tests = ROOT / "tests"
@@ -207,9 +217,12 @@ def test_a_room_is_imported_without_those_above_it() -> None:
     """The world loads no controller, and a controller no learning."""
     code = "import sys, poise.{};print(*(name for name in sys.modules if name.startswith({})))"
     for room, above in (
-        ("envs.vector.vector_env", ("poise.baselines", "poise.training", "torch")),
+        ("envs.balance.vector.vector_env", ("poise.baselines", "poise.training", "torch")),
         ("baselines.environments.stepping", ("poise.training", "torch")),
-        ("training.statistics.rates", ("poise.envs", "poise.baselines", "torch", "mujoco")),
+        (
+            "training.benchmark.statistics.rates",
+            ("poise.envs", "poise.baselines", "torch", "mujoco"),
+        ),
     ):
         command = [sys.executable, "-c", code.format(room, above)]
         result = subprocess.run(command, capture_output=True, text=True, check=True)

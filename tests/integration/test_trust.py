@@ -28,32 +28,32 @@ from poise.baselines.plugins import find_plugin
 from poise.baselines.registry import controller_config, load_controller, momentum_qp_config
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled import warmup
+from poise.training.benchmark.evaluation.evaluate import benchmark, evaluate
+from poise.training.benchmark.metrics.seed_groups import seed_groups
+from poise.training.benchmark.results.compare import compare
+from poise.training.benchmark.results.film import film
+from poise.training.benchmark.results.leaderboard import write_leaderboard
+from poise.training.benchmark.results.read import load_results
+from poise.training.benchmark.results.replay import replay
+from poise.training.benchmark.trials.agents import load_agent
+from poise.training.benchmark.trials.jobs import Job, Stage, play
 from poise.training.cli.entry import main
-from poise.training.evaluation.evaluate import benchmark, evaluate
-from poise.training.export.export import export_policy
+from poise.training.deploy.export.export import export_policy
+from poise.training.deploy.qp_set.export import write_qp_set
+from poise.training.deploy.standalone.controller import load_standalone
 from poise.training.learning.checkpoints import check_controller, controller_fingerprint
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import train_seeds
-from poise.training.metrics.seed_groups import seed_groups
-from poise.training.qp_set.export import write_qp_set
-from poise.training.report import page
-from poise.training.report.page import write_report
-from poise.training.results.compare import compare
-from poise.training.results.film import film
-from poise.training.results.leaderboard import write_leaderboard
-from poise.training.results.read import load_results
-from poise.training.results.replay import replay
+from poise.training.learning.tuning.candidates import Candidate
+from poise.training.learning.tuning.candidates import play as play_candidate
+from poise.training.learning.tuning.gains import Gains
+from poise.training.learning.tuning.search import TuneConfig, tune, tune_config
+from poise.training.pictures.report import page
+from poise.training.pictures.report.page import write_report
+from poise.training.pictures.view.view import view, view_trial
 from poise.training.running.executor import Executor
-from poise.training.standalone.controller import load_standalone
-from poise.training.trials.agents import load_agent
-from poise.training.trials.jobs import Job, Stage, play
-from poise.training.tuning.candidates import Candidate
-from poise.training.tuning.candidates import play as play_candidate
-from poise.training.tuning.gains import Gains
-from poise.training.tuning.search import TuneConfig, tune, tune_config
-from poise.training.view.view import view, view_trial
 from tests.support.report_folders import copied
 from tests.support.shared import robot, tiny_config
 from tests.support.trap import NAMES, Ground, allowed_there, loaded_there
@@ -549,10 +549,10 @@ DANGEROUS = {
         "configs/kinds.py",
         "envs/compiled/calls.py",
         "src/poise/lazy.py",
-        "training/export/libraries.py",
+        "training/deploy/export/libraries.py",
     },
     "exec_module": {"baselines/plugins.py"},
-    "find_plugin": {"baselines/plugins.py", "training/trials/agents.py"},
+    "find_plugin": {"baselines/plugins.py", "training/benchmark/trials/agents.py"},
     "PluginConfig": {"baselines/plugins.py", "baselines/registry.py"},
     # TorchScript, of a file that `policy_file_config` has asked about
     "torch.jit.load": {"baselines/policy_files/networks.py"},

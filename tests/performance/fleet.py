@@ -26,16 +26,16 @@ import numpy as np
 
 from poise.configs.errors import PoiseError, one_line
 from poise.configs.files import packaged
-from poise.envs.pushes.push import Push
-from poise.envs.pushes.sampler import push_bodies
+from poise.envs.physics.pushes.push import Push
+from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.models.urdf import PACKAGES, WHEELS
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.robot_check.check import RobotCheck, check_robot
+from poise.training.benchmark.trials.agents import load_agent
+from poise.training.benchmark.trials.play import run_trial
+from poise.training.benchmark.trials.push_limits import PushLimits
+from poise.training.benchmark.trials.trial import Trial
+from poise.training.deploy.robot_check.check import RobotCheck, check_robot
 from poise.training.running.processes import WorkerPool, single_threaded
-from poise.training.trials.agents import load_agent
-from poise.training.trials.play import run_trial
-from poise.training.trials.push_limits import PushLimits
-from poise.training.trials.trial import Trial
 
 OURS = ("humanoid", "tall", "compact", "toddler", "human")  # that nobody else has
 #: where wheels put models of humanoids, in site-packages or in the folder of pip install --target

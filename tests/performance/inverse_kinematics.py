@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from poise.baselines import IkGoal, IkOptions, IkResult, InverseKinematics, PosePrior
-from poise.baselines.inverse_kinematics.solve import METHODS
-from poise.baselines.retargeting.limbs import find_limbs
+from poise.baselines.motion.retargeting.inverse_kinematics.solve import METHODS
+from poise.baselines.motion.retargeting.limbs import find_limbs
 from poise.envs import Robot, load_robot
 
 RESTARTS = 4
@@ -103,9 +103,9 @@ def chain_table(count: int) -> None:
 
 def clip_postures(robot: Robot) -> dict[str, np.ndarray]:
     """Name → (F, nj) joints of the packaged clips that stand in place, on this robot."""
-    from poise.baselines.clips.bvh import read_bvh
-    from poise.baselines.clips.library import find_bvh
-    from poise.baselines.retargeting.retarget import retarget
+    from poise.baselines.motion.clips.bvh import read_bvh
+    from poise.baselines.motion.clips.library import find_bvh
+    from poise.baselines.motion.retargeting.retarget import retarget
 
     return {name: retarget(read_bvh(find_bvh(name)).clip, robot).clip.qpos[:, 7:]
             for name in IN_PLACE}  # fmt: skip

@@ -22,23 +22,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from poise.baselines.clips.bvh import read_bvh
-from poise.baselines.clips.library import find_bvh
-from poise.baselines.feasibility.curve import Curve
-from poise.baselines.feasibility.physical import (
+from poise.baselines.balance.references.robot_clip import RobotClip, reference_from
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.feasibility.curve import Curve
+from poise.baselines.motion.feasibility.physical import (
     JoinRefused,
     assembled,
     make_shaper,
     physical_join,
 )
-from poise.baselines.motions.robot_clip import RobotClip, reference_from
-from poise.baselines.retargeting.retarget import retarget
+from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.following.follow import performer
-from poise.training.statistics.rates import wilson_interval
-from poise.training.tracking.record import ANYWHERE, Footing, lies
-from poise.training.tracking.reference import ReferenceBodies
+from poise.training.benchmark.statistics.rates import wilson_interval
+from poise.training.motion.following.follow import performer
+from poise.training.motion.tracking.record import ANYWHERE, Footing, lies
+from poise.training.motion.tracking.reference import ReferenceBodies
 
 CLIPS = ("cmu02_stand", "cmu02_squat", "cmu02_reach_down", "cmu02_reach_up", "cmu02_punch",
          "fair1_wave_hello")  # fmt: skip

@@ -10,10 +10,10 @@ import time
 
 import numpy as np
 
-from poise.baselines.clips.bvh import read_bvh
-from poise.baselines.clips.library import find_bvh, packaged_clips
-from poise.baselines.matching.database import MatchingDatabase
-from poise.baselines.matching.player import Command
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.library import find_bvh, packaged_clips
+from poise.baselines.motion.graphs.matching.database import MatchingDatabase
+from poise.baselines.motion.graphs.matching.player import Command
 
 QUERIES = 2_000
 

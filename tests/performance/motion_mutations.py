@@ -15,21 +15,21 @@ from pathlib import Path
 
 import numpy as np
 
-from poise.baselines.clips.bvh import read_bvh
-from poise.baselines.clips.clip import Clip
-from poise.baselines.clips.library import find_bvh
-from poise.baselines.motion_graphs.adjacency import make_graph
-from poise.baselines.motion_graphs.motion_graph import (
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.graphs.adjacency import make_graph
+from poise.baselines.motion.graphs.motion_graph import (
     GraphClip,
     MotionGraph,
     StatePlace,
     read_graph,
     write_graph,
 )
-from poise.baselines.motion_graphs.paths import Task
-from poise.baselines.motion_graphs.search import best_paths
-from poise.baselines.scripts.parser import parse
-from poise.baselines.synthesis.synthesis import Synthesis
+from poise.baselines.motion.graphs.paths import Task
+from poise.baselines.motion.graphs.search import best_paths
+from poise.baselines.motion.synthesis.scripts.parser import parse
+from poise.baselines.motion.synthesis.synthesis import Synthesis
 from poise.configs.errors import PoiseError
 from tests.support.graph_files import damaged_graph
 from tests.support.scripts import damaged

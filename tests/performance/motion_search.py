@@ -12,12 +12,12 @@ import time
 
 import numpy as np
 
-from poise.baselines.clips.bvh import read_bvh
-from poise.baselines.clips.library import find_bvh, packaged_clips
-from poise.baselines.motion_graphs.adjacency import make_graph
-from poise.baselines.motion_graphs.motion_graph import GraphClip
-from poise.baselines.motion_graphs.paths import Task
-from poise.baselines.motion_graphs.search import best_paths
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.library import find_bvh, packaged_clips
+from poise.baselines.motion.graphs.adjacency import make_graph
+from poise.baselines.motion.graphs.motion_graph import GraphClip
+from poise.baselines.motion.graphs.paths import Task
+from poise.baselines.motion.graphs.search import best_paths
 from poise.configs.errors import ConfigError
 from tests.support.motion_graphs import check_search, random_graph
 

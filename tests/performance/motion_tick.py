@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from poise.baselines.balance.references.reference_motion import ReferenceMotion
+from poise.baselines.balance.references.splines import piecewise, rest_spline
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.baselines.motions.reference_motion import ReferenceMotion
-from poise.baselines.motions.splines import piecewise, rest_spline
 from poise.envs.robots.robot import load_robot
 
 STEPS, ROUNDS = 50, 60

@@ -12,11 +12,11 @@ import sys
 
 import numpy as np
 
-from poise.baselines.motions.motion import load_motion
+from poise.baselines.balance.references.motion import load_motion
 from poise.envs.robots.robot import load_robot
-from poise.training.following.follow import follow
-from poise.training.open_loop.plant import Plant
-from poise.training.open_loop.search import OpenLoop, replay, samcon, search_whole
+from poise.training.motion.following.follow import follow
+from poise.training.motion.open_loop.plant import Plant
+from poise.training.motion.open_loop.search import OpenLoop, replay, samcon, search_whole
 
 MOTIONS = ("squat", "weight_shift")
 VELOCITY = 0.05  # [m/s]

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from poise.baselines.solvers import QP, Solution, Status, make_solver, residuals
-from poise.training.qp_set.export import write_qp_set
+from poise.training.deploy.qp_set.export import write_qp_set
 from poise.training.running.provenance import machine, versions
 from tests.performance.qp_solvers import SOLVERS, Answer, available
 

@@ -19,12 +19,12 @@ import mujoco
 import numpy as np
 from scipy.optimize import least_squares
 
-from poise.baselines.clips.bvh import read_bvh
-from poise.baselines.clips.library import find_bvh
-from poise.baselines.retargeting.limbs import Limbs, find_limbs
-from poise.baselines.retargeting.retarget import LEAD, SMOOTH, targets_on
-from poise.baselines.retargeting.targets import BodyTargets
-from poise.baselines.space_time.retarget_clip import RetargetedClip, Solver, retarget_clip
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.retargeting.limbs import Limbs, find_limbs
+from poise.baselines.motion.retargeting.retarget import LEAD, SMOOTH, targets_on
+from poise.baselines.motion.retargeting.targets import BodyTargets
+from poise.baselines.motion.space_time.retarget_clip import RetargetedClip, Solver, retarget_clip
 from poise.envs.robots.robot import Robot, load_robot
 
 ROBOTS = ("humanoid", "compact", "tall", "toddler")

@@ -23,13 +23,13 @@ import numpy as np
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.whole_body.momentum_qp import MomentumQP, accept, momentum_tick
+from poise.envs.balance.vector.batch import EnvBatch
 from poise.envs.physics.kinematics import allocate_state, update_state
+from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
-from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import Robot
-from poise.envs.vector.batch import EnvBatch
-from poise.training.figures.style import BLUE, GREEN, GREY, ORANGE, saved_figure
+from poise.training.pictures.figures.style import BLUE, GREEN, GREY, ORANGE, saved_figure
 from tests.performance.scaling_robots import make_robot, with_soles
 
 SIZES = ((3, 0), (6, 0), (6, 6), (6, 12), (6, 18), (6, 24), (6, 30), (6, 36), (6, 42))

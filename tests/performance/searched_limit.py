@@ -28,7 +28,7 @@ from functools import partial
 import cma
 import numpy as np
 
-from poise.envs.pushes.push import Push
+from poise.envs.physics.pushes.push import Push
 from poise.training.learning.policy import load_policy
 
 KNOTS, SPACING = 11, 0.1  # of δ; [s]

@@ -32,14 +32,14 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 
-from poise.baselines.motions.feet import nominal_feet
+from poise.baselines.balance.references.feet import nominal_feet
+from poise.baselines.balance.stepping.cop_region import CopRegion
 from poise.baselines.registry import controller_config
-from poise.baselines.stepping.cop_region import CopRegion
 from poise.baselines.whole_body.momentum_qp import com_offset
-from poise.envs.maths.polygons import half_planes
+from poise.envs.compiled.maths.polygons import half_planes
 from poise.envs.physics.arrays import dof_chain
+from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
-from poise.envs.pushes.sampler import push_bodies
 from poise.envs.robots.robot import load_robot
 
 from .flywheel_limit import turn_budget

@@ -24,7 +24,7 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 import poise  # noqa: F401  (registers the environments)
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.envs.vector.batch import replicate
+from poise.envs.balance.vector.batch import replicate
 from poise.training.learning.vec_env import ThreadedVecEnv
 
 NAME = "poise/ResidualBalance-v0"

@@ -14,12 +14,12 @@ import time
 
 import numpy as np
 
-from poise.baselines.motions.motion import load_motion
+from poise.baselines.balance.references.motion import load_motion
 from poise.envs.robots.robot import load_robot
-from poise.training.sessions.live import Live
-from poise.training.sessions.session import load_session
-from poise.training.view.browser import BrowserView
-from poise.training.view.server import serving
+from poise.training.pictures.sessions.live import Live
+from poise.training.pictures.sessions.session import load_session
+from poise.training.pictures.view.browser import BrowserView
+from poise.training.pictures.view.server import serving
 
 NAMES = ("feedback-step", "momentum-qp", "capture-step")
 PUSH = {"impulse": 6.0, "direction": 90.0, "duration": 0.1, "body": "torso"}

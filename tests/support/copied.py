@@ -21,11 +21,11 @@ from poise.configs.files import packaged
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.balance.vector.batch import EnvBatch, replicate
+from poise.envs.balance.vector.vector_env import BalanceVectorEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 from poise.envs.sensing.estimator import EstimatedState
-from poise.envs.vector.batch import EnvBatch, replicate
-from poise.envs.vector.vector_env import BalanceVectorEnv
 from poise.training.learning.policy import load_policy
 from poise.training.learning.vec_env import ThreadedVecEnv
 from tests.support.limits import described as limits_described

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.training.export.export import export_policy
+from poise.training.deploy.export.export import export_policy
 from poise.training.learning.policy import Policy, load_policy
 from tests.support.shared import finished_run, policies_here, robot
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from poise.baselines.motion_graphs.layers import SHORT
-from poise.baselines.motion_graphs.motion_graph import (
+from poise.baselines.motion.graphs.layers import SHORT
+from poise.baselines.motion.graphs.motion_graph import (
     GraphClip,
     MotionGraph,
     Thresholds,
@@ -15,8 +15,8 @@ from poise.baselines.motion_graphs.motion_graph import (
     earliest_part,
     latest_part,
 )
-from poise.baselines.motion_graphs.paths import Task
-from poise.baselines.motion_graphs.search import best_paths
+from poise.baselines.motion.graphs.paths import Task
+from poise.baselines.motion.graphs.search import best_paths
 from poise.configs.errors import ConfigError
 
 Node = tuple[int, str, float]  # layer, clip, time

@@ -12,9 +12,9 @@ from poise.baselines.controller import Targets
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.baselines.whole_body.parameters import QPParameters
 from poise.envs.physics.kinematics import update_state
+from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
-from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import Robot, load_robot
 
 robot_named = functools.cache(load_robot)

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from poise.baselines.feasibility.trajectory import PlantedRobot
-from poise.baselines.motions.foot_steps import FootStep, Waypoint, plan_steps
-from poise.baselines.motions.footwork import perform_plan
-from poise.baselines.motions.legs import PlantedLegs
-from poise.baselines.motions.motion import load_motion
-from poise.baselines.motions.robot_clip import About, RobotClip
+from poise.baselines.balance.references.foot_steps import FootStep, Waypoint, plan_steps
+from poise.baselines.balance.references.footwork import perform_plan
+from poise.baselines.balance.references.legs import PlantedLegs
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.robot_clip import About, RobotClip
+from poise.baselines.motion.feasibility.trajectory import PlantedRobot
 from poise.envs.robots.robot import Robot
 
 RATE = 1.0 / 30.0  # [s]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from poise.baselines.motions.robot_clip import About, RobotClip, write_robot_clip
+from poise.baselines.balance.references.robot_clip import About, RobotClip, write_robot_clip
 from tests.support.physics import robot_named
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from poise.baselines.retargeting.limbs import find_limbs
-from poise.baselines.space_time.constraints.scene import Scene
+from poise.baselines.motion.retargeting.limbs import find_limbs
+from poise.baselines.motion.space_time.constraints.scene import Scene
 from tests.support.physics import robot_named
 
 DT, LEAD = 1.0 / 30.0, 0.2

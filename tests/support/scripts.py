@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from poise.baselines.scripts.tree import (
+from poise.baselines.motion.synthesis.scripts.tree import (
     KINDS,
     Arrow,
     ClipName,

@@ -9,9 +9,9 @@ import numpy as np
 
 from poise.configs.files import packaged
 from poise.envs.balance.base import EnvConfig
-from poise.envs.balance.termination import FallLimits
+from poise.envs.balance.mdp.termination import FallLimits
+from poise.envs.physics.pushes.sampler import PushSampler
 from poise.envs.physics.simulation import Simulation
-from poise.envs.pushes.sampler import PushSampler
 from poise.envs.robots.menagerie import WHEEL
 from poise.envs.robots.robot import Robot, load_robot
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from poise.baselines.stepping.cop_region import DIRECTIONS, LOAD_FRACTIONS, rest_ahead
-from poise.baselines.stepping.feedback import LATER_STEP
-from poise.baselines.stepping.planner import StepPlan
-from poise.baselines.stepping.recentring import LOADING, SHIFTING
-from poise.envs.maths.pendulum import drifted
-from poise.envs.maths.polygons import nearest_inside
-from poise.envs.maths.vectors import turn
+from poise.baselines.balance.stepping.cop_region import DIRECTIONS, LOAD_FRACTIONS, rest_ahead
+from poise.baselines.balance.stepping.feedback import LATER_STEP
+from poise.baselines.balance.stepping.planner import StepPlan
+from poise.baselines.balance.stepping.recentring import LOADING, SHIFTING
+from poise.envs.compiled.maths.pendulum import drifted
+from poise.envs.compiled.maths.polygons import nearest_inside
+from poise.envs.compiled.maths.vectors import turn
 
 FROZEN = 0.03
 

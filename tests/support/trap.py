@@ -16,17 +16,17 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged_folder
 from poise.configs.schema import to_dict, to_yaml
 from poise.envs.balance.config import StartNoise
-from poise.training.evaluation.folder import Settings
-from poise.training.metrics.entry import controller_entry, robot_figures
+from poise.training.benchmark.evaluation.folder import Settings
+from poise.training.benchmark.metrics.entry import controller_entry, robot_figures
+from poise.training.benchmark.suites.plan import Plan
+from poise.training.benchmark.suites.suite import load_suite
+from poise.training.benchmark.trials.jobs import Stage
+from poise.training.benchmark.trials.push_limits import PushLimits
+from poise.training.benchmark.trials.table import COLUMNS, trial_row
+from poise.training.benchmark.trials.trial import failed
 from poise.training.running.files import csv_text, plain
 from poise.training.running.provenance import circumstances, versions
 from poise.training.running.summary import FORMAT, Summary
-from poise.training.suites.plan import Plan
-from poise.training.suites.suite import load_suite
-from poise.training.trials.jobs import Stage
-from poise.training.trials.push_limits import PushLimits
-from poise.training.trials.table import COLUMNS, trial_row
-from poise.training.trials.trial import failed
 from tests.support.benchmarks_small import write_small
 from tests.support.shared import robot
 

@@ -103,10 +103,10 @@ def evaluate(
         overwrite: replace what the folder holds.
     """
     from poise.configs.outputs import check_out_file
-    from poise.training.trials.names import check_names
+    from poise.training.benchmark.trials.names import check_names
 
     check_names(controllers, robot=robot, suite=suite, realism=realism)
-    from poise.training.evaluation.evaluate import evaluate, measured_limits
+    from poise.training.benchmark.evaluation.evaluate import evaluate, measured_limits
 
     if write_limits is not None:
         check_out_file(write_limits, "write_limits")
@@ -168,10 +168,10 @@ def benchmark(
 
     choose_gl_backend()
     from poise.baselines.allowance import named
-    from poise.training.trials.names import check_names
+    from poise.training.benchmark.trials.names import check_names
 
     check_names(controllers, robot=robot, suite=suite, realism=realism)
-    from poise.training.evaluation.evaluate import benchmark
+    from poise.training.benchmark.evaluation.evaluate import benchmark
 
     summary = benchmark(
         controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
@@ -182,7 +182,7 @@ def benchmark(
     if json:
         print_json(summary)
     if report:
-        from poise.training.report.page import write_report
+        from poise.training.pictures.report.page import write_report
 
         write_report(out, console=terminal(stderr=json), allow=[*named(*controllers), *allow])
     return code
@@ -229,13 +229,13 @@ def tune(
     """
     from poise.baselines.allowance import named
     from poise.configs.files import resolve
-    from poise.training.trials.names import check_name, check_names
+    from poise.training.benchmark.trials.names import check_name, check_names
 
     resolve("tuning", config)
     check_names(robot=robot)
     if policy is not None:
         check_name(policy)
-    from poise.training.tuning.search import tune, tune_config
+    from poise.training.learning.tuning.search import tune, tune_config
 
     given = {"controller": controller, "robot": robot, "policy": policy,
              "generations": generations, "seed": seed}  # fmt: skip
@@ -263,7 +263,7 @@ def qp_set(
         robot: a packaged robot or a .yaml description.
         controller: a packaged controller or a .yaml file.
     """
-    from poise.training.qp_set.export import write_qp_set
+    from poise.training.deploy.qp_set.export import write_qp_set
 
     manifest = write_qp_set(
         out, count=count, seed=seed, form=form, robot=robot, controller=controller
@@ -305,9 +305,9 @@ def robot(
 
         check_out_file(picture, "picture")
         choose_gl_backend()
-    from poise.training.robot_check.check import check_robot
-    from poise.training.robot_check.tables import print_check
-    from poise.training.robot_check.written import load_and_write
+    from poise.training.deploy.robot_check.check import check_robot
+    from poise.training.deploy.robot_check.tables import print_check
+    from poise.training.deploy.robot_check.written import load_and_write
 
     loaded, written = load_and_write(name)
     if written is not None:
@@ -320,7 +320,7 @@ def robot(
         write_atomic(out, dumps(check.to_json(), indent=2, ensure_ascii=False) + "\n")
         terminal(stderr=json).print(str(out), soft_wrap=True)
     if picture is not None:
-        from poise.training.robot_check.picture import draw_robot
+        from poise.training.deploy.robot_check.picture import draw_robot
 
         draw_robot(loaded, picture)
         print(picture)
@@ -338,10 +338,10 @@ def policies() -> None:
 
 def list_names(*, json: Json = False) -> None:
     """List what can be named: robots, controllers, policies with their J50, suites and the like."""
-    from poise.baselines.clips.library import packaged_clips
-    from poise.baselines.scripts.library import packaged_scripts
-    from poise.training.options.names import named
-    from poise.training.options.pages import print_names
+    from poise.baselines.motion.clips.library import packaged_clips
+    from poise.baselines.motion.synthesis.scripts.library import packaged_scripts
+    from poise.training.running.options.names import named
+    from poise.training.running.options.pages import print_names
 
     more = {"clips": packaged_clips(), "scripts": packaged_scripts()}
     if json:

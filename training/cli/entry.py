@@ -13,9 +13,9 @@ import tyro
 
 import poise
 from poise.configs.errors import ConfigError, PoiseError, meant, shown
-from poise.training.options.pages import print_commands
-from poise.training.options.parsing import parsed
-from poise.training.options.spelling import respelled, suggestion
+from poise.training.running.options.pages import print_commands
+from poise.training.running.options.parsing import parsed
+from poise.training.running.options.spelling import respelled, suggestion
 from poise.training.running.stopping import (
     exit_at_once,
     ignore_stops,

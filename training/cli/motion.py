@@ -7,15 +7,15 @@ from typing import Annotated, Literal
 
 import tyro
 
-from poise.baselines.clips.bvh import read_bvh, write_bvh
-from poise.baselines.clips.clip import Clip
-from poise.baselines.clips.library import find_bvh
-from poise.baselines.clips.names import ROLES
+from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.clips.names import ROLES
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
-from poise.training.options.pages import print_commands
-from poise.training.options.parsing import parsed
+from poise.training.running.options.pages import print_commands
+from poise.training.running.options.parsing import parsed
 from poise.training.running.terminal import terminal
 
 from .arguments import Switch
@@ -50,7 +50,7 @@ def info(
         forward: the axis along which the rest pose faces, or auto.
         joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
     """
-    from poise.training.following.tables import print_clip
+    from poise.training.motion.following.tables import print_clip
 
     clip, axes = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints))
     print_clip(clip, axes, terminal())
@@ -157,9 +157,9 @@ def bring(
             by trial in steps; without one spacetime if there are constraints, else frame.
         constraints: a packaged name (see poise list) or a .yaml file of what else is wanted.
     """
-    from poise.baselines.motions.robot_clip import reference_from, write_robot_clip
-    from poise.baselines.space_time.retarget_clip import retarget_clip
-    from poise.training.following.tables import print_retargeted
+    from poise.baselines.balance.references.robot_clip import reference_from, write_robot_clip
+    from poise.baselines.motion.space_time.retarget_clip import retarget_clip
+    from poise.training.motion.following.tables import print_retargeted
 
     check_out_file(out)
     clip = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
@@ -209,10 +209,15 @@ def play(
         size: width and height [pixels], even.
         planted: take the feet as planted though they move in the clip.
     """
-    from poise.baselines.motions.robot_clip import read_robot_clip, reference_from
-    from poise.baselines.retargeting.paces import clip_heading
-    from poise.baselines.retargeting.retarget import retarget
-    from poise.training.figures.playback import beside_of, check_size, check_video, write_playback
+    from poise.baselines.balance.references.robot_clip import read_robot_clip, reference_from
+    from poise.baselines.motion.retargeting.paces import clip_heading
+    from poise.baselines.motion.retargeting.retarget import retarget
+    from poise.training.pictures.figures.playback import (
+        beside_of,
+        check_size,
+        check_video,
+        write_playback,
+    )
 
     check_video(video)
     check_out_file(video)
@@ -274,8 +279,8 @@ def _clip(file: Path, unit: str, up: str, forward: str, robot: str, joints: Sequ
     """The clip of a BVH file, or of a robot's .npz."""
     if file.suffix != ".npz":
         return read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
-    from poise.baselines.motions.robot_clip import read_robot_clip
-    from poise.baselines.retargeting.robot_bvh import clip_of_robot
+    from poise.baselines.balance.references.robot_clip import read_robot_clip
+    from poise.baselines.motion.retargeting.robot_bvh import clip_of_robot
 
     stored, body = read_robot_clip(file), load_robot(robot)
     if stored.about.fingerprint != body.fingerprint:

@@ -41,17 +41,17 @@ def check(
     Returns:
         0 if the robot can do it, 1 if it cannot.
     """
-    from poise.baselines.feasibility.check import check_motion
-    from poise.baselines.feasibility.fit import fit_motion
-    from poise.baselines.feasibility.gap import with_gap
-    from poise.baselines.motions.motion import load_motion
-    from poise.baselines.motions.robot_clip import (
+    from poise.baselines.balance.references.motion import load_motion
+    from poise.baselines.balance.references.robot_clip import (
         read_robot_clip,
         reference_from,
         write_robot_clip,
     )
+    from poise.baselines.motion.feasibility.check import check_motion
+    from poise.baselines.motion.feasibility.fit import fit_motion
+    from poise.baselines.motion.feasibility.gap import with_gap
     from poise.baselines.registry import momentum_qp_config
-    from poise.training.following.tables import print_feasibility
+    from poise.training.motion.following.tables import print_feasibility
 
     if (out is None) == fit:
         raise ConfigError("--fit and --out go together", field="out")
@@ -120,17 +120,17 @@ def follow(
         size: of the video, width and height [pixels], even.
     """
     from poise.baselines.allowance import allowing
-    from poise.training.trials.names import check_names
+    from poise.training.benchmark.trials.names import check_names
 
     check_names([controller], robot=robot, motion=motion)
-    from poise.baselines.motions.tempo import Tempo
-    from poise.training.figures.playback import check_size, check_video
-    from poise.training.following.fastest import STARTS, find_fastest
-    from poise.training.following.follow import follow as perform
-    from poise.training.following.tables import print_followed
-    from poise.training.motion_report.film import Film
-    from poise.training.motion_report.page import check_page
-    from poise.training.motion_report.performance import Watched, write_performance
+    from poise.baselines.balance.references.tempo import Tempo
+    from poise.training.motion.following.fastest import STARTS, find_fastest
+    from poise.training.motion.following.follow import follow as perform
+    from poise.training.motion.following.tables import print_followed
+    from poise.training.pictures.figures.playback import check_size, check_video
+    from poise.training.pictures.motion_report.film import Film
+    from poise.training.pictures.motion_report.page import check_page
+    from poise.training.pictures.motion_report.performance import Watched, write_performance
 
     if fastest and (push or share or tempo != 1.0 or waits or out or report or video):
         raise ConfigError("goes with --controller, --robot, --starts and --seed alone",

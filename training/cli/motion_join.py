@@ -5,10 +5,14 @@ from typing import Annotated, Literal
 
 import tyro
 
-from poise.baselines.clips.bvh import read_bvh, write_bvh
-from poise.baselines.clips.library import find_bvh
-from poise.baselines.joining.coefficient import best_duration, coefficient, moved_shares
-from poise.baselines.joining.joins import JOINS, ends
+from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.graphs.joining.coefficient import (
+    best_duration,
+    coefficient,
+    moved_shares,
+)
+from poise.baselines.motion.graphs.joining.joins import JOINS, ends
 from poise.configs.errors import ConfigError
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
@@ -80,7 +84,7 @@ def match(
         seconds: how long the motion lasts.
         start: CLIP@SECONDS where it begins. None: the first frame of the first clip.
     """
-    from poise.training.following.matched import matched, print_matched
+    from poise.training.motion.following.matched import matched, print_matched
 
     if out.suffix != ".bvh":
         raise ConfigError("must be the name of a .bvh file", source=out, choices=("*.bvh",))
@@ -95,8 +99,8 @@ def _physical(
     first: Path, second: Path, out: Path, robot: str, leave: float | None, enter: float
 ) -> None:
     """Join two motions of a robot by what it can do."""
-    from poise.baselines.feasibility.physical import physical_join
-    from poise.baselines.motions.robot_clip import read_robot_clip, write_robot_clip
+    from poise.baselines.balance.references.robot_clip import read_robot_clip, write_robot_clip
+    from poise.baselines.motion.feasibility.physical import physical_join
 
     clips = [read_robot_clip(file) for file in (first, second)]
     made = physical_join(load_robot(robot), *clips, leave=leave, enter=enter)

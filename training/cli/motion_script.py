@@ -8,26 +8,26 @@ from typing import Annotated, Literal
 
 import tyro
 
-from poise.baselines.clips.bvh import write_bvh
-from poise.baselines.motion_graphs.adjacency import make_graph
-from poise.baselines.motion_graphs.motion_graph import (
+from poise.baselines.motion.clips.bvh import write_bvh
+from poise.baselines.motion.graphs.adjacency import make_graph
+from poise.baselines.motion.graphs.motion_graph import (
     StatePlace,
     Thresholds,
     Weight,
     write_graph,
 )
-from poise.baselines.scripts.library import between, find_script
-from poise.baselines.scripts.printer import sequence_text
-from poise.baselines.scripts.table import to_csv
+from poise.baselines.motion.synthesis.scripts.library import between, find_script
+from poise.baselines.motion.synthesis.scripts.printer import sequence_text
+from poise.baselines.motion.synthesis.scripts.table import to_csv
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import write_atomic
 from poise.configs.reading import read_yaml
 from poise.configs.schema import build
 from poise.envs.robots.robot import load_robot
-from poise.training.following.scripts import load_clips, open_synthesis, write_robot_motion
-from poise.training.motion_report.graph_chart import graph_pictures
-from poise.training.motion_report.page import check_page, write_page
-from poise.training.motion_report.performance import write_synthesis
+from poise.training.motion.following.scripts import load_clips, open_synthesis, write_robot_motion
+from poise.training.pictures.motion_report.graph_chart import graph_pictures
+from poise.training.pictures.motion_report.page import check_page, write_page
+from poise.training.pictures.motion_report.performance import write_synthesis
 from poise.training.running.terminal import terminal
 
 from .arguments import Switch
@@ -74,7 +74,7 @@ def graph(
         plot: a .png file for the adjacency matrix and the graph.
         report: a .html file for both, which follows light and dark.
     """
-    from poise.training.following.script_tables import print_graph
+    from poise.training.motion.following.script_tables import print_graph
 
     if report is not None:
         check_page(report)
@@ -88,7 +88,7 @@ def graph(
     print_graph(made, terminal())
     print(out)
     if plot is not None:
-        from poise.training.figures.motion_graph import plot_graph
+        from poise.training.pictures.figures.motion_graph import plot_graph
 
         plot_graph(plot, made)
         print(plot)
@@ -119,7 +119,7 @@ def plan(
         kind: of transitions that the script leaves open. None: physical with a robot, which
             lasts as long and bends as much as it needs, and insert without.
     """
-    from poise.training.following.script_tables import print_plan
+    from poise.training.motion.following.script_tables import print_plan
 
     tree = find_script(script)
     synthesis = open_synthesis(graph, robot, kind, script=tree)

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from poise.configs.errors import ConfigError, shown
-from poise.training.options.parsing import parsed
+from poise.training.running.options.parsing import parsed
 from poise.training.running.terminal import terminal
 
 from .arguments import Allow, PolicyName
@@ -22,7 +22,7 @@ def show() -> None:
     FILE says what is missing of another one.
     """
     from poise.baselines.policy_files.known import known_policies
-    from poise.training.policy_check.tables import print_policies
+    from poise.training.deploy.policy_check.tables import print_policies
 
     print_policies(known_policies(), terminal())
 
@@ -41,8 +41,8 @@ def check(file: Checked, /, *, robot: str, rollout: Path | None = None, allow: A
     """
     from poise.baselines.allowance import allowing
     from poise.envs.robots.robot import load_robot
-    from poise.training.policy_check.check import check_policy
-    from poise.training.policy_check.tables import print_check
+    from poise.training.deploy.policy_check.check import check_policy
+    from poise.training.deploy.policy_check.tables import print_check
 
     with allowing(allow):
         found = check_policy(file, load_robot(robot), rollout)
@@ -84,10 +84,10 @@ def export(
             summary.json: its figures go into the card.
         licence: of the policy, as Hugging Face abbreviates it; of a packaged one it is known.
     """
-    from poise.training.trials.names import check_policy_name
+    from poise.training.benchmark.trials.names import check_policy_name
 
     check_policy_name(policy)
-    from poise.training.export.export import export_policy
+    from poise.training.deploy.export.export import export_policy
 
     worst = export_policy(policy, out, result=result, licence=licence, allow=allow)
     print(f"{out}: ONNX differs from the policy by {worst:.1g} at most")
@@ -118,10 +118,10 @@ def dataset(
         robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the trials.
     """
-    from poise.training.trials.names import check_names
+    from poise.training.benchmark.trials.names import check_names
 
     check_names([controller], robot=robot, suite=suite)
-    from poise.training.export.dataset import write_dataset
+    from poise.training.deploy.export.dataset import write_dataset
 
     found = write_dataset(controller, out, name=name, suite=suite, robot=robot, trials=trials,
                           seed=seed, allow=allow)  # fmt: skip

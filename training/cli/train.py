@@ -15,19 +15,19 @@ from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
 from poise.configs.schema import build, to_dict
+from poise.training.benchmark.statistics.differences import difference
+from poise.training.benchmark.statistics.rates import wilson_interval
 from poise.training.learning.checkpoints import STATE, find_checkpoint
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.policy_files import read_state
 from poise.training.learning.seeds import SEEDS, Evaluation, evaluations, start_and_best
 from poise.training.learning.train import BEST, LAST, train
 from poise.training.learning.train_seeds import train_seeds
-from poise.training.options.described import Option, kind_of, options_of, sentences
-from poise.training.options.pages import grouped, print_options
-from poise.training.options.parsing import one_line_errors
 from poise.training.running.executor import Backend
+from poise.training.running.options.described import Option, kind_of, options_of, sentences
+from poise.training.running.options.pages import grouped, print_options
+from poise.training.running.options.parsing import one_line_errors
 from poise.training.running.terminal import terminal
-from poise.training.statistics.differences import difference
-from poise.training.statistics.rates import wilson_interval
 
 from .commands import Allow
 

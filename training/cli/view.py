@@ -79,13 +79,13 @@ def view(
     from poise.envs.viewing.gl import choose_gl_backend
 
     choose_gl_backend()
-    from poise.training.trials.names import check_names
+    from poise.training.benchmark.trials.names import check_names
 
     if trial is None:
         check_names(shown, robot=robot, motion=motion, realism=realism)
     else:
         check_folders(*shown)
-    from poise.training.view.view import view, view_trial
+    from poise.training.pictures.view.view import view, view_trial
 
     if trial is None:
         if controllers:

@@ -62,10 +62,10 @@ def walk(
 
     if video is not None:
         choose_gl_backend()
-    from poise.training.trials.names import check_names
+    from poise.training.benchmark.trials.names import check_names
 
     check_names([controller], robot=robot, realism=realism)
-    from poise.training.sessions.walk import walk
+    from poise.training.pictures.sessions.walk import walk
 
     walk(speed, left=left, turn=math.radians(turn), step_time=step_time,
          step_length=step_length, width=width, clearance=clearance, arm_swing=arm_swing,
@@ -121,12 +121,12 @@ def gait(
         workers: processes of that suite; all cores if not given.
     """
     from poise.configs.files import resolve
-    from poise.training.trials.names import check_names
+    from poise.training.benchmark.trials.names import check_names
 
     check_names(robot=robot, suite=push_suite)
     resolve("human", human)
-    from poise.training.gaits.compare import compare_gaits
-    from poise.training.gaits.tables import print_gaits
+    from poise.training.motion.gaits.compare import compare_gaits
+    from poise.training.motion.gaits.tables import print_gaits
 
     figures = compare_gaits(
         compare, out=out, speeds=speeds, starts=starts, duration=duration, robot=robot, seed=seed,

@@ -15,9 +15,9 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from poise.configs.files import write_atomic
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.reward import REWARD_TERMS
+from poise.envs.balance.mdp.reward import REWARD_TERMS
+from poise.envs.balance.vector.batch import EnvBatch
 from poise.envs.robots.robot import Robot
-from poise.envs.vector.batch import EnvBatch
 from poise.training.running.terminal import ProgressLines
 
 from .checkpoints import controller_fingerprint, save_checkpoint

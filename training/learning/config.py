@@ -4,14 +4,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.tempo import Tempo
 from poise.baselines.environments.hand_over import HandOverConfig
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales, StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
-from poise.baselines.motions.motion import load_motion
-from poise.baselines.motions.tempo import Tempo
 from poise.baselines.registry import controller_config
 from poise.baselines.walking.schedule import CommandSampler
 from poise.configs.files import resolve
@@ -20,9 +20,9 @@ from poise.envs.balance.base import BalanceEnv, EnvConfig
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.servos import ServoConfig
 from poise.envs.balance.torque import TorqueBalanceEnv
-from poise.envs.pushes.sampler import PushSampler
+from poise.envs.balance.vector.batch import replicate
+from poise.envs.physics.pushes.sampler import PushSampler
 from poise.envs.robots.robot import Robot
-from poise.envs.vector.batch import replicate
 
 MOST_STEPS = 4_000_000  # of a rollout, which is kept in memory
 MOST_SEED = 2**31 - 1  # that torch and NumPy take, also with a run's steps added

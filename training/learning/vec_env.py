@@ -8,8 +8,8 @@ import numpy as np
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices
 
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.vector.batch import EnvBatch
 from poise.envs.compiled.copies import Copyable
-from poise.envs.vector.batch import EnvBatch
 
 
 class ThreadedVecEnv(Copyable, VecEnv):

@@ -15,9 +15,9 @@ from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.easing import eased
+from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.easing import eased
-from poise.envs.maths.pendulum import Units
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.robots.robot import Robot
 

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import copy_into, turn_error, turned
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.maths.vectors import copy_into, turn_error, turned
 from poise.envs.physics.body_points import (
     BodyPoint,
     body_point,

@@ -7,7 +7,7 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy_into, placed
+from poise.envs.compiled.maths.vectors import copy_into, placed
 from poise.envs.physics.body_points import (
     BodyPoint,
     body_point,

@@ -7,7 +7,7 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
-from poise.envs.maths.vectors import copy_into, rotation_error
+from poise.envs.compiled.maths.vectors import copy_into, rotation_error
 from poise.envs.physics.state import RobotState
 
 from .task import Rows, Task, TaskTick

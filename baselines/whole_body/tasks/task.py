@@ -9,7 +9,7 @@ import numpy as np
 from poise.configs.errors import below
 from poise.configs.kinds import OfKind
 from poise.envs.compiled.block import Block
-from poise.envs.maths.pendulum import Units
+from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot

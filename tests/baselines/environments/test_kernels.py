@@ -5,10 +5,10 @@ import sys
 
 import pytest
 
+from poise.baselines.balance.stepping.capture_step import CaptureStep
+from poise.baselines.balance.stepping.config import CaptureStepConfig
 from poise.baselines.environments import kernels
 from poise.baselines.environments.whole import ResidualWholeEnv
-from poise.baselines.stepping.capture_step import CaptureStep
-from poise.baselines.stepping.config import CaptureStepConfig
 from poise.baselines.warmup import PARTS, prepare
 from poise.baselines.whole_body import momentum_qp
 from poise.configs.schema import build

@@ -7,21 +7,21 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.targets import motion_arrays, update_targets
 from poise.baselines.controller import Targets
 from poise.baselines.environments.policy_step import gate_opening
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales
-from poise.baselines.motions.motion import load_motion
-from poise.baselines.motions.targets import motion_arrays, update_targets
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.whole_body.gains import CoMTask
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import EnvConfig
-from poise.envs.balance.reward import RewardWeights
+from poise.envs.balance.mdp.reward import RewardWeights
 from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.balance.vector.batch import replicate
 from poise.envs.physics.simulation import Simulation
-from poise.envs.vector.batch import replicate
 from tests.support.shared import robot
 
 PUSH = {"impulse": 9.0, "direction": 30.0, "start": 0.1, "body": "torso"}

@@ -6,13 +6,13 @@ import re
 import numpy as np
 import pytest
 
+from poise.baselines.balance.stepping.guidance import copy_reference, guide_com
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
-from poise.baselines.stepping.guidance import copy_reference, guide_com
 from poise.configs.errors import ConfigError
+from poise.envs.balance.vector.batch import EnvBatch, replicate
 from poise.envs.sensing.realism import Realism, load_realism
-from poise.envs.vector.batch import EnvBatch, replicate
 from tests.support.sensing import PLAIN
 from tests.support.shared import robot
 

@@ -14,7 +14,7 @@ from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.envs.balance.episode import FAILURES
-from poise.envs.vector.batch import EnvBatch, replicate
+from poise.envs.balance.vector.batch import EnvBatch, replicate
 from tests.support.shared import robot
 
 PUSH = {"impulse": 25.0, "direction": 30.0, "duration": 0.1, "start": 0.1, "body": "torso"}

@@ -14,9 +14,9 @@ import pytest
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import load_controller
 from poise.configs.errors import ConfigError, PoiseError
+from poise.envs.balance.vector.batch import EnvBatch, replicate
 from poise.envs.robots.menagerie import WHEEL
 from poise.envs.robots.robot import Robot
-from poise.envs.vector.batch import EnvBatch, replicate
 from tests.support.policies import linear, onnx_session, write_onnx, write_yaml
 from tests.support.rivals import network
 from tests.support.shared import robot as shared_robot

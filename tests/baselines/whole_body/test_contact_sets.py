@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from poise.baselines.balance.stepping.swing import SwingTask
 from poise.baselines.controller import Targets
 from poise.baselines.solvers import make_solver, residuals
-from poise.baselines.stepping.swing import SwingTask
 from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.baselines.whole_body.formulation import build, unknowns
 from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig

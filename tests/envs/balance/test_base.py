@@ -7,13 +7,13 @@ import pytest
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.base import EnvConfig, env_config
-from poise.envs.balance.reward import REWARD_TERMS
+from poise.envs.balance.mdp.reward import REWARD_TERMS
+from poise.envs.balance.plain_info import PlainInfo
 from poise.envs.balance.start import RESET_OPTIONS
 from poise.envs.balance.torque import TorqueBalanceEnv
-from poise.envs.plain_info import PlainInfo
-from poise.envs.pushes.push import Kick, Push
-from poise.envs.pushes.sampler import PushSampler
-from poise.envs.vector.batch import EnvBatch
+from poise.envs.balance.vector.batch import EnvBatch
+from poise.envs.physics.pushes.push import Kick, Push
+from poise.envs.physics.pushes.sampler import PushSampler
 from tests.support.shared import robot
 
 BOTH = pytest.mark.parametrize("make", [ResidualBalanceEnv, TorqueBalanceEnv])

@@ -8,7 +8,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.configs.schema import build, to_dict
 from poise.envs.balance.config import EnvConfig, env_config
-from poise.envs.balance.reward import RewardWeights
+from poise.envs.balance.mdp.reward import RewardWeights
 from poise.envs.sensing.realism import Realism
 
 

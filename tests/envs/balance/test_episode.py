@@ -13,9 +13,9 @@ from poise.envs.balance.episode import (
     judge_step,
     record_tick,
 )
-from poise.envs.balance.observation import scales
-from poise.envs.balance.reward import REWARD_TERMS, RewardView, RewardWeights, rewards
-from poise.envs.balance.termination import FallLimits, episode_limits, has_fallen
+from poise.envs.balance.mdp.observation import scales
+from poise.envs.balance.mdp.reward import REWARD_TERMS, RewardView, RewardWeights, rewards
+from poise.envs.balance.mdp.termination import FallLimits, episode_limits, has_fallen
 from poise.envs.physics.simulation import Simulation
 from tests.support.shared import generic_state, robot
 

@@ -106,7 +106,8 @@ def test_without_a_cache_one_line_says_so(tmp_path: Path) -> None:
     """Once, when something compiles; and it compiles."""
     code = (
         "from poise.envs.compiled import jit; jit.tell(); jit.tell(); "
-        "from poise.envs.maths.pendulum import compiled_rate; print(compiled_rate(9.81, 1.0))"
+        "from poise.envs.compiled.maths.pendulum import compiled_rate; "
+        "print(compiled_rate(9.81, 1.0))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], env=os.environ | {"NUMBA_CACHE_DIR": "here"}, cwd=tmp_path,

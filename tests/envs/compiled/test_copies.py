@@ -21,11 +21,11 @@ from poise.baselines.plugins import PluginController
 from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 from poise.configs.errors import PoiseError
 from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.balance.vector.scheduler import StepSchedule
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, address_of
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.simulation import Simulation
-from poise.envs.vector.scheduler import StepSchedule
 from tests.support.copied import BEFORE, KEEPS_TO_ITSELF, KINDS, digest, env_of, outcome, play_env
 from tests.support.shared import robot
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from poise.envs.compiled import jit, warmup
-from poise.envs.maths import pendulum
-from poise.envs.maths.pendulum import compiled_rate
+from poise.envs.compiled.maths import pendulum
+from poise.envs.compiled.maths.pendulum import compiled_rate
 from tests.envs.compiled import test_kernel_cache
 from tests.envs.compiled.test_kernel_cache import total
 

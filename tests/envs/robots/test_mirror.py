@@ -12,8 +12,8 @@ from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.configs.errors import ConfigError
+from poise.envs.balance.mdp.terms import TERMS
 from poise.envs.balance.position import PositionBalanceEnv
-from poise.envs.balance.terms import TERMS
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.robots.mirror import SIDES, mirror_robot
 from poise.envs.robots.robot import load_robot

@@ -6,7 +6,7 @@ import pytest
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
-from poise.envs.maths.vectors import skew
+from poise.envs.compiled.maths.vectors import skew
 from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.inekf import (
     ATTITUDE,

@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
-from poise.envs.pushes.sampler import push_bodies
 from poise.envs.sensing.plant import CHANGED, Plant
 from tests.support.physics import random_state
 from tests.support.sensing import drawn_of

@@ -10,11 +10,11 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.servos import drive
 from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.balance.vector.batch import replicate
+from poise.envs.balance.vector.vector_env import BalanceVectorEnv
 from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.realism import Realism, load_realism
 from poise.envs.sensing.source import StateSource
-from poise.envs.vector.batch import replicate
-from poise.envs.vector.vector_env import BalanceVectorEnv
 from tests.support.sensing import PLAIN
 from tests.support.shared import robot
 

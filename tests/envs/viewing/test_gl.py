@@ -71,7 +71,7 @@ def test_imports_set_no_variable_and_choosing_loads_no_mujoco():
     code = (
         "import os, sys; import poise.envs.viewing.gl; assert 'mujoco' not in sys.modules;"
         "before = dict(os.environ); import poise.envs.viewing.renderer;"
-        "import poise.training.figures.video;"
+        "import poise.training.pictures.figures.video;"
         "assert 'mujoco' in sys.modules; new = set(os.environ.items()) - set(before.items());"
         "assert not new, new"
     )

@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from poise.envs.physics.pushes.push import Kick, Push
 from poise.envs.physics.simulation import Simulation
-from poise.envs.pushes.push import Kick, Push
 from poise.envs.robots.robot import load_robot
 from poise.envs.viewing.overlays import FADE, draw, marks, push_arrows
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from poise.configs.errors import PoiseError
+from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
-from poise.envs.pushes.push import Push
 from poise.envs.robots.robot import load_robot, on_terrain
 from poise.envs.terrain.stairs import Stairs
 from poise.envs.viewing import renderer as rendering

@@ -18,13 +18,13 @@ from poise.baselines.allowance import SCRIPTS
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.schema import to_dict
+from poise.training.benchmark.evaluation import run
 from poise.training.cli import entry
 from poise.training.cli import train as train_command
 from poise.training.cli.entry import main
 from poise.training.cli.train import parse
-from poise.training.evaluation import run
 from poise.training.learning.config import TrainConfig, train_config
-from poise.training.options.names import FIGURES
+from poise.training.running.options.names import FIGURES
 from tests.support.evaluations import RANDOM, InProcess, write_suite
 
 RICH = (
@@ -104,7 +104,7 @@ def test_what_cannot_be_walked_is_refused_before_a_controller_is_made(
         raise AssertionError("compiles")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("poise.training.sessions.walk.load_agent", never)
+    monkeypatch.setattr("poise.training.pictures.sessions.walk.load_agent", never)
     monkeypatch.setattr(run, "prepare", never)
     assert main(args) == 2
     assert capsys.readouterr().err.startswith("poise: ")

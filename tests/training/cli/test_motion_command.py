@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.baselines.clips.bvh import read_bvh
-from poise.baselines.clips.library import find_bvh
-from poise.baselines.motions.robot_clip import read_robot_clip, write_robot_clip
+from poise.baselines.balance.references.robot_clip import read_robot_clip, write_robot_clip
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.library import find_bvh
 from poise.training.cli.entry import main
 from tests.support.motion_files import small_bvh
 from tests.support.physics import robot_named

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from poise.baselines.clips.bvh import read_bvh
-from poise.baselines.motion_graphs.motion_graph import read_graph
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.graphs.motion_graph import read_graph
 from poise.training.cli.entry import main
 
 THREE = ["cmu02_stand", "cmu02_squat", "cmu02_punch"]

@@ -17,13 +17,14 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from poise.baselines.balance.stepping.capture_step import CaptureStep
 from poise.baselines.environments.stepping import ResidualStepEnv
-from poise.baselines.stepping.capture_step import CaptureStep
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build, read_yaml
-from poise.envs.balance.reward import REWARD_TERMS
-from poise.envs.pushes.sampler import PushSampler
-from poise.envs.vector.batch import EnvBatch
+from poise.envs.balance.mdp.reward import REWARD_TERMS
+from poise.envs.balance.vector.batch import EnvBatch
+from poise.envs.physics.pushes.sampler import PushSampler
+from poise.training.benchmark.trials.agents import load_agent
 from poise.training.learning import callbacks, curriculum
 from poise.training.learning.checkpoints import FILES, POLICY, STATE
 from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, train_config
@@ -31,7 +32,6 @@ from poise.training.learning.policy import load_policy
 from poise.training.learning.seeds import KEPT
 from poise.training.learning.train import _env_seed, train
 from poise.training.learning.train_seeds import train_seeds
-from poise.training.trials.agents import load_agent
 from tests.support.shared import finished_run, robot, tiny_config
 
 ROOT = Path(__file__).parents[3]

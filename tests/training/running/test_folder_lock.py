@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from poise.configs.errors import PoiseError
-from poise.training.evaluation.evaluate import evaluate
+from poise.training.benchmark.evaluation.evaluate import evaluate
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import train_seeds
+from poise.training.learning.tuning.search import TuneConfig, TuningPushes, tune
 from poise.training.running.folder_lock import HOLDER, FolderLock
-from poise.training.tuning.search import TuneConfig, TuningPushes, tune
 from tests.support.shared import tiny_config
 
 HOLD = """

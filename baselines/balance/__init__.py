@@ -1,0 +1,1 @@
+"""Balance: in place, on reference motions, with steps."""

@@ -1,0 +1,199 @@
+"""The way of a swing foot: C² from wherever it is to a foothold that may move on the way."""
+
+import numpy as np
+
+from poise.baselines.whole_body.tasks.sole_pose import SolePose, SolePoseBlock, SolePoseGains
+from poise.baselines.whole_body.tasks.task import BoundTask
+from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.pendulum import Units
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.physics.arrays import RobotArrays
+
+from .blocks import SwingArrays
+from .config import SwingTask
+
+LANDING = 0.6  # fraction of a swing after which contact is touchdown, not the lift-off
+FROZEN = 0.03  # [s] before touchdown the foothold no longer moves
+
+
+@compiled
+def quintic(
+    p0: float,
+    v0: float,
+    a0: float,
+    p1: float,
+    v1: float,
+    a1: float,
+    duration: float,
+    t: float,
+) -> tuple[float, float, float]:
+    """Position, velocity, acceleration at `t` of the polynomial of degree five that leads from
+    (p0, v0, a0) to (p1, v1, a1) in `duration`: the way of least jerk [Flash85]."""
+    T = max(duration, 1e-6)
+    v0, a0, v1, a1 = v0 * T, a0 * T * T, v1 * T, a1 * T * T
+    d = p1 - p0
+    c3 = 10.0 * d - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1
+    c4 = -15.0 * d + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1
+    c5 = 6.0 * d - 3.0 * (v0 + v1) - 0.5 * (a0 - a1)
+    s = min(max(t / T, 0.0), 1.0)
+    position = p0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
+    velocity = v0 + s * (a0 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
+    acceleration = a0 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5))
+    return position, velocity / T, acceleration / (T * T)
+
+
+@compiled
+def start_swing(w: SwingArrays, point: np.ndarray, ground: float, duration: float) -> None:
+    """Begin a swing of `duration` [s] at rest at `point` (3,) [m], above `ground` [m]."""
+    for a in range(3):
+        w.reference[0, a], w.reference[1, a], w.reference[2, a] = point[a], 0.0, 0.0
+    w.foothold[0], w.foothold[1] = point[0], point[1]
+    w.time[0], w.duration[0], w.ground[0], w.time_offset[0] = 0.0, duration, ground, 0.0
+
+
+@compiled
+def time_left(w: SwingArrays) -> float:
+    """The time until touchdown is planned [s]."""
+    return max(w.duration[0] - w.time[0], 0.0)
+
+
+@compiled
+def aim_swing(w: SwingArrays, x: float, y: float, duration: float) -> None:
+    """Lead to the foothold (x, y) [m] in `duration` [s]; nothing in the last `FROZEN` seconds."""
+    if time_left(w) > FROZEN:
+        w.foothold[0], w.foothold[1] = x, y
+        w.duration[0] = max(duration, w.time[0] + FROZEN)
+
+
+@compiled
+def _lead(
+    reference: np.ndarray, a: int, position: float, velocity: float, duration: float, dt: float
+) -> None:
+    """Move axis `a` of the reference `dt` further on its way to a place and a speed."""
+    reference[0, a], reference[1, a], reference[2, a] = quintic(
+        reference[0, a], reference[1, a], reference[2, a], position, velocity, 0.0, duration, dt
+    )
+
+
+@compiled
+def advance_swing(w: SwingArrays, dt: float) -> None:
+    """Go `dt` [s] further: up to the apex, down to the ground, on at the landing speed."""
+    advance_over(w, w.apex, dt)
+
+
+@compiled
+def advance_over(w: SwingArrays, apex: float, dt: float) -> None:
+    """The same with another `apex` above the ground [m]."""
+    rest, now, ground, speed = time_left(w), w.reference, w.ground[0], w.landing_speed
+    for a in range(2):
+        if rest > dt:
+            _lead(now, a, w.foothold[a], 0.0, rest, dt)
+        else:
+            now[0, a], now[1, a], now[2, a] = w.foothold[a], 0.0, 0.0
+    lift = w.lift * w.duration[0]
+    if w.time[0] + dt < lift:
+        _lead(now, 2, ground + apex, 0.0, lift - w.time[0], dt)
+    elif rest > dt:
+        _lead(now, 2, ground, -speed, rest, dt)
+    else:
+        now[0, 2], now[1, 2], now[2, 2] = now[0, 2] - speed * dt, -speed, 0.0
+    w.time[0] += dt
+
+
+@compiled
+def advance_high(w: SwingArrays, top: float, lower: float, dt: float) -> None:
+    """The same over rough ground: up to a height `top` [m] at `lift`, and on at it until the
+    fraction `lower`: the foot is high before it is far, and comes down where it is to land."""
+    start, now = w.time[0], w.reference
+    z, speed, accel = now[0, 2], now[1, 2], now[2, 2]
+    advance_over(w, top - w.ground[0], dt)
+    end = lower * w.duration[0]
+    if w.lift * w.duration[0] <= w.time[0] < end:
+        now[0, 2], now[1, 2], now[2, 2] = quintic(z, speed, accel, top, 0.0, 0.0, end - start, dt)
+
+
+class Swing(Copyable):
+    """The reference of one swing foot, planned anew each tick from its own last value: C² always.
+
+    Vertically it rises to the clearance in the fraction `lift` of the time. Then it comes down,
+    and goes on at the landing speed where the ground is late.
+    """
+
+    FROZEN = FROZEN
+
+    def __init__(self, point: np.ndarray, duration: float, task: SwingTask, units: Units):
+        height = units.height
+        speed = task.landing_speed * height * units.omega
+        self.task = task
+        self.arrays = SwingArrays(
+            reference=guarded_zeros((3, 3)),
+            foothold=guarded_zeros(2),
+            time=guarded_zeros(1),
+            duration=guarded_zeros(1),
+            ground=guarded_zeros(1),
+            time_offset=guarded_zeros(1),
+            apex=task.clearance * height,
+            lift=task.lift,
+            landing_speed=float(speed),
+        )
+        start_swing(self.arrays, np.array(point, dtype=float), float(point[2]), float(duration))
+
+    @property
+    def reference(self) -> np.ndarray:
+        """(3, 3) Position, velocity and acceleration now [m, s]."""
+        return self.arrays.reference
+
+    @property
+    def foothold(self) -> np.ndarray:
+        """(2,) The place where the sole is to land [m]."""
+        return self.arrays.foothold
+
+    @property
+    def time(self) -> float:
+        """The time since lift-off [s]."""
+        return float(self.arrays.time[0])
+
+    @property
+    def duration(self) -> float:
+        """The time from lift-off to touchdown [s]."""
+        return float(self.arrays.duration[0])
+
+    @property
+    def landing_speed(self) -> float:
+        """The speed downwards at which the foot meets the ground [m/s]."""
+        return self.arrays.landing_speed
+
+    @property
+    def remaining(self) -> float:
+        """The time until touchdown is planned [s]."""
+        return time_left(self.arrays)
+
+    def aim(self, foothold: np.ndarray, duration: float | None = None) -> None:
+        """Lead to another `foothold` (2,), or at another time, see `aim_swing`."""
+        duration = self.duration if duration is None else duration
+        aim_swing(self.arrays, float(foothold[0]), float(foothold[1]), float(duration))
+
+    def advance(self, dt: float) -> np.ndarray:
+        """(3, 3) Position, velocity and acceleration [m, s] after `dt` more seconds."""
+        advance_swing(self.arrays, dt)
+        return self.reference.copy()
+
+
+def swing_gains(robot: RobotArrays, task: SwingTask) -> SolePoseGains:
+    """The gains of `task` for one robot."""
+    g, rate2 = robot.gravity, robot.gravity / robot.height_com
+    k = task.stiffness * rate2
+    d = 2.0 * task.damping_ratio * np.sqrt(k)
+    turn = task.turn_weight / rate2**2
+    return SolePoseGains(
+        stiffness=float(k), damping=float(d), weight=float(task.weight / g**2),
+        turn_weight=float(turn), yaw_weight=float(task.yaw_fraction * turn), error=guarded_zeros(3),
+    )  # fmt: skip
+
+
+def swing_task(
+    sole: int, reference: np.ndarray, axes: np.ndarray, gains: SolePoseGains
+) -> BoundTask:
+    """The task of the QP that moves a sole along `reference` (3, 3), its `axes` (3, 3) fixed."""
+    return BoundTask(SolePose(), SolePoseBlock(sole, reference, axes, gains))

@@ -1,0 +1,231 @@
+"""A tick of `CaptureStep`, compiled: when to step, the swing, and what the QPs are asked for.
+
+`capture_tick` is where to begin. All that a tick works on has its name in `blocks.py`.
+"""
+
+import numpy as np
+
+from poise.baselines.balance.references.offsets import TRIGGER
+from poise.baselines.whole_body.tick import ContactTick
+from poise.envs.compiled.calls import call
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import copy_into
+
+from .blocks import BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, CaptureTick
+from .cop_region import distance_beyond, double_support_region, single_support_region
+from .feedback import LATER_STEP, LX, LY
+from .guidance import copy_reference, crouch, guide_com, moves, return_to_motion, turned_away
+from .recentring import (
+    INACTIVE,
+    SWINGING,
+    end_recentring_swing,
+    lower_foot,
+    plan_recentring,
+    recentring_step_due,
+    replan_recentring,
+    set_level_frame,
+    slipped_foot,
+    stop_recentring,
+)
+from .search import plan_step, replan_step, set_capture_point
+from .swing import (
+    FROZEN,
+    LANDING,
+    advance_swing,
+    aim_swing,
+    start_swing,
+    time_left,
+)
+
+LEAD = 0.7  # [1/ω] by which the turn of the root is looked ahead; in a crouch by less
+DEEP = 0.1  # [h] of a crouch in which it is not
+AWAY = 1.0  # [rad/s] a slower turn is no reason for a step
+LOW = 0.04  # [h] above the ground: a foot that touches it higher up stands on its edge
+FIRST_LOAD = 0.3  # [m g] that a foot may bear at touchdown; then the limit rises
+FZ = 2  # of a sole's wrench
+
+
+@compiled
+def must_step(t: CaptureTick) -> bool:
+    """Return whether ξ is so far outside the CoP region of both soles that a step begins.
+
+    `CaptureStepConfig` has the distance."""
+    s, m, g, feet = t.state, t.memory, t.gains, t.state.sole_point
+    stepped = m.recovering[0] > 0
+    if stepped and m.clock[0] < g.double_support_time:
+        return False
+    cos, sin = s.heading[0], s.heading[1]
+    if stepped:
+        cos, sin = m.level_frame[0, 0], m.level_frame[1, 0]
+    x, y = s.capture_point[0], s.capture_point[1]
+    if stepped:
+        t.search.heading[0], t.search.heading[1] = cos, sin
+        set_capture_point(t.search)
+        x, y = t.search.capture_point[0], t.search.capture_point[1]
+    outside = distance_beyond(
+        t.search.region, feet[0, 0], feet[0, 1], feet[1, 0], feet[1, 1], cos, sin, x, y
+    )
+    if stepped:
+        return outside > g.restep_margin + t.offsets[TRIGGER]
+    x, y = x - s.origin[0], y - s.origin[1]  # of the fall
+    turning = (x * s.momentum[LY] - y * s.momentum[LX]) / max(np.sqrt(x * x + y * y), 1e-9)
+    margin = g.step_margin
+    if moves(t):
+        angle, rate = turned_away(t)
+        low = crouch(t)
+        lead = LEAD / s.omega[0] * max(1.0 - low / (DEEP * t.robot.height_com), 0.0)
+        if rate > AWAY and angle + lead * rate > g.turn_limit:
+            return True
+        margin += g.crouch_margin * low * max(1.0 - (angle / g.turn_limit) ** 2, 0.0)
+    return outside + g.momentum_gain * turning > margin + t.offsets[TRIGGER]
+
+
+@compiled
+def begin_step(t: CaptureTick, to_nominal: bool) -> None:
+    """Plan a step that catches the fall, or one back to the nominal stance, and start its swing."""
+    s, m, q = t.state, t.memory, t.search
+    wrenches = t.on_both.problem.workspace.wrenches
+    if m.steps[0] == 0:
+        before = t.standing.problem.workspace
+        copy_into(before.tau, t.on_both.applied)
+        copy_into(before.tau, t.on_both.memory.torques)
+        t.on_both.follows[0] = 1
+        wrenches = before.wrenches
+    if m.recovering[0] == 0:
+        set_level_frame(m.level_frame, s.heading[0], s.heading[1])
+    q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
+    q.feedback.signals[LATER_STEP] = 1.0 if m.recovering[0] > 0 else 0.0
+    if to_nominal:
+        plan_recentring(q, t.recentring)
+    else:
+        stop_recentring(t.recentring)
+        plan_step(q)
+    foot = q.best_foot[0]
+    m.steps[0] += 1
+    m.recovering[0], m.return_fraction[0] = 1, 0.0
+    m.foot[0], m.swinging[0] = foot, 1
+    start_swing(t.swing, s.sole_point[foot], s.sole_point[1 - foot, 2], q.best[BEST_TIME])
+    aim_swing(t.swing, q.best[BEST_X], q.best[BEST_Y], q.best[BEST_TIME])
+    t.swing.time_offset[0] = q.best[BEST_OFFSET]
+    m.load[0], m.load_fraction[0] = wrenches[6 * foot + FZ], 1.0
+
+
+@compiled
+def has_landed(t: CaptureTick) -> bool:
+    """Return whether the foot touches the ground, late in its swing and level."""
+    s, w, foot = t.state, t.swing, t.memory.foot[0]
+    low = s.sole_point[foot, 2] - w.ground[0] < LOW * t.robot.height_com
+    return s.contacts[foot] > 0.5 and w.time[0] > LANDING * w.duration[0] and low
+
+
+@compiled
+def solve_contacts(t: CaptureTick, contacts: ContactTick) -> None:
+    """Torques with these soles in contact."""
+    call(t.contact_kernel, contacts)
+    copy_into(contacts.problem.workspace.tau, t.tau)
+    copy_into(contacts.problem.workspace.vdot, t.vdot)
+
+
+@compiled
+def limit_load(t: CaptureTick, most: float) -> None:
+    """Limit the load of the foot that steps [N]; the other one bears what there is."""
+    t.on_both.load_limits[0] = t.on_both.load_limits[1] = np.inf
+    t.on_both.load_limits[t.memory.foot[0]] = most
+    t.on_both.limited[0] = 1
+
+
+@compiled
+def replan_swing(t: CaptureTick) -> None:
+    """Plan the rest of the running step anew, and lead its foot there."""
+    m, w, q, r = t.memory, t.swing, t.search, t.recentring
+    q.heading[0], q.heading[1] = m.level_frame[0, 0], m.level_frame[1, 0]
+    if r.stage[0] != SWINGING or not replan_recentring(q, r, w):
+        r.stage[0] = INACTIVE
+        replan_step(q, m.foot[0], w)
+    aim_swing(w, q.best[BEST_X], q.best[BEST_Y], w.time[0] + q.best[BEST_TIME])
+    w.time_offset[0] = q.best[BEST_OFFSET]
+
+
+@compiled
+def swing_tick(t: CaptureTick) -> None:
+    """A tick in a step: first the foot gives its load away, then it swings."""
+    s, m, g, w, q = t.state, t.memory, t.gains, t.swing, t.search
+    foot, level = m.foot[0], m.level_frame
+    stance = s.sole_point[1 - foot]
+    if time_left(w) > FROZEN:
+        replan_swing(t)
+    n = single_support_region(q.region, 1 - foot, stance, level[0, 0], level[1, 0], t.corners)
+    stride_x, stride_y = w.foothold[0] - stance[0], w.foothold[1] - stance[1]
+    guide_com(t, t.corners[:n], 0.0, stance[2], stride_x, stride_y)
+    m.load_fraction[0] -= g.period / max(g.unload_time, 1e-9)
+    if m.load_fraction[0] > 0.0:
+        limit_load(t, m.load_fraction[0] * max(m.load[0], 0.0))
+        solve_contacts(t, t.on_both)
+        return
+    advance_swing(w, g.period)
+    contacts = t.on_second if foot == 0 else t.on_first
+    contacts.limited[0] = 0
+    solve_contacts(t, contacts)
+
+
+@compiled
+def double_support_tick(t: CaptureTick) -> None:
+    """A tick on both feet, wherever they are."""
+    m, g, feet, level = t.memory, t.gains, t.state.sole_point, t.memory.level_frame
+    if m.corners[0] == 0:  # feet have just come to rest
+        m.corners[0] = double_support_region(
+            t.search.region, feet, level[0, 0], level[1, 0], t.cloud, m.region
+        )
+    stride_x, stride_y = feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1]
+    ground = 0.5 * (feet[0, 2] + feet[1, 2])
+    guide_com(t, m.region[: m.corners[0]], g.cop_overreach, ground, stride_x, stride_y)
+    if m.moved[0]:
+        return_to_motion(t)
+    t.on_both.limited[0] = 0
+    if m.clock[0] < g.load_time:
+        weight = t.robot.mass * t.robot.gravity
+        limit_load(t, weight * (FIRST_LOAD + m.clock[0] / g.load_time))
+    m.clock[0] += g.period
+    solve_contacts(t, t.on_both)
+
+
+@compiled
+def standing_tick(t: CaptureTick) -> None:
+    """A tick before the first step: the QP with the feet in place, or a request to Python."""
+    if t.standing_kernel == 0:
+        t.to_python[0] = 1
+        return
+    call(t.standing_kernel, t.standing)
+    copy_into(t.standing.problem.workspace.tau, t.tau)
+    copy_into(t.standing.problem.workspace.vdot, t.vdot)
+    t.failures[0] = t.standing.memory.failures[0]
+
+
+@compiled
+def capture_tick(t: CaptureTick) -> None:
+    """One tick of `CaptureStep`: `tau` holds torques, unless `to_python` says that Python must."""
+    m = t.memory
+    t.to_python[0] = 0
+    if not m.moved[0] and moves(t):
+        m.moved[0] = 1
+    if not m.swinging[0]:
+        if must_step(t):
+            begin_step(t, False)
+        elif m.steps[0] == 0:
+            standing_tick(t)
+            return
+        elif recentring_step_due(t):
+            begin_step(t, True)
+    copy_reference(t)
+    if m.swinging[0] and has_landed(t):
+        m.swinging[0], m.clock[0], m.corners[0] = 0, 0.0, 0
+        end_recentring_swing(t.recentring)
+    if not m.swinging[0] and t.recentring.homing[0]:
+        foot = slipped_foot(t)
+        if foot >= 0:
+            lower_foot(t, foot)
+    if m.swinging[0]:
+        swing_tick(t)
+    else:
+        double_support_tick(t)
+    t.failures[0] = t.standing.memory.failures[0] + t.on_both.memory.failures[0]

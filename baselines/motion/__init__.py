@@ -1,0 +1,1 @@
+"""Captured and synthesised motion: read, retargeted, joined, made feasible, performed."""

@@ -1,0 +1,282 @@
+"""The join that a robot can do: how long it lasts and how it bends are chosen by physics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from poise.baselines.balance.references.legs import PlantedLegs
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.reference_motion import ReferenceMotion
+from poise.baselines.balance.references.robot_clip import RobotClip
+from poise.configs.errors import ConfigError, PoiseError
+from poise.envs.robots.robot import Robot
+
+from .apart import Stretch, check_rates, in_one, stretch_at
+from .check import Feasibility, FeasibilityLimits
+from .curve import Curve
+from .ends import Attempt, End
+from .shape import Shaper
+from .trajectory import PlantedRobot
+
+LEAST, MOST, LENGTHS = 0.2, 2.5, 16  # [s] durations that are tried, evenly in their logarithm
+TIME_PRICE = 4.0  # λ of K + λ D [m²/s⁴]
+LOWER, HIGHER = 0.02, 0.005  # [m] that the CoM may go beyond both clips
+STILL = 4  # frames of standing between two joins
+
+
+class JoinRefused(PoiseError):
+    """There is no way between two motions that the robot can do; the text says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class JoinPart:
+    """One way from state to state.
+
+    Attributes:
+        duration: D [s].
+        coefficient: K, the energy of its bending [m²/s³].
+        bent: whether knots had to leave the curve of the fifth order.
+        calm: whether it begins and ends without the clips' accelerations.
+        feasibility: of its samples, whose times count from its begin.
+    """
+
+    duration: float
+    coefficient: float
+    bent: bool
+    calm: bool
+    feasibility: Feasibility
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalJoin:
+    """Two motions in one, and how they are joined.
+
+    Attributes:
+        clip: A until it is left, the join, and B from where it is entered.
+        left, entered: times of A and of B [s].
+        start, end: of the join in the clip [s].
+        parts: one, or two with standing between them.
+    """
+
+    clip: RobotClip
+    left: float
+    entered: float
+    start: float
+    end: float
+    parts: tuple[JoinPart, ...]
+
+    @property
+    def through_standing(self) -> bool:
+        """Whether there was no direct way."""
+        return len(self.parts) > 1
+
+    @property
+    def coefficient(self) -> float:
+        """K of all parts [m²/s³]."""
+        return sum(part.coefficient for part in self.parts)
+
+
+def physical_join(
+    robot: Robot,
+    before: RobotClip,
+    after: RobotClip,
+    *,
+    leave: float | None = None,
+    enter: float = 0.0,
+    time_price: float = TIME_PRICE,
+    through: bool = True,
+    limits: FeasibilityLimits | None = None,
+) -> PhysicalJoin:
+    """A until `leave`, the cheapest way that a robot can do, and B from `enter`.
+
+    CoM, root and the joints that are no legs follow the curve of the fifth order between both
+    states, of duration D and with up to three knots moved; the legs follow from soles that stay
+    planted. Chosen is the least K + λ D, D from 0.2 to 2.5 s, that keeps `FeasibilityLimits`;
+    within 0.1 s of a cut it may be as bad as the clip is there. If none does with the clips'
+    accelerations at the cuts, the curve begins and ends without any. A motion is a C² spline
+    through its frames, so the join is C² in any case. B goes on from where A's feet stand.
+
+    Args:
+        robot: whose motions they are.
+        before, after: A and B; B is taken at the rate of A.
+        leave: time of A [s], taken at its nearest frame; None for its end.
+        enter: time of B [s].
+        time_price: λ [m²/s⁴].
+        through: go by the standing posture if there is no direct way.
+        limits: what the join has to keep.
+
+    Raises:
+        ConfigError: a time outside of its clip, a motion of another robot; a cut in a step, or
+            where the feet stand otherwise than in standing, see `stretch_at`.
+        JoinRefused: no duration is possible, nor the way by standing.
+    """
+    last = _frame(before, before.duration if leave is None else leave, "leave")
+    first = _frame(after, enter, "enter")
+    check_rates(before, after)
+    steps = before.planted is not None or after.planted is not None
+    enter = first * after.dt if steps else enter
+    left = stretch_at(robot, before, last, "leave")
+    entered = stretch_at(robot, after, first, "enter")
+    shaper = make_shaper(robot, before.dt, [left.motion, entered.motion], limits)
+    a, b = _sides(shaper, before, left, last, entered, enter)
+    way = way_between(shaper, a, b, time_price, through)
+    if isinstance(way, str):
+        raise JoinRefused(f"no way from {before.about.name!r} at {last * before.dt:.2f} s to "
+                          f"{after.about.name!r} at {enter:.2f} s: {way}")  # fmt: skip
+    made = [attempt.qpos for attempt in way if attempt.qpos is not None]
+    between = pause(shaper, made)
+    name = f"{before.about.name}-{after.about.name}"
+    if steps:
+        kept = _kept(before, slice(0, last + 1)), _kept(after, slice(first, None))
+        clip = in_one(shaper.planted, *kept, between, name)
+    else:
+        clip = assembled(shaper, before, name, [a.frames, *between, b.frames])
+    parts = tuple(part_of(shaper, attempt) for attempt in way)
+    start, length = last * before.dt, (sum(map(len, between)) + 1) * before.dt
+    return PhysicalJoin(clip, start, enter, start, start + length, parts)
+
+
+def make_shaper(
+    robot: Robot,
+    dt: float,
+    motions: Sequence[ReferenceMotion],
+    limits: FeasibilityLimits | None = None,
+) -> Shaper:
+    """What makes joins between motions at a rate; the CoM stays about as low and high as theirs."""
+    planted, legs = PlantedRobot(robot), PlantedLegs(robot)
+    still = np.zeros(len(robot.joint_names))
+    planted.at(robot.standing_qpos[7:], still, still)
+    inertia = np.diag(planted.state.M) / robot.mass
+    masses = np.concatenate([np.ones(3), inertia[3:6], inertia[6:][legs.others]])
+    return Shaper(planted, legs, limits or FeasibilityLimits(), dt, height_span(motions), masses)
+
+
+def height_span(motions: Sequence[ReferenceMotion]) -> tuple[float, float]:
+    """Lowest and highest CoM that joins between motions may have [m]."""
+    heights = [m.sample(t).com_offset[2] for m in motions for t in np.arange(0.0, m.duration, 0.1)]
+    return min(heights) - LOWER, max(heights) + HIGHER
+
+
+def cheapest(shaper: Shaper, a: End, b: End, time_price: float) -> Attempt:
+    """The possible way of least K + λ D; if none is, the attempt that lacks least."""
+    best, nearest, least = None, None, np.inf
+    for bound, count in sorted(_prices(shaper, a, b, time_price)):
+        if bound >= least:
+            break  # bends only add to K
+        tried = shaper.attempt(a, b, count)
+        if tried.qpos is None:
+            nearest = tried if nearest is None or tried.lacking < nearest.lacking else nearest
+            continue
+        price = tried.curve.energy(shaper.masses) + time_price * tried.curve.duration
+        if price < least:
+            best, least = tried, price
+    found = best or nearest
+    assert found is not None  # there are lengths
+    return found
+
+
+def pause(shaper: Shaper, ways: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Joints of frames of ways (n, nq), with standing between each two."""
+    standing = np.tile(shaper.planted.robot.standing_qpos[7:], (STILL, 1))
+    between = [frames for way in ways for frames in (way[:, 7:], standing)]
+    return between[:-1]
+
+
+def assembled(
+    shaper: Shaper, like: RobotClip, name: str, frames: Sequence[np.ndarray]
+) -> RobotClip:
+    """A clip of joints (n, nj), one after the other, on the soles as they stand.
+
+    What the check lets a joint be beyond its range between frames, no frame of a clip may be.
+    """
+    joints = np.clip(np.vstack(frames), *shaper.planted.robot.joint_range.T)
+    qpos = np.array([shaper.planted.placed(q) for q in joints])
+    return RobotClip(replace(like.about, name=name), like.dt, qpos)
+
+
+def way_between(
+    shaper: Shaper, a: End, b: End, time_price: float, through: bool
+) -> tuple[Attempt, ...] | str:
+    """One way, or two by standing if that is allowed; or why there is none."""
+    direct = direct_way(shaper, a, b, time_price)
+    if direct.qpos is not None or not through:
+        return (direct,) if direct.qpos is not None else direct.reason
+    ways = ways_by_standing(shaper, a, b, time_price)
+    return f"{direct.reason}; {ways}" if isinstance(ways, str) else ways
+
+
+def direct_way(shaper: Shaper, a: End, b: End, time_price: float) -> Attempt:
+    """The cheapest way from one end to the other, without the clips' accelerations if need be."""
+    direct = cheapest(shaper, a, b, time_price)
+    if direct.qpos is None:  # a clip may be about to do what leads to nothing
+        calm = cheapest(shaper, a.calm, b.calm, time_price)
+        direct = calm if calm.qpos is not None else direct
+    return direct
+
+
+def ways_by_standing(
+    shaper: Shaper, a: End, b: End, time_price: float
+) -> tuple[Attempt, ...] | str:
+    """Two ways with standing between them; or why there are none."""
+    standing, ways = standing_end(shaper), []
+    for word, (start, goal) in zip(("to", "from"), pairwise((a, standing, b)), strict=True):
+        way = cheapest(shaper, start, goal, time_price)
+        if way.qpos is None:
+            return f"{word} standing: {way.reason}"
+        ways.append(way)
+    return tuple(ways)
+
+
+def standing_end(shaper: Shaper) -> End:
+    """The standing posture as one side of a join."""
+    robot = shaper.planted.robot
+    frames = np.tile(robot.standing_qpos[7:], (STILL, 1))
+    return shaper.end(load_motion("standing", robot), 0.0, frames)
+
+
+def _prices(shaper: Shaper, a: End, b: End, time_price: float) -> list[tuple[float, int]]:
+    """K + λ D without bends, and the frames of D, for every duration that is tried."""
+    lengths = np.geomspace(LEAST, MOST, LENGTHS) / shaper.dt
+    prices = []
+    for count in np.unique(np.maximum(2, np.round(lengths).astype(int))):
+        curve = Curve.between(a.boundary, b.boundary, count * shaper.dt)
+        price = curve.energy(shaper.masses) + time_price * curve.duration
+        prices.append((price, int(count)))
+    return prices
+
+
+def part_of(shaper: Shaper, way: Attempt) -> JoinPart:
+    """What is told of a way that is possible."""
+    assert way.feasibility is not None  # of a way that is possible
+    bent, calm = bool(np.any(way.curve.bends)), not np.any(way.curve.coefficients[2])
+    coefficient = way.curve.energy(shaper.masses)
+    return JoinPart(way.curve.duration, coefficient, bent, calm, way.feasibility)
+
+
+def _sides(
+    shaper: Shaper, before: RobotClip, left: Stretch, last: int, entered: Stretch, enter: float
+) -> tuple[End, End]:
+    """A at its frame `last` and B at `enter` [s], with the frames beside them."""
+    dt, first = shaper.dt, left.frames.start
+    a = shaper.end(left.motion, (last - first) * dt, before.qpos[first : last + 1, 7:])
+    enter -= entered.frames.start * dt
+    times = np.arange(enter, entered.motion.duration + 1e-9, dt)
+    frames = np.array([entered.motion.sample(time).q_ref for time in times])
+    return a, shaper.end(entered.motion, enter, frames)
+
+
+def _kept(clip: RobotClip, frames: slice) -> RobotClip:
+    planted = None if clip.planted is None else clip.planted[frames]
+    return replace(clip, qpos=clip.qpos[frames], planted=planted)
+
+
+def _frame(clip: RobotClip, time: float, field: str) -> int:
+    """The frame nearest to a time; raises ConfigError for one outside of the clip."""
+    if not 0.0 <= time <= clip.duration + 1e-9:
+        raise ConfigError(f"must be from 0 to {clip.duration:.2f} s, not {time:g}", field=field,
+                          source=clip.about.name)  # fmt: skip
+    return round(time / clip.dt)

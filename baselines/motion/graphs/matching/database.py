@@ -1,0 +1,120 @@
+"""Clips as points in the space of their features, and the exact search for the nearest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from poise.baselines.motion.clips.clip import Clip
+from poise.configs.errors import ConfigError
+
+from .features import AHEAD, FUTURE, clip_features, groups
+from .search import NearestPoint
+
+RATE = 1.0 / 30.0  # [s] between frames
+
+
+class Match(NamedTuple):
+    """A frame of a clip, and its distance from what was asked for."""
+
+    clip: int
+    frame: int
+    distance: float
+
+
+class MatchingDatabase:
+    """Frames of clips of one skeleton, each by its weighted, normalised features.
+
+    A column is (value − mean) w/(σ √k), σ the mean standard deviation of the k columns of its
+    group, so that groups of equal weight count alike. Frames less than the longest time ahead from
+    the end of their clip are played, but not gone to.
+
+    Args:
+        clips: resampled to `dt`.
+        weights: group → w ≥ 0 instead of the default, see `features.groups`.
+        ahead: times [s] of the features of the future.
+        dt: time between frames [s].
+
+    Raises:
+        ConfigError: no clips, clips of several skeletons or too short to be gone to, unknown
+            groups, weights below 0, times that are not above 0.
+    """
+
+    def __init__(
+        self,
+        clips: Sequence[Clip],
+        *,
+        weights: Mapping[str, float] | None = None,
+        ahead: tuple[float, ...] = AHEAD,
+        dt: float = RATE,
+    ):
+        if not ahead or not all(0.0 < time < np.inf for time in ahead):
+            raise ConfigError(f"must be times above 0, not {ahead}", field="ahead")
+        self.clips, self.ahead = tuple(clip.resampled(dt) for clip in clips), tuple(ahead)
+        _check_skeletons(self.clips)
+        tables = [clip_features(clip, self.ahead) for clip in self.clips]
+        raw = np.concatenate(tables)
+        self.mean, self.scale = raw.mean(axis=0), _scales(raw, weights or {}, self.ahead)
+        self.starts = np.cumsum([0, *(len(table) for table in tables)])
+        self.values = self.normalised(raw)
+        last = round(max(self.ahead) / dt)
+        frames = [np.arange(a, b - last) for a, b in pairwise(self.starts)]
+        self.entries = np.concatenate(frames)
+        if not len(self.entries):
+            raise ConfigError(f"no clip is longer than {max(self.ahead):g} s", field="clips")
+        self.search = NearestPoint(self.values[self.entries])
+
+    def normalised(self, features: np.ndarray) -> np.ndarray:
+        """Features (…, n) as columns of the database."""
+        return (features - self.mean) * self.scale
+
+    def nearest(self, query: np.ndarray) -> Match:
+        """The frame whose columns are nearest to `query` (n,), of all there are."""
+        found, distance = self.search.find(query)
+        return self.match_at(int(self.entries[found]), distance)
+
+    def match_at(self, row: int, distance: float) -> Match:
+        """The frame of a row of `values`."""
+        clip = int(np.searchsorted(self.starts, row, side="right")) - 1
+        return Match(clip, row - int(self.starts[clip]), distance)
+
+    def query(self, clip: int, frame: int, future: np.ndarray) -> np.ndarray:
+        """(n,) the posture of a frame with another future: for every time ahead x, y [m] and
+        (cos, sin) of the turn, in its facing frame."""
+        columns = self.values[self.starts[clip] + frame].copy()
+        count = len(self.ahead) * sum(group.size for group in FUTURE)
+        columns[-count:] = (future - self.mean[-count:]) * self.scale[-count:]
+        return columns
+
+
+def _scales(raw: np.ndarray, weights: Mapping[str, float], ahead: tuple[float, ...]) -> np.ndarray:
+    """(n,) w/σ of every column; a group that never changes counts nothing."""
+    known = {group.name for group in groups(ahead)}
+    for name, weight in weights.items():
+        if name not in known:
+            raise ConfigError(f"no such features: {name!r}", field="weights", choices=sorted(known))
+        if not 0.0 <= weight < np.inf:
+            raise ConfigError(f"must be at least 0, not {weight:g}", field=f"weights.{name}")
+    scales, begin = np.empty(raw.shape[1]), 0
+    for group in groups(ahead):
+        columns = slice(begin, begin + group.size)
+        deviation = float(raw[:, columns].std(axis=0).mean())
+        weight = weights.get(group.name, group.weight)
+        share = weight / np.sqrt(group.size)
+        scales[columns] = share / deviation if deviation > 1e-9 else 0.0
+        begin += group.size
+    return scales
+
+
+def _check_skeletons(clips: Sequence[Clip]) -> None:
+    if not clips:
+        raise ConfigError("at least one is needed", field="clips")
+    first = clips[0].skeleton
+    for clip in clips[1:]:
+        own = clip.skeleton
+        if own.names != first.names or not np.allclose(own.offsets, first.offsets, atol=1e-6):
+            raise ConfigError(f"{clip.name!r} has another skeleton than {clips[0].name!r}",
+                              field="clips")  # fmt: skip

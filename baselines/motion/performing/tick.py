@@ -1,0 +1,170 @@
+"""A tick of `MotionStep` in a motion with steps; `perform_tick` is where to begin.
+
+While it performs, the soles in contact are those of the schedule, the foot in the air follows the
+motion's, and the CoM c̈ = ω² (c − p − δ) with p = p_ref + (1 + k) (ξ − ξ_ref), kept within what the
+soles reach [Englsberger11]; δ is what the motion's angular momentum does. When p_ref + ξ − ξ_ref is
+beyond that, no CoP brings ξ back, and the planner of steps takes over. Once it has come to rest the
+motion goes on from the new stance.
+"""
+
+import numpy as np
+
+from poise.baselines.balance.references.footing import COM, PLACE, ROOT, SPIN, TURN
+from poise.baselines.balance.references.targets import root_reference
+from poise.baselines.balance.stepping.guidance import limit_posture
+from poise.baselines.balance.stepping.swing import start_swing
+from poise.baselines.balance.stepping.tick import (
+    FIRST_LOAD,
+    capture_tick,
+    has_landed,
+    solve_contacts,
+)
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.polygons import find_nearest
+from poise.envs.compiled.maths.vectors import copy_into, rotated, turned
+
+from .blocks import COS, GROUND, SIN, PerformTick
+from .catching import ask_to_rest, go_on, leave, may_go_on
+from .schedule import (
+    beyond_reach,
+    lifted_foot,
+    motion_time,
+    next_switch,
+    pendulum_rate,
+    phase_at,
+    put_frame,
+    reached_region,
+    sample_footing,
+    to_world,
+    wanted_cop,
+)
+
+UNLOADED, LEAST_LOAD = 1.15, 0.03  # [m g] that a foot may bear when it begins to, and as it, leaves
+SETTLING = 0.3  # [s] before the first lift-off until which the motion's frame is that of the soles
+
+
+@compiled
+def ask_for(t: PerformTick, corners: int) -> None:
+    """The targets of a tick that performs."""
+    c, p, s, own, given = t.own, t.performance, t.own.state, t.own.reference_out, t.given
+    wanted_cop(t, p.gain, c.vector)
+    find_nearest(c.memory.region[:corners], c.vector, c.pair)
+    rate = pendulum_rate(t)
+    for a in range(2):
+        own.cop[a] = c.pair[a]
+        own.com[a], own.com_vel[a] = s.com[a], s.com_vel[a]
+        own.com_acc[a] = rate * (s.com[a] - own.cop[a] - p.samples[0, SPIN + a])
+    own.com[2] = p.samples[0, COM + 2]
+    own.com_vel[2], own.com_acc[2] = p.samples[1, COM + 2], p.samples[2, COM + 2]
+    copy_into(given.q_ref, own.q_ref)
+    copy_into(given.v_ref, own.v_ref)
+    copy_into(given.angular_momentum, own.angular_momentum)
+    root_reference(c.robot, p.frame[COS], p.frame[SIN], p.samples[:, ROOT : ROOT + 3], own)
+    limit_posture(c)
+    for j in range(own.a_ref.shape[0]):
+        own.a_ref[j] += given.a_ref[j]
+
+
+@compiled
+def limit_loads(t: PerformTick, time: float) -> None:
+    """Let the load go to the foot that has landed, and leave the one that lifts off next."""
+    c, p, m = t.own, t.performance, t.own.memory
+    weight, limits = c.robot.mass * c.robot.gravity, c.on_both.load_limits
+    limits[0] = limits[1] = np.inf
+    if m.steps[0] > 0:
+        limits[m.foot[0]] = weight * (FIRST_LOAD + m.clock[0] / p.load_time)
+    switch = next_switch(t, time)
+    left = switch - time
+    if left < p.unload_time:
+        foot = lifted_foot(t, phase_at(p.switches, switch + 1e-9))
+        if foot >= 0:
+            most = max(UNLOADED * left / p.unload_time, LEAST_LOAD)
+            limits[foot] = min(limits[foot], weight * most)
+    c.on_both.limited[0] = 1
+
+
+@compiled
+def lift_off(t: PerformTick, foot: int, phase: int) -> None:
+    """Begin the swing of a foot."""
+    c, p, m = t.own, t.performance, t.own.memory
+    m.steps[0] += 1
+    m.foot[0], m.swinging[0], m.load_fraction[0], m.corners[0] = foot, 1, 0.0, 0
+    p.begun[0] = phase
+    duration = p.switches[phase] - p.switches[phase - 1]
+    start_swing(c.swing, c.state.sole_point[foot], p.frame[GROUND], duration)
+
+
+@compiled
+def follow_foot(t: PerformTick) -> None:
+    """Lead the swinging sole as the motion does; down, once it should have landed."""
+    c, p, w, foot = t.own, t.performance, t.own.swing, t.own.memory.foot[0]
+    place, turn = PLACE[foot], TURN[foot]
+    late = w.time[0] - w.duration[0]
+    for r in range(3):
+        for a in range(3):
+            w.reference[r, a] = p.samples[r, place + a]
+    if late > 0.0:
+        w.reference[0, 2] -= p.landing_speed * late
+        w.reference[1, 2] = -p.landing_speed
+    w.foothold[0], w.foothold[1] = p.samples[0, place], p.samples[0, place + 1]
+    x, y, z = p.samples[0, turn], p.samples[0, turn + 1], p.samples[0, turn + 2]
+    angle = np.sqrt(x * x + y * y + z * z)
+    if angle > 1e-12:
+        x, y, z = x / angle, y / angle, z / angle
+    cos, sin, level = np.cos(angle), np.sin(angle), t.own.vector
+    for a in range(3):
+        for b in range(3):
+            level[b] = 1.0 if a == b else 0.0
+        u, v, up = rotated(x, y, z, cos, sin, level)
+        t.axes[0, a], t.axes[1, a] = turned(p.frame[COS], p.frame[SIN], u, v)
+        t.axes[2, a] = up
+    w.time[0] += c.gains.period
+
+
+@compiled
+def perform(t: PerformTick, time: float) -> bool:
+    """A tick of the performance; False instead of torques where the planner has to take over."""
+    c, p, m = t.own, t.performance, t.own.memory
+    phase = phase_at(p.switches, time)
+    if m.steps[0] == 0 and next_switch(t, time) - time > SETTLING:
+        put_frame(t)
+    to_world(t)
+    if m.swinging[0] and has_landed(c):
+        m.swinging[0], m.clock[0] = 0, 0.0
+    foot = lifted_foot(t, phase)
+    if not m.swinging[0] and foot >= 0 and p.begun[0] != phase:
+        lift_off(t, foot, phase)
+    corners = reached_region(t)
+    if beyond_reach(t, corners) > (p.margin if m.swinging[0] else p.margin_both):
+        leave(t)
+        return False
+    ask_for(t, corners)
+    if m.swinging[0]:
+        follow_foot(t)
+        contacts = c.on_second if m.foot[0] == 0 else c.on_first
+        contacts.limited[0] = 0
+    else:
+        contacts = c.on_both
+        limit_loads(t, time)
+        m.clock[0] += c.gains.period
+    solve_contacts(c, contacts)
+    return True
+
+
+@compiled
+def perform_tick(t: PerformTick) -> None:
+    """One tick of `MotionStep` in a motion with steps: `tau` of the capture's block holds torques,
+    unless `to_python` says that Python must."""
+    c, p = t.capture, t.performance
+    c.to_python[0] = 0
+    time = motion_time(t)
+    p.clock[0] += t.own.gains.period
+    sample_footing(t, time)
+    if not p.performing[0] and may_go_on(t, time):
+        go_on(t)
+        sample_footing(t, time)
+    if not p.performing[0] or not perform(t, time):
+        ask_to_rest(t)
+        capture_tick(c)
+    failures = c.standing.memory.failures[0] + c.on_both.memory.failures[0]
+    c.failures[0] = failures + t.own.on_both.memory.failures[0]

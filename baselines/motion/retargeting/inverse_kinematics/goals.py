@@ -1,0 +1,110 @@
+"""What a posture is to reach, and by how much it misses that."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from poise.baselines.motion.clips.rotations import to_scipy
+from poise.baselines.motion.graphs.joining.states import vector_rate
+from poise.configs.errors import ConfigError
+from poise.configs.numbers import finite_array
+
+from .chain import Chain
+
+
+@dataclass(frozen=True, eq=False)
+class IkGoal:
+    """A point of a body is to be at a place; the body may be asked to lie in an orientation, too.
+
+    Attributes:
+        body: its name.
+        position: (3,) in the world [m].
+        orientation: (4,) of the body in the world, a quaternion, scalar first; None for any.
+        point: (3,) in the body's axes [m].
+        weight: above 0, beside those of other goals.
+
+    Raises:
+        ConfigError: other than finite numbers, a quaternion of length 0, a weight not above 0.
+    """
+
+    body: str
+    position: np.ndarray
+    orientation: np.ndarray | None = None
+    point: np.ndarray = (0.0, 0.0, 0.0)  # type: ignore[assignment] # made an array below
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, size in (("position", 3), ("orientation", 4), ("point", 3)):
+            value = getattr(self, name)
+            if value is None and name == "orientation":
+                continue
+            array = finite_array(value, (size,))
+            if array is None or (size == 4 and np.linalg.norm(array) < 1e-9):
+                raise ConfigError(f"must be {size} finite numbers", source=f"goal {self.body!r}",
+                                  field=name)  # fmt: skip
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        if not 0.0 < self.weight < np.inf:
+            raise ConfigError(f"must be above 0, not {self.weight:g}",
+                              source=f"goal {self.body!r}", field="weight")  # fmt: skip
+
+
+class Misses:
+    """The errors of goals in the axes of a chain's base.
+
+    e stacks w (p − p*) and, for a goal with an orientation, w ℓ Log(R*ᵀ R) of every goal, with its
+    weight w and the lever ℓ [m per rad].
+    """
+
+    def __init__(self, chain: Chain, goals: Sequence[IkGoal], lever: float):
+        self.chain, self.goals, self.lever = chain, tuple(goals), lever
+        place, axes = (part.copy() for part in chain.frame())
+        self.places = np.array([axes.T @ (goal.position - place) for goal in goals])
+        self.turns = [
+            None if goal.orientation is None
+            else axes.T @ to_scipy(goal.orientation).as_matrix()[0]
+            for goal in goals
+        ]  # fmt: skip
+
+    def errors(self) -> tuple[np.ndarray, np.ndarray]:
+        """(g, 3) distances p − p* [m] and (g, 3) rotation vectors [rad], 0 where any will do."""
+        moved, turned = np.zeros((2, len(self.goals), 3))
+        for i, goal in enumerate(self.goals):
+            place, axes = self.chain.end_pose(i, goal.point)
+            moved[i] = place - self.places[i]
+            if (wanted := self.turns[i]) is not None:
+                turned[i] = Rotation.from_matrix(wanted.T @ axes).as_rotvec()
+        return moved, turned
+
+    def residual(self) -> float:
+        """The largest √(‖p − p*‖² + ℓ²‖Log(R*ᵀ R)‖²) of a goal [m]."""
+        moved, turned = self.errors()
+        squares = (moved**2).sum(axis=1) + self.lever**2 * (turned**2).sum(axis=1)
+        return float(np.sqrt(squares.max()))
+
+    def vector(self) -> np.ndarray:
+        """(r,) e."""
+        moved, turned = self.errors()
+        parts = []
+        for i, goal in enumerate(self.goals):
+            parts.append(goal.weight * moved[i])
+            if self.turns[i] is not None:
+                parts.append(goal.weight * self.lever * turned[i])
+        return np.concatenate(parts)
+
+    def jacobian(self) -> np.ndarray:
+        """(r, n) ∂e/∂q, with d Log(R*ᵀ R) = J_r⁻¹ Rᵀ J_ω dq."""
+        rows = []
+        for i, goal in enumerate(self.goals):
+            of_place, of_turn = self.chain.jacobians(i, goal.point)
+            rows.append(goal.weight * of_place)
+            if (wanted := self.turns[i]) is not None:
+                axes = self.chain.end_pose(i, goal.point)[1]
+                turn = Rotation.from_matrix(wanted.T @ axes).as_rotvec()
+                rates = vector_rate(turn, (axes.T @ of_turn).T).T
+                rows.append(goal.weight * self.lever * rates)
+        return np.concatenate(rows)

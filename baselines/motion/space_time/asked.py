@@ -1,0 +1,85 @@
+"""What the clip asks of every frame, and the clearance of links; needs mink."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from poise.baselines.motion.retargeting.clearance import ClearanceLimit, Pair
+from poise.baselines.motion.retargeting.frame_tasks import FrameTasks
+from poise.baselines.motion.retargeting.targets import BodyTargets
+from poise.baselines.motion.space_time.constraints.constraint import Constraint
+from poise.baselines.motion.space_time.constraints.scene import Rows, Scene
+from poise.baselines.motion.space_time.constraints.touch import Touch
+
+from .stance import Stance
+
+ENDLESS = np.array([np.inf])
+
+
+class Asked:
+    """Errors of the tasks of single frames, and rows of what a body must not do.
+
+    What a user wants to touch may: links of such a pair keep a distance of 0 in its period.
+    """
+
+    def __init__(self, scene: Scene, targets: BodyTargets, constraints: Sequence[Constraint]):
+        self.targets = targets
+        self.tasks = FrameTasks(scene.robot, scene.limbs, list(targets.directions))
+        self.limit = ClearanceLimit(scene.robot, self.tasks.configuration.data)
+        self.touching: dict[int, set[frozenset[int]]] = {}
+        for constraint in constraints:
+            if isinstance(constraint, Touch):
+                geom, others = constraint.geoms(scene)
+                for frame in constraint.frames(scene).tolist():
+                    pairs = self.touching.setdefault(frame, set())
+                    pairs |= {frozenset((geom, other)) for other in others}
+
+    def errors(self, scene: Scene, frame: int) -> np.ndarray:
+        """(m,) W e of a frame."""
+        self.tasks.configuration.update(scene.qpos[frame])
+        self.tasks.aim(self.targets, frame)
+        return self.tasks.errors()
+
+    def errors_and_jacobian(self, scene: Scene, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """(m,) W e and its derivative (m, nv)."""
+        return self.errors(scene, frame), self.tasks.jacobian()
+
+    def clearance(self, scene: Scene, frame: int) -> list[Rows]:
+        """d ≥ d₀ for the pairs of geometries that are near, see `ClearanceLimit`."""
+        data, found = scene.at(frame), []
+        for pair in self.limit.candidates(data):
+            if frozenset(pair[:2]) in self.touching.get(frame, ()):
+                pair = Pair(pair.first, pair.second, 0.0)
+            distance, row = self.limit.row(data, pair)
+            if row is not None:
+                least = np.array([pair.kept])
+                found.append(Rows({frame: row[None]}, np.array([distance]), least, ENDLESS))
+        return found
+
+    def too_near(self, scene: Scene, frame: int) -> float:
+        """Σ (d₀ − d) over the pairs that are nearer than they are to be [m]."""
+        data, ends, total = scene.at(frame), np.empty(6), 0.0
+        for pair in self.limit.candidates(data):
+            if frozenset(pair[:2]) in self.touching.get(frame, ()):
+                pair = Pair(pair.first, pair.second, 0.0)
+            total += max(pair.kept - self.limit.distance(data, pair, ends), 0.0)
+        return total
+
+
+def soles_over_floor(scene: Scene, stance: Stance, frame: int) -> list[Rows]:
+    """z ≥ 0 for the corners of soles that are not planted."""
+    data, jacobian, found = scene.at(frame), np.empty((3, scene.model.nv)), []
+    for i, sole in enumerate(scene.robot.soles):
+        if stance.planted[frame, i]:
+            continue
+        corners = scene.corners(i)
+        derivative = np.empty((len(corners), scene.model.nv))
+        for row, corner in zip(derivative, corners, strict=True):
+            mujoco.mj_jac(scene.model, data, jacobian, None, corner, sole.body_id)
+            row[:] = jacobian[2]
+        zero = np.zeros(len(corners))
+        found.append(Rows({frame: derivative}, corners[:, 2].copy(), zero, zero + np.inf))
+    return found

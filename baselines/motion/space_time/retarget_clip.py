@@ -1,0 +1,173 @@
+"""A clip on a robot by any of the solvers, with constraints of the user's."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, get_args
+
+import numpy as np
+
+from poise.baselines.balance.references.robot_clip import RATE, RobotClip
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.retargeting.retarget import (
+    LEAD,
+    SMOOTH,
+    Retargeted,
+    retarget_to,
+    targets_on,
+)
+from poise.baselines.motion.space_time.constraints.constraint import Constraint
+from poise.baselines.motion.space_time.constraints.reading import (
+    check_constraints,
+    read_constraints,
+)
+from poise.baselines.motion.space_time.constraints.scene import Scene
+from poise.configs.errors import ConfigError
+from poise.envs.robots.robot import Robot
+
+from .stance import standing_stance
+from .trajectory import jerk
+
+Solver = Literal["frame", "spacetime", "grid"]
+CROSSOVER = 2.0  # [Hz] what is asked faster than this is smoothed
+
+
+class RetargetedClip(NamedTuple):
+    """A robot's clip, and what it misses.
+
+    Attributes:
+        clip: the postures, from standing to standing.
+        quality: as `measure` finds it.
+        solver: that made it.
+        scale: the robot's legs over the clip's.
+        time_per_frame: of the processor: of `frame` the median, of the others what they added,
+            over the frames [s].
+        stride: by which steps are shorter than the legs' scale has them; 1 without steps.
+    """
+
+    clip: RobotClip
+    quality: Any  # Quality
+    solver: Solver
+    scale: float
+    time_per_frame: float
+    stride: float = 1.0
+
+
+def retarget_clip(
+    clip: Clip | str | Path,
+    robot: Robot,
+    *,
+    solver: Solver | None = None,
+    constraints: str | Path | Sequence[Constraint] = (),
+    smooth: float = SMOOTH,
+    lead: float = LEAD,
+    planted: bool = False,
+    crossover: float = CROSSOVER,
+    progress: Callable[[str], None] | None = None,
+) -> RetargetedClip:
+    """The postures in which a robot does what a clip shows, as `retarget` says, by a solver:
+
+    ``frame``: frame by frame, without constraints; they are measured all the same. ``spacetime``:
+    the optimum of the whole clip, begun at the result of ``frame``,
+
+        min Σ ‖W e‖² + ρ Σ ‖x⃛‖² + Σ weight · excess,  ρ = (2π f)⁻⁶,
+
+    with the soles where they are planted and joints within their limits; a constraint that cannot
+    be met is missed by little in its L1 norm. ``grid``: constraints by trial in steps, keyframe by
+    keyframe, as `by_trial` says.
+
+    Args:
+        clip: as for `retarget`; or a packaged one's name, or a path to a .bvh file. One with steps
+            is for ``frame`` alone, without constraints.
+        robot: with two feet.
+        solver: without one, spacetime if there are constraints, else frame.
+        constraints: the user's, or the name of a packaged file or a path to one.
+        smooth: low-pass on what the clip asks for [Hz].
+        lead: time from standing into the clip, and back [s].
+        planted: take the feet as planted though they move in the clip.
+        crossover: f, what is asked of the body faster than this is smoothed away [Hz].
+        progress: is told a line after every quadratic program.
+
+    Raises:
+        ConfigError: as `retarget`; a constraint of a point that the robot lacks, or a time that the
+            clip lacks; another solver, or constraints, for a clip with steps.
+        PoiseError: no posture keeps the soles and the limits; OSQP breaks down.
+    """
+    if solver is not None and solver not in get_args(Solver):
+        raise ConfigError(f"no such solver: {solver!r}", field="solver", choices=get_args(Solver))
+    if not 0.1 <= crossover <= 100.0:
+        raise ConfigError(f"must be from 0.1 to 100, not {crossover:g}", field="crossover")
+    clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
+    if isinstance(constraints, (str, Path)):
+        source: str | Path | None = constraints
+        wanted = read_constraints(constraints)
+    else:
+        source, wanted = None, tuple(constraints)
+    chosen: Solver = solver or ("spacetime" if wanted else "frame")
+    given = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
+    limbs, targets, heading = given
+    if heading is not None and (chosen != "frame" or wanted):
+        raise ConfigError("its feet step: only the solver 'frame', without constraints, is for "
+                          "such clips (--planted takes the feet as planted)", source=clip.name,
+                          field="solver" if chosen != "frame" else "constraints")  # fmt: skip
+    shape = np.tile(robot.standing_qpos, (len(targets), 1))
+    check_constraints(wanted, _scene(robot, limbs, shape, lead), source)
+    made = retarget_to(given, clip, robot, smooth=smooth, lead=lead)
+    from .asked import Asked  # mink is there: `retarget_to` has used it
+    from .grid import by_trial
+    from .problem import Problem
+    from .quality import measure
+    from .solve import optimise
+
+    scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted)
+    if heading is not None:
+        return _stepped(made, scene)
+    stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
+    spent, begun = made.time_per_frame, time.thread_time()
+    if chosen == "spacetime":
+        optimise(Problem(scene, asked, stance, wanted, crossover),
+                 None if progress is None else lambda i, cost: progress(
+                     f"program {i}: tasks {cost.tasks:.3f}, third derivative {cost.rough:.3f}, "
+                     f"constraints {cost.lacking:.3f}"))  # fmt: skip
+    elif chosen == "grid":
+        by_trial(scene, asked, stance, wanted)
+    if chosen != "frame":
+        spent = (time.thread_time() - begun) / len(scene)
+    done = replace(made.clip, qpos=scene.qpos)
+    quality = measure(scene, asked, wanted)
+    return RetargetedClip(done, quality, chosen, made.scale, spent)
+
+
+def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
+    """A clip with steps, whose frames are not those of what was asked for: hands are left out."""
+    from .quality import Quality, measure_soles
+
+    soles = measure_soles(scene)
+    quality = Quality(
+        soles.error, soles.skating, soles.skating_largest, max(made.penetration, soles.depth),
+        made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
+    )  # fmt: skip
+    return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride)
+
+
+def _scene(
+    robot: Robot, limbs: Any, qpos: np.ndarray, lead: float, planted: np.ndarray | None = None
+) -> Scene:
+    """Postures at `RATE`; soles that step are to stay where they land."""
+    both = np.ones((len(qpos), 2), dtype=bool)
+    scene = Scene(robot, limbs, qpos, RATE, lead, both if planted is None else planted)
+    if planted is None:
+        return scene
+    for frame in range(1, len(scene)):
+        scene.at(frame)
+        for foot in range(2):
+            if planted[frame, foot] and planted[frame - 1, foot]:
+                scene.planted_corners[frame, foot] = scene.planted_corners[frame - 1, foot]
+            elif planted[frame, foot]:
+                scene.planted_corners[frame, foot] = scene.padded_corners(foot)
+    return scene

@@ -1,0 +1,191 @@
+"""What a script wants played, in order: brackets and names of its own resolved, overlays made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.synthesis.scripts.printer import overlay_text
+from poise.baselines.motion.synthesis.scripts.tokens import wrong
+from poise.baselines.motion.synthesis.scripts.tree import (
+    Arrow,
+    ClipName,
+    Modifier,
+    Overlay,
+    Script,
+    Sequence,
+    StateName,
+    Term,
+)
+from poise.configs.errors import ConfigError, shown
+
+from .stage import Stage, changed, layer_of, overlaid
+
+MOST_ACTIONS = 1000
+OVER = ("on", "weight")
+
+
+@dataclass(frozen=True)
+class Actions:
+    """What is wanted.
+
+    Attributes:
+        names: of clips of the stage, in order.
+        arrows: the one into each but the first.
+        start, goal: names of postures, or empty.
+    """
+
+    names: tuple[str, ...]
+    arrows: tuple[Arrow, ...]
+    start: StateName | None = None
+    goal: StateName | None = None
+
+
+Item = tuple[Arrow, Overlay, int]  # the arrow before it, how many definitions it sees
+
+
+class Reader:
+    """The actions of a script on a stage.
+
+    `make` turns an inner sequence into one clip. `again` is given every clip that has been changed.
+    """
+
+    def __init__(
+        self, script: Script, stage: Stage, make: Callable[[Actions], Clip],
+        again: Callable[[Clip], Clip],
+    ):  # fmt: skip
+        self.script, self.stage, self.make, self.again = script, stage, make, again
+        self.count = 0
+
+    def actions(self) -> Actions:
+        """Those of the whole script.
+
+        Raises ConfigError with line and column: no such clip, link group or posture, a posture that
+        is neither first nor last, a modifier that cannot be used, more than 1,000 actions.
+        """
+        items = self._flat(self.script.sequence, len(self.script.defines), Arrow())
+        states = [state_of(item[1]) for item in items]
+        start, goal = states[0], states[-1] if len(items) > 1 else None
+        inner = items[start is not None : len(items) - (goal is not None)]
+        if not inner:
+            raise self._wrong("a script needs a motion, not postures alone", 0)
+        if start is not None and inner[0][0].kind:
+            raise self._wrong("next to a posture no transition is chosen by hand", inner[0][0].at)
+        if goal is not None and items[-1][0].kind:
+            raise self._wrong("next to a posture no transition is chosen by hand", items[-1][0].at)
+        return replace(self._actions(inner), start=start, goal=goal)
+
+    def _actions(self, items: list[Item]) -> Actions:
+        names = tuple(self._name(overlay, seen) for _, overlay, seen in items)
+        return Actions(names, tuple(arrow for arrow, _, _ in items[1:]))
+
+    def _flat(self, sequence: Sequence, seen: int, arrow: Arrow) -> list[Item]:
+        """Overlays in order; sequences that only repeat are laid out."""
+        items: list[Item] = []
+        for into, overlay in zip((arrow, *sequence.arrows), sequence.overlays, strict=True):
+            term = overlay.terms[0]
+            times, rest = _repeats(term)
+            body, inner = self._body(term, seen)
+            alone = len(overlay.terms) == 1
+            for turn in range(times if alone else 1):
+                self._counted(term)
+                before = Arrow() if turn else into
+                if alone and isinstance(body, Sequence) and not rest:
+                    items += self._flat(body, inner, before)
+                else:
+                    left = Overlay((replace(term, modifiers=rest),)) if alone else overlay
+                    items.append((before, left, seen))
+        return items
+
+    def _counted(self, term: Term) -> None:
+        self.count += 1
+        if self.count > MOST_ACTIONS:
+            raise self._wrong(f"more than {MOST_ACTIONS} actions", term.at)
+
+    def _body(self, term: Term, seen: int) -> tuple[ClipName | StateName | Sequence, int]:
+        """What a term is, and how many definitions it sees: those before its own."""
+        body = term.body
+        if isinstance(body, ClipName) and not body.quoted:
+            for i, define in enumerate(self.script.defines[:seen]):
+                if define.name == body.name:
+                    return define.sequence, i
+        return body, seen
+
+    def _name(self, overlay: Overlay, seen: int) -> str:
+        """The clip of the stage that an overlay is; made now if the graph has it not."""
+        term = overlay.terms[0]
+        body, _ = self._body(term, seen)
+        if len(overlay.terms) == 1 and isinstance(body, ClipName) and not term.modifiers:
+            return self._found(body)
+        text = overlay_text(overlay)
+        if text not in self.stage.derived:
+            clip = self._overlaid(overlay, seen)
+            try:
+                self.stage.add(text, clip)
+            except ConfigError as error:
+                raise self._wrong(error.message, term.at) from None
+        return text
+
+    def _overlaid(self, overlay: Overlay, seen: int) -> Clip:
+        base = self._clip(overlay.terms[0], seen, ())
+        if len(overlay.terms) == 1:
+            return base
+        layers = []
+        for term in overlay.terms[1:]:
+            over = tuple(m for m in term.modifiers if m.kind in OVER)
+            layers.append(layer_of(self._clip(term, seen, OVER), over, self.script))
+        at = overlay.terms[1].at
+        return self._planned(overlaid(base, layers, at, self.script), at)
+
+    def _planned(self, clip: Clip, at: int) -> Clip:
+        """A clip that has been changed; an error says where."""
+        try:
+            return self.again(clip)
+        except ConfigError as error:
+            raise self._wrong(error.message, at) from None
+
+    def _clip(self, term: Term, seen: int, skipped: tuple[str, ...]) -> Clip:
+        """The clip of a term by itself, but for modifiers of the kinds `skipped`."""
+        times, modifiers = _repeats(term)
+        body, inner = self._body(term, seen)
+        if isinstance(body, StateName):
+            raise self._wrong("a posture stands first or last, alone", term.at)
+        if times > 1 or isinstance(body, Sequence):
+            once = body if isinstance(body, Sequence) else Sequence((Overlay((Term(body),)),))
+            items = [item for _ in range(times) for item in self._flat(once, inner, Arrow())]
+            clip = self.make(self._actions(items))
+        else:
+            clip = self.stage.clips[self._found(body)]
+        for modifier in modifiers:
+            if modifier.kind not in skipped:
+                clip = changed(clip, modifier, self.script)
+                clip = self._planned(clip, modifier.at) if modifier.kind == "@" else clip
+        return clip
+
+    def _found(self, body: ClipName) -> str:
+        name = self.stage.find(body.name)
+        if name is None:
+            names = [*(define.name for define in self.script.defines), *self.stage.packed,
+                     *self.stage.others]  # fmt: skip
+            raise self._wrong(f"no motion {shown(body.name)}", body.at, names)
+        return name
+
+    def _wrong(self, message: str, at: int, choices: list[str] | None = None) -> ConfigError:
+        return wrong(message, self.script.text, at, self.script.source, choices)
+
+
+def state_of(overlay: Overlay) -> StateName | None:
+    """The posture that an overlay is, alone and unchanged, or None."""
+    term = overlay.terms[0]
+    alone = len(overlay.terms) == 1 and not term.modifiers
+    return term.body if alone and isinstance(term.body, StateName) else None
+
+
+def _repeats(term: Term) -> tuple[int, tuple[Modifier, ...]]:
+    """How often a term is played, and its other modifiers."""
+    times = 1
+    for modifier in term.modifiers:
+        if modifier.kind == "*":
+            times = min(times * int(modifier.numbers[0]), MOST_ACTIONS + 1)
+    return times, tuple(modifier for modifier in term.modifiers if modifier.kind != "*")

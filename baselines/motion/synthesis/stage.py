@@ -1,0 +1,119 @@
+"""The clips that a script plays: those of a graph, and those that it makes of them on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.groups import GROUPS
+from poise.baselines.motion.graphs.adjacency import Frames, end_to_begin, frames_of, with_clip
+from poise.baselines.motion.graphs.joining.overlay import Layer, overlay
+from poise.baselines.motion.graphs.motion_graph import GraphClip, MotionGraph, Transition
+from poise.baselines.motion.synthesis.scripts.tokens import wrong
+from poise.baselines.motion.synthesis.scripts.tree import Modifier, Script
+from poise.configs.errors import ConfigError, shown
+
+LONGEST = 600.0  # [s] of a clip and of a whole motion
+
+
+class Stage:
+    """A graph, its clips and their frames; grows by what scripts derive.
+
+    Attributes:
+        graph: with a node for every clip.
+        clips: name → clip; `frames` likewise.
+        derived: name of a clip that a script made → its text.
+        others: clips that there are, too, and that are not loaded.
+    """
+
+    def __init__(self, graph: MotionGraph, clips: dict[str, Clip], others: Iterable[str] = ()):
+        missing = [name for name in graph.names if name not in clips]
+        if missing:
+            raise ConfigError(f"the clip {missing[0]!r} is not loaded", source="graph")
+        self.graph = graph
+        self.clips = {name: clips[name] for name in graph.names}
+        self.frames = {name: self._frames(name, clip) for name, clip in self.clips.items()}
+        self.packed, self.others = graph.names, tuple(others)
+        self.derived: dict[str, str] = {}
+
+    def _frames(self, name: str, clip: Clip) -> Frames:
+        return frames_of(clip, planted=True if self.graph.robot else None)._replace(name=name)
+
+    def find(self, name: str) -> str | None:
+        """The clip of a name, or the only one that ends in `_name`; None if there is none."""
+        if name in self.packed:
+            return name
+        ends = [full for full in self.packed if full.endswith(f"_{name}")]
+        return ends[0] if len(ends) == 1 else None
+
+    def add(self, text: str, clip: Clip) -> str:
+        """Make a derived clip a node of the graph; its name."""
+        if clip.duration > LONGEST:
+            raise ConfigError(f"lasts {clip.duration:.0f} s, at most {LONGEST:g} s are made")
+        self.clips[text] = replace(clip, name=text)
+        self.frames[text] = self._frames(text, self.clips[text])
+        entry = GraphClip(text, "", clip.duration)
+        self.graph = with_clip(self.graph, entry, self.frames)
+        self.derived[text] = text
+        return text
+
+    def by_hand(self, before: str, after: str, duration: float | None) -> Transition:
+        """The transition from end to begin, of a duration [s] or of the best one."""
+        limits = self.graph.thresholds
+        if duration is not None:
+            limits = replace(limits, least=duration, most=duration)
+        made = end_to_begin(self.frames[before], self.frames[after], limits)
+        lengths = {clip.name: clip.duration for clip in self.graph.clips}
+        return replace(made, leave=lengths[before])
+
+    def posture(self, name: str, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Height (3,) and rotations (J, 4) of a clip at a time [s], facing x."""
+        clip = self.clips[name]
+        frame = min(round(time / clip.dt), len(clip) - 1)
+        pair = clip.cut(max(frame - 1, 0) * clip.dt, max(frame, 1) * clip.dt)
+        frames = frames_of(pair, pair.dt)
+        index = -1 if frame else 0
+        return frames.heights[index], frames.rotations[index]
+
+
+def changed(clip: Clip, modifier: Modifier, script: Script) -> Clip:
+    """A clip after one modifier; an error says where the modifier stands."""
+    try:
+        if modifier.kind == "[":
+            clip = clip.cut(*modifier.numbers)
+            if clip.support is not None and not clip.support.planted[[0, -1]].all():
+                raise ConfigError("cuts a step: both soles must be planted there")
+            return clip
+        if modifier.kind == "@":
+            return clip.at_speed(modifier.numbers[0])
+        if modifier.kind == "mirrored":  # on the same bones: sides may differ by a millimetre
+            return replace(clip.mirrored(), skeleton=clip.skeleton)
+    except ConfigError as error:
+        raise wrong(error.message, script.text, modifier.at, script.source) from None
+    raise wrong(f'"{modifier.kind}" is for what lies over another motion: a | b '
+                f"{modifier.kind} …", script.text, modifier.at, script.source)  # fmt: skip
+
+
+def layer_of(clip: Clip, modifiers: tuple[Modifier, ...], script: Script) -> Layer:
+    """A layer by its `on` and `weight`."""
+    groups, weight = [], None
+    for modifier in modifiers:
+        if modifier.kind == "weight":
+            weight = modifier.numbers[0]
+        for name in modifier.names:
+            if name not in GROUPS:
+                raise wrong(f"no link group {shown(name)}", script.text, modifier.at,
+                            script.source, GROUPS)  # fmt: skip
+            groups.append(GROUPS[name])
+    return Layer(clip, tuple(groups), weight)
+
+
+def overlaid(base: Clip, layers: list[Layer], at: int, script: Script) -> Clip:
+    """The base under its layers; an error says where the overlay stands."""
+    try:
+        return overlay(base, layers)
+    except ConfigError as error:
+        raise wrong(error.message, script.text, at, script.source, error.choices) from None

@@ -1,0 +1,1 @@
+"""What an environment observes, rewards and ends on: terms in tables, compiled."""

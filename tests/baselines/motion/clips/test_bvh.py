@@ -1,0 +1,153 @@
+"""BVH files: what is read is what was written, axes and units are found, faults have their line."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from poise.baselines.motion.clips.axes import axes_of
+from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.library import find_bvh, packaged_clips
+from poise.baselines.motion.clips.rotations import angle_between
+from poise.configs.errors import ConfigError, PoiseError
+from tests.support.motion_files import FRAMES, mutated, small_bvh
+
+MUTATIONS = 150
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    path = tmp_path / "small.bvh"
+    path.write_text(small_bvh())
+    return path
+
+
+@pytest.mark.parametrize("name", packaged_clips())
+def test_packaged_clips_are_read_written_and_read(name: str, tmp_path: Path) -> None:
+    """Six decimals: places to 1e-6 of the file's unit, rotations to 1e-6 degrees."""
+    clip, axes = read_bvh(find_bvh(name))
+    moved = clip.turned(0.3).resampled(clip.dt * 1.7)  # values that six decimals do not hold
+    for each in (clip, moved):
+        write_bvh(each, tmp_path / "again.bvh", axes)
+        again = read_bvh(tmp_path / "again.bvh", str(axes.unit), *axes.names).clip
+        assert np.abs(each.root - again.root).max() / axes.unit < 1e-6
+        assert np.degrees(angle_between(each.rotations, again.rotations).max()) < 2e-6
+        assert again.skeleton.names == each.skeleton.names
+        assert np.abs(again.skeleton.end_offsets - each.skeleton.end_offsets).max() < 1e-6
+        assert again.dt == pytest.approx(each.dt, rel=1e-6)
+
+
+def test_axes_and_unit_are_found() -> None:
+    clip, axes = read_bvh(find_bvh("cmu02_squat"))
+    assert axes.names == ("y", "z") and axes.unit == 1.0
+    assert 0.8 < clip.skeleton.leg_length < 0.9
+    wave, axes = read_bvh(find_bvh("fair1_wave_hello"))
+    assert axes.names == ("z", "-y")
+    assert wave.skeleton.leg_length == pytest.approx(0.8)
+    for each in (clip, wave):  # the head is above, the left hip to the left of who faces x
+        places, roles = each.faced().places()[0], each.skeleton.roles
+        assert places[roles["head"], 2] > 1.2
+        assert places[roles["hip_left"], 1] > 0.05 > -0.05 > places[roles["hip_right"], 1]
+
+
+def test_another_frame_of_axes_is_the_same_motion(small: Path, tmp_path: Path) -> None:
+    clip = read_bvh(small).clip
+    path = tmp_path / "centimetres.bvh"
+    write_bvh(clip, path, axes_of("-x", "y", 0.01))
+    again, axes = read_bvh(path)
+    assert axes.names == ("-x", "y") and axes.unit == 0.01
+    assert np.abs(again.places() - clip.places()).max() < 1e-7
+
+
+def test_places_are_those_that_the_file_says(small: Path) -> None:
+    """Hips at 0.95 m, straight legs of 0.8 m: ankles at 5 cm; left is y."""
+    clip = read_bvh(small).clip
+    first = dict(zip(clip.skeleton.names, clip.places()[0], strict=True))
+    assert first["LeftFoot"] == pytest.approx([0.0, 0.1, 0.05], abs=1e-6)
+    assert first["RightLeg"] == pytest.approx([0.0, -0.1, 0.45], abs=1e-6)
+    knee = clip.places()[FRAMES // 2, clip.skeleton.roles["knee_left"]]
+    assert knee[0] > 0.05  # a knee bends forward
+
+
+FAULTS = {
+    "HIERARCHY": ("HIERACHY", "line 1: 'HIERACHY' begins no line"),
+    "ROOT Hips\n{": ("ROOT Hips\nOFFSET", "line 3: 'OFFSET' where '{' must stand"),
+    "OFFSET 0.1 -0.1 0": ("OFFSET 0.1 -0.1", "line 8: 2 numbers instead of 3"),
+    "OFFSET -0.1 -0.1 0": ("OFFSET -0.1 x 0", "line 27: 'x' is no number"),
+    "CHANNELS 3 Z": ("CHANNELS 3 W", "line 9: no such channel: 'Wrotation' (choices: Xposition"),
+    "JOINT LeftLeg": ("JOINT Hips", "line 10: a second joint is called 'Hips'"),
+    "Frames: 12": ("Frames: 13", "line 59: the file ends after 12 rows, 'Frames:' says 13"),
+    "Frames: 12\n": ("Frames: 10000000000\n", "line 46: 10000000000 frames"),
+    "Frame Time: 0.033333": ("Frame Time: 0", "line 47: a frame time must be"),
+    "0.950000 0.000000 0.000000": ("0.950000 0.000000", "line 48: 23 values instead of 24"),
+    "0.949000": ("inf", "line 49: 'inf' is no number"),
+    "}\nMOTION": ("MOTION", "line 46: 1 '{' are not closed"),
+}
+
+
+@pytest.mark.parametrize("old", FAULTS)
+def test_a_fault_has_the_number_of_its_line(old: str, tmp_path: Path) -> None:
+    new, text = FAULTS[old]
+    path = tmp_path / "wrong.bvh"
+    path.write_text(small_bvh().replace(old, new, 1))
+    with pytest.raises(ConfigError) as error:
+        read_bvh(path)
+    assert f"wrong.bvh: {text}" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_unknown_legs_are_named_or_need_unit_and_axes(small: Path) -> None:
+    """Where neither names nor structure tell: here one leg is longer."""
+    text = small.read_text().replace("UpLeg", "Tentacle").replace("-0.4 0", "-0.3 0", 1)
+    small.write_text(text)
+    with pytest.raises(ConfigError, match="no joint is called as 'hip_left' is, .*hip_left=JOINT"):
+        read_bvh(small)
+    assert len(read_bvh(small, "m", "y", "z").clip) == FRAMES
+    joints = {"hip_left": "LeftTentacle", "hip_right": "RightTentacle"}
+    named, axes = read_bvh(small, joints=joints)
+    assert axes.names == ("y", "z") and axes.unit == 1.0
+    assert named.skeleton.names[named.skeleton.roles["hip_left"]] == "LeftTentacle"
+    with pytest.raises(ConfigError, match="joints: no such role: 'wing' .choices: hip_left"):
+        read_bvh(small, joints={"wing": "LeftLeg"})
+    with pytest.raises(ConfigError, match="joints.hip_left: no joint is called 'x'"):
+        read_bvh(small, joints={"hip_left": "x"})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("mile",), "unit: no such unit: 'mile' .choices: m, "),
+        (("m", "w"), "up: no such axis: 'w' .choices: x, "),
+        (("m", "y", "-y"), "are on one line"),
+    ],
+)
+def test_wrong_units_and_axes(small: Path, arguments: tuple[str, ...], text: str) -> None:
+    with pytest.raises(ConfigError, match=text):
+        read_bvh(small, *arguments)
+
+
+def test_without_the_library_the_error_says_how_to_get_it(
+    small: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pybvh", None)
+    clip = read_bvh(small).clip
+    with pytest.raises(ConfigError, match=r"pip install -e '\.\[motion\]'"):
+        write_bvh(clip, small)
+
+
+def test_mutated_files_are_read_or_refused_in_one_line(tmp_path: Path) -> None:
+    read = refused = 0
+    for seed in range(MUTATIONS):
+        path = tmp_path / "mutated.bvh"
+        text = mutated(small_bvh(), np.random.default_rng(seed))
+        path.write_text(text, encoding="utf-8", errors="replace")
+        try:
+            clip = read_bvh(path).clip
+            assert isinstance(clip, Clip) and np.isfinite(clip.places()).all()
+            read += 1
+        except PoiseError as error:
+            assert "\n" not in str(error) and "mutated.bvh" in str(error)
+            refused += 1
+    assert read > 5 and refused > MUTATIONS / 2

@@ -1,0 +1,44 @@
+"""Planted feet: of captured clips, and of one whose skating is known."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.contacts import measure_contacts
+from poise.baselines.motion.clips.library import find_bvh, packaged_clips
+from tests.support.motion_files import small_bvh
+
+
+@pytest.mark.parametrize("name", [name for name in packaged_clips() if "walk" not in name])
+def test_clips_in_place_have_planted_feet(name: str) -> None:
+    contacts = measure_contacts(read_bvh(find_bvh(name)).clip)
+    assert contacts.in_place
+    assert contacts.planted.mean() > 0.9
+
+
+def test_walking_feet_take_turns() -> None:
+    contacts = measure_contacts(read_bvh(find_bvh("cmu02_walk")).clip)
+    assert not contacts.in_place
+    left, right = contacts.planted.T
+    assert 0.2 < left.mean() < 0.7 and 0.2 < right.mean() < 0.7
+    assert np.mean(left != right) > 0.5
+
+
+def test_skating_and_sinking_are_measured(tmp_path: Path) -> None:
+    """A rigid figure that slides at 5 cm/s along x while its last frame is 3 mm lower."""
+    path = tmp_path / "small.bvh"
+    path.write_text(small_bvh(60))
+    clip = read_bvh(path).clip
+    still = np.broadcast_to(clip.rotations[:1], clip.rotations.shape).copy()
+    root = np.zeros((60, 3))
+    root[:, 0], root[:, 2] = 0.05 * clip.times, 0.95
+    root[-1, 2] -= 0.003
+    contacts = measure_contacts(replace(clip, root=root, rotations=still))
+    assert contacts.planted.all()
+    assert contacts.skating == pytest.approx(0.05, rel=1e-6)
+    assert contacts.skating_largest == pytest.approx(0.05, rel=1e-6)
+    assert contacts.floor == pytest.approx(0.0, abs=1e-6)
+    assert contacts.penetration == pytest.approx(0.003, abs=1e-6)

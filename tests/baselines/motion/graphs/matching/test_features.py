@@ -1,0 +1,86 @@
+"""Features of frames: what they are, and that they do not depend on where the body stands."""
+
+import numpy as np
+import pytest
+
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.graphs.matching.features import FUTURE, LIMBS, clip_features, groups
+
+AHEAD = (0.2, 0.5)
+
+
+@pytest.fixture(scope="module")
+def walk() -> Clip:
+    return read_bvh(find_bvh("cmu02_walk")).clip
+
+
+def columns(table: np.ndarray, name: str) -> np.ndarray:
+    begin = 0
+    for group in groups(AHEAD):
+        if group.name == name:
+            return table[:, begin : begin + group.size]
+        begin += group.size
+    raise KeyError(name)
+
+
+def test_turned_and_moved_clips_have_the_same_features(walk: Clip) -> None:
+    moved = walk.turned(2.1).moved(np.array([3.0, -4.0, 0.0]))
+    assert clip_features(moved, AHEAD) == pytest.approx(clip_features(walk, AHEAD), abs=1e-9)
+
+
+def test_every_column_has_a_group(walk: Clip) -> None:
+    table = clip_features(walk, AHEAD)
+    assert table.shape == (len(walk), sum(group.size for group in groups(AHEAD)))
+    assert [group.name for group in groups(AHEAD)][-4:] == [
+        "place@0.2", "direction@0.2", "place@0.5", "direction@0.5",
+    ]  # fmt: skip
+    assert len(groups(AHEAD)) == 5 + len(AHEAD) * len(FUTURE)
+
+
+def test_velocities_are_seen_from_the_facing_frame(walk: Clip) -> None:
+    """A walk goes forward; the speed is that of the root, whatever the frame."""
+    table = clip_features(walk, AHEAD)
+    velocity = columns(table, "velocity")
+    true = np.gradient(walk.places()[:, 0], walk.dt, axis=0)
+    assert np.linalg.norm(velocity, axis=1) == pytest.approx(np.linalg.norm(true, axis=1))
+    assert velocity[:, 0].mean() > 0.8 and abs(velocity[:, 1].mean()) < 0.2
+    heading = np.unwrap(walk.facing())
+    assert columns(table, "turning")[:, 0] == pytest.approx(np.gradient(heading, walk.dt))
+
+
+def test_limbs_are_where_they_are_about_the_place_below_the_root(walk: Clip) -> None:
+    """Heights and distances are the world's; left ones are to the left."""
+    limbs = columns(clip_features(walk, AHEAD), "limbs").reshape(len(walk), -1, 3)
+    places = walk.places()
+    for i, role in enumerate(LIMBS):
+        true = places[:, walk.skeleton.roles[role]]
+        assert limbs[:, i, 2] == pytest.approx(true[:, 2])
+        across = np.linalg.norm((true - places[:, 0])[:, :2], axis=1)
+        assert np.linalg.norm(limbs[:, i, :2], axis=1) == pytest.approx(across)
+        assert (limbs[:, i, 1].mean() > 0.0) == role.endswith("left")
+
+
+def test_limb_velocities_are_the_worlds(walk: Clip) -> None:
+    """A planted foot is at rest, though the body passes over it."""
+    table = clip_features(walk, AHEAD)
+    speeds = np.linalg.norm(columns(table, "limb_velocities").reshape(len(walk), -1, 3), axis=2)
+    planted = columns(table, "contacts").astype(bool)
+    feet = speeds[:, [LIMBS.index("ankle_left"), LIMBS.index("ankle_right")]]
+    assert 0.2 < planted.mean() < 0.8
+    assert np.median(feet[planted]) < 0.3 * np.median(feet[~planted])
+
+
+def test_the_future_is_where_the_clip_goes(walk: Clip) -> None:
+    """The place ahead, put into the world, is the root's then; past the end it is the end's."""
+    table, steps = clip_features(walk, AHEAD), round(0.5 / walk.dt)
+    heading, root = np.unwrap(walk.facing()), walk.places()[:, 0, :2]
+    place, direction = columns(table, "place@0.5"), columns(table, "direction@0.5")
+    for frame in (0, 17, len(walk) - 5):
+        then = min(frame + steps, len(walk) - 1)
+        c, s = np.cos(heading[frame]), np.sin(heading[frame])
+        world = root[frame] + np.array([[c, -s], [s, c]]) @ place[frame]
+        assert world == pytest.approx(root[then])
+        turn = np.arctan2(*direction[frame, ::-1])
+        assert turn == pytest.approx(heading[then] - heading[frame])

@@ -1,0 +1,243 @@
+"""From a script to a clip: what is played when, what is derived, and what is refused where."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.groups import GROUPS
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.clips.rotations import angle_between
+from poise.baselines.motion.graphs.adjacency import frames_of, make_graph
+from poise.baselines.motion.graphs.components import strong_clips, strong_part
+from poise.baselines.motion.graphs.joining.joins import JOINS
+from poise.baselines.motion.graphs.motion_graph import GraphClip, MotionGraph, StatePlace
+from poise.baselines.motion.graphs.nearest import nearest_places
+from poise.baselines.motion.synthesis.scripts.library import between, find_script, packaged_scripts
+from poise.baselines.motion.synthesis.scripts.parser import parse
+from poise.baselines.motion.synthesis.synthesis import Synthesis
+from poise.configs.errors import ConfigError
+
+NAMES = ("cmu02_stand", "cmu02_squat", "cmu02_punch", "cmu02_reach_up", "cmu02_walk")
+
+
+@cache
+def clips() -> dict[str, Clip]:
+    return {name: read_bvh(find_bvh(name)).clip for name in NAMES}
+
+
+@cache
+def graph() -> MotionGraph:
+    entries = [(GraphClip(name, name, clip.duration), clip) for name, clip in clips().items()]
+    return make_graph(entries, states={"upright": StatePlace("cmu02_stand", 0.5)})
+
+
+def make(text: str, **settings) -> tuple[Clip, dict[str, Any]]:
+    return Synthesis(graph(), clips(), **settings).make(parse(text, "try.motion"))
+
+
+def wanted(record: dict[str, Any]) -> list[str]:
+    return [part["what"] for part in record["played"] if part["wanted"]]
+
+
+def test_clips_are_played_in_order_and_the_record_says_when() -> None:
+    """Each part of the whole is the clip that the record names there, but for place and heading."""
+    made, record = make("squat -> punch")
+    assert wanted(record) == ["cmu02_squat", "cmu02_punch"]
+    played = record["played"]
+    assert played[0]["begins"] == 0.0 and played[-1]["ends"] == pytest.approx(made.duration)
+    for before, after in pairwise(played):
+        assert after["begins"] == pytest.approx(before["ends"])
+    for part in (part for part in played if part["coefficient"] is None):
+        own = clips()[part["what"]].cut(part["enter"], part["leave"])
+        there = made.cut(part["begins"], part["ends"])
+        assert len(own) == len(there)
+        assert angle_between(own.rotations[:, 1:], there.rotations[:, 1:]).max() < 1e-6
+    assert record["duration"] == made.duration and record["cost"] > 0.0
+
+
+def test_no_step_between_frames_is_larger_than_the_clips_own_by_much() -> None:
+    made, _ = make("squat -> punch -> reach_up * 2 -> stand")
+    steps = angle_between(made.rotations[:-1], made.rotations[1:]).max()
+    own = max(angle_between(clip.rotations[:-1], clip.rotations[1:]).max()
+              for clip in clips().values())  # fmt: skip
+    assert steps < 1.5 * own
+    assert np.linalg.norm(np.diff(made.root, axis=0), axis=1).max() < 0.08
+
+
+def test_the_same_script_gives_the_same_clip() -> None:
+    text = "a = squat | punch on arms; a -> stand"
+    first, second = make(text), make(text)
+    assert np.array_equal(first[0].rotations, second[0].rotations)
+    assert np.array_equal(first[0].root, second[0].root) and first[1] == second[1]
+
+
+def test_transitions_by_hand_are_those_of_the_joins() -> None:
+    """From end to begin, of the kind and duration that the script says; nothing in between."""
+    a, b = clips()["cmu02_squat"], clips()["cmu02_punch"]
+    for kind in JOINS:
+        made, record = make(f"squat ->{{{kind}, 0.5}} punch")
+        own = JOINS[kind](a, b, 0.5)
+        assert np.array_equal(made.rotations, own.rotations)
+        assert [part["what"] for part in record["played"]] == [a.name, kind, b.name]
+    made, record = make("squat ->{insert} punch -> stand", kind="inertial")
+    kinds = [part["what"] for part in record["played"] if part["coefficient"] is not None]
+    assert kinds[0] == "insert" and set(kinds[1:]) == {"inertial"}
+
+
+def test_definitions_brackets_and_repetitions() -> None:
+    _, record = make("pair = squat -> stand * 2; (pair -> punch) * 2 -> pair")
+    order = [name.removeprefix("cmu02_") for name in wanted(record)]
+    assert order == ["squat", "stand", "stand", "punch"] * 2 + ["squat", "stand", "stand"]
+
+
+def test_a_definition_sees_those_before_it_alone() -> None:
+    """So a name may stand for more of the clip of that name."""
+    _, record = make("squat = squat -> stand; punch = squat -> punch; punch")
+    assert wanted(record) == ["cmu02_squat", "cmu02_stand", "cmu02_punch"]
+    _, record = make('stand = squat; "stand" -> stand')
+    assert wanted(record) == ["cmu02_stand", "cmu02_squat"]
+
+
+def test_modifiers_are_what_clips_do() -> None:
+    made, record = make("squat[1:3]@0.5 mirrored")
+    own = clips()["cmu02_squat"].cut(1.0, 3.0).at_speed(0.5).mirrored()
+    assert angle_between(made.rotations, own.rotations).max() < 1e-9
+    assert made.skeleton.same_as(clips()["cmu02_squat"].skeleton)
+    assert record["made"] == ["squat [1:3] @ 0.5 mirrored"]
+    backwards, _ = make("squat@0.5[1:3]")
+    assert backwards.duration == pytest.approx(2.0) and made.duration == pytest.approx(4.0)
+
+
+def test_an_overlay_has_the_base_s_legs_and_the_layer_s_arms() -> None:
+    made, record = make("squat | punch on arms weight 1")
+    base, over = clips()["cmu02_squat"], clips()["cmu02_punch"]
+    legs, arms = (GROUPS[name].joints(base.skeleton) for name in ("legs", "arms"))
+    middle = slice(20, 130)
+    assert np.array_equal(made.rotations[:, legs], base.rotations[:, legs])
+    assert (
+        angle_between(made.rotations[middle][:, arms], over.rotations[middle][:, arms]).max() < 1e-6
+    )
+    assert wanted(record) == ["squat | punch on arms weight 1"]
+    longer, _ = make("(squat -> stand) | (punch[1:3] * 2) on right_arm")
+    assert longer.duration > base.duration + 0.5
+
+
+def test_start_and_goal_are_postures() -> None:
+    made, record = make("<upright> -> squat -> <upright>")
+    upright = clips()["cmu02_stand"].rotations[15]
+    for frame in (0, -1):
+        gap = angle_between(made.rotations[frame, 1:], upright[1:])
+        assert np.degrees(gap.max()) < 20.0 and np.degrees(np.sqrt((gap**2).mean())) < 6.0
+    assert wanted(record) == ["cmu02_squat"]
+    begun, record = make("<squat> -> punch")  # how a clip begins
+    gap = angle_between(begun.rotations[0, 1:], clips()["cmu02_squat"].rotations[0, 1:])
+    assert np.degrees(np.sqrt((gap**2).mean())) < 12.0 and wanted(record) == ["cmu02_punch"]
+
+
+def test_nearest_frames() -> None:
+    frames = {name: frames_of(clip)._replace(name=name) for name, clip in clips().items()}
+    squat = frames["cmu02_squat"]
+    found = nearest_places(frames, (squat.heights[10], squat.rotations[10]), near=3.0)
+    assert found["cmu02_squat", float(squat.times[10])] == pytest.approx(0.0, abs=1e-6)
+    deep = int(np.argmin(squat.heights[:, 2]))
+    others = {name: each for name, each in frames.items() if name != "cmu02_squat"}
+    with pytest.raises(ConfigError, match=r"no clip comes within 8° of it: the nearest is 'cmu02_"):
+        nearest_places(others, (squat.heights[deep], squat.rotations[deep]))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("squat ->\n wawe", "line 2, column 2: no motion 'wawe' (choices: cmu02_stand, "),
+        ("a = b; a", "line 1, column 5: no motion 'b' (choices: a, cmu02_stand"),
+        ("a = a; a", "line 1, column 5: no motion 'a' (choices: a, cmu02_stand"),
+        ("squat[1:9]", "line 1, column 6: must be two times within 0 and 5.300 s"),
+        ("squat on arms", 'line 1, column 7: "on" is for what lies over another motion'),
+        ("squat weight 1 | punch", 'line 1, column 7: "weight" is for what lies over another'),
+        ("squat | punch on hat", "line 1, column 15: no link group 'hat' (choices: left_arm, "),
+        (
+            "squat | punch on legs",
+            "line 1, column 9: the base keeps its root and legs: 'lfemur'",
+        ),
+        ("squat | punch | reach_up", "line 1, column 9: 'cmu02_punch' and 'cmu02_reach_up' both"),
+        ("squat -> <upright> -> punch", "line 1, column 10: a posture stands first or last, alone"),
+        ("<upright> | squat", "line 1, column 1: a posture stands first or last, alone"),
+        ("<upright> -> <upright>", "line 1, column 1: a script needs a motion, not postures alone"),
+        ("<upright>", "line 1, column 1: a script needs a motion, not postures alone"),
+        ("<sitting> -> squat", "line 1, column 1: no posture 'sitting' (choices: upright, cmu02_"),
+        ("<upright> ->{cross} squat", "line 1, column 11: next to a posture no transition is"),
+        ("squat ->{physical} punch", "line 1, column 7: no transition 'physical' here (choices: "),
+        ("squat ->{cross, 60} punch", "cross: lasts 60 s, longer than a clip"),
+        ("squat -> ((walk * 90) * 90) * 90", ": more than 1000 actions"),
+        ("a=punch*90; b=a*90; b", ": more than 1000 actions"),
+        ("a=squat@0.1*90; a | stand", "lasts longer than 600 s"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_place(text: str, said: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        make(text)
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_without_a_way_the_reason_is_told() -> None:
+    none = replace(graph(), transitions=tuple(
+        t for t in graph().transitions if t.after != "cmu02_punch"))  # fmt: skip
+    none = replace(none, refused=(*none.refused, ("cmu02_squat", "cmu02_punch", "K = 41 > 20")))
+    with pytest.raises(ConfigError, match=r"try\.motion: no way from 'cmu02_squat' to "
+                       r"'cmu02_punch' \(reachable: .*; nearest to it: K = 41 > 20\)"):  # fmt: skip
+        Synthesis(none, clips()).make(parse("squat -> punch", "try.motion"))
+
+
+def test_a_refused_transition_is_gone_round() -> None:
+    """The check is asked of the best path alone, and what it refuses is not played."""
+    asked = []
+
+    def check(transition) -> str:
+        asked.append(transition)
+        return "too fast" if transition.before == "cmu02_squat" and len(asked) < 4 else ""
+
+    made, _ = make("squat -> punch", check=check)
+    assert 1 < len(asked) < 12 and made.duration > 8.0
+
+
+def test_the_strong_part_goes_on_for_ever() -> None:
+    assert set(strong_clips(graph())) <= set(NAMES)
+    part = strong_part(graph())
+    assert 0 < len(part.transitions) <= len(graph().transitions)
+    lonely = replace(graph(), transitions=tuple(
+        t for t in graph().transitions if "cmu02_walk" not in (t.before, t.after)))  # fmt: skip
+    assert "cmu02_walk" not in strong_clips(lonely)
+    assert strong_clips(replace(graph(), transitions=())) == []
+    assert strong_part(replace(graph(), transitions=())).transitions == ()
+
+
+def test_settings_that_are_wrong() -> None:
+    with pytest.raises(ConfigError, match="kind: no transition 'jump' here"):
+        Synthesis(graph(), clips(), kind="jump")
+    with pytest.raises(ConfigError, match="graph: the clip 'cmu02_walk' is not loaded"):
+        Synthesis(graph(), {name: clips()[name] for name in NAMES[:4]})
+
+
+def test_packaged_scripts_are_read() -> None:
+    assert packaged_scripts() == ["greeting", "warm_up"]
+    for name in packaged_scripts():
+        assert find_script(name).source.endswith(f"{name}.motion")
+    assert find_script("squat -> punch") == parse("squat -> punch")
+    with pytest.raises(ConfigError, match="no.motion: cannot be read"):
+        find_script("no.motion")
+
+
+def test_between_postures() -> None:
+    script = parse("a = b;  # first\na -> c  # last")
+    whole = between(script, "x", "y")
+    assert whole == parse("a = b; <x> -> a -> c -> <y>")
+    assert between(script, None, None) is script
+    assert between(script, None, "y") == parse("a = b; a -> c -> <y>")

@@ -1,0 +1,234 @@
+"""The observation against the quantities of RobotState, index by index."""
+
+import numpy as np
+import pytest
+
+from poise.configs.errors import ConfigError
+from poise.envs.balance.mdp.observation import (
+    Terms,
+    View,
+    mirror_terms,
+    observation_table,
+    observer,
+    scales,
+    term_table,
+)
+from poise.envs.balance.mdp.terms import TERMS
+from poise.envs.balance.torque import TorqueBalanceEnv
+from poise.envs.compiled.calls import run
+from tests.support.shared import generic_state, robot
+
+
+def terms_of(r, actions, names=None):
+    """The terms of a robot, by default those that are on."""
+    sizes = {
+        "joints": r.joint_names,
+        "motors": r.motor_names,
+        "feet": tuple(sole.name for sole in r.soles),
+        "actions": actions,
+    }
+    return [kind.of(sizes) for kind in TERMS.choose(names)]
+
+
+def observed(simulation, q_ref, v_ref, action, names=None):
+    """The observation as a mapping from term to its numbers."""
+    terms = terms_of(simulation.robot, tuple(f"a{i}" for i in range(len(action))), names)
+    whole = np.full(sum(term.size for term in terms), np.nan)
+    standing = type(simulation)(simulation.robot).state.support_polygon
+    world = simulation.world()
+
+    def view(kind, out):
+        return View(
+            robot=simulation.arrays,
+            state=simulation.state_arrays,
+            scales=scales(simulation.arrays, standing),
+            q_ref=q_ref,
+            v_ref=v_ref,
+            action=action,
+            views=world.views,
+            clock=world.clock,
+            pushes=world.pushes,
+            out=out,
+        )
+
+    run(observer(terms, whole, view))
+    ends = np.cumsum([term.size for term in terms])
+    return dict(zip([term.name for term in terms], np.split(whole, ends[:-1]), strict=True))
+
+
+@pytest.mark.parametrize("name", ["humanoid", "tall", "compact"])
+def test_every_term_is_what_its_name_says(name):
+    """At a pushed state that faces another way, each term equals its definition."""
+    simulation = generic_state(name)
+    state, r = simulation.state, robot(name)
+    rng = np.random.default_rng(1)
+    q_ref, v_ref = state.q + rng.normal(0, 0.1, len(state.q)), rng.normal(0, 0.5, len(state.q))
+    action = rng.uniform(-1.0, 1.0, 4)
+    terms = observed(simulation, q_ref, v_ref, action)
+
+    yaw = state.heading_yaw
+    assert abs(yaw) > 0.3  # else the frames would not be told apart
+    to_heading = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    polygon = type(simulation)(r).state.support_polygon
+    half = (polygon.max(axis=0) - polygon.min(axis=0)) / 2
+    h, g, m = r.height_com, 9.81, r.mass
+    omega = np.sqrt(g / h)
+
+    def ground(point):
+        return to_heading @ (point[:2] - state.origin[:2]) / half
+
+    def space(vector):
+        return np.append(to_heading @ vector[:2], vector[2])
+
+    expected = {
+        "com": ground(state.com),
+        "com_height": [(state.com[2] - state.origin[2] - h) / (0.1 * h)],
+        "capture_point": ground(state.capture_point),
+        "cop": ground(state.cop),
+        "com_vel": space(state.com_vel) / (0.2 * omega * h),
+        "angular_momentum": space(state.angular_momentum) / (0.1 * m * h**2 * omega),
+        "gravity": state.root_axes.T @ [0.0, 0.0, -1.0],
+        "root_rate": state.qvel[3:6] / omega,
+        "load": [state.contact_wrench[2] / (m * g) - 1.0],
+        "joint_pos": state.q - q_ref,
+        "joint_vel": (state.qvel[6:] - v_ref) / (3.0 * omega),
+        "contacts": state.contacts,
+        "last_action": action,
+    }
+    assert list(terms) == list(expected)
+    terms |= observed(simulation, q_ref, v_ref, action, ["root_vel"])
+    expected["root_vel"] = state.root_axes.T @ state.qvel[:3] / (0.2 * omega * h)
+    for term, value in expected.items():
+        np.testing.assert_allclose(terms[term], np.clip(value, -10, 10), atol=1e-9, err_msg=term)
+        if term != "contacts":
+            assert np.abs(terms[term]).max() > 1e-4, f"{term} is not tested at zero"
+
+
+def test_the_observation_does_not_depend_on_place_and_heading():
+    """A robot that stands elsewhere and faces another way sees the same."""
+    r = robot()
+    still = np.zeros(len(r.joint_names))
+    here = type(generic_state())(r)
+    there = type(here)(r)
+    qpos = r.standing_qpos.copy()
+    q = qpos[3:7].copy()
+    qpos[3:7] = np.cos(1.0) * q + np.sin(1.0) * np.array([-q[3], -q[2], q[1], q[0]])
+    cos, sin = np.cos(2.0), np.sin(2.0)
+    x, y = qpos[:2]
+    qpos[:2] = [3.0 + cos * x - sin * y, -2.0 + sin * x + cos * y]
+    there.reset(qpos)
+    assert abs(there.state.heading_yaw - 2.0) < 1e-9
+    a = observed(here, r.standing_qpos[7:], still, np.zeros(4))
+    b = observed(there, r.standing_qpos[7:], still, np.zeros(4))
+    for term in a:
+        np.testing.assert_allclose(a[term], b[term], atol=1e-4, err_msg=term)
+
+
+def test_the_observation_is_clipped():
+    """No entry leaves the observation space, however fast the robot."""
+    simulation = generic_state()
+    q = simulation.state.q
+    terms = observed(simulation, q - 50.0, np.full(len(q), 1e6), np.zeros(4))
+    assert np.all(terms["joint_pos"] == 10.0) and np.all(terms["joint_vel"] == -10.0)
+
+
+def test_scales_of_the_standing_robot():
+    """Half extents, height and rate are those of the robot."""
+    simulation = type(generic_state())(robot())
+    scale = scales(simulation.arrays, simulation.state.support_polygon)
+    polygon = simulation.state.support_polygon
+    assert 2 * scale.support_x == pytest.approx(np.ptp(polygon[:, 0]))
+    assert 2 * scale.support_y == pytest.approx(np.ptp(polygon[:, 1]))
+    assert scale.omega == pytest.approx(simulation.state.omega)
+    assert scale.weight == pytest.approx(robot().mass * 9.81)
+
+
+def test_the_table_has_one_row_per_index():
+    """Rows count from 0 and name the entries of each term."""
+    terms = terms_of(robot(), ("push",))
+    rows = observation_table(terms).splitlines()[2:]
+    assert [int(row.split("|")[1]) for row in rows] == list(range(sum(t.size for t in terms)))
+    assert rows[20].startswith(f"| 20 | joint_pos | {robot().joint_names[0]} | rad |")
+    assert rows[-1] == "| 64 | last_action | push | 1 | action of the step before |"
+
+
+def test_the_docstring_has_the_terms():
+    """A row for each term that there is, on by default or not."""
+    for kind in TERMS.values():
+        assert term_table([kind]).splitlines()[2] in TorqueBalanceEnv.__doc__, kind.name
+
+
+def test_the_configuration_chooses_the_terms():
+    """In the order of the list; extra ones come last; the mirror and the space follow."""
+    chosen = {"terms": ["last_action", "com"], "extra": ["gravity"]}
+    env = TorqueBalanceEnv(robot(), pushes=None, observation=chosen)
+    assert [term.name for term in env.terms] == ["last_action", "com", "gravity"]
+    nu = robot().model.nu
+    assert env.observation_space.shape == (nu + 2 + 3,)
+    observation, _ = env.reset(seed=0)
+    whole, _ = TorqueBalanceEnv(robot(), pushes=None).reset(seed=0)
+    np.testing.assert_array_equal(observation[nu:], [*whole[:2], *whole[13:16]])
+    observation = env.step(np.full(nu, 0.1))[0]
+    np.testing.assert_array_equal(observation[:nu], np.float32(0.1))
+    assert env.mirrors()[0].order.shape == env.observation_space.shape
+
+
+@pytest.mark.parametrize(
+    ("chosen", "error"),
+    [
+        ({"terms": ["com", "comm"]}, r"observation.terms: unknown term 'comm'.*com_height"),
+        ({"extra": ["push me"]}, r"observation.extra: unknown term 'push me'"),
+        ({"extra": ["com"]}, r"observation: 'com' comes twice"),
+        ({"terms": []}, r"observation.terms: needs at least one term"),
+        ({"terms": "com"}, r"observation.terms: must be a list"),
+    ],
+)
+def test_wrong_terms_are_refused(chosen, error):
+    """Unknown, twice or none; the line names the choices."""
+    with pytest.raises(ConfigError, match=error):
+        TorqueBalanceEnv(robot(), observation=chosen)
+
+
+def test_a_term_is_one_function():
+    """Whatever fills `out` can be a term: its entries, unit, meaning and image are told once."""
+    terms = Terms()
+
+    @terms.add(("n", "m"), "1", "squared", "number")
+    def square(v: View):
+        v.out[0], v.out[1] = v.action[0] ** 2, v.action[1] ** 2
+
+    (term,) = [kind.of({}) for kind in terms.choose(None)]
+    assert (term.name, term.size, term.unit) == ("square", 2, "1")
+    out, simulation = np.zeros(2), generic_state()
+    blank = np.zeros(1)
+
+    def view(kind, out):
+        scale = scales(simulation.arrays, simulation.state.support_polygon)
+        world = simulation.world()
+        action = np.array([3.0, 4.0])
+        return View(
+            simulation.arrays, simulation.state_arrays, scale, blank, blank, action,
+            world.views, world.clock, world.pushes, out,
+        )  # fmt: skip
+
+    run(observer([term], out, view))
+    assert out.tolist() == [9.0, 10.0]  # clipped
+    assert mirror_terms([term], {}).sign.tolist() == [1.0, 1.0]
+
+
+def test_the_push_that_acts_is_observed():
+    """Its force in the heading frame over the weight, while it acts; a half-sine's at its phase."""
+    env = TorqueBalanceEnv(robot(), pushes=None, observation={"terms": ["push"]})
+    still = np.zeros(env.action_space.shape)
+    pushes = [
+        {"force": 60.0, "direction": 90.0, "duration": 0.03, "start": 0.01},
+        {"force": 40.0, "duration": 0.04, "start": 0.07, "profile": "half-sine"},
+        {"delta_v": 0.1, "start": 0.2},
+    ]
+    observation, _ = env.reset(seed=0, options={"push": pushes})
+    seen = [observation, *(env.step(still)[0] for _ in range(5))]
+    left = np.array([0.0, 60.0, 0.0]) / (robot().mass * 9.81)
+    ahead = np.array([40.0 * np.sin(np.pi / 4), 0.0, 0.0]) / (robot().mass * 9.81)
+    for moment, force in zip(seen, (0.0, left, 0.0, 0.0, ahead, ahead), strict=True):
+        # 0.04 s is the end of the first push, 0.08 s and 0.1 s quarters of the second
+        np.testing.assert_allclose(moment, np.broadcast_to(force, 3), atol=0.01)

@@ -1,0 +1,93 @@
+"""Motions are performed: errors are small where the robot stands, and falls are counted."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.robot_clip import reference_from
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.retargeting.retarget import retarget
+from poise.configs.errors import ConfigError
+from poise.training.benchmark.trials.push_limits import load_limits
+from poise.training.motion.following.fastest import fastest
+from poise.training.motion.following.follow import follow
+from tests.support.physics import robot_named
+
+
+def test_a_captured_clip_is_followed() -> None:
+    """Both arms overhead: no fall, joints to 3°, bodies to 2 cm."""
+    robot = robot_named("humanoid")
+    clip = read_bvh(find_bvh("cmu02_reach_up")).clip
+    motion = reference_from(retarget(clip, robot).clip, robot, "test")
+    (trial,) = follow(motion, robot=robot, starts=1)
+    assert not trial.fallen and trial.solver_failures == 0
+    assert 0.0 < np.degrees(trial.joint_rms) < 3.0
+    assert 0.0 < trial.body_error < 0.02 and trial.body_error_root < 0.02
+
+
+def test_a_hard_push_is_a_fall_and_standing_is_none() -> None:
+    robot = robot_named("humanoid")
+    (fallen,) = follow("standing", robot=robot, starts=1, impulse=200.0)
+    assert fallen.fallen and fallen.push is not None and fallen.push["impulse"] == 200.0
+    (still,) = follow("standing", robot=robot, starts=1)
+    assert not still.fallen
+
+
+def test_standing_still_is_an_error_of_zero() -> None:
+    (still,) = follow("standing", robot=robot_named("humanoid"), starts=1)
+    assert still.body_error_last < 3e-3
+
+
+def test_what_follows_no_motion_is_said() -> None:
+    with pytest.raises(ConfigError, match="'zero' follows no motion"):
+        follow("standing", "zero", robot=robot_named("humanoid"), starts=1)
+    with pytest.raises(ConfigError, match="starts: must be at least 1"):
+        follow("standing", starts=0)
+    with pytest.raises(ConfigError, match="seed: must be at least 0"):
+        follow("standing", seed=-1)
+    with pytest.raises(ConfigError, match="share: give either an impulse or a share of J50"):
+        follow("standing", impulse=1.0, share=0.5)
+    with pytest.raises(ConfigError, match="share: no J50 of 'compact' was measured"):
+        follow("standing", robot=robot_named("compact"), share=0.5)
+
+
+def test_a_share_of_j50_is_that_of_the_direction() -> None:
+    robot = robot_named("humanoid")
+    table = load_limits(robot).table
+    assert table is not None
+    trials = follow("standing", robot=robot, starts=2, directions=2, share=0.3)
+    assert [trial.push["impulse"] for trial in trials if trial.push] == pytest.approx(
+        [0.3 * table(0.0), 0.3 * table(180.0)]
+    )
+    assert not any(trial.fallen for trial in trials)
+
+
+def test_the_fastest_tempo_is_the_last_one_before_falls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bisection on steps of 0.05; between 1 and a tenth where the motion's own tempo falls."""
+    for limit, wanted in ((1.32, 1.3), (1.0, 1.0), (9.0, 4.0), (0.43, 0.4), (0.01, 0.0)):
+        asked = []
+
+        def fake(*_, speed: float, limit: float = limit, asked: list = asked, **__) -> list:
+            asked.append(speed)
+            return [SimpleNamespace(fallen=speed > limit)]
+
+        monkeypatch.setattr("poise.training.motion.following.fastest.follow", fake)
+        assert fastest("squat") == pytest.approx(wanted)
+        assert len(asked) < 12
+
+
+def test_a_faster_motion_has_its_rates_and_the_impatient_stop_at_a_fall() -> None:
+    robot = robot_named("humanoid")
+    motion = load_motion("squat", robot)
+    fast = motion.at_speed(2.0)
+    assert fast.duration == pytest.approx(0.5 * motion.duration)
+    own, twice = motion.sample(1.0), fast.sample(0.5)
+    for name, factor in (("q_ref", 1), ("v_ref", 2), ("a_ref", 4), ("com_acc", 4), ("root_vel", 2)):
+        np.testing.assert_allclose(getattr(twice, name), factor * getattr(own, name), atol=1e-9)
+    trials = follow(motion, robot=robot, starts=2, impulse=200.0, speed=2.0, patient=False)
+    assert len(trials) == 1 and trials[0].fallen
+    with pytest.raises(ConfigError, match=r"tempo: must be from 0.1 to 10, not 0"):
+        follow(motion, robot=robot, speed=0.0)

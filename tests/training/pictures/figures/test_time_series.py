@@ -1,0 +1,156 @@
+"""Pictures over time: a training run and one trial."""
+
+import numpy as np
+import pytest
+
+from poise.training.pictures.figures import style
+from poise.training.pictures.figures.time_series import FAR, training_curve, trial_timeseries
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """The figures that were drawn, for a look at their artists."""
+    drawn = []
+
+    class Recorded(style.Figure):
+        def __init__(self, *args, **kwargs):
+            super().__init__(*args, **kwargs)
+            drawn.append(self)
+
+    monkeypatch.setattr(style, "Figure", Recorded)
+    return drawn
+
+
+def rows():
+    """A log with rollouts at every entry and evaluations at every fifth."""
+    log = []
+    for k in range(20):
+        row = {"steps": 1000.0 * k, "rollout_rate": 0.02 * k, "reward": 1.0 + k}
+        if k % 5 == 0:
+            rate = 0.03 * k
+            row |= {
+                "evaluation_rate": rate,
+                "evaluation_rate_low": rate - 0.1,
+                "evaluation_rate_high": rate + 0.1,
+            }
+        log.append(row)
+    return log
+
+
+def trial(n=500):
+    """Two seconds of a trial: time and all signals."""
+    t = np.arange(n) * 0.004
+    sway = 0.05 * np.sin(3 * t)
+    line = np.stack([sway, 0.5 * sway], axis=1)
+    support = np.tile([[-0.1, 0.16], [-0.13, 0.13]], (n, 1, 1))
+    torque = np.where((t > 0.5) & (t < 0.8), 1.0, 0.3)
+    signals = {"com": line, "cop": 1.5 * line, "capture_point": 2 * line}
+    return t, signals | {"support": support, "torque": torque}
+
+
+def by_label(ax):
+    """The artists of the axes by their label."""
+    handles, labels = ax.get_legend_handles_labels()
+    return dict(zip(labels, handles, strict=True))
+
+
+def test_rates_share_a_panel_and_others_have_their_own(tmp_path, figures):
+    """Rates are in the top panel, the reward below, and band columns are no lines."""
+    training_curve(tmp_path / "a.png", rows(), baseline=0.3)
+    top, below = figures[0].axes
+    assert set(by_label(top)) == {"rollout rate", "evaluation rate", "baseline"}
+    assert set(by_label(below)) == {"reward"}
+    assert len(top.collections) == 1
+
+
+def test_rare_evaluations_are_joined(tmp_path, figures):
+    """The evaluation line has just the entries that hold one."""
+    training_curve(tmp_path / "a.png", rows())
+    line = by_label(figures[0].axes[0])["evaluation rate"]
+    assert line.get_xdata().tolist() == [0.0, 5000.0, 10000.0, 15000.0]
+    np.testing.assert_allclose(line.get_ydata(), [0, 0.15, 0.3, 0.45])
+
+
+def test_a_run_without_rates_is_drawn(tmp_path, figures):
+    """Any numeric column can be drawn over any other."""
+    training_curve(tmp_path / "a.png", [{"epoch": 1, "loss": 2.0}, {"epoch": 2}], x="epoch")
+    assert len(figures[0].axes) == 1
+    assert figures[0].axes[0].get_xlabel() == "epoch"
+
+
+@pytest.mark.parametrize("bad", [[], [{"steps": 1.0}], [{"reward": 1.0}]])
+def test_a_log_without_columns_is_refused(tmp_path, bad):
+    """An empty log, or one with nothing to draw, is an error and writes nothing."""
+    with pytest.raises(ValueError, match="steps"):
+        training_curve(tmp_path / "a.png", bad)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_trial_shows_its_signals_against_the_support(tmp_path, figures):
+    """Each panel holds one axis of every signal, the support, and the push."""
+    t, signals = trial()
+    trial_timeseries(tmp_path / "a.png", t, signals, pushes=[(0.5, 0.1), (1.0, 0.2)])
+    for axis, ax in enumerate(figures[0].axes[:2]):
+        artists = by_label(ax)
+        assert set(artists) == {
+            "support",
+            "capture point",
+            "centre of mass",
+            "centre of pressure",
+            "push",
+        }
+        np.testing.assert_allclose(artists["centre of mass"].get_ydata(), signals["com"][:, axis])
+        reach = artists["support"].get_paths()[0].vertices[:, 1]
+        np.testing.assert_allclose([reach.min(), reach.max()], signals["support"][0, axis])
+    pushes = [(p.get_x(), p.get_width()) for p in figures[0].axes[2].patches]
+    np.testing.assert_allclose(pushes, [(0.5, 0.1), (1.0, 0.2)])
+
+
+def test_saturation_is_shaded_where_it_is(tmp_path, figures):
+    """The torque panel marks the time at the limit, and nothing if there is none."""
+    t, signals = trial()
+    trial_timeseries(tmp_path / "a.png", t, signals)
+    marked = by_label(figures[0].axes[2])["motor at its limit"].get_paths()[0].vertices[:, 0]
+    assert marked.min() == pytest.approx(0.5, abs=0.01)
+    assert marked.max() == pytest.approx(0.8, abs=0.01)
+    trial_timeseries(tmp_path / "a.png", t, signals | {"torque": np.full(t.size, 0.5)})
+    assert "motor at its limit" not in by_label(figures[1].axes[2])
+
+
+def test_a_fall_does_not_flatten_the_rest(tmp_path, figures):
+    """A CoM metres away leaves the support readable; without a fall nothing is cut off."""
+    t, signals = trial()
+    trial_timeseries(tmp_path / "a.png", t, signals)
+    bottom, top = figures[0].axes[0].get_ylim()
+    assert bottom < -0.1 and 0.16 < top < 0.2
+    trial_timeseries(tmp_path / "a.png", t, signals | {"com": signals["com"] + 5 * t[:, None]})
+    bottom, top = figures[1].axes[0].get_ylim()
+    assert bottom < -0.1 and 0.16 + FAR <= top < 0.16 + FAR + 0.1
+
+
+def test_gaps_and_missing_signals_are_drawn(tmp_path):
+    """NaN (no contact) and a trial with only some signals are fine."""
+    t, signals = trial()
+    signals["cop"][200:] = np.nan
+    signals["support"][200:] = np.nan
+    trial_timeseries(tmp_path / "a.png", t, signals)
+    trial_timeseries(tmp_path / "b.png", t, {"com": signals["com"]})
+    assert (tmp_path / "b.png").stat().st_size > 10_000
+
+
+def test_the_legend_is_not_cut_off(tmp_path, figures):
+    """With every signal, the legend fits into the picture and covers no axes."""
+    t, signals = trial()
+    trial_timeseries(tmp_path / "a.png", t, signals, pushes=[(0.5, 0.1)])
+    training_curve(tmp_path / "b.png", rows(), baseline=0.3)
+    for figure in figures:
+        box = figure.legends[0].get_window_extent()
+        assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0
+        assert not any(box.overlaps(ax.get_tightbbox()) for ax in figure.axes)
+
+
+def test_unknown_signals_are_refused(tmp_path):
+    """A misspelt signal is an error that names the known ones."""
+    with pytest.raises(ValueError, match="capture_point"):
+        trial_timeseries(tmp_path / "a.png", [0.0, 1.0], {"zmp": np.zeros((2, 2))})
+    assert not list(tmp_path.iterdir())

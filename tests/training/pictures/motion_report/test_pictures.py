@@ -1,0 +1,143 @@
+"""Pictures of graphs, scripts and performances: what is drawn is what the data hold."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.motion.feasibility.check import check_motion
+from poise.baselines.motion.graphs.motion_graph import (
+    GraphClip,
+    MotionGraph,
+    Thresholds,
+    Transition,
+)
+from poise.configs.errors import ConfigError
+from poise.training.motion.following.follow import follow
+from poise.training.pictures.motion_report.graph_chart import (
+    best_transitions,
+    circle_chart,
+    graph_pictures,
+    matrix_chart,
+)
+from poise.training.pictures.motion_report.over_time import errors_picture, zmp_picture
+from poise.training.pictures.motion_report.page import check_page, write_page
+from poise.training.pictures.motion_report.performance import Watched
+from poise.training.pictures.motion_report.timeline import layers_of, timeline_picture
+from tests.support.physics import robot_named
+from tests.support.robot_clips import ahead_clip
+
+NAMES = ("stand", "squat <deep>", "walk")
+GRAPH = MotionGraph(
+    "", Thresholds(), tuple(GraphClip(name, "", 3.0) for name in NAMES),
+    transitions=(Transition("stand", NAMES[1], 3.0, 0.0, 0.4, 8.0),
+                 Transition("stand", NAMES[1], 2.0, 0.0, 0.2, 2.0),
+                 Transition(NAMES[1], "stand", 3.0, 0.0, 0.2, 0.0)),
+    refused=((NAMES[1], "walk", "other feet are planted"), ("stand", "walk", "K = 41 > 20"),
+             ("walk", "stand", "never, by the expert's weights"),
+             ("walk", "walk", "knee turns by 140° > 120°")),
+)  # fmt: skip
+
+
+def test_the_matrix_has_every_pair_and_the_reasons() -> None:
+    table = best_transitions(GRAPH)
+    assert table[0, 1] == 2.0 and table[1, 0] == 0.0 and np.isnan(table[0, 2])
+    drawing = ElementTree.fromstring(str(matrix_chart(GRAPH)))
+    cells = [e for e in drawing.iter("rect") if "cell" in e.get("class", "")]
+    assert len(cells) == 9 and sum("yes" in e.get("class", "") for e in cells) == 2
+    kinds = {e.get("class") for e in drawing.iter("g")}
+    assert {"mark-k", "mark-feet", "mark-never", "mark-turn"} <= kinds
+    titles = {e.text for e in drawing.iter("title")}
+    assert "squat <deep> → walk: other feet are planted" in titles
+
+
+def test_the_circle_names_every_clip_and_has_an_arrow_for_each_pair() -> None:
+    drawing = ElementTree.fromstring(str(circle_chart(GRAPH)))
+    assert {e.text for e in drawing.iter("text")} == set(NAMES)
+    assert sum(e.get("class") == "arrow" for e in drawing.iter("path")) == 2
+    apart = [e for e in drawing.iter("circle") if "apart" in e.get("class", "")]
+    assert len(apart) == 1  # walk: nobody leads there
+
+
+def test_without_any_transition_there_is_still_a_picture() -> None:
+    alone = replace(GRAPH, transitions=())
+    assert [p.title for p in graph_pictures(alone)] == ["Which clip may follow which", "The graph"]
+
+
+def test_a_timeline_has_a_row_for_each_layer_and_the_durations_of_transitions() -> None:
+    assert layers_of("squat | punch on arms") == ["squat", "punch on arms"]
+    assert layers_of("(squat | punch on arms) [0.7:6.6]") == ["squat", "punch on arms"]
+    assert layers_of("squat [1:2] mirrored") == ["squat [1:2] mirrored"]
+    assert layers_of("any: thing") == ["any: thing"]
+    part = {"enter": 0.0, "leave": 1.0, "wanted": True, "coefficient": None}
+    physics = {"zmp_inside": 0.05, "torque": 0.7, "bent": True, "through_standing": False}
+    record = {"duration": 5.0, "played": [
+        {**part, "what": "squat | punch on arms", "begins": 0.0, "ends": 2.0},
+        {**part, "what": "physical", "begins": 2.0, "ends": 2.6, "coefficient": 1.0,
+         "physics": physics},
+        {**part, "what": "stand", "begins": 2.6, "ends": 5.0},
+    ]}  # fmt: skip
+    drawing = ElementTree.fromstring(str(timeline_picture(record).svg))
+    boxes = [e for e in drawing.iter("rect") if e.get("class") == "clip"]
+    assert [float(e.get("width", 0)) for e in boxes] == pytest.approx(
+        [926 * s / 5.0 for s in (2.0, 2.0, 2.4)], abs=0.1
+    )
+    said = {e.text for e in drawing.iter("title")}
+    assert "physical, 0.60 s, ZMP 5.0 cm inside, torque 70%, bent" in said
+    assert "over 1" in {e.text for e in drawing.iter("text")}
+    for wrong in ({}, {"played": [{}]}, {"played": "x", "duration": 1.0}, []):
+        with pytest.raises(ConfigError, match="holds no record of a script"):
+            timeline_picture(wrong)
+
+
+def test_a_performance_is_seen_with_its_push(tmp_path: Path) -> None:
+    """The push moves β and the errors; the measured CoP is where the motion's ZMP is before it."""
+    robot, watched = robot_named("humanoid"), Watched()
+    motion = load_motion("bow", robot)
+    (trial,) = follow(motion, robot=robot, starts=1, impulse=12.0, watch=watched)
+    trace = watched.tracers[0].trace()
+    ((start, length),) = trace.pushes
+    before = (trace.time > start - 0.3) & (trace.time < start)
+    after = (trace.time > start + length) & (trace.time < start + 0.5)
+    assert trace.bodies[after].max() > 2.0 * trace.bodies[before].max()
+    assert trace.beta[after].min() < 0.9 < trace.beta[before].min()
+    assert np.allclose(trace.tempo, 1.0) and not trace.fallen and not trial.fallen
+    counted = (trace.time > 0.01) & (trace.time < motion.duration + 0.5)
+    assert trace.bodies[counted].mean() == pytest.approx(trial.body_error, rel=0.02)
+    judged = check_motion(motion, robot)
+    middle = judged.support.mean(axis=0)
+    zmp = np.interp(trace.time[before], judged.times, judged.zmp[:, 0] - middle[0])
+    assert np.abs(trace.cop[before, 0] - zmp).mean() < 0.02
+    path = tmp_path / "page.html"
+    pictures = [errors_picture(trace), zmp_picture(judged, trace)]
+    write_page(path, "a <title>", "lead", pictures)
+    text = path.read_text()
+    assert "a &lt;title&gt;" in text and text.count("<svg") == 2 and "prefers-color-scheme" in text
+    assert not re.search(r"(src|href)=", text)
+
+
+def test_the_soles_of_steps_are_those_that_are_planted() -> None:
+    """Both, one, both, the other one, both: to the side five boxes. Ahead one sole beside the other
+    reaches as far as both, so there are three, the last one further up than the first."""
+    robot = robot_named("humanoid")
+    judged = check_motion(ahead_clip(robot), robot)
+    drawing = ElementTree.fromstring(str(zmp_picture(judged).svg))
+    boxes = [e for e in drawing.iter("rect") if e.get("class") == "support"]
+    assert len(boxes) == 8
+    first, apart, last = ([float(box.get(name, 0)) for name in ("y", "height")]
+                          for box in boxes[:3])  # fmt: skip
+    assert last[0] < first[0] - 10.0 and last[1] == pytest.approx(first[1], abs=1.0)
+    assert apart[0] == pytest.approx(last[0], abs=1.0) and apart[1] > first[1] + 10.0
+    sides = [float(box.get("height", 0)) for box in boxes[3:]]
+    assert max(sides[1], sides[3]) < 0.6 * min(sides[0], sides[2], sides[4])
+
+
+def test_the_page_is_html() -> None:
+    with pytest.raises(ConfigError, match=r"x.png: must be the name of a .html file"):
+        check_page(Path("x.png"))

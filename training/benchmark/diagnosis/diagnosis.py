@@ -1,0 +1,207 @@
+"""Why a trial was lost: the criterion, and what went wrong before it, each with its time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.mdp.termination import has_diverged, uprightness
+from poise.envs.robots.robot import Robot
+
+from .record import Course
+
+FULL = 0.999  # of a motor's limit
+FULL_STEPS = 2  # policy steps in a row for which a motor must be full to count
+SLIPPED = 0.03  # [m] that a sole moves while it stands
+MISSED = 0.05  # [m] from where a foot lands to where it was to land
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Why a trial was lost; times in s after the reset, None where there is no such thing.
+
+    Attributes:
+        loss: which criterion it failed: "height" (the CoM too low), "tilt" (the root too far),
+            "contact" (more than the feet on the ground), "diverged" (numbers too large), "not
+            quiet" (on its feet, but not upright and at rest at the end), "off command" (a walk that
+            did not go on as commanded), "motion" (a fall from a motion), "error".
+        loss_body: body that touched the ground, where that is the criterion.
+        full_motor: motor between root and soles that was first at its limit after the first push,
+            for 2 policy steps or more in a row. Arms are swung as hard as they can be, which is no
+            reason to fall.
+        full_from: when that began.
+        full_time: how long it lasted then.
+        capture_left: when the capture point left the support for the last time.
+        capture_outside: how far outside it came at most from then on [m].
+        foothold: "slipped" (a sole moved by 3 cm while it stood) or "missed" (a foot landed 5 cm or
+            more from where it was to land), whichever came first.
+        foothold_time: when.
+        foothold_error: how far [m].
+        failures_from: when the controller's solver first failed.
+        hardware: what sensors or motors did where a suite's conditions say that they are not
+            perfect; in words.
+    """
+
+    loss: str | None = None
+    loss_body: str | None = None
+    full_motor: str | None = None
+    full_from: float | None = None
+    full_time: float | None = None
+    capture_left: float | None = None
+    capture_outside: float | None = None
+    foothold: str | None = None
+    foothold_time: float | None = None
+    foothold_error: float | None = None
+    failures_from: float | None = None
+    hardware: str | None = None
+
+
+COLUMNS = tuple(Diagnosis.__dataclass_fields__)
+
+
+def diagnose(env: BalanceEnv, course: Course, start: float, loss: str) -> Diagnosis:
+    """Why the trial that has just ended in `env` was lost.
+
+    Args:
+        env: as it is after the trial.
+        course: of the trial.
+        start: of the first push or kick; 0 without one [s].
+        loss: the criterion of a trial that did not end by a fall.
+    """
+    found = Diagnosis(loss=loss)
+    if env.fallen:
+        found = _fall(env, loss)
+    for part in (_full(env, course, start), _capture(course), _foothold(course, start)):
+        found = replace(found, **part)
+    failed = np.flatnonzero(course.failures > 0)
+    return replace(found, failures_from=_time(course, failed[0]) if len(failed) else None)
+
+
+def _fall(env: BalanceEnv, loss: str) -> Diagnosis:
+    """The criterion of `has_fallen` that is met, in the order in which it asks."""
+    s, arrays = env.simulation.state_arrays, env.simulation.arrays
+    if has_diverged(env.simulation.views):
+        return Diagnosis("diverged")
+    if s.com[2] - s.origin[2] < env.limits.height:
+        return Diagnosis("height")
+    if uprightness(arrays, s) < env.limits.cos_tilt:
+        return Diagnosis("tilt")
+    if env.limits.ground_contact and s.other_contacts[0] > 0.5:
+        return Diagnosis("contact", loss_body=touching_body(env))
+    return Diagnosis(loss)
+
+
+def touching_body(env: BalanceEnv) -> str | None:
+    """The first body that is no foot and touches the ground."""
+    model, data = env.model, env.data
+    feet = {sole.body_id for sole in env.robot.soles}
+    for contact in data.contact[: data.ncon]:
+        bodies = [int(model.geom_bodyid[geom]) for geom in contact.geom]
+        others = [body for body in bodies if model.body_weldid[body] != 0]
+        if len(others) == 1 and others[0] not in feet:
+            return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, others[0])
+    return None
+
+
+def _full(env: BalanceEnv, course: Course, start: float) -> dict[str, Any]:
+    """The motor that was first full, from when and for how long."""
+    full = (course.load > FULL) & (course.time > start)[:, None] & bearing(env.robot)
+    runs = np.zeros(full.shape, dtype=int)  # rows in a row, the last one's included
+    for k in range(1, len(full)):
+        runs[k] = np.where(full[k], runs[k - 1] + 1, 0)
+    lasting = np.argwhere(runs == FULL_STEPS)
+    if not len(lasting):
+        return {}
+    row = lasting[:, 0].min()
+    motors = lasting[lasting[:, 0] == row, 1]
+    lengths = {int(motor): _length(full[row:, motor]) for motor in motors}
+    motor = max(lengths, key=lambda each: lengths[each])
+    period = env.config.policy_period
+    return {
+        "full_motor": env.robot.motor_names[motor],
+        "full_from": _time(course, row - FULL_STEPS + 1),
+        "full_time": round((lengths[motor] + FULL_STEPS - 1) * period, 6),
+    }
+
+
+def bearing(robot: Robot) -> np.ndarray:
+    """(nu,) whether a motor is between the root and a sole."""
+    model = robot.model
+    between = set()
+    for sole in robot.soles:
+        body = sole.body_id
+        while body not in (0, robot.root_body_id):
+            between.add(body)
+            body = int(model.body_parentid[body])
+    bodies = model.dof_bodyid[np.array(robot.motor_dofs)]
+    return np.isin(bodies, list(between))
+
+
+def _length(full: np.ndarray) -> int:
+    """Rows until a motor is no longer full."""
+    ends = np.flatnonzero(~full)
+    return int(ends[0]) if len(ends) else len(full)
+
+
+def _capture(course: Course) -> dict[str, Any]:
+    """When the capture point left the support for the last time, and how far it came."""
+    pairs = zip(course.supports, course.capture_point, strict=True)
+    outside = np.array([distance_outside(polygon, point) for polygon, point in pairs])
+    inside = np.flatnonzero(outside <= 0.0)
+    row = int(inside[-1]) + 1 if len(inside) else 0
+    beyond = outside[row:]
+    beyond = beyond[np.isfinite(beyond)]
+    if not len(beyond):
+        return {}
+    return {"capture_left": _time(course, row), "capture_outside": round(float(beyond.max()), 6)}
+
+
+def distance_outside(polygon: np.ndarray, point: np.ndarray) -> float:
+    """How far a point is outside a convex polygon (k, 2) [m]: 0 within, NaN of no polygon."""
+    if len(polygon) < 3:  # no foot touches the ground, or one with an edge
+        ways = np.linalg.norm(polygon - point, axis=1)
+        return float(ways.min()) if len(ways) else float("nan")
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    away = point - polygon
+    side = edges[:, 0] * away[:, 1] - edges[:, 1] * away[:, 0]
+    if np.all(side >= 0.0) or np.all(side <= 0.0):
+        return 0.0
+    length = np.maximum(np.sum(edges**2, axis=1), 1e-18)
+    along = np.clip(np.sum(edges * away, axis=1) / length, 0.0, 1.0)
+    return float(np.linalg.norm(away - along[:, None] * edges, axis=1).min())
+
+
+def _foothold(course: Course, start: float) -> dict[str, Any]:
+    """The first sole after the first push that slipped, or that landed where it should not."""
+    for row in range(1, len(course.time)):
+        if course.time[row] <= start:
+            continue
+        for foot in range(course.soles.shape[1]):
+            name, error = _step_fault(course, row, foot)
+            if name:
+                return {"foothold": name, "foothold_time": _time(course, row),
+                        "foothold_error": round(error, 6)}  # fmt: skip
+    return {}
+
+
+def _step_fault(course: Course, row: int, foot: int) -> tuple[str, float]:
+    """What is wrong with a foot at a row, and by how much; empty if nothing is."""
+    if not course.contacts[row, foot]:
+        return "", 0.0
+    if not course.contacts[row - 1, foot]:
+        planned = course.swinging[row - 1] == foot
+        error = float(np.linalg.norm(course.soles[row, foot] - course.foothold[row - 1]))
+        return ("missed", error) if planned and error > MISSED else ("", 0.0)
+    since = row
+    while since > 0 and course.contacts[since - 1, foot]:
+        since -= 1
+    moved = float(np.linalg.norm(course.soles[row, foot] - course.soles[since, foot]))
+    return ("slipped", moved) if moved > SLIPPED else ("", 0.0)
+
+
+def _time(course: Course, row: int) -> float:
+    return round(float(course.time[row]), 6)

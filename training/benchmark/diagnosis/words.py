@@ -1,0 +1,110 @@
+"""A diagnosis in words: one line on a trial, a few words to count trials by."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from poise.envs.physics.pushes.push import Kick, Push
+from poise.training.running.summary import Loss
+
+from .diagnosis import COLUMNS, Diagnosis
+
+LOSSES = {
+    "height": "fell: its CoM sank too low",
+    "tilt": "fell: its trunk tilted too far",
+    "contact": "fell: {body} touched the ground",
+    "diverged": "the simulation diverged",
+    "not quiet": "stood at the end, but was not upright and at rest",
+    "off command": "did not walk on as commanded",
+    "motion": "fell from the motion",
+    "error": "the controller raised an error",
+}
+DIRECTIONS = ("forward", "forward left", "left", "backward left", "backward", "backward right",
+              "right", "forward right")  # fmt: skip
+SIDE = re.compile(r"(^|_)(left|right|l|r)(?=_|$)")
+
+
+def diagnosis_of(line: Mapping[str, str]) -> Diagnosis:
+    """The diagnosis in a line of trials.csv; empty where older results have none."""
+    numbers = {name for name, hint in Diagnosis.__annotations__.items() if "float" in hint}
+    given: dict[str, Any] = {name: line.get(name) or None for name in COLUMNS}
+    for name in numbers:
+        given[name] = None if given[name] is None else float(given[name])
+    return Diagnosis(**given)
+
+
+def why(d: Diagnosis, fall_time: float | None = None) -> str:
+    """What is known of a lost trial, in the order of time; empty of one that was recovered."""
+    if d.loss is None:
+        return ""
+    end = LOSSES.get(d.loss, d.loss).format(body=d.loss_body or "a body")
+    if fall_time is not None and d.loss not in ("not quiet", "off command"):
+        end += f" at {fall_time:.2f} s"
+    told: list[tuple[float, str]] = []
+    if d.full_motor is not None and d.full_from is not None:
+        told.append((d.full_from, f"{d.full_motor} at its limit from {d.full_from:.2f} s, for "
+                                  f"{d.full_time:.2f} s"))  # fmt: skip
+    if d.failures_from is not None:
+        told.append((d.failures_from, f"no solution of its QP from {d.failures_from:.2f} s on"))
+    if d.foothold is not None and d.foothold_time is not None:
+        told.append((d.foothold_time, f"foothold {d.foothold} by {d.foothold_error:.2f} m at "
+                                      f"{d.foothold_time:.2f} s"))  # fmt: skip
+    if d.capture_left is not None:
+        told.append((d.capture_left, "capture point outside of the support for good from "
+                     f"{d.capture_left:.2f} s, by {d.capture_outside:.2f} m at most"))  # fmt: skip
+    if d.hardware is not None:
+        told.append((float("inf"), d.hardware))
+    before = "; ".join(text for _, text in sorted(told))
+    return f"{end}. Before: {before}." if before else f"{end}."
+
+
+def cause(d: Diagnosis, steps: int) -> str:
+    """The cause of a loss in a few words, without numbers and sides, to count by."""
+    if d.loss in ("diverged", "error"):
+        return LOSSES[d.loss]
+    first = "no motor of the legs at its limit"
+    if d.hardware is not None:
+        first = d.hardware
+    elif d.full_motor is not None:
+        first = f"{SIDE.sub('', d.full_motor).strip('_')} at its limit"
+    if d.failures_from is not None and d.failures_from <= (d.full_from or float("inf")):
+        first = "QP without a solution"
+    then = {0: "no step", 1: "one step was not enough"}.get(steps, "its steps were not enough")
+    slipped = d.foothold == "slipped" and (d.foothold_time or 0.0) <= (d.capture_left or 0.0)
+    if slipped or d.foothold == "missed":  # a sole that slips later is one of a robot that falls
+        then = f"a foothold {d.foothold}"
+    if d.loss == "not quiet":
+        then = "did not come to rest"
+    if d.loss == "off command":
+        then = "left its command"
+    return f"{first}, then {then}"
+
+
+def losses(lost: Iterable[tuple[Diagnosis, int]]) -> list[Loss]:
+    """The causes of lost trials (diagnosis, steps), the most frequent one first."""
+    counts = Counter(cause(d, steps) for d, steps in lost if d.loss is not None)
+    return [{"cause": name, "trials": count} for name, count in counts.most_common()]
+
+
+def told_losses(found: list[Loss], most: int = 3) -> str:
+    """The most frequent causes in a line: of 57 losses 31: …; 9: …"""
+    total = sum(loss["trials"] for loss in found)
+    some = "; ".join(f"{loss['trials']}: {loss['cause']}" for loss in found[:most])
+    return f"of {total} losses {some}" if found else ""
+
+
+def push_told(push: Push | Kick) -> str:
+    """A push or a kick in words."""
+    where = f"{push.direction:g}° ({towards(push.direction)}), at {push.start:.2f} s"
+    if isinstance(push, Kick):
+        return f"a kick of {push.delta_v:.2f} m/s towards {where}"
+    return (f"a push of {push.impulse:.1f} N·s in {push.duration:.2f} s on {push.body} towards "
+            f"{where}")  # fmt: skip
+
+
+def towards(direction: float) -> str:
+    """The name of the nearest of eight directions [deg]."""
+    return DIRECTIONS[round(direction / 45.0) % len(DIRECTIONS)]

@@ -1,0 +1,107 @@
+"""Jobs tell a process what to play, and `play` plays it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.reference_motion import ReferenceMotion
+from poise.baselines.balance.references.tempo import Tempo
+from poise.envs.balance.config import StartNoise
+from poise.envs.robots.robot import Robot, load_robot
+from poise.training.motion.tracking.record import ANYWHERE
+
+from .agents import Agent, load_agent
+from .play import run_trial
+from .trial import Outcome, Trial, failed
+from .variants import AgentVariants
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The robot, duration and noise that all trials of a suite share.
+
+    Attributes:
+        robot: name or path.
+        duration: of a trial [s].
+        noise: of the start.
+        motions: name and file (or packaged name) of each motion that trials perform. Falls are
+            relative to these then.
+        tempo: at which they are played.
+    """
+
+    robot: str | Path
+    duration: float
+    noise: StartNoise
+    motions: tuple[tuple[str, str], ...] = ()
+    tempo: Tempo = field(default_factory=Tempo)
+
+    def load(self, controller: str, robot: Robot | None = None) -> Agent:
+        """The agent of this name; `robot` if it is loaded. Raises ConfigError."""
+        robot = robot or _robot(self.robot)
+        given: dict[str, Any] = {"duration": self.duration, "pushes": None, "noise": self.noise}
+        if self.motions:
+            given["fall"] = ANYWHERE
+        if self.tempo.waits:
+            given["tempo"] = self.tempo
+        return load_agent(controller, robot, **given)
+
+    def motion(self, trial: Trial, robot: Robot | None = None) -> ReferenceMotion | None:
+        """The motion that a trial performs, or None. Raises ConfigError."""
+        if trial.motion is None:
+            return None
+        return load_motion(dict(self.motions)[trial.motion], robot or _robot(self.robot))
+
+
+@dataclass(frozen=True)
+class Job:
+    """One trial for one controller, by the name that `load_agent` takes."""
+
+    stage: Stage
+    controller: str
+    trial: Trial
+
+
+def play(job: Job) -> Outcome:
+    """Play a job; what the controller raises while it plays becomes the outcome's `error`.
+
+    Raises PoiseError when the controller cannot be loaded here: that is no trial.
+    """
+    variants = _loaded(job.stage, job.controller)
+    motion = _motion(job.stage, job.trial)
+    try:
+        agent = variants.under(job.trial.conditions, job.trial.terrain, motion)
+        return run_trial(agent, job.trial)
+    except MemoryError:  # of this process, not of the controller
+        raise
+    except Exception as error:  # a controller from outside may raise anything
+        del _variants[job.stage, job.controller]  # it may be broken: the next trial gets a new one
+        return failed(error)
+
+
+def _motion(stage: Stage, trial: Trial) -> ReferenceMotion | None:
+    key = (stage, trial.motion)
+    if key not in _motions:
+        _motions[key] = stage.motion(trial)
+    return _motions[key]
+
+
+_motions: dict[tuple[Stage, str | None], ReferenceMotion | None] = {}  # of this process
+
+
+@lru_cache(maxsize=1)
+def _robot(name: str | Path) -> Robot:
+    return load_robot(name)
+
+
+_variants: dict[tuple[Stage, str], AgentVariants] = {}  # of this process
+
+
+def _loaded(stage: Stage, controller: str) -> AgentVariants:
+    key = (stage, controller)
+    if key not in _variants:
+        _variants[key] = AgentVariants(stage.load(controller))
+    return _variants[key]

@@ -1,0 +1,96 @@
+"""The figures of a policy's card, each read from a result that exists."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from poise.configs.errors import ConfigError
+from poise.configs.reading import is_folder
+from poise.envs.robots.robot import Robot
+from poise.training.benchmark.results.summary import read_summary
+from poise.training.benchmark.trials.agents import load_agent
+from poise.training.learning.policy import Policy
+from poise.training.running.files import SUMMARY
+from poise.training.running.summary import Entry, Summary
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number of a result.
+
+    Attributes:
+        key: what it is, as a word.
+        name: the same for a reader.
+        value: the number.
+        text: the number for a reader, with its interval and unit.
+        source: where it was measured.
+    """
+
+    key: str
+    name: str
+    value: float
+    text: str
+    source: str
+
+
+def figures(policy: Policy, name: str, robot: Robot, result: str | Path | None) -> list[Figure]:
+    """What the run's own evaluation says of this policy, then what `result` says.
+
+    `result` is a folder of `poise evaluate` or `poise benchmark`, or its summary.json.
+
+    Raises ConfigError for another file, or one in which this very policy (by its fingerprint) did
+    not take part.
+    """
+    found = _of_training(policy)
+    if result is not None:
+        found += _of_result(load_agent(name, robot).fingerprint, Path(result))
+    return found
+
+
+def _of_training(policy: Policy) -> list[Figure]:
+    """Recovered and fallen of the held-out pushes that this checkpoint met, if it met any."""
+    rows = policy.state.get("evaluations")
+    row = next((r for r in rows if _met(r, policy)), None) if isinstance(rows, list) else None
+    if row is None:
+        return []
+    source = f"{policy.config.evaluation.trials} held-out pushes during training"
+    return [
+        Figure(key, f"{key}, {source}", row[key], f"{row[key]:.1%}", source)
+        for key in ("recovered", "fallen")
+        if isinstance(row.get(key), float) and 0.0 <= row[key] <= 1.0
+    ]
+
+
+def _met(row: object, policy: Policy) -> bool:
+    return isinstance(row, Mapping) and row.get("timesteps") == policy.state["timesteps"]
+
+
+def _of_result(fingerprint: str, path: Path) -> list[Figure]:
+    path = path / SUMMARY if is_folder(path) else path
+    summary = read_summary(path)
+    entry = _entry(summary, fingerprint, path)
+    source = f"suite {summary['suite']}, seed {summary['seed']}, robot {summary['robot']['name']}"
+    low, high = entry["recovered_ci95"]
+    rate = f"{entry['recovered_rate']:.1%} of {entry['trials']}"
+    found = [Figure("recovered_rate", f"recovered, {source}", entry["recovered_rate"],
+                    f"{rate}, 95 % {_interval(low, high, '.1%')}", source)]  # fmt: skip
+    if "j50_mean" in entry and "j50_mean_ci95" in entry:
+        low, high = entry["j50_mean_ci95"]
+        text = f"{entry['j50_mean']:.1f} N·s, 95 % {_interval(low, high, '.1f')}"
+        name = f"mean J50 [N·s], {source}"
+        found.append(Figure("j50_mean", name, entry["j50_mean"], text, source))
+    return found
+
+
+def _interval(low: float | None, high: float | None, form: str) -> str:
+    return " to ".join("unknown" if end is None else f"{end:{form}}" for end in (low, high))
+
+
+def _entry(summary: Summary, fingerprint: str, path: Path) -> Entry:
+    for entry in summary["controllers"].values():
+        if entry.get("fingerprint") == fingerprint:
+            return entry
+    raise ConfigError("this policy took no part: no controller has its fingerprint", source=path,
+                      field="controllers", choices=summary["controllers"])  # fmt: skip

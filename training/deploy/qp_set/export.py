@@ -1,0 +1,246 @@
+"""A set of whole-body QPs from real push recoveries, in the files of `qpsolvers.Problem`.
+
+From each trial of `recordings.py`, ticks spread evenly over the two seconds after the push begins,
+or up to the fall.
+"""
+
+import io
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal, TypedDict
+
+import numpy as np
+
+from poise.baselines.registry import momentum_qp_config
+from poise.baselines.solvers import QP
+from poise.baselines.whole_body import formulation
+from poise.baselines.whole_body.constraint_rows import torque_matrix
+from poise.baselines.whole_body.momentum_qp import MomentumQP
+from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.files import check_new_folder, new_folder
+from poise.configs.schema import to_dict
+from poise.envs.physics.pushes.sampler import push_bodies
+from poise.envs.robots.robot import load_robot
+from poise.training.benchmark.trials.push_limits import load_limits
+from poise.training.running.provenance import commit, versions
+
+from .recordings import PUSH_DURATION, RecordedTick, Recovery, recoveries
+
+Form = Literal["reduced", "full"]
+PER_TRIAL = 25  # problems
+LIBRARIES = ("mujoco", "numpy", "numba", "scipy")
+
+
+class PushRecord(TypedDict):
+    """The pushes of all trials: the body, its duration [s], and the limit of the impulses."""
+
+    body: str
+    duration: float
+    limit: str
+
+
+class TrialRecord(TypedDict):
+    """A push (impulse [N·s]; direction [°]), how it ended, the ticks met and those solved."""
+
+    trial: int
+    seed: int
+    impulse: float
+    direction: float
+    end: str
+    ticks: int
+    solved: int
+
+
+class ProblemRecord(TypedDict):
+    """A file, its trial, the time after the push began [s], and the rows active at the solution."""
+
+    file: str
+    trial: int
+    time: float
+    active: int
+
+
+class Manifest(TypedDict):
+    """manifest.json; see `README` for the folder."""
+
+    form: Form
+    count: int
+    seed: int
+    robot: str
+    robot_fingerprint: str
+    joints: list[str]
+    controller: Mapping[str, object]
+    push: PushRecord
+    commit: str | None
+    versions: dict[str, str]
+    trials: list[TrialRecord]
+    problems: list[ProblemRecord]
+
+
+def qp_of(tick: RecordedTick, controller: MomentumQP, form: Form) -> dict[str, np.ndarray | None]:
+    """The arrays of one file: those of `qpsolvers.Problem`, and how torques follow from x."""
+    if form == "reduced":
+        qp, T, offset = tick.reduced, tick.torque_matrix, tick.torque_offset
+    else:
+        state = tick.state
+        tasks = [task.rows(state) for task in controller.tasks.values()]
+        points = [contact.rows(state) for contact in controller.contacts.values()]
+        qp = formulation.build(
+            state, tick.targets, controller.parameters, tick.cop_vel, tasks, points=points
+        )
+        joints = controller.arrays.motor_dofs - 6
+        T = np.zeros((len(joints), len(qp.g)))
+        rows = torque_matrix(state, points)[joints]
+        T[:, : rows.shape[1]] = rows
+        offset = state.h[6:][joints]
+    return {
+        **problem_arrays(qp),
+        "torque_matrix": T,
+        "torque_offset": offset,
+        "torque_limit": controller.arrays.torque_limit,
+        "torques": tick.torques,
+    }
+
+
+def problem_arrays(qp: QP) -> dict[str, np.ndarray | None]:
+    """P, q, G, h, A, b, lb, ub of `qpsolvers.Problem`; what there is none of is None.
+
+    l == u becomes an equality; a row that picks one unknown becomes a bound of it; other rows
+    become Gx ≤ h, the upper sides before the lower ones.
+    """
+    n = len(qp.g)
+    equal = qp.l == qp.u
+    picks = ~equal & (np.count_nonzero(qp.C, axis=1) == 1) & (qp.C.max(axis=1, initial=0.0) == 1.0)
+    lb, ub = np.full(n, -np.inf), np.full(n, np.inf)
+    for row in np.flatnonzero(picks):
+        i = int(np.argmax(qp.C[row]))
+        lb[i], ub[i] = max(lb[i], qp.l[row]), min(ub[i], qp.u[row])
+    upper, lower = (np.isfinite(side) & ~equal & ~picks for side in (qp.u, qp.l))
+    G, h = np.vstack([qp.C[upper], -qp.C[lower]]), np.concatenate([qp.u[upper], -qp.l[lower]])
+    some = {
+        "G": len(h) > 0, "h": len(h) > 0, "A": equal.any(), "b": equal.any(),
+        "lb": picks.any(), "ub": picks.any(),
+    }  # fmt: skip
+    arrays = {"G": G, "h": h, "A": qp.C[equal], "b": qp.u[equal], "lb": lb, "ub": ub}
+    return {"P": qp.H, "q": qp.g} | {k: a if some[k] else None for k, a in arrays.items()}
+
+
+def write_qp_set(
+    out: str | Path,
+    *,
+    count: int = 1000,
+    seed: int = 0,
+    form: Form = "reduced",
+    robot: str = "humanoid",
+    controller: str = "momentum-qp",
+) -> Manifest:
+    """Write a folder of `count` problems with manifest.json and README.md; returns the manifest.
+
+    The same arguments give the same arrays. The folder appears when it is complete.
+
+    Raises:
+        ConfigError: an argument that is not valid, or a folder that is not empty.
+        PoiseError: the folder cannot be written, or there are no problems to be had.
+    """
+    out = Path(out)
+    if count < 1:
+        raise ConfigError(f"must be at least 1, not {count}", field="count")
+    if seed < 0:
+        raise ConfigError(f"must be at least 0, not {seed}", field="seed")
+    check_new_folder(out)
+    body = load_robot(robot)
+    limits = load_limits(body)
+    config = momentum_qp_config(controller)
+    writer = MomentumQP(body, config)
+    manifest: Manifest = {
+        "form": form, "count": count, "seed": seed,
+        "robot": body.name, "robot_fingerprint": body.fingerprint,
+        "joints": [body.joint_names[i] for i in body.motor_dofs - 6],
+        "controller": to_dict(config),
+        "push": {"body": push_bodies(body)[0], "duration": PUSH_DURATION, "limit": limits.scale},
+        "commit": commit(), "versions": versions(LIBRARIES),
+        "trials": [], "problems": [],
+    }  # fmt: skip
+    with new_folder(out) as part:
+        _write_problems(part, manifest, recoveries(body, controller, limits, seed), writer)
+        (part / "README.md").write_text(README, "utf-8")
+        (part / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", "utf-8")
+    return manifest
+
+
+def _write_problems(
+    folder: Path, manifest: Manifest, trials: Iterator[Recovery], controller: MomentumQP
+) -> None:
+    count, form, problems = manifest["count"], manifest["form"], manifest["problems"]
+    for number, trial in enumerate(trials):
+        if number > 10 + count:
+            raise PoiseError(
+                f"{controller.robot.name}: its trials give no problems that are solved"
+            )
+        record: TrialRecord = {
+            "trial": number, "seed": trial.seed,
+            "impulse": trial.push.impulse, "direction": trial.push.direction,
+            "end": trial.end, "ticks": trial.met, "solved": len(trial.ticks),
+        }  # fmt: skip
+        manifest["trials"].append(record)
+        wanted = min(PER_TRIAL, count - len(problems), len(trial.ticks))
+        for i in np.linspace(0, len(trial.ticks) - 1, wanted).round().astype(int):
+            tick = trial.ticks[i]
+            name = f"qp{len(problems):05d}.npz"
+            (folder / name).write_bytes(npz(qp_of(tick, controller, form)))
+            time = round(tick.time - trial.push.start, 6)
+            problems.append({"file": name, "trial": number, "time": time, "active": tick.active})
+        if len(problems) == count:
+            return
+
+
+def npz(arrays: Mapping[str, np.ndarray | None]) -> bytes:
+    """The content of a compressed .npz file; None becomes the object array that qpsolvers reads."""
+    content = io.BytesIO()
+    plain: dict[str, Any] = {name: np.array(array) for name, array in arrays.items()}
+    np.savez_compressed(content, **plain)
+    return content.getvalue()
+
+
+README = """\
+# Whole-body QPs from push recoveries
+
+Inverse-dynamics problems that a balance controller met, tick by tick, while a simulated humanoid
+was pushed: written by `poise qp-set`. manifest.json says with which robot, controller, pushes,
+seed, commit and versions.
+
+Each qpNNNNN.npz is a file of `qpsolvers.Problem`, as qpbenchmark reads it:
+
+    import qpsolvers
+
+    problem = qpsolvers.Problem.load("qp00000.npz")
+    x = qpsolvers.solve_problem(problem, solver="daqp").x
+
+    minimise   ½ xᵀPx + qᵀx   subject to   Gx ≤ h,  Ax = b,  lb ≤ x ≤ ub
+
+P is positive definite. What a problem has none of (A, b, lb, ub of the reduced form) is None.
+The same file holds how joint torques τ [N·m] follow from x, and what the controller answered:
+
+    import numpy as np
+
+    data = np.load("qp00000.npz", allow_pickle=True)  # allow_pickle: for what is None
+    torques = data["torque_matrix"] @ x + data["torque_offset"]
+    error = np.abs(torques - data["torques"]) / data["torque_limit"]  # fraction of the limits
+
+Two forms (`form` in the manifest) of the same problem, with the same torques:
+
+- full: x = (v̇, w), the accelerations (root: linear in the world's axes, angular in the body's;
+  then the joints) and the wrench of each sole (force [N], moment [N·m], world axes). A: the six
+  root rows of the dynamics and the soles that do not accelerate. G: wrench cones, torque limits.
+  lb, ub: accelerations that let joints stop before their limits.
+- reduced: both sets of equalities eliminated. x holds coordinates of the accelerations that leave
+  the soles at rest, and of the wrenches that cancel between them. Dense, inequalities only.
+
+A soft root adds its wrench (force, moment about the centre of mass) at the end of x.
+
+In the manifest, `trials` lists every push (impulse [N·s]; direction [°], counter-clockwise from
+forward), how it ended, the ticks met in its first two seconds and those that had a solution: the
+others, where joint limits contradict the rest, are left out. `problems` gives for each file its
+trial, the time after the push began [s] and the number of rows that are active at the solution.
+"""

@@ -1,0 +1,1 @@
+"""Motions and gaits played as measurements: followed, tracked, compared."""

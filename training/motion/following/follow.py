@@ -1,0 +1,164 @@
+"""Trials in which a controller performs a motion from disturbed starts, and may be pushed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.reference_motion import ReferenceMotion
+from poise.baselines.balance.references.tempo import Tempo
+from poise.configs.errors import ConfigError, shown
+from poise.configs.numbers import whole_number
+from poise.envs.balance.mdp.termination import FallLimits
+from poise.envs.physics.pushes.push import Push
+from poise.envs.physics.pushes.sampler import push_bodies
+from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.sensing.realism import load_realism
+from poise.training.benchmark.trials.agents import Agent, load_agent
+from poise.training.benchmark.trials.play import Watch, run_trial
+from poise.training.benchmark.trials.push_limits import load_limits
+from poise.training.benchmark.trials.trial import Outcome, Trial
+from poise.training.motion.tracking.record import ANYWHERE, TrackingFigures
+
+PUSH_TIME = 0.1  # [s]
+LONGEST = 600.0  # [s]
+LEAN = 30.0  # [deg] beyond the motion's own largest tilt
+FALLEN = 0.8  # of the motion's lowest CoM: lower is a fall where the motion itself goes low
+
+
+@dataclass(frozen=True)
+class Followed(TrackingFigures):
+    """How near one trial stayed to the motion, until half a second after its end or a fall.
+
+    Attributes:
+        fallen: whether the robot fell.
+        solver_failures: ticks without a solution of the QP.
+        push: the push, as an environment takes it; None for none.
+    """
+
+    fallen: bool
+    solver_failures: int
+    push: dict[str, Any] | None
+
+
+def follow(
+    motion: str | Path | ReferenceMotion,
+    controller: str = "momentum-qp",
+    *,
+    robot: str | Path | Robot = "humanoid",
+    starts: int = 20,
+    impulse: float = 0.0,
+    share: float = 0.0,
+    directions: int = 8,
+    seed: int = 0,
+    speed: float = 1.0,
+    tempo: Tempo | None = None,
+    watch: Callable[[Trial], Watch | None] | None = None,
+    patient: bool = True,
+    realism: str | Path | None = None,
+) -> list[Followed]:
+    """Let a controller perform a motion from `starts` disturbed starts.
+
+    A fall is what environments call so, with the motion for standing: more than the feet on the
+    ground, a CoM below 0.6 of the motion's height at that time, or a root that leans 90° away from
+    the motion's. A trial goes on for 3 s after the motion's end, and for 6 s after the push. With
+    an `impulse` [N·s] trial k is pushed once at the robot's first push body, in direction
+    360° k / `directions`, at a random time within the motion; the same for every controller. With a
+    `share` the impulse is that share of the J50 that the robot's file of limits has for the
+    direction: what momentum-qp stands half of.
+
+    The motion is played `speed` times as fast, and waits as `tempo` says. `watch` gives, for a
+    trial, what is called with the environment after the reset and after every step. Without
+    `patient` the first fall is the last trial. `realism` is a level, by name or file.
+
+    Raises:
+        ConfigError: no such motion, controller or robot, one that does not play motions, counts
+            below 1, an impulse, a share or a seed below 0, an impulse and a share, a share without
+            measured limits, a speed that is not from 0.1 to 10.
+    """
+    if not 0.1 <= speed <= 10.0:
+        raise ConfigError(f"must be from 0.1 to 10, not {speed:g}", field="tempo")
+    for name, count in (("starts", starts), ("directions", directions)):
+        whole_number(count, 1, name)
+    whole_number(seed, 0, "seed")
+    for name, size in (("impulse", impulse), ("share", share)):
+        if not 0.0 <= size < np.inf:
+            raise ConfigError(f"must be at least 0, not {size:g}", field=name)
+    if impulse and share:
+        raise ConfigError("give either an impulse or a share of J50", field="share")
+    body = robot if isinstance(robot, Robot) else load_robot(robot)
+    half = load_limits(body).j50() if share else None
+    reference = load_motion(motion, body)
+    reference = reference if speed == 1.0 else reference.at_speed(speed)
+    agent = performer(controller, body, reference, LONGEST, ANYWHERE, tempo, realism)
+    rng = np.random.default_rng(seed)
+    trials = []
+    for k in range(starts):
+        start = float(rng.uniform(0.1, 0.9)) * reference.duration
+        direction = 360.0 * k / directions % 360.0
+        size = impulse if half is None else share * half(direction)
+        push = Push(push_bodies(body)[0], start, PUSH_TIME, size, direction)
+        pushes = (push,) if size else ()
+        trial = Trial(k, seed + k, pushes, motion=reference.name)
+        watcher = None if watch is None else watch(trial)
+        trials.append(_followed(run_trial(agent, trial, watcher), trial))
+        if trials[-1].fallen and not patient:
+            break
+    return trials
+
+
+def _followed(outcome: Outcome, trial: Trial) -> Followed:
+    """The figures of a trial that has been played."""
+    names = TrackingFigures.__dataclass_fields__
+    values = {name: getattr(outcome, name) for name in names}
+    return Followed(
+        **{name: np.nan if value is None else value for name, value in values.items()},
+        fallen=outcome.fallen,
+        solver_failures=outcome.solver_failures,
+        push=None if trial.push is None else asdict(trial.push),
+    )
+
+
+def performer(
+    controller: str,
+    robot: Robot,
+    motion: ReferenceMotion,
+    duration: float,
+    fall: Mapping[str, float] | None = None,
+    tempo: Tempo | None = None,
+    realism: str | Path | None = None,
+) -> Agent:
+    """An agent that performs a motion for `duration` [s], whose time runs as `tempo` says.
+
+    `fall` are its `FallLimits`; by default lower than the motion ever is, or further from upright.
+
+    Raises:
+        ConfigError: no such controller, or one that plays no motions.
+    """
+    fall = fall or fall_limits(motion, robot)
+    given: dict[str, Any] = {"motion": motion, "pushes": None, "duration": duration, "fall": fall}
+    given |= {} if tempo is None else {"tempo": tempo}
+    given |= {} if realism is None else {"realism": load_realism(realism)}
+    try:
+        return load_agent(controller, robot, **given)
+    except TypeError:
+        raise ConfigError(
+            f"{shown(controller)} follows no motion: name a controller that tracks a reference, "
+            "or a policy on one", field="controller",
+        ) from None  # fmt: skip
+
+
+def fall_limits(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
+    """`FallLimits` that a robot does not reach which performs this motion."""
+    samples = [motion.sample(time) for time in np.arange(0.0, motion.duration, 0.05)]
+    upright = min(Rotation.from_rotvec(sample.root).as_matrix()[2, 2] for sample in samples)
+    tilt = float(np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))))
+    low = min(float(sample.com_offset[2]) for sample in samples)
+    return {"height": min(FallLimits().height, FALLEN * low / robot.height_com),
+            "tilt": min(max(FallLimits().tilt, tilt + LEAN), 180.0)}  # fmt: skip

@@ -1,0 +1,106 @@
+"""The motions of a suite: put on the robot once, kept beside the trials, the same for all."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.robot_clip import (
+    RobotClip,
+    read_robot_clip,
+    reference_from,
+    write_robot_clip,
+)
+from poise.baselines.balance.references.tempo import Tempo
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.library import find_bvh, packaged_clips
+from poise.baselines.motion.retargeting.retarget import retarget
+from poise.configs.files import resolve
+from poise.configs.reading import is_file
+from poise.envs.balance.config import StartNoise
+from poise.envs.robots.robot import Robot
+from poise.training.benchmark.trials.jobs import Stage
+
+from .follow import LONGEST
+
+FOLDER = "motions"  # in that of the results
+STANDING = "standing"
+
+
+@dataclass(frozen=True)
+class Repertoire:
+    """The motions that the trials of a suite perform.
+
+    Attributes:
+        durations: name → duration [s].
+        digests: name → hash of what decides it.
+        clips: name → the robot's postures, of those that are not keyframes.
+    """
+
+    durations: dict[str, float]
+    digests: dict[str, str]
+    clips: dict[str, RobotClip]
+
+    def write(self, folder: Path) -> None:
+        """Keep the clips in the folder of the results; raises PoiseError when the disk refuses."""
+        for name, clip in self.clips.items():
+            (folder / FOLDER).mkdir(exist_ok=True)
+            write_robot_clip(clip, kept(folder, name))
+
+
+def kept(folder: Path, name: str) -> Path:
+    """Where the clip of a motion is kept."""
+    return folder / FOLDER / f"{name}.npz"
+
+
+def stage_of(
+    robot: str | Path, noise: StartNoise, names: Sequence[str], labels: Sequence[str], folder: Path,
+    tempo: Tempo,
+) -> Stage:  # fmt: skip
+    """The stage of a suite that performs motions, which `folder` keeps."""
+    files = [(label, str(kept(folder.resolve(), label)) if is_clip(name) else name)
+             for name, label in zip(names, labels, strict=True)]  # fmt: skip
+    return Stage(robot, LONGEST, noise, ((STANDING, STANDING), *files), tempo)
+
+
+def is_clip(name: str) -> bool:
+    """True for what is a robot's postures, or becomes that; false for keyframes."""
+    return name in packaged_clips() or Path(name).suffix.lower() in (".npz", ".bvh")
+
+
+def load_repertoire(
+    names: Sequence[str], labels: Sequence[str], robot: Robot, folder: Path, anew: bool = False
+) -> Repertoire:
+    """The motions of these `names`, called `labels`.
+
+    A packaged clip is put on the robot, which takes a second or so, unless `folder` has kept it;
+    with `anew` it is in any case. So is a ``.bvh`` file. A ``.npz`` file is the motion itself.
+
+    Raises:
+        ConfigError: no such motion, one of another robot, one that cannot be followed; a clip
+            without the packages that it takes.
+    """
+    durations, digests = {STANDING: load_motion(STANDING, robot).duration}, {}
+    clips: dict[str, RobotClip] = {}
+    for name, label in zip(names, labels, strict=True):
+        if is_clip(name):
+            clips[label] = clip = _clip(name, robot, kept(folder, label), anew)
+            durations[label] = reference_from(clip, robot, name).duration
+            content = [f"{clip.dt!r} {clip.qpos.shape}".encode(), clip.qpos.tobytes()]
+        else:
+            durations[label] = load_motion(name, robot).duration
+            content = [resolve("motions", name).read_bytes()]
+        digests[label] = hashlib.sha256(b"\0".join(content)).hexdigest()
+    return Repertoire(durations, digests, clips)
+
+
+def _clip(name: str, robot: Robot, stored: Path, anew: bool) -> RobotClip:
+    """The robot's postures of a packaged clip, a .bvh or a .npz file."""
+    if Path(name).suffix == ".npz":
+        return read_robot_clip(name)
+    if name in packaged_clips() and is_file(stored) and not anew:
+        return read_robot_clip(stored)
+    return retarget(read_bvh(find_bvh(name)).clip, robot).clip

@@ -1,0 +1,114 @@
+"""The clips that scripts are made of, ready to be put together, and what becomes of a script."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from poise.baselines.balance.references.motion import motions_with_steps
+from poise.baselines.balance.references.robot_clip import write_robot_clip
+from poise.baselines.motion.clips.bvh import write_bvh
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.library import packaged_clips
+from poise.baselines.motion.graphs.adjacency import make_graph
+from poise.baselines.motion.graphs.motion_graph import GraphClip, Thresholds, read_graph
+from poise.baselines.motion.retargeting.performed import load_clip, robot_clip_of
+from poise.baselines.motion.retargeting.robot_bvh import clip_of_robot
+from poise.baselines.motion.synthesis.plan import PHYSICAL
+from poise.baselines.motion.synthesis.robot_joins import RobotJoins
+from poise.baselines.motion.synthesis.scripts.tree import Script, clip_names
+from poise.baselines.motion.synthesis.synthesis import Synthesis
+from poise.configs.errors import ConfigError
+from poise.configs.reading import is_file
+from poise.configs.schema import build
+from poise.envs.robots.robot import Robot, load_robot
+
+
+def open_synthesis(
+    file: Path | None,
+    robot: str | None,
+    kind: str | None = None,
+    least: float | None = None,
+    script: Script | None = None,
+) -> Synthesis:
+    """The clips of a graph, or the packaged ones, ready for scripts.
+
+    For a robot packaged motions with steps are loaded where the script names them: in the ways of
+    others they have no place.
+
+    Args:
+        file: of the graph; None for the packaged clips.
+        robot: whose motions the clips are to be; None for their own skeleton.
+        kind: of transitions that scripts leave open; None for `physical` with a robot, else
+            `insert`.
+        least: shortest transition of the packaged clips [s].
+        script: that is to be played.
+
+    Raises:
+        ConfigError: a graph of another robot, a clip that changed, `physical` without a robot; as
+            `read_graph` and `load_clip`.
+    """
+    body = None if robot is None else load_robot(robot)
+    joins = None if body is None else RobotJoins(body)
+    kind = kind or (PHYSICAL if joins else "insert")
+    if file is not None:
+        made = read_graph(file)
+        if (robot or "") != made.robot:
+            raise ConfigError(f"is of {made.robot or 'no robot'}, not of {robot or 'none'}",
+                              source=file, field="robot")  # fmt: skip
+        loaded = load_clips([_beside(clip.file, file) for clip in made.clips], body,
+                       [clip.name for clip in made.clips])  # fmt: skip
+        for told, (found, _) in zip(made.clips, loaded, strict=True):
+            if told.digest and told.digest != found.digest:
+                raise ConfigError(f"is not the file that it was: {told.file}; make the graph again",
+                                  source=file, field=f"clips.{told.name}")  # fmt: skip
+        return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind,
+                         robot_joins=joins)  # fmt: skip
+    names = [name for name in packaged_clips() if _fits(name, robot)]
+    steps = [] if robot is None else [*_walks(), *motions_with_steps()]
+    said = set() if script is None else clip_names(script)
+    names += [name for name in steps if any(name == n or name.endswith(f"_{n}") for n in said)]
+    limits = Thresholds() if least is None else build(Thresholds, {"least": least}, "synth")
+    loaded = load_clips(names, body)
+    return Synthesis(make_graph(loaded, limits, robot=robot or ""),
+                     {entry.name: clip for entry, clip in loaded}, kind,
+                     robot_joins=joins, others=[n for n in steps if n not in names])  # fmt: skip
+
+
+def _walks() -> list[str]:
+    """The packaged clips whose feet move."""
+    return [name for name in packaged_clips() if name.endswith("walk")]
+
+
+def _fits(name: str, robot: str | None) -> bool:
+    """Without a robot the clips of one skeleton; with one those whose feet stay."""
+    return name.startswith("cmu02") if robot is None else name not in _walks()
+
+
+def load_clips(
+    files: Sequence[str], robot: Robot | None, names: Sequence[str] | None = None
+) -> list[tuple[GraphClip, Clip]]:
+    """The clips of files with what a graph keeps of them; see `load_clip`."""
+    loaded = []
+    for file, name in zip(files, names or [Path(file).stem for file in files], strict=True):
+        clip, digest = load_clip(file, robot)
+        loaded.append((GraphClip(name, file, clip.duration, digest), clip))
+    return loaded
+
+
+def _beside(file: str, graph_file: Path) -> str:
+    """A clip's file, looked for beside the graph's file too."""
+    beside = graph_file.parent / file
+    return str(beside) if Path(file).suffix and not is_file(file) and is_file(beside) else file
+
+
+def write_robot_motion(clip: Clip, robot: Robot, out: Path, source: str) -> None:
+    """Write a clip of the robot's skeleton as its motion (.npz), or as BVH.
+
+    Raises ConfigError and PoiseError as `robot_clip_of`.
+    """
+    made = robot_clip_of(clip, robot, out.stem, source)
+    if out.suffix == ".npz":
+        write_robot_clip(made, out)
+    else:
+        write_bvh(clip_of_robot(robot, made.qpos, made.dt, out.stem), out)

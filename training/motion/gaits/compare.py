@@ -1,0 +1,266 @@
+"""The comparison of [Zhao]: reference models of a walk at the same commands."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from poise.baselines.allowance import allows
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.walking.schedule import TimedCommand, parse_commands
+from poise.configs.errors import ConfigError
+from poise.configs.files import packaged, write_atomic
+from poise.configs.numbers import whole_number
+from poise.configs.outputs import check_out_folder
+from poise.envs.robots.robot import Robot, load_robot
+from poise.training.benchmark.evaluation.evaluate import evaluate
+from poise.training.benchmark.evaluation.tick_times import Clocked
+from poise.training.benchmark.suites.suite import load_suite
+from poise.training.benchmark.trials.agents import Agent, check_walks, load_agent
+from poise.training.benchmark.trials.play import run_trial
+from poise.training.benchmark.trials.trial import Outcome, Trial
+from poise.training.running.folder_lock import FolderLock
+
+from .human import KneeMoment, load_knee_moment
+from .stance import StanceRecord, Stances
+
+SETTLED = 5.0  # [s] after which stances count
+TICKS_FROM = 3.0  # [s] after which ticks are timed, for so long
+Say = Callable[[str], object]
+
+
+@dataclass(frozen=True)
+class GaitFigures:
+    """A controller at one speed; means over its starts.
+
+    Attributes:
+        controller, speed: whose figures these are, and the command [m/s].
+        starts, falls: how many walks there were, and how many of them fell.
+        speed_ahead, speed_error_rms: reached, and the root mean square error of strides [m/s].
+        cost_of_transport, positive_cost_of_transport: see `Outcome`.
+        knee_mean, knee_peak: of the stance knee on one foot, |τ|/m [N·m/kg].
+        knee_stance: mean |τ|/m over whole stances, on both feet too [N·m/kg].
+        knee_rmse: root mean square difference of the mean curve over stance from the human one.
+        force_peak: mean of the stances' largest vertical force, in m g.
+        height_amplitude: of the CoM in a step, half of its way up and down [m].
+        step_length, step_time: [m], [s].
+        knee_curve: (51,) mean τ/m over stance, extension positive [N·m/kg]; empty without stances.
+        tick: median time of a control tick while it walks, from Python [µs].
+        j50: mean over directions and phases at 0.5 m/s [N·s]; None where it was not asked for.
+    """
+
+    controller: str
+    speed: float
+    starts: int
+    falls: int
+    speed_ahead: float | None
+    speed_error_rms: float | None
+    cost_of_transport: float | None
+    positive_cost_of_transport: float | None
+    knee_mean: float | None
+    knee_peak: float | None
+    knee_stance: float | None
+    knee_rmse: float | None
+    force_peak: float | None
+    height_amplitude: float | None
+    step_length: float | None
+    step_time: float | None
+    knee_curve: tuple[float, ...]
+    tick: float | None = None
+    j50: float | None = None
+
+
+def controller_of(model: str) -> str:
+    """The packaged controller `walk-MODEL`, where there is one; other names mean themselves."""
+    return f"walk-{model}" if f"walk-{model}" in packaged("controllers") else model
+
+
+@allows("models")
+def compare_gaits(
+    models: Sequence[str],
+    *,
+    out: str | Path,
+    speeds: Sequence[float] = (0.5, 0.8),
+    starts: int = 4,
+    duration: float = 20.0,
+    robot: str = "humanoid",
+    seed: int = 21,
+    human: str | Path = "knee-moment",
+    pushed: bool = False,
+    push_suite: str | Path = "walk-push",
+    workers: int | None = None,
+    say: Say = print,
+    allow: str | Iterable[str] = (),
+) -> list[GaitFigures]:
+    """Let controllers walk at the same commands from the same starts, and write what came of it.
+
+    `out` gets gaits.json and stance_knee.png, and with `pushed` the folder walk-push.
+
+    Args:
+        models: of packaged controllers (`lip` for `walk-lip`), or controllers that walk.
+        speeds: ahead [m/s].
+        starts: of each speed, a little disturbed.
+        duration: of a walk [s].
+        human: a packaged band of the human knee's moment, or a YAML file of one.
+        pushed: find J50, too: by the suite `walk-push` at 0.5 m/s, which is long.
+        push_suite: another suite, packaged or a file, with a part `walk_push`.
+        workers: processes of that suite; None for all cores.
+        say: what prints lines of progress.
+
+    Raises:
+        ConfigError: a name, number or file that is not valid, a controller that does not walk, a
+            robot whose legs have no knees.
+        PoiseError: a file cannot be written.
+    """
+    from .plot import stance_plot
+
+    _check(models, speeds, starts, duration, seed)
+    check_out_folder(out)
+    if pushed and load_suite(push_suite).walk_push is None:
+        raise ConfigError("needs a part walk_push", source=push_suite, field="push_suite")
+    band, body = load_knee_moment(human), load_robot(robot)
+    StanceRecord(body)  # raises where a leg has no knee
+    names = [controller_of(model) for model in models]
+    agents = [load_agent(name, body, duration=duration, pushes=None) for name in names]
+    for name, agent in zip(names, agents, strict=True):
+        check_walks(name, agent, "gait")
+    with FolderLock(Path(out)):
+        figures = []
+        for agent in agents:
+            tick = tick_time(agent, seed)
+            for speed in speeds:
+                figures.append(walk_at(agent, speed, starts, seed, band, tick))
+                say(_line(figures[-1]))
+        if pushed:
+            figures = _with_j50(figures, names, push_suite, out, robot, seed, workers, allow)
+        write_figures(Path(out), figures, band, body, duration, seed)
+        stance_plot(Path(out) / "stance_knee.png", figures, band)
+    return figures
+
+
+def _check(
+    models: Sequence[str], speeds: Sequence[float], starts: int, duration: float, seed: int
+) -> None:
+    if not models or len(set(models)) < len(models):
+        raise ConfigError("needs names, all different", field="compare", choices=KNOWN)
+    if not speeds or not all(0.0 < abs(speed) < np.inf for speed in speeds):
+        raise ConfigError("must be finite and not 0", field="speeds")
+    if not SETTLED + 2.0 <= duration < np.inf:
+        raise ConfigError(f"must be at least {SETTLED + 2.0:g} s, not {duration:g}",
+                          field="duration")  # fmt: skip
+    whole_number(starts, 1, "starts")
+    whole_number(seed, 0, "seed")
+
+
+KNOWN = ("lip", "rigid", "spring", "double")  #: models that have a packaged controller
+
+
+def walk_at(
+    agent: Agent, speed: float, starts: int, seed: int, band: KneeMoment, tick: float | None
+) -> GaitFigures:
+    """The figures of an agent at one speed."""
+    commands = parse_commands({"ahead": speed}, "command")
+    outcomes, stances = [], []
+    for k in range(starts):
+        record = StanceRecord(agent.env.robot)
+        outcomes.append(run_trial(agent, Trial(k, seed + k, (), commands=commands), record))
+        if not outcomes[-1].fallen:
+            stances.append(record.stances(SETTLED))
+    return figures_of(agent.name, speed, outcomes, stances, band, tick)
+
+
+def figures_of(
+    name: str,
+    speed: float,
+    outcomes: Sequence[Outcome],
+    stances: Sequence[Stances],
+    band: KneeMoment,
+    tick: float | None,
+) -> GaitFigures:
+    """The figures of walks: falls of all of them, the rest of those that did not fall."""
+    stood = [outcome for outcome in outcomes if not outcome.fallen]
+    means = {key: _mean([getattr(each, key) for each in stood]) for key in MEANS}
+    curves = np.concatenate([each.knees for each in stances]) if stances else np.zeros((0, 1))
+    curve = curves.mean(axis=0) if len(curves) else np.zeros(0)
+    off = curve - band.curves()[0] if len(curves) else None
+    peaks = np.concatenate([each.peaks for each in stances]) if stances else np.zeros(0)
+    return GaitFigures(
+        controller=name, speed=speed, starts=len(outcomes), falls=len(outcomes) - len(stood),
+        **means,
+        knee_stance=float(np.abs(curves).mean()) if len(curves) else None,
+        knee_rmse=None if off is None else float(np.sqrt(np.mean(off**2))),
+        force_peak=float(peaks.mean()) if len(peaks) else None,
+        height_amplitude=_mean([each.height_amplitude for each in stances]),
+        knee_curve=tuple(float(value) for value in curve), tick=tick,
+    )  # fmt: skip
+
+
+#: figures of an `Outcome` whose means count
+MEANS = (
+    "speed_ahead", "speed_error_rms", "cost_of_transport", "positive_cost_of_transport",
+    "knee_mean", "knee_peak", "step_length", "step_time",
+)  # fmt: skip
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def tick_time(agent: Agent, seed: int) -> float | None:
+    """Median time of a control tick [µs] from Python, at 0.5 m/s; None if it falls before."""
+    env = agent.env
+    assert isinstance(env, ResidualBalanceEnv)  # it walks
+    inner = env.controller
+    clocked = env.controller = Clocked(inner, env.robot)
+    try:
+        commands = [TimedCommand(0.5)]
+        observation, _ = env.reset(seed=seed, options={"push": [], "command": commands})
+        for k in range(round(2.0 * TICKS_FROM / env.config.policy_period)):
+            if k == round(TICKS_FROM / env.config.policy_period):
+                clocked.seconds.clear()
+            env.step_without_info(agent.act(observation))
+            if env.fallen:
+                return None
+        return 1e6 * float(np.median(clocked.seconds))
+    finally:
+        env.controller = inner
+
+
+def _with_j50(
+    figures: list[GaitFigures], names: Sequence[str], suite: str | Path, out: str | Path,
+    robot: str, seed: int, workers: int | None, allow: str | Iterable[str],
+) -> list[GaitFigures]:  # fmt: skip
+    """The same with J50 of a suite."""
+    from poise.training.running.terminal import terminal
+
+    summary = evaluate(names, suite, out=Path(out) / "walk-push", robot=robot, seed=seed,
+                       workers=workers, console=terminal(), allow=allow)  # fmt: skip
+    found = {name: entry.get("j50_mean") for name, entry in summary["controllers"].items()}
+    return [replace(each, j50=found.get(each.controller)) for each in figures]
+
+
+def write_figures(
+    out: Path, figures: Sequence[GaitFigures], band: KneeMoment, robot: Robot, duration: float,
+    seed: int,
+) -> None:  # fmt: skip
+    """Write gaits.json: settings, the human band, the figures."""
+    content = {
+        "robot": robot.name, "seed": seed, "duration": duration, "human": asdict(band),
+        "gaits": [asdict(each) for each in figures],
+    }  # fmt: skip
+    write_atomic(out / "gaits.json", json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+
+
+def _line(f: GaitFigures) -> str:
+    if f.falls == f.starts:
+        return f"{f.controller} at {f.speed:g} m/s: fell in all of {f.starts}"
+    knee = "–" if f.knee_mean is None else f"{f.knee_mean:.2f} N·m/kg"
+    cost = f.positive_cost_of_transport
+    cost_text = "–" if cost is None else f"{cost:.2f}"
+    return (f"{f.controller} at {f.speed:g} m/s: fell in {f.falls} of {f.starts}, stance knee "
+            f"{knee}, cost of transport of positive work {cost_text}")  # fmt: skip

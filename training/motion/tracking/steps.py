@@ -1,0 +1,93 @@
+"""How near the feet stay to a motion with steps: in the air, at touchdown, and planted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.baselines.balance.references.footing import Footing
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.baselines.motion.performing.motion_step import MotionStep
+
+
+@dataclass(frozen=True)
+class StepFigures:
+    """Errors of the feet while a motion is performed as its schedule says; NaN without steps.
+
+    Attributes:
+        swing_error: root mean square of the distance of a sole in the air from the motion's [m].
+        placement_error: largest horizontal distance of a sole from where it is to be when it is
+            planted, at the first policy step on both feet [m].
+        support_slide: largest way of a planted sole from there until it lifts off [m].
+        interruptions: how often steps of the planner took over.
+    """
+
+    swing_error: float
+    placement_error: float
+    support_slide: float
+    interruptions: float
+
+
+NONE = StepFigures(np.nan, np.nan, np.nan, np.nan)
+
+
+class StepErrors:
+    """The record of `StepFigures` of an environment that has just been reset.
+
+    Places of the motion are those of its own frame, which stands where the soles do before the
+    first foot lifts off, and after an interruption where the robot has come to rest.
+    """
+
+    def __init__(self, env: ResidualBalanceEnv, footing: Footing):
+        self._env, self._footing = env, footing
+        self._swing: list[float] = []
+        self._placed: list[float] = []
+        self._slide = 0.0
+        self._resting: list[np.ndarray | None] = [None, None]
+        self._swung = [False, False]
+
+    def update(self) -> None:
+        """Call it after every policy step."""
+        controller = self._env.controller
+        if not isinstance(controller, MotionStep):
+            return
+        performance = controller.performance
+        if performance is None or not performance.performing[0]:
+            self._resting, self._swung = [None, None], [False, False]
+            return
+        x, y, ground, cos, sin = performance.frame
+        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        sample = self._footing.sample(self._env.motion_time)
+        places = sample.places[:, 0] @ turn.T + [x, y, ground]
+        state, begun = self._env.simulation.state, controller.memory.steps[0] > 0
+        for foot in range(2):
+            gap = state.sole_points[foot] - places[foot]
+            if not sample.planted[foot]:
+                self._swing.append(float(gap @ gap))
+                self._resting[foot], self._swung[foot] = None, True
+            elif state.contacts[foot] > 0.5 and begun:
+                self._rest(foot, state.sole_points[foot], float(np.hypot(*gap[:2])))
+
+    def _rest(self, foot: int, point: np.ndarray, gap: float) -> None:
+        """Count a sole that is planted and touches the ground."""
+        rest = self._resting[foot]
+        if rest is None:
+            self._resting[foot] = point.copy()
+            if self._swung[foot]:
+                self._placed.append(gap)
+        else:
+            self._slide = max(self._slide, float(np.linalg.norm((point - rest)[:2])))
+
+    def figures(self) -> StepFigures:
+        """What has been so far."""
+        controller = self._env.controller
+        performance = controller.performance if isinstance(controller, MotionStep) else None
+        if performance is None:
+            return NONE
+        return StepFigures(
+            float(np.sqrt(np.mean(self._swing))) if self._swing else np.nan,
+            max(self._placed, default=np.nan),
+            self._slide,
+            float(performance.left[0]),
+        )

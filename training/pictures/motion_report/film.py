@@ -1,0 +1,82 @@
+"""A performance as a video: the robot, and where it is if it follows its motion exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.viewing.renderer import SceneRenderer
+from poise.training.benchmark.trials.play import Watch
+from poise.training.benchmark.trials.trial import Trial
+from poise.training.pictures.figures.encoder import Encoder
+from poise.training.pictures.sessions.ghost import Ghost, ghost_of
+
+RATE = 25.0  # [1/s] of the frames
+
+
+class Film:
+    """Films the first trial of `follow`, which calls it; use as a context, which writes the file.
+
+    Args:
+        path: of the .mp4 or .webp file.
+        size: width and height [pixels], even.
+        others: is also told of every trial.
+
+    Attributes:
+        frames: how many have been written.
+    """
+
+    def __init__(
+        self, path: Path, size: tuple[int, int] = (640, 480),
+        others: Callable[[Trial], Watch] | None = None,
+    ):  # fmt: skip
+        self.path, self.size, self.others = path, size, others
+        self.frames, self._first = 0, True
+        self._renderer: SceneRenderer | None = None
+        self._ghost: Ghost | None = None
+
+    def __enter__(self) -> Film:
+        self._encoder = Encoder(self.path, self.size, RATE)
+        self._encoder.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:  # fmt: skip
+        if self._renderer is not None:
+            self._renderer.close()
+        self._encoder.__exit__(kind, error, trace)
+
+    def __call__(self, trial: Trial) -> Watch:
+        """What watches a trial."""
+        more = None if self.others is None else self.others(trial)
+        films, self._first = self._first, False
+
+        def watch(env: BalanceEnv) -> None:
+            if more is not None:
+                more(env)
+            if films:
+                self._shoot(env)
+
+        return watch
+
+    def _shoot(self, env: BalanceEnv) -> None:
+        """Film a moment, if it is one that the video has a frame of."""
+        if self._renderer is None:
+            width, height = self.size
+            self._renderer = SceneRenderer(env.simulation, False, width, height)
+            self._ghost = ghost_of(env)
+        if env.simulation.time < self.frames / RATE - 1e-9:
+            return
+        posture = None if self._ghost is None else self._ghost.posture(_motion_time(env))
+        frame = self._renderer.render(posture)
+        assert frame is not None  # it is open, and off-screen
+        self._encoder.send(frame)
+        self.frames += 1
+
+
+def _motion_time(env: BalanceEnv) -> float:
+    return float(getattr(env, "motion_time", env.simulation.time))

@@ -1,0 +1,64 @@
+"""Pictures of motions as one HTML file that opens from disk, in the colours of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import jinja2
+from markupsafe import Markup
+
+from poise.configs.errors import ConfigError
+from poise.configs.files import write_atomic
+from poise.configs.outputs import check_out_file
+from poise.envs.viewing.quantities import PUSH, SUPPORT
+from poise.training.pictures.report.palette import CARDS, variables
+
+
+class Picture(NamedTuple):
+    """One section of the page.
+
+    Attributes:
+        title: its heading.
+        svg: the drawing.
+        caption: what it shows, below it.
+        wide: whether it keeps its size on a narrow screen, and is moved there by hand.
+        key: class of the style sheet → name of a line in the legend.
+    """
+
+    title: str
+    svg: Markup
+    caption: str
+    wide: bool = False
+    key: dict[str, str] = {}  # noqa: RUF012 - a default that nothing changes
+
+
+def check_page(path: Path) -> None:
+    """Raise ConfigError for a path that no page can be written to."""
+    if path.suffix not in (".html", ".htm"):
+        raise ConfigError("must be the name of a .html file", source=path, choices=("*.html",))
+    check_out_file(path)
+
+
+def write_page(path: Path, title: str, lead: str, pictures: Sequence[Picture]) -> None:
+    """Write the page; the same pictures give the same file.
+
+    Raises PoiseError if the file cannot be written.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("poise.training.pictures.report", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    text = environment.get_template("motion.html.j2").render(
+        title=title,
+        lead=lead,
+        pictures=pictures,
+        colours={scheme: variables(scheme) for scheme in CARDS},
+        push=PUSH.hexadecimal,
+        support=SUPPORT.hexadecimal,
+    )
+    write_atomic(path, text)

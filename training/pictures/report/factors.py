@@ -1,0 +1,216 @@
+"""Tables that only some suites have: sensitivity to factors, indicators, seeds, errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TypedDict, cast
+
+import numpy as np
+from markupsafe import Markup
+
+from poise.training.benchmark.results.read import Results
+from poise.training.benchmark.statistics.rates import wilson_interval
+from poise.training.benchmark.statistics.seeds import FIGURES
+from poise.training.running.summary import Level, MarginFigures, both_ends
+
+from .cells import Cell, Column, Table, cell, figure_cell, name_cell, p_cell
+from .charts import Series, level_curves, level_text
+from .svg import right_angle
+
+TITLES = {
+    "duration": "duration of the push [s]",
+    "body": "body that is pushed",
+    "height": "height of the push, over that of the CoM",
+    "friction": "friction",
+    "delay": "delay of the sensors [s]",
+    "mass_error": "error of the masses",
+    "velocity_noise": "noise of joint velocities [rad/s]",
+    "realism": "realism",
+    "pushes": "number of pushes",
+}
+
+
+class FactorPlot(TypedDict):
+    """A picture with its title."""
+
+    title: str
+    picture: Markup
+
+
+def factor_levels(results: Results) -> list[tuple[str, str, Level]]:
+    """(controller, factor, level's entry) of all levels in the summary."""
+    return [
+        (name, factor["factor"], level)
+        for name, entry in results.summary["controllers"].items()
+        for factor in entry.get("factors", ())
+        for level in factor["levels"]
+    ]
+
+
+def factor_plots(results: Results, order: Sequence[str]) -> list[FactorPlot]:
+    """A picture of every factor, controllers as in `order`."""
+    pictures: list[FactorPlot] = []
+    found = factor_levels(results)
+    for factor in dict.fromkeys(factor for _, factor, _ in found):
+        entries: dict[str, list[Level]] = {}
+        for name, own, level in found:
+            if own == factor:
+                entries.setdefault(name, []).append(level)
+        levels = list(dict.fromkeys(e["level"] for each in entries.values() for e in each))
+        standard = [levels.index(e["level"]) for each in entries.values() for e in each
+                    if e["standard"]]  # fmt: skip
+        series = []
+        for name in order:
+            own_levels = entries.get(name, [])
+            around = [wilson_interval(e["recovered"], e["trials"]) for e in own_levels]
+            low, high = np.array(around, dtype=float).reshape(-1, 2).T
+            x = np.array([levels.index(e["level"]) for e in own_levels], dtype=float)
+            y = np.array([e["recovered_rate"] for e in own_levels], dtype=float)
+            series.append(Series(name, results.controllers.index(name), x, y, low, high))
+        title = TITLES.get(factor, factor)
+        picture = level_curves(series, levels, title, standard[0] if standard else None)
+        pictures.append({"title": title[:1].upper() + title[1:], "picture": picture})
+    return pictures
+
+
+def factor_table(results: Results) -> Table | None:
+    """Every level of every factor; None without factors."""
+    columns = [
+        Column("controller", "Controller"),
+        Column("factor", "Factor"),
+        Column("level", "Level"),
+        Column("trials", "Trials"),
+        Column("recovered", "Recovered"),
+        Column("recovered_rate", "Rate", interval=True),
+        Column("lost", "Lost", "against the standard case"),
+        Column("won", "Won", "against the standard case"),
+        Column("p_mcnemar", "p", "McNemar's exact test"),
+    ]
+    rows = [
+        [
+            name_cell(name, results.controllers.index(name)),
+            Cell(factor, factor),
+            Cell(level["level"], level_text(level["level"])
+                 + (" (standard)" if level["standard"] else "")),
+            cell(level["trials"], "d"),
+            cell(level["recovered"], "d"),
+            cell(level["recovered_rate"], ".0%", both_ends(level["recovered_ci95"])),
+            cell(level["lost"], "d"),
+            cell(level["won"], "d"),
+            p_cell(level["p_mcnemar"]),
+        ]
+        for name, factor, level in factor_levels(results)
+    ]  # fmt: skip
+    caption = "Recovery rate at every level of every factor."
+    return Table("factors", caption, columns, rows) if rows else None
+
+
+def sensitivity(results: Results, order: Sequence[str]) -> Table | None:
+    """The largest loss of each controller by each factor; None without factors."""
+    found = factor_levels(results)
+    factors = list(dict.fromkeys(factor for _, factor, _ in found))
+    columns = [Column("controller", "Controller"), Column("standard", "Standard case")]
+    columns += [Column(f, f.replace("_", " "), TITLES.get(f, "")) for f in factors]
+    rows = []
+    for name in order:
+        own = [(f, level) for other, f, level in found if other == name]
+        base = [level["recovered_rate"] for _, level in own if level["standard"]]
+        if not base:
+            continue
+        row = [name_cell(name, results.controllers.index(name)), cell(base[0], ".0%")]
+        for factor in factors:
+            levels = [level for f, level in own if f == factor and not level["standard"]]
+            worst = min(levels, key=lambda level: level["recovered_rate"], default=None)
+            if worst is None:
+                row.append(cell(None))
+                continue
+            change = 100.0 * (worst["recovered_rate"] - base[0])
+            shown = cell(change, "+.0f" if abs(change) >= 0.5 else ".0f")
+            row.append(shown._replace(ends_text=f"at {level_text(worst['level'])}"))
+        rows.append(row)
+    caption = "Change of the recovery rate at the worst level of each factor, in percent points."
+    return Table("sensitivity", caption, columns, rows) if rows else None
+
+
+def indicators(results: Results, order: Sequence[str]) -> Table | None:
+    """EUROBENCH's indicators; None where no standard pushes were played."""
+    entries = results.summary["controllers"]
+    order = [name for name in order if "eurobench" in entries[name]]
+    margins: dict[str, dict[float, MarginFigures]] = {
+        name: {margin["direction"]: margin for margin in entries[name]["eurobench"]["margins"]}
+        for name in order
+    }
+    angles = list(dict.fromkeys(angle for own in margins.values() for angle in own))
+    columns = [
+        Column("controller", "Controller"),
+        Column("body_sway_mean", "Body sway [rad]", "mean over recovered standard pushes"),
+        Column("recovery_time_mean", "Recovery time [s]", "until the sway stays below 0.015 rad/s"),
+        Column("recovery_time_trials", "of trials", "that came to rest by this measure"),
+    ]
+    for angle in angles:
+        to, key = right_angle(angle), f"margin_{angle:g}"
+        columns += [
+            Column(f"{key}_force", f"Margin {to} [N]", "largest with < 30 % falls in 10 runs"),
+            Column(f"{key}_force_normalised", "at human size [N]", f"margin {to}, normalised"),
+            Column(f"{key}_energy_normalised", "energy [J]", f"margin {to}, normalised"),
+        ]
+    rows = []
+    for name in order:
+        found = entries[name]["eurobench"]
+        row = [
+            name_cell(name, results.controllers.index(name)),
+            figure_cell(found, "body_sway_mean", ".3f"),
+            figure_cell(found, "recovery_time_mean", ".2f"),
+            figure_cell(found, "recovery_time_trials", "d"),
+        ]
+        for angle in angles:
+            margin = margins[name].get(angle, MarginFigures(direction=angle))
+            sign = "≥ " if margin.get("largest_tried") else ""
+            for key in ("force", "force_normalised", "energy_normalised"):
+                form = ".1f" if "energy" in key else ".0f"
+                row.append(figure_cell(margin, key, form, sign=sign))
+        rows.append(row)
+    caption = "Indicators of simulated subjects, as EUROBENCH's protocols define them."
+    return Table("indicators", caption, columns, rows).without_empty() if rows else None
+
+
+def seed_table(results: Results) -> Table | None:
+    """Interquartile means over training seeds and the worst seed; None without groups of seeds."""
+    columns = [Column("name", "Runs"), Column("seeds", "Seeds")]
+    for key, title, _ in FIGURES:
+        columns += [
+            Column(f"{key}_iqm", f"{title}, IQM", "interquartile mean over seeds", interval=True),
+            Column(f"{key}_worst", "worst seed", "the smallest value of a seed"),
+        ]
+    rows = []
+    for group in results.summary["seeds"]:
+        row = [Cell(group["name"], group["name"]), cell(len(group["seeds"]), "d")]
+        for key, _, form in FIGURES:
+            found = cast(Mapping[str, object], group.get(key, {}))
+            row += [figure_cell(found, "iqm", form, "iqm_ci95"), figure_cell(found, "worst", form)]
+        rows.append(row)
+    if not rows:
+        return None
+    return Table("seeds", "Means over training seeds.", columns, rows).without_empty()
+
+
+def error_table(results: Results) -> Table | None:
+    """Trials in which a controller raised; None without any."""
+    columns = [
+        Column("controller", "Controller"),
+        Column("trial", "Trial"),
+        Column("seed", "Seed"),
+        Column("error", "Error"),
+    ]
+    rows = [
+        [
+            name_cell(record.controller, results.controllers.index(record.controller)),
+            cell(record.trial, "d"),
+            Cell(int(record.line["seed"]), record.line["seed"]),
+            Cell(record.error, record.error),
+        ]
+        for record in results.records
+        if record.error
+    ]
+    caption = "Trials in which a controller raised an error; they count as not recovered."
+    return Table("errors", caption, columns, rows) if rows else None

@@ -1,0 +1,274 @@
+"""A result folder as one HTML file that opens from disk, with nothing outside it."""
+
+from __future__ import annotations
+
+import base64
+import re
+import shlex
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import jinja2
+from rich.console import Console
+
+from poise.baselines.allowance import allowing, named
+from poise.configs.errors import PoiseError
+from poise.configs.files import write_atomic
+from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
+from poise.envs.viewing.quantities import PUSH, SUPPORT
+from poise.training.benchmark.evaluation.tables import assisted
+from poise.training.benchmark.results.read import Record, Results, load_results
+from poise.training.running.files import REPORT, SUMMARY, TRIALS
+from poise.training.running.terminal import print_paths
+
+from . import factors, motions, plots, walking, words
+from . import tables as report_tables
+from .cells import Download, download
+from .palette import CARDS, variables
+from .svg import swatch
+from .time_chart import signals_csv, time_plot
+from .worst_trials import AFTER, Exhibit, Film, can_draw, choose_exhibits, film, frame_times
+
+CROWD = 4  # of controllers; with more, bands and bars are shown for the one that is pointed at
+EMBEDDED = 600_000  # [bytes] trials.csv is embedded up to this size, beyond it packed
+PACKED = 2_500_000  # [bytes] up to this size
+
+
+def write_report(
+    folder: str | Path,
+    out: str | Path | None = None,
+    *,
+    films: bool = True,
+    console: Console | None = None,
+    allow: str | Iterable[str] = (),
+) -> Path:
+    """Write the report of a finished evaluation or benchmark; returns its path.
+
+    The file holds everything it shows: style, script, plots, pictures, and the numbers as CSV. The
+    same folder gives the same file. Trials that cannot be played again are left out, and the report
+    says why.
+
+    Args:
+        folder: written by `evaluate`.
+        out: the file; `folder`/report.html if not given.
+        films: play the worst trials again, for pictures and plots over time (seconds for each).
+        console: where progress and the path are printed; None: nowhere.
+        allow: controllers from outside (``module:Class``) that may run; others are not played.
+
+    Raises:
+        ConfigError: the folder holds no finished evaluation, or its files are not whole.
+        PoiseError: the file cannot be written.
+    """
+    console = console or Console(quiet=True)
+    path = Path(folder) / REPORT if out is None else Path(out)
+    results = load_results(folder)
+    with allowing(allow):
+        write_atomic(path, render(results, films=films, console=console))
+    print_paths([path], console)
+    return path
+
+
+def render(results: Results, *, films: bool = True, console: Console | None = None) -> str:
+    """The page; raises ConfigError where the summary does not hold what it should."""
+    console = console or Console(quiet=True)
+    baseline = results.reference
+    order = results.summary["ranking"]
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("poise.training.pictures.report", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    tables = {
+        "ranking": report_tables.ranking(results, baseline),
+        "directions": report_tables.directions(results),
+        "pairs": report_tables.pairs(results),
+        "factors": factors.factor_table(results),
+        "sensitivity": factors.sensitivity(results, order),
+        "indicators": factors.indicators(results, order),
+        "seeds": factors.seed_table(results),
+        "errors": factors.error_table(results),
+        "walks": walking.walk_table(results, order),
+        "walk_costs": walking.cost_table(results, order),
+        "phases": walking.phase_table(results, order),
+        "motions": motions.motion_table(results, order),
+        "in_motion": motions.in_motion_table(results, order),
+        "smallest": report_tables.smallest(results, order),
+        "losses": report_tables.losses(results, order),
+    }
+    cases, notes = _cases(results, baseline, order, films, console)
+    envelope, own_envelopes = plots.envelopes(results)
+    falls, curves = plots.falls(results)
+    return environment.get_template("report.html.j2").render(
+        summary=results.summary,
+        trial_count=len({record.trial for record in results.records}),
+        controllers=[
+            {"name": name, "index": results.controllers.index(name),
+             "swatch": swatch(results.controllers.index(name))}
+            for name in order
+        ],
+        baseline=baseline,
+        assisted=[name for name in order if assisted(results.summary["controllers"][name])],
+        lead=words.lead(results),
+        tables=tables,
+        forests=plots.forests(results),
+        envelope=envelope,
+        own_envelopes=own_envelopes,
+        step_lines=list(plots.step_lines(results)) if envelope else [],
+        phases=walking.phase_plot(results, order),
+        falls=falls,
+        curves=curves,
+        factors=factors.factor_plots(results, order),
+        cases=cases,
+        notes=notes,
+        facts=_facts(results),
+        trials=_trials(results),
+        summary_file=_summary_file(results),
+        crowded=len(order) > CROWD,
+        colours={scheme: variables(scheme) for scheme in CARDS},
+        push=PUSH.hexadecimal,
+        support=SUPPORT.hexadecimal,
+    )  # fmt: skip
+
+
+def _cases(
+    results: Results, baseline: str, order: Sequence[str], films: bool, console: Console
+) -> tuple[list[dict[str, object]], list[str]]:
+    """The trials shown, and what to say of those that are not."""
+    cases = choose_exhibits(results, baseline, order)
+    notes: list[str] = []
+    if not films:
+        notes.append("The trials were not played again: the report was asked to go without.")
+    problem = can_draw() if films and cases else None
+    if problem:
+        notes.append(f"There are no pictures: {problem}.")
+    done: dict[tuple[int, str], Film | None] = {}
+    shown = []
+    for k, case in enumerate(cases, 1):
+        played = []
+        for record in [case.record, *([case.baseline] if case.baseline else [])]:
+            key = (record.trial, record.controller)
+            if films and key not in done:
+                console.print(f"playing trial {k} of {len(cases)} again: {record.controller}",
+                              markup=False, highlight=False)  # fmt: skip
+                times = frame_times(case.record)
+                done[key] = _film(results, record, times, not problem, notes, console)
+            found = done.get(key)
+            if found is not None:
+                played.append(found)
+        shown.append(_shown(case, played, results))
+    return shown, notes
+
+
+def _film(
+    results: Results,
+    record: Record,
+    times: Sequence[float],
+    draw: bool,
+    notes: list[str],
+    console: Console,
+) -> Film | None:
+    try:
+        return film(results, record, times, draw)
+    except PoiseError as error:
+        reason = str(error)
+    except Exception as error:  # a controller from outside may raise anything
+        reason = f"{type(error).__name__}: {error}"
+    note = f"{record.controller} was not played again: {reason}."
+    if note not in notes:
+        notes.append(note)
+        console.print(note, markup=False, highlight=False, soft_wrap=True)
+    return None
+
+
+def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, object]:
+    """A case for the template."""
+    record = case.record
+    trial = results.trial(record)
+    start = _float(record.line.get("start"))
+    pushes = words.push_times(trial)
+    end = _end(record, start or 0.0)
+    parts = []
+    for played in films:
+        who, t = played.record, played.signals.t
+        columns = played.signals.columns
+        label = (f"Trial {who.trial}, {who.controller}: centre of mass, centre of pressure, "
+                 f"capture point, angular momentum and torque over {end:.1f} s.")  # fmt: skip
+        name = re.sub(r"[^\w.-]+", "-", f"trial-{who.trial}-{Path(who.controller).name}")
+        parts.append({
+            "name": who.controller,
+            "swatch": swatch(results.controllers.index(who.controller)),
+            "end": _ending(who),
+            "same": played.same,
+            "frames": [
+                (time, "data:image/webp;base64," + base64.b64encode(picture).decode())
+                for time, picture in played.frames
+            ],
+            "plot": time_plot(t, columns, end, pushes, label),
+            "download": signals_csv(name, t, columns),
+        })  # fmt: skip
+    return {
+        "case": case,
+        "facts": words.push_text(record, trial),
+        "end": _ending(record),
+        "why": record.why,
+        "films": parts,
+        "command": f"poise replay {shlex.quote(str(results.folder))} --trial {record.trial} "
+        f"--controllers {shlex.quote(record.controller)} --video trial.mp4{_allowed(record)}",
+    }
+
+
+def _allowed(record: Record) -> str:
+    """What a command needs besides that names the controller of a record in a folder."""
+    return "".join(f" --allow {shlex.quote(name)}" for name in named(record.controller))
+
+
+def _end(record: Record, start: float) -> float:
+    """Last time worth showing of a trial that was lost [s]."""
+    return (record.fall_time if record.fallen else start + 3.0) + AFTER
+
+
+def _ending(record: Record) -> str:
+    if record.recovered:
+        return "recovered"
+    return f"fell after {record.fall_time:.2f} s" if record.fallen else "stood, but not quiet"
+
+
+def _facts(results: Results) -> list[tuple[str, str]]:
+    """The origin of the result."""
+    summary, settings = results.summary, results.settings
+    machine, versions = summary["machine"], summary["versions"]
+    rows = [
+        ("Command", summary["command"]),
+        ("Commit", summary["commit"]),
+        ("Suite", settings.suite_name),
+        ("Seed", settings.seed),
+        ("Robot", f"{settings.robot} ({settings.robot_fingerprint[:12]})"),
+        ("Processor", machine["processor"]),
+        ("Cores", machine["cores"]),
+        ("Workers", summary["workers"]),
+        ("System", machine["system"]),
+        ("Duration", f"{summary['seconds']} s"),
+        ("Versions", ", ".join(f"{name} {version}" for name, version in versions.items())),
+        ("Fingerprints", ", ".join(f"{n} {mark[:12]}" for n, mark in settings.controllers.items())),
+    ]
+    return [(name, str(value)) for name, value in rows if value is not None]
+
+
+def _trials(results: Results) -> Download | None:
+    """trials.csv, packed where it is long; None where it is too long for a page."""
+    text = read_text(results.folder / TRIALS, TABLE_BYTES)
+    if len(text) <= EMBEDDED:
+        return download(TRIALS, text)
+    packed = download(TRIALS, text, pack=True)
+    return packed if packed.size <= PACKED else None
+
+
+def _summary_file(results: Results) -> Download:
+    text = read_text(results.folder / SUMMARY, JSON_BYTES)
+    return download(SUMMARY, text, pack=len(text) > EMBEDDED)
+
+
+def _float(text: str | None) -> float | None:
+    return float(text) if text not in (None, "") else None

@@ -1,0 +1,47 @@
+"""The colours of the page, from the tables that pictures and the viewer have theirs from."""
+
+from __future__ import annotations
+
+from matplotlib.colors import to_hex, to_rgb
+
+from poise.envs.viewing.quantities import CAPTURE_POINT, COM, COP, RGB
+from poise.training.pictures.figures.style import MANY
+
+CARDS = {"light": "#ffffff", "dark": "#1a1e22"}  # scheme → what is drawn on, as in report.css
+CONTRAST = 3.0  # to the card: WCAG's least for graphics
+QUANTITIES = {"com": COM, "cop": COP, "capture": CAPTURE_POINT}
+
+
+def variables(scheme: str) -> dict[str, str]:
+    """CSS variable → colour, of a scheme of `CARDS`: series s0, s1, … and quantities."""
+    series = {f"s{k}": to_rgb(colour) for k, colour in enumerate(MANY)}
+    quantities = {name: quantity.colour for name, quantity in QUANTITIES.items()}
+    card = to_rgb(CARDS[scheme])
+    return {name: to_hex(readable(colour, card)) for name, colour in (series | quantities).items()}
+
+
+def readable(colour: RGB, ground: RGB, least: float = CONTRAST) -> RGB:
+    """A colour, mixed with black on light ground or with white on dark as far as it must be.
+
+    Args:
+        colour, ground: parts of 0 to 1.
+        least: WCAG's contrast that the result has to `ground`, up to 21.
+    """
+    end = 0.0 if luminance(ground) > 0.18 else 1.0
+    for percent in range(101):
+        r, g, b = (part + 0.01 * percent * (end - part) for part in colour)
+        if contrast((r, g, b), ground) >= least:
+            break
+    return r, g, b
+
+
+def contrast(first: RGB, second: RGB) -> float:
+    """WCAG's contrast of two colours, 1 to 21."""
+    low, high = sorted((luminance(first), luminance(second)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def luminance(colour: RGB) -> float:
+    """WCAG's relative luminance, 0 to 1."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

@@ -1,0 +1,73 @@
+"""Sentences of a report."""
+
+from __future__ import annotations
+
+import math
+
+from poise.training.benchmark.diagnosis.words import towards
+from poise.training.benchmark.evaluation.tables import assisted, places
+from poise.training.benchmark.results.read import Record, Results
+from poise.training.benchmark.trials.trial import Trial
+from poise.training.running.summary import both_ends
+
+from .svg import number_text
+
+
+def lead(results: Results) -> list[str]:
+    """The result in a sentence or three."""
+    summary = results.summary
+    fair = [name for name in summary["ranking"] if not assisted(summary["controllers"][name])]
+    first = (fair or summary["ranking"])[0]
+    best = summary["controllers"][first]
+    unfair = len(fair) < len(results.controllers)
+    alone = " of those that take no force from outside" if unfair else ""
+    what = "random trials" if summary["rated"] else "trials"
+    ranks = places(summary["controllers"])
+    tied = [name for name in fair if ranks[name] == 1 and name != first]
+    place = f"ties with {' and '.join(tied)} for the first place" if tied else "comes first"
+    said = [f"{first} {place}{alone}: it recovers {best['recovered_rate']:.1%} of "
+            f"{best['trials']} {what}."]  # fmt: skip
+    if "j50_mean" in best:
+        around = both_ends(best["j50_mean_ci95"])
+        text = f"Half of its trials are recovered at {best['j50_mean']:.1f} N·s"
+        text += f" ({around[0]:.1f} to {around[1]:.1f})" if around else ""
+        text += f": {best['eta_mean']:.2f} of the ankle limit, {best['eta_min']:.2f} in the worst"
+        said.append(text + " direction, over all directions.")
+    return said
+
+
+def push_text(record: Record, trial: Trial) -> str:
+    """The first push in words, and in what the trial differs from the standard one."""
+    if not math.isfinite(record.impulse):
+        return "No push."
+    details = f", {record.fraction:.2f} of the limit" if math.isfinite(record.fraction) else ""
+    details += "".join(f"; {text}" for text in _world(trial))
+    return (
+        f"{record.impulse:.1f}\u00a0N·s in {record.duration:.2f}\u00a0s on {record.line['body']}, "
+        f"towards {record.direction:.0f}° ({towards(record.direction)}){details}."
+    )
+
+
+def push_times(trial: Trial) -> list[tuple[float, float]]:
+    """(start, duration) of every push of a trial [s]."""
+    return [(push.start, push.duration) for push in trial.pushes]
+
+
+def _world(trial: Trial) -> list[str]:
+    """Return how the conditions of a trial differ from the standard ones."""
+    said, conditions = [], trial.conditions
+    if conditions.friction is not None:
+        said.append(f"friction {conditions.friction:.2f}")
+    if conditions.delay:
+        said.append(f"sensors {1000.0 * conditions.delay:.0f}\u00a0ms late")
+    if conditions.mass_error:
+        said.append(number_text(conditions.mass_error, "+.0%") + " mass")
+    if conditions.velocity_noise:
+        said.append(f"joint velocities with {conditions.velocity_noise:g}\u00a0rad/s of noise")
+    if conditions.realism:
+        said.append(f"realism {conditions.realism}")
+    if trial.terrain is not None:
+        said.append(type(trial.terrain).__name__.lower())
+    if len(trial.pushes) > 1:
+        said.append(f"{len(trial.pushes)} pushes")
+    return said

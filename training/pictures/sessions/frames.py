@@ -1,0 +1,126 @@
+"""What is seen of a robot at one moment: poses, marks, and the values that are plotted."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from poise.baselines.balance.stepping.controller import SteppingController
+from poise.baselines.controller import BaseController
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.physics.pushes.push import Push
+from poise.envs.physics.simulation import Simulation
+from poise.envs.viewing.contact_forces import ContactForces
+from poise.envs.viewing.overlays import Mark, foothold_mark, marks
+
+from .ghost import Ghost, Poses, ghost_of
+
+#: value of a frame → title of its plot
+VALUES = {
+    "speed": "speed of the centre of mass [m/s]",
+    "margin": "capture point inside the support [m]",
+    "torque": "largest torque over its limit",
+    "push": "push [N]",
+}
+
+
+class Frame(NamedTuple):
+    """A robot at one moment, world axes.
+
+    Attributes:
+        time: [s] after the reset.
+        positions, quaternions: (nbody, 3) [m] and (nbody, 4), w first, of the bodies.
+        com: (3,) centre of mass [m].
+        marks: of the quantities of `envs/viewing/quantities.py`.
+        values: of `VALUES`.
+        fall_time: when it fell [s]; None: it has not.
+        ghost: where the bodies are if the reference motion is followed exactly; None: it has none
+            that moves.
+    """
+
+    time: float
+    positions: np.ndarray
+    quaternions: np.ndarray
+    com: np.ndarray
+    marks: tuple[Mark, ...]
+    values: dict[str, float]
+    fall_time: float | None
+    ghost: Poses | None = None
+
+
+def between(first: Frame, second: Frame, fraction: float) -> Frame:
+    """Bodies between two frames, for slow motion; everything else is that of the second one."""
+    ghost = second.ghost
+    if first.ghost is not None and ghost is not None:
+        ghost = _between(first.ghost, ghost, fraction)
+    both = Poses(first.positions, first.quaternions), Poses(second.positions, second.quaternions)
+    return second._replace(**_between(*both, fraction)._asdict(), ghost=ghost)
+
+
+def _between(first: Poses, second: Poses, fraction: float) -> Poses:
+    """Of each body the fraction of the way, and of the turn the shorter way around."""
+    signs = np.where(np.sum(first.quaternions * second.quaternions, axis=1) < 0.0, -1.0, 1.0)
+    turned = (1.0 - fraction) * signs[:, None] * first.quaternions + fraction * second.quaternions
+    return Poses(
+        (1.0 - fraction) * first.positions + fraction * second.positions,
+        turned / np.linalg.norm(turned, axis=1, keepdims=True),
+    )
+
+
+class Observer:
+    """Makes the frames of an environment, which is only read."""
+
+    def __init__(self, env: BalanceEnv):
+        self._env = env
+        self._forces = ContactForces(env.simulation)
+        self._ghost: Ghost | None = None
+
+    def __call__(self, fall_time: float | None = None) -> Frame:
+        """The frame of this moment, of a robot that fell at `fall_time` [s]."""
+        env, simulation = self._env, self._env.simulation
+        if self._forces.simulation is not simulation:  # other conditions, another simulation
+            self._forces = ContactForces(simulation)
+        data = simulation.data
+        return Frame(
+            time=simulation.time,
+            positions=data.xpos.copy(),
+            quaternions=data.xquat.copy(),
+            com=simulation.state.com.copy(),
+            marks=(*marks(simulation), *self._forces.marks(), *_footholds(env)),
+            values=_values(simulation),
+            fall_time=fall_time,
+            ghost=self._reference(simulation.time),
+        )
+
+    def _reference(self, time: float) -> Poses | None:
+        """The ghost's bodies at a time [s]; it stands anew where the robot has been reset."""
+        if time == 0.0:
+            self._ghost = ghost_of(self._env)
+        return None if self._ghost is None else self._ghost(time)
+
+
+def _values(simulation: Simulation) -> dict[str, float]:
+    state = simulation.state.copy()  # the support polygon is computed into the state's own arrays
+    load = np.abs(simulation.views.ctrl) / simulation.robot.torque_limit
+    force = sum(
+        float(np.linalg.norm(push.force(simulation.time)))
+        for push in simulation.pushes
+        if isinstance(push, Push)
+    )
+    return {
+        "speed": float(np.linalg.norm(state.com_vel)),
+        "margin": state.support_distance(state.capture_point),
+        "torque": float(load.max()),
+        "push": force,
+    }
+
+
+def _footholds(env: BalanceEnv) -> list[Mark]:
+    """Where the controller's foot is to land, while it swings."""
+    controller = getattr(env, "controller", None)
+    inner = controller.unwrapped if isinstance(controller, BaseController) else None
+    if not isinstance(inner, SteppingController):
+        return []
+    step = inner.stepping()
+    return [foothold_mark(step.foothold, env.robot.height_com)] if step.foot >= 0 else []
