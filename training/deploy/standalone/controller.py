@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import mujoco
@@ -20,10 +20,12 @@ from poise.envs.balance.servos import drive
 from poise.envs.compiled.calls import run
 from poise.envs.physics.kinematics import update_state
 from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.sensing.realism import Realism, load_realism
 from poise.envs.sensing.source import StateSource
 from poise.training.benchmark.trials.agents import Agent, load_agent
 
 from .readings import Readings
+from .sensed import SensedController
 
 
 @allows("name")
@@ -31,22 +33,30 @@ def load_standalone(
     name: str,
     robot: str | Path | Robot = "humanoid",
     *,
+    realism: str | Path | Mapping | Realism | None = None,
     allow: str | Iterable[str] = (),
-) -> StandaloneController:
+) -> StandaloneController | SensedController:
     """A controller or a policy that runs outside of an environment, from readings of a robot.
+
+    Without `realism` the state is told; with a level it is estimated from what sensors measure.
 
     Args:
         name: as `poise evaluate` takes it: a packaged controller or policy, a .yaml file of a
             controller, a folder of `poise train`, a policy from outside, or ``module:Class``.
         robot: a packaged robot, a .yaml description, or a robot. A policy must be for it.
+        realism: what is known of a real robot: a level's name, a .yaml file, or a mapping.
         allow: what may run though a file names it, as of `load_policy`.
 
     Raises:
-        ConfigError: no such controller or robot, or one that is no use outside: it pulls the root
+        ConfigError: no such controller, robot or level, or one that is no use outside: it pulls the root
             by a force from nowhere, or it observes the push.
     """
     body = robot if isinstance(robot, Robot) else load_robot(robot)
-    return StandaloneController(load_agent(name, body))
+    agent = load_agent(name, body)
+    if realism is not None:
+        check_usable(agent.name, agent.env)
+        return SensedController(agent, load_realism(realism))
+    return StandaloneController(agent)
 
 
 class StandaloneController:
@@ -72,7 +82,7 @@ class StandaloneController:
 
     def __init__(self, agent: Agent):
         env = agent.env
-        _check(agent.name, env)
+        check_usable(agent.name, env)
         env.state_source = StateSource(env.simulation)  # delays are now the robot's own
         self._agent, self._env = agent, env
         self.name, self.robot, self.fingerprint = agent.name, env.robot, agent.fingerprint
@@ -137,7 +147,8 @@ class StandaloneController:
         env.tick()
 
 
-def _check(name: str, env: BalanceEnv) -> None:
+def check_usable(name: str, env: BalanceEnv) -> None:
+    """Raise ConfigError for a controller that is no use outside of a simulation."""
     controller = env.controller if isinstance(env, ResidualBalanceEnv) else None
     if isinstance(controller, CompiledController) and controller.outputs().soft_root:
         raise ConfigError("has a soft root: it needs a force from nowhere, which no robot has",

@@ -12,6 +12,8 @@ from poise.configs.errors import ConfigError
 from poise.configs.numbers import finite_array
 from poise.envs.robots.robot import Robot
 
+SOURCE = "readings"  # in what is told of them
+
 
 @dataclass(frozen=True)
 class Readings:
@@ -51,42 +53,49 @@ class Readings:
 
     def qpos(self, robot: Robot) -> np.ndarray:
         """(nq,) as MuJoCo orders it; raises ConfigError naming what is missing or no number."""
-        turn = _numbers(self.orientation, 4, "orientation")
-        if abs(float(np.linalg.norm(turn)) - 1.0) > 1e-3:
-            raise ConfigError("must be a quaternion of length 1", source="readings",
-                              field="orientation")  # fmt: skip
-        joints = _joints(self.joint_positions, robot.joint_names, "joint_positions")
-        return np.concatenate([_numbers(self.position, 3, "position"), turn, joints])
+        turn = unit_quaternion(self.orientation, "orientation")
+        joints = joint_numbers(self.joint_positions, robot.joint_names, "joint_positions")
+        return np.concatenate([numbers(self.position, 3, "position"), turn, joints])
 
     def qvel(self, robot: Robot) -> np.ndarray:
         """(nv,) as MuJoCo orders it; raises ConfigError naming what is missing or no number."""
-        linear = _numbers(self.velocity, 3, "velocity")
-        angular = _numbers(self.angular_velocity, 3, "angular_velocity")
-        joints = _joints(self.joint_velocities, robot.joint_names, "joint_velocities")
+        linear = numbers(self.velocity, 3, "velocity")
+        angular = numbers(self.angular_velocity, 3, "angular_velocity")
+        joints = joint_numbers(self.joint_velocities, robot.joint_names, "joint_velocities")
         return np.concatenate([linear, angular, joints])
 
     def wrench(self) -> np.ndarray | None:
         """(6,) of the ground, if it is measured; raises ConfigError where it is no six numbers."""
         if self.ground_wrench is None:
             return None
-        return _numbers(self.ground_wrench, 6, "ground_wrench")
+        return numbers(self.ground_wrench, 6, "ground_wrench")
 
 
-def _joints(
-    values: ArrayLike | Mapping[str, float], names: Sequence[str], field: str
+def joint_numbers(
+    values: ArrayLike | Mapping[str, float], names: Sequence[str], field: str, source: str = SOURCE
 ) -> np.ndarray:
+    """(nj,) finite numbers, given in the order of `names` or by name; else ConfigError."""
     if not isinstance(values, Mapping):
-        return _numbers(values, len(names), field)
+        return numbers(values, len(names), field, source)
     if missing := [name for name in names if name not in values]:
-        raise ConfigError(f"lacks {', '.join(missing)}", source="readings", field=field)
+        raise ConfigError(f"lacks {', '.join(missing)}", source=source, field=field)
     if unknown := [name for name in values if name not in names]:
-        raise ConfigError(f"has unknown joints: {', '.join(map(str, unknown))}", source="readings",
+        raise ConfigError(f"has unknown joints: {', '.join(map(str, unknown))}", source=source,
                           field=field, choices=names)  # fmt: skip
-    return _numbers([values[name] for name in names], len(names), field)
+    return numbers([values[name] for name in names], len(names), field, source)
 
 
-def _numbers(values: object, count: int, field: str) -> np.ndarray:
-    numbers = finite_array(values, (count,))
-    if numbers is None:
-        raise ConfigError(f"must be {count} finite numbers", source="readings", field=field)
-    return numbers
+def numbers(values: object, count: int, field: str, source: str = SOURCE) -> np.ndarray:
+    """(`count`,) finite numbers; else ConfigError."""
+    found = finite_array(values, (count,))
+    if found is None:
+        raise ConfigError(f"must be {count} finite numbers", source=source, field=field)
+    return found
+
+
+def unit_quaternion(values: object, field: str, source: str = SOURCE) -> np.ndarray:
+    """(4,) of length 1, w first; else ConfigError."""
+    turn = numbers(values, 4, field, source)
+    if abs(float(np.linalg.norm(turn)) - 1.0) > 1e-3:
+        raise ConfigError("must be a quaternion of length 1", source=source, field=field)
+    return turn

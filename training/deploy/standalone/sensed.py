@@ -1,0 +1,195 @@
+"""A controller or a policy from what a robot's sensors measure, by the benchmark's estimator."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.configs.errors import ConfigError, PoiseError
+from poise.envs.compiled.calls import Program, run
+from poise.envs.robots.robot import Robot
+from poise.envs.sensing.drawn import DrawnRobot
+from poise.envs.sensing.estimator import EstimatedState
+from poise.envs.sensing.measurement import RING
+from poise.envs.sensing.motors import DAMPING, STIFFNESS, TARGET, TORQUE
+from poise.envs.sensing.realism import PARTS, Realism
+from poise.training.benchmark.trials.agents import Agent
+
+from .measurement import Measurement
+from .readings import Readings
+
+
+class MotorCommand(NamedTuple):
+    """What the motors are asked for: τ = `torque` + `stiffness` (`target` − q) − `damping` q̇.
+
+    Each is (nu,), in N·m, N·m/rad, rad and N·m·s/rad. A controller of torques has no stiffness and
+    no damping. A motor runs the servo on its own encoder, and keeps to its limit.
+    """
+
+    torque: np.ndarray
+    target: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+
+
+class MeasuredState(EstimatedState):
+    """The believed state of a robot whose measurements are handed over, instead of simulated.
+
+    Attributes:
+        start: measurements before the episode, the last one at its start.
+    """
+
+    start: Sequence[Measurement] = ()
+
+    @classmethod
+    def instead_of(cls, source: EstimatedState) -> MeasuredState:
+        """The same of the plant and the estimator of `source`."""
+        config = source.config
+        if config.kind == "exact":
+            raise ConfigError("exact: is the true state, which no sensor gives",
+                              field="estimator.kind", choices=("auto", "odometry", "inekf"))  # fmt: skip
+        if config.kind == "auto":
+            config = replace(config, kind="odometry")
+        state = cls(source.plant, source.plant.robot, config)
+        state.believing, state.estimate, state.sense = state.estimate, Program.of(()), Program.of(())
+        return state
+
+    believing: Program  #: of the estimator
+
+    def begin(self, drawn: DrawnRobot, holding: np.ndarray) -> None:
+        """As of `EstimatedState`, from the measurements of `start`."""
+        super().begin(drawn, holding)
+        rings = self.sensors.rings
+        rings.next[0] = 0
+        for i in range(-RING, 0):
+            self.measure(self.start[max(len(self.start) + i, 0)])
+        rings.count[0] = 1
+        self._begin_odometry()
+        self._begin_invariant()
+        self.update()
+
+    def measure(self, m: Measurement) -> None:
+        """Take the measurement of the next physics step."""
+        rings, bus = self.sensors.rings, self.bus
+        k, robot = int(rings.next[0]), self.plant.robot
+        m.write(rings, k, robot)
+        bus.q[:], bus.dq[:] = rings.q[k], rings.dq[k]
+        rings.next[0] = (k + 1) % RING
+        rings.count[0] += 1
+
+    def update(self) -> None:
+        """Estimate the state from what has been measured."""
+        run(self.believing)
+
+
+class SensedController:
+    """What the motors are asked for, from measurements: the bits of `poise evaluate --realism`.
+
+    The estimator and the predictor are those of the benchmark. The level of realism says what is
+    known of the robot: by how much measurements and commands are late, the motors' lag, and the
+    sensors' noise; of a range it is the middle.
+
+    Call `reset` once, and then `command` every `period` seconds with what was measured since.
+
+    Attributes:
+        name: of the controller, as it was loaded.
+        robot: that it is made for.
+        period: seconds between two calls of `command`.
+        sensor_period: seconds between two measurements.
+        measurements: that `command` takes, `period` over `sensor_period`.
+        joint_names: (nj,) in the order of `Measurement`.
+        motor_names: (nu,) in the order of `MotorCommand`.
+        fingerprint: hash of the controller's configuration and the policy's weights.
+    """
+
+    def __init__(self, agent: Agent, level: Realism):
+        env = agent.env
+        if level.ideal:
+            raise ConfigError("is ideal: its state needs no estimate; leave realism out",
+                              source=agent.name, field="realism", choices=PARTS)  # fmt: skip
+        env.realism = typical(level)
+        assert isinstance(env.state_source, EstimatedState)  # the level is not ideal
+        self._state = MeasuredState.instead_of(env.state_source)
+        env.state_source = self._state
+        self._agent, self._env = agent, env
+        self.name, self.robot, self.fingerprint = agent.name, env.robot, agent.fingerprint
+        self.joint_names, self.motor_names = env.robot.joint_names, env.robot.motor_names
+        residual = isinstance(env, ResidualBalanceEnv)
+        self.measurements = env.control_substeps if residual else env.substeps
+        self.sensor_period = env.arrays.timestep
+        self.period: float = self.measurements * self.sensor_period
+        self._running = False
+
+    def reset(self, start: Readings, measured: Measurement | Sequence[Measurement]) -> None:
+        """Forget everything; the robot stands as `start` tells, and has measured `measured`.
+
+        Args:
+            start: the pose from which the estimate sets out; its velocities are those of the start.
+            measured: at rest, the last one now; at most the last 64 count. Their mean tells the
+                joints, so that more of them tell it better.
+
+        Raises ConfigError naming what is missing, or no number.
+        """
+        self._state.start = [measured] if isinstance(measured, Measurement) else list(measured)
+        if not self._state.start:
+            raise ConfigError("must be at least one", source="reset", field="measured")
+        for each in self._state.start:
+            each.check(self.robot)
+        pose = {"qpos": start.qpos(self.robot), "qvel": start.qvel(self.robot)}
+        self._env.reset(options={"push": [], **pose})
+        if self._agent.begin is not None:
+            self._agent.begin()
+        self._running, self._first = True, True
+
+    def command(self, measured: Measurement | Sequence[Measurement] = ()) -> MotorCommand:
+        """What the motors are asked for during the next `period`.
+
+        Args:
+            measured: since the last call, oldest first, one each `sensor_period`; none in the first
+                call after a reset, which had them.
+
+        Raises ConfigError for another number of them, or naming what is no number; PoiseError
+        before a `reset`.
+        """
+        if not self._running:
+            raise PoiseError("command() before reset(): tell the controller where it starts")
+        new = [measured] if isinstance(measured, Measurement) else list(measured)
+        expected = 0 if self._first else self.measurements
+        if len(new) != expected:
+            raise ConfigError(f"must be {expected} measurements, not {len(new)}", source="command",
+                              field="measured")  # fmt: skip
+        for each in new:
+            each.check(self.robot)
+        for each in new:
+            self._state.measure(each)
+        if not self._first:
+            self._state.update()
+        self._first = False
+        return self._tick()
+
+    def _tick(self) -> MotorCommand:
+        """A control tick of the environment; what it simulates besides is of no account."""
+        env, motors = self._env, self._state.motors
+        if env.episode.ticks[0] == 0:  # a policy step begins
+            run(env.step_end().observe)
+            env.set_action(self._agent.act(env.episode.observation.astype(np.float32)))
+        believed, views = self._state.state_arrays, env.simulation.views
+        views.qpos[:], views.qvel[:] = believed.qpos, believed.qvel
+        env.tick()
+        asked = motors.asked[(motors.written[0] - 1) % len(motors.asked)]
+        return MotorCommand(*(asked[i].copy() for i in (TORQUE, TARGET, STIFFNESS, DAMPING)))
+
+
+def typical(level: Realism) -> Realism:
+    """The level with the middle of each range in its place."""
+    parts = {}
+    for name in PARTS[1:]:
+        part = getattr(level, name)
+        values = {item.name: getattr(part, item.name) for item in fields(part)}
+        middle = {k: sum(v) / 2.0 for k, v in values.items() if isinstance(v, tuple)}
+        parts[name] = replace(part, **middle)
+    return replace(level, **parts)
