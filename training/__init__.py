@@ -32,10 +32,10 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from poise.training.benchmark.evaluation.evaluate import benchmark, evaluate
-    from poise.training.benchmark.results.compare import compare
-    from poise.training.benchmark.results.read import load_results
-    from poise.training.benchmark.results.replay import replay
+    from poise.training.benchmarking.evaluation.evaluate import benchmark, evaluate
+    from poise.training.benchmarking.results.compare import compare
+    from poise.training.benchmarking.results.read import load_results
+    from poise.training.benchmarking.results.replay import replay
     from poise.training.deploy.export.dataset import write_dataset
     from poise.training.deploy.export.export import export_policy
     from poise.training.deploy.standalone.controller import StandaloneController, load_standalone
@@ -52,7 +52,7 @@ else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
-            "benchmark.evaluation.evaluate": ("benchmark", "evaluate"),
+            "benchmarking.evaluation.evaluate": ("benchmark", "evaluate"),
             "deploy.export.dataset": ("write_dataset",),
             "deploy.export.export": ("export_policy",),
             "pictures.figures.video": ("frame_strip", "record"),
@@ -62,9 +62,9 @@ else:
             "learning.train_seeds": ("train_seeds",),
             "learning.vec_env": ("ThreadedVecEnv",),
             "pictures.report.page": ("write_report",),
-            "benchmark.results.compare": ("compare",),
-            "benchmark.results.read": ("load_results",),
-            "benchmark.results.replay": ("replay",),
+            "benchmarking.results.compare": ("compare",),
+            "benchmarking.results.read": ("load_results",),
+            "benchmarking.results.replay": ("replay",),
             "deploy.standalone.controller": ("StandaloneController", "load_standalone"),
             "deploy.standalone.readings": ("Readings",),
             "learning.tuning.search": ("tune",),

@@ -78,7 +78,7 @@ if TYPE_CHECKING:
     from poise.baselines.registry import load_controller
     from poise.configs.errors import ConfigError, PoiseError
     from poise.envs.robots.robot import load_robot
-    from poise.training.benchmark.evaluation.evaluate import benchmark, evaluate
+    from poise.training.benchmarking.evaluation.evaluate import benchmark, evaluate
     from poise.training.deploy.standalone.controller import load_standalone
     from poise.training.learning.policy import load_policy, make_env
 else:
@@ -90,7 +90,7 @@ else:
             "baselines.registry": ("load_controller",),
             "configs.errors": ("ConfigError", "PoiseError"),
             "envs.robots.robot": ("load_robot",),
-            "training.benchmark.evaluation.evaluate": ("benchmark", "evaluate"),
+            "training.benchmarking.evaluation.evaluate": ("benchmark", "evaluate"),
             "training.learning.policy": ("load_policy", "make_env"),
             "training.deploy.standalone.controller": ("load_standalone",),
         },

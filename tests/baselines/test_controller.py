@@ -28,7 +28,11 @@ from poise.configs.files import packaged
 from poise.envs import RobotState, Simulation, replicate
 from tests.support.shared import robot
 
-FOLDERS = ("baselines/environments", "training/benchmark/trials", "training/benchmark/evaluation")
+FOLDERS = (
+    "baselines/environments",
+    "training/benchmarking/trials",
+    "training/benchmarking/evaluation",
+)
 
 
 class Plain:

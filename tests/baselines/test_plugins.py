@@ -18,9 +18,9 @@ from poise.baselines.registry import controller_config, load_controller
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
-from poise.training.benchmark.trials.agents import load_agent
-from poise.training.benchmark.trials.play import run_trial
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.trials.agents import load_agent
+from poise.training.benchmarking.trials.play import run_trial
+from poise.training.benchmarking.trials.trial import Trial
 from tests.support.shared import robot
 
 SETTINGS = {"duration": 1.2, "pushes": None}

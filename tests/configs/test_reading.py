@@ -39,9 +39,9 @@ from poise.configs.yaml_loader import DEPTH, DIGITS, NODES
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
 from poise.envs.sensing.realism import load_realism
-from poise.training.benchmark.suites.suite import load_suite
-from poise.training.benchmark.trials.agents import load_agent
-from poise.training.benchmark.trials.push_limits import load_limits
+from poise.training.benchmarking.suites.suite import load_suite
+from poise.training.benchmarking.trials.agents import load_agent
+from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.tuning.search import tune_config

@@ -12,7 +12,7 @@ import pytest
 import stable_baselines3
 from hypothesis import strategies as st
 
-from poise.training.benchmark.evaluation import run
+from poise.training.benchmarking.evaluation import run
 from poise.training.cli import entry
 from poise.training.deploy.qp_set import export
 from poise.training.learning import train_seeds

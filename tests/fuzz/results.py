@@ -12,11 +12,11 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from poise.training.benchmark.evaluation.folder import read_settings
-from poise.training.benchmark.results.compare import compare, print_comparison
-from poise.training.benchmark.results.leaderboard import write_leaderboard
-from poise.training.benchmark.results.read import load_results
-from poise.training.benchmark.results.replay import replay
+from poise.training.benchmarking.evaluation.folder import read_settings
+from poise.training.benchmarking.results.compare import compare, print_comparison
+from poise.training.benchmarking.results.leaderboard import write_leaderboard
+from poise.training.benchmarking.results.read import load_results
+from poise.training.benchmarking.results.replay import replay
 from poise.training.pictures.report.page import write_report
 from poise.training.running.terminal import terminal
 

@@ -15,9 +15,9 @@ from poise.configs.schema import to_yaml
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.robots.robot import load_robot
 from poise.envs.sensing.realism import load_realism
-from poise.training.benchmark.suites.plan import Plan
-from poise.training.benchmark.suites.suite import load_suite
-from poise.training.benchmark.trials.push_limits import load_limits
+from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.suite import load_suite
+from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.learning.config import train_config
 from poise.training.learning.tuning.gains import Gains
 from poise.training.learning.tuning.search import tune_config

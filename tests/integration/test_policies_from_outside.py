@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from poise.training.benchmark.evaluation import run
-from poise.training.benchmark.trials.agents import load_agent
+from poise.training.benchmarking.evaluation import run
+from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.cli.entry import main
 from tests.support.benchmarks_small import TRIALS, play_in_process, write_small
 from tests.support.evaluations import InProcess, write_suite

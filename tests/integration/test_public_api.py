@@ -120,5 +120,5 @@ def test_a_deep_import_is_found() -> None:
         "poise.envs.robots.robot", "poise.envs.robots.robot Robot", "poise.envs Robots",
     ]  # fmt: skip
     assert list(
-        deep_names("`poise.training.benchmark.evaluation.evaluate` and poise.envs.Robot")
-    ) == ["poise.training.benchmark.evaluation.evaluate"]
+        deep_names("`poise.training.benchmarking.evaluation.evaluate` and poise.envs.Robot")
+    ) == ["poise.training.benchmarking.evaluation.evaluate"]

@@ -9,10 +9,10 @@ import pytest
 
 from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.files import packaged
-from poise.training.benchmark.evaluation import run
-from poise.training.benchmark.evaluation import run as evaluation
-from poise.training.benchmark.evaluation.evaluate import benchmark, evaluate
-from poise.training.benchmark.results.replay import replay
+from poise.training.benchmarking.evaluation import run
+from poise.training.benchmarking.evaluation import run as evaluation
+from poise.training.benchmarking.evaluation.evaluate import benchmark, evaluate
+from poise.training.benchmarking.results.replay import replay
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train

@@ -22,7 +22,7 @@ DOORS = 7  # folders in a folder
 # A room imports rooms of lower floors only; those of one floor do not know each other. A file that
 # is not in a room is one by itself.
 FLOORS = """
- 1 configs, training/benchmark/statistics
+ 1 configs, training/benchmarking/statistics
  2 baselines/allowance, baselines/motion/synthesis/scripts, envs/compiled
  3 baselines/solvers, baselines/warmup, envs/compiled/maths, envs/robots/models, envs/terrain
  3 training/running, training/running/options
@@ -40,18 +40,18 @@ FLOORS = """
 10 baselines/motion/synthesis, baselines/walking
 11 baselines/motion/space_time, baselines/registry
 12 baselines/environments
-13 training/benchmark/diagnosis, training/learning, training/motion/tracking
-14 training/benchmark/trials
-15 training/benchmark/suites, training/deploy/standalone, training/learning/tuning
+13 training/benchmarking/diagnosis, training/learning, training/motion/tracking
+14 training/benchmarking/trials
+15 training/benchmarking/suites, training/deploy/standalone, training/learning/tuning
 15 training/motion/following, training/motion/open_loop, training/pictures/figures
-16 training/benchmark/metrics, training/deploy/policy_check, training/deploy/qp_set
+16 training/benchmarking/metrics, training/deploy/policy_check, training/deploy/qp_set
 16 training/deploy/robot_check
-17 training/benchmark/evaluation
-18 training/benchmark/results, training/motion/gaits
+17 training/benchmarking/evaluation
+18 training/benchmarking/results, training/motion/gaits
 19 training/deploy/export, training/pictures/report, training/pictures/sessions
 20 training/pictures/motion_report, training/pictures/view
 21 training/cli
-22 baselines, baselines/balance, baselines/motion, envs, training, training/benchmark
+22 baselines, baselines/balance, baselines/motion, envs, training, training/benchmarking
 22 training/deploy, training/motion, training/pictures
 """
 FLOOR = {
@@ -220,7 +220,7 @@ def test_a_room_is_imported_without_those_above_it() -> None:
         ("envs.balance.vector.vector_env", ("poise.baselines", "poise.training", "torch")),
         ("baselines.environments.stepping", ("poise.training", "torch")),
         (
-            "training.benchmark.statistics.rates",
+            "training.benchmarking.statistics.rates",
             ("poise.envs", "poise.baselines", "torch", "mujoco"),
         ),
     ):

@@ -28,15 +28,15 @@ from poise.baselines.plugins import find_plugin
 from poise.baselines.registry import controller_config, load_controller, momentum_qp_config
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled import warmup
-from poise.training.benchmark.evaluation.evaluate import benchmark, evaluate
-from poise.training.benchmark.metrics.seed_groups import seed_groups
-from poise.training.benchmark.results.compare import compare
-from poise.training.benchmark.results.film import film
-from poise.training.benchmark.results.leaderboard import write_leaderboard
-from poise.training.benchmark.results.read import load_results
-from poise.training.benchmark.results.replay import replay
-from poise.training.benchmark.trials.agents import load_agent
-from poise.training.benchmark.trials.jobs import Job, Stage, play
+from poise.training.benchmarking.evaluation.evaluate import benchmark, evaluate
+from poise.training.benchmarking.metrics.seed_groups import seed_groups
+from poise.training.benchmarking.results.compare import compare
+from poise.training.benchmarking.results.film import film
+from poise.training.benchmarking.results.leaderboard import write_leaderboard
+from poise.training.benchmarking.results.read import load_results
+from poise.training.benchmarking.results.replay import replay
+from poise.training.benchmarking.trials.agents import load_agent
+from poise.training.benchmarking.trials.jobs import Job, Stage, play
 from poise.training.cli.entry import main
 from poise.training.deploy.export.export import export_policy
 from poise.training.deploy.qp_set.export import write_qp_set
@@ -552,7 +552,7 @@ DANGEROUS = {
         "training/deploy/export/libraries.py",
     },
     "exec_module": {"baselines/plugins.py"},
-    "find_plugin": {"baselines/plugins.py", "training/benchmark/trials/agents.py"},
+    "find_plugin": {"baselines/plugins.py", "training/benchmarking/trials/agents.py"},
     "PluginConfig": {"baselines/plugins.py", "baselines/registry.py"},
     # TorchScript, of a file that `policy_file_config` has asked about
     "torch.jit.load": {"baselines/policy_files/networks.py"},

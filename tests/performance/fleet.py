@@ -30,10 +30,10 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.models.urdf import PACKAGES, WHEELS
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.benchmark.trials.agents import load_agent
-from poise.training.benchmark.trials.play import run_trial
-from poise.training.benchmark.trials.push_limits import PushLimits
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.trials.agents import load_agent
+from poise.training.benchmarking.trials.play import run_trial
+from poise.training.benchmarking.trials.push_limits import PushLimits
+from poise.training.benchmarking.trials.trial import Trial
 from poise.training.deploy.robot_check.check import RobotCheck, check_robot
 from poise.training.running.processes import WorkerPool, single_threaded
 

@@ -32,7 +32,7 @@ from poise.envs.compiled.maths.polygons import half_planes
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmark.trials.push_limits import load_limits
+from poise.training.benchmarking.trials.push_limits import load_limits
 
 STEP, STEPS, SUBSTEPS = 0.025, 100, 5  # [s]
 

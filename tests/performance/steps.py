@@ -15,9 +15,9 @@ from collections import defaultdict
 import numpy as np
 
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmark.trials.agents import load_agent
-from poise.training.benchmark.trials.push_limits import PushLimits
-from poise.training.benchmark.trials.step_limits import NStepLimit
+from poise.training.benchmarking.trials.agents import load_agent
+from poise.training.benchmarking.trials.push_limits import PushLimits
+from poise.training.benchmarking.trials.step_limits import NStepLimit
 
 # about J50 of `residual-step` after its first stage
 IMPULSES = (30.5, 29.0, 30.5, 22.0, 22.5, 27.0, 31.5, 31.5)  # [N·s] every 22.5°, left as right

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
-from poise.training.benchmark.evaluation import run
+from poise.training.benchmarking.evaluation import run
 from tests.support.evaluations import InProcess
 
 SMALL: dict[str, Any] = {

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from poise.training.benchmark.evaluation import run
-from poise.training.benchmark.evaluation import run as evaluation
-from poise.training.benchmark.evaluation.evaluate import benchmark, evaluate
+from poise.training.benchmarking.evaluation import run
+from poise.training.benchmarking.evaluation import run as evaluation
+from poise.training.benchmarking.evaluation.evaluate import benchmark, evaluate
 from tests.support.benchmarks_small import InProcessExecutor, write_small
 from tests.support.evaluations import ENVELOPE, InProcess, random_suite, write_suite
 

@@ -16,14 +16,14 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged_folder
 from poise.configs.schema import to_dict, to_yaml
 from poise.envs.balance.config import StartNoise
-from poise.training.benchmark.evaluation.folder import Settings
-from poise.training.benchmark.metrics.entry import controller_entry, robot_figures
-from poise.training.benchmark.suites.plan import Plan
-from poise.training.benchmark.suites.suite import load_suite
-from poise.training.benchmark.trials.jobs import Stage
-from poise.training.benchmark.trials.push_limits import PushLimits
-from poise.training.benchmark.trials.table import COLUMNS, trial_row
-from poise.training.benchmark.trials.trial import failed
+from poise.training.benchmarking.evaluation.folder import Settings
+from poise.training.benchmarking.metrics.entry import controller_entry, robot_figures
+from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.suite import load_suite
+from poise.training.benchmarking.trials.jobs import Stage
+from poise.training.benchmarking.trials.push_limits import PushLimits
+from poise.training.benchmarking.trials.table import COLUMNS, trial_row
+from poise.training.benchmarking.trials.trial import failed
 from poise.training.running.files import csv_text, plain
 from poise.training.running.provenance import circumstances, versions
 from poise.training.running.summary import FORMAT, Summary

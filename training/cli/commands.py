@@ -103,10 +103,10 @@ def evaluate(
         overwrite: replace what the folder holds.
     """
     from poise.configs.outputs import check_out_file
-    from poise.training.benchmark.trials.names import check_names
+    from poise.training.benchmarking.trials.names import check_names
 
     check_names(controllers, robot=robot, suite=suite, realism=realism)
-    from poise.training.benchmark.evaluation.evaluate import evaluate, measured_limits
+    from poise.training.benchmarking.evaluation.evaluate import evaluate, measured_limits
 
     if write_limits is not None:
         check_out_file(write_limits, "write_limits")
@@ -168,10 +168,10 @@ def benchmark(
 
     choose_gl_backend()
     from poise.baselines.allowance import named
-    from poise.training.benchmark.trials.names import check_names
+    from poise.training.benchmarking.trials.names import check_names
 
     check_names(controllers, robot=robot, suite=suite, realism=realism)
-    from poise.training.benchmark.evaluation.evaluate import benchmark
+    from poise.training.benchmarking.evaluation.evaluate import benchmark
 
     summary = benchmark(
         controllers, suite, out=out, robot=robot, seed=seed, workers=workers, backend=backend,
@@ -229,7 +229,7 @@ def tune(
     """
     from poise.baselines.allowance import named
     from poise.configs.files import resolve
-    from poise.training.benchmark.trials.names import check_name, check_names
+    from poise.training.benchmarking.trials.names import check_name, check_names
 
     resolve("tuning", config)
     check_names(robot=robot)

@@ -120,7 +120,7 @@ def follow(
         size: of the video, width and height [pixels], even.
     """
     from poise.baselines.allowance import allowing
-    from poise.training.benchmark.trials.names import check_names
+    from poise.training.benchmarking.trials.names import check_names
 
     check_names([controller], robot=robot, motion=motion)
     from poise.baselines.balance.references.tempo import Tempo

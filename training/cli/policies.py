@@ -84,7 +84,7 @@ def export(
             summary.json: its figures go into the card.
         licence: of the policy, as Hugging Face abbreviates it; of a packaged one it is known.
     """
-    from poise.training.benchmark.trials.names import check_policy_name
+    from poise.training.benchmarking.trials.names import check_policy_name
 
     check_policy_name(policy)
     from poise.training.deploy.export.export import export_policy
@@ -118,7 +118,7 @@ def dataset(
         robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the trials.
     """
-    from poise.training.benchmark.trials.names import check_names
+    from poise.training.benchmarking.trials.names import check_names
 
     check_names([controller], robot=robot, suite=suite)
     from poise.training.deploy.export.dataset import write_dataset

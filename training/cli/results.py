@@ -14,7 +14,7 @@ from .arguments import Allow, Folder, Json, check_folders, print_json
 
 if TYPE_CHECKING:
     from poise.envs.physics.pushes.push import Kick, Push
-    from poise.training.benchmark.results.replay import Replay
+    from poise.training.benchmarking.results.replay import Replay
 
 
 def compare(
@@ -31,7 +31,7 @@ def compare(
         b: another of the same kind.
     """
     check_folders(a, b)
-    from poise.training.benchmark.results.compare import compare, print_comparison
+    from poise.training.benchmarking.results.compare import compare, print_comparison
 
     found = compare(a, b)
     print_comparison(found, a, b, terminal(stderr=json))
@@ -58,7 +58,7 @@ def leaderboard(
         page: the Markdown file to write; docs/leaderboard.md, or docs/walking-leaderboard.md for
             walks, if not given.
     """
-    from poise.training.benchmark.results.leaderboard import write_leaderboard
+    from poise.training.benchmarking.results.leaderboard import write_leaderboard
 
     if not results:
         raise ConfigError("needs one or more results", field="results")
@@ -92,8 +92,8 @@ def replay(
     from poise.configs.outputs import check_out_file
 
     check_folders(folder)
-    from poise.training.benchmark.results.film import film
-    from poise.training.benchmark.results.replay import replay
+    from poise.training.benchmarking.results.film import film
+    from poise.training.benchmarking.results.replay import replay
 
     for file, field in ((video, "video"), (plot, "plot")):
         if file is not None:
@@ -114,7 +114,7 @@ def replay(
 
 def _print_replay(done: "Replay") -> None:
     """How a trial ended that was played again, why, and in what it differs from its record."""
-    from poise.training.benchmark.diagnosis.words import push_told, why
+    from poise.training.benchmarking.diagnosis.words import push_told, why
 
     end = "recovered" if done.outcome.recovered else "fell" if done.outcome.fallen else "not quiet"
     print(f"trial {done.trial.number}, {done.controller}: {end}")

@@ -15,8 +15,8 @@ from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
 from poise.configs.schema import build, to_dict
-from poise.training.benchmark.statistics.differences import difference
-from poise.training.benchmark.statistics.rates import wilson_interval
+from poise.training.benchmarking.statistics.differences import difference
+from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.learning.checkpoints import STATE, find_checkpoint
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.policy_files import read_state

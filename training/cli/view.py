@@ -79,7 +79,7 @@ def view(
     from poise.envs.viewing.gl import choose_gl_backend
 
     choose_gl_backend()
-    from poise.training.benchmark.trials.names import check_names
+    from poise.training.benchmarking.trials.names import check_names
 
     if trial is None:
         check_names(shown, robot=robot, motion=motion, realism=realism)

@@ -62,7 +62,7 @@ def walk(
 
     if video is not None:
         choose_gl_backend()
-    from poise.training.benchmark.trials.names import check_names
+    from poise.training.benchmarking.trials.names import check_names
 
     check_names([controller], robot=robot, realism=realism)
     from poise.training.pictures.sessions.walk import walk
@@ -121,7 +121,7 @@ def gait(
         workers: processes of that suite; all cores if not given.
     """
     from poise.configs.files import resolve
-    from poise.training.benchmark.trials.names import check_names
+    from poise.training.benchmarking.trials.names import check_names
 
     check_names(robot=robot, suite=push_suite)
     resolve("human", human)

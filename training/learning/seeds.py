@@ -11,7 +11,7 @@ from poise.configs.reading import is_file, read_json
 from poise.training.running.provenance import Circumstances
 
 if TYPE_CHECKING:  # it loads scipy
-    from poise.training.benchmark.statistics.seeds import SeedFigures
+    from poise.training.benchmarking.statistics.seeds import SeedFigures
 
 SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
 KEPT = "kept"  # folder of a run: its policies, by their steps

@@ -18,7 +18,7 @@ from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_folder
 from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
-from poise.training.benchmark.statistics.seeds import seed_figures
+from poise.training.benchmarking.statistics.seeds import seed_figures
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.provenance import circumstances

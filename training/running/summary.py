@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal, TypedDict
 
 from poise.configs.errors import ConfigError, shown
-from poise.training.benchmark.statistics.seeds import SeedFigures
+from poise.training.benchmarking.statistics.seeds import SeedFigures
 
 from .provenance import Circumstances
 
@@ -287,7 +287,7 @@ class Played(Rate):
 
 
 class Loss(TypedDict):
-    """How many of the lost trials have a cause, see `training/benchmark/diagnosis`."""
+    """How many of the lost trials have a cause, see `training/benchmarking/diagnosis`."""
 
     cause: str
     trials: int

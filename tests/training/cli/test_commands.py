@@ -18,7 +18,7 @@ from poise.baselines.allowance import SCRIPTS
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.schema import to_dict
-from poise.training.benchmark.evaluation import run
+from poise.training.benchmarking.evaluation import run
 from poise.training.cli import entry
 from poise.training.cli import train as train_command
 from poise.training.cli.entry import main

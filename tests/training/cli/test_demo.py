@@ -1,4 +1,4 @@
-"""training/cli/demo.py, and training/benchmark/results/film.py, which it ends with."""
+"""training/cli/demo.py, and training/benchmarking/results/film.py, which it ends with."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from rich.console import Console
 
 from poise.configs.errors import PoiseError
-from poise.training.benchmark.evaluation import run as evaluation
-from poise.training.benchmark.results.read import load_results
+from poise.training.benchmarking.evaluation import run as evaluation
+from poise.training.benchmarking.results.read import load_results
 from poise.training.cli import demo
 from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, write_suite
 

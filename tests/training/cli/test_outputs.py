@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from poise.baselines import warmup
-from poise.training.benchmark.evaluation.folder import ResultFolder
+from poise.training.benchmarking.evaluation.folder import ResultFolder
 from poise.training.cli.entry import main
-from tests.training.benchmark.evaluation.test_folder import SETTINGS
+from tests.training.benchmarking.evaluation.test_folder import SETTINGS
 
 FOLDERS = (
     "evaluate zero", "benchmark --controllers zero", "train", "train --seeds 0 1", "tune", "demo",

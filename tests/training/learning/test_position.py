@@ -12,7 +12,7 @@ import pytest
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build
 from poise.envs.balance.position import PositionBalanceEnv
-from poise.training.benchmark.trials.agents import load_agent
+from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.learning import train as training
 from poise.training.learning.checkpoints import STATE
 from poise.training.learning.config import TrainConfig, train_config

@@ -24,7 +24,7 @@ from poise.configs.schema import build, read_yaml
 from poise.envs.balance.mdp.reward import REWARD_TERMS
 from poise.envs.balance.vector.batch import EnvBatch
 from poise.envs.physics.pushes.sampler import PushSampler
-from poise.training.benchmark.trials.agents import load_agent
+from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.learning import callbacks, curriculum
 from poise.training.learning.checkpoints import FILES, POLICY, STATE
 from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, train_config

@@ -21,7 +21,7 @@ from rich.console import Console
 
 from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.schema import read_yaml, to_yaml
-from poise.training.benchmark.evaluation.evaluate import evaluate
+from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.cli.train import run as train_command
 from poise.training.learning import train_seeds as module
 from poise.training.learning.checkpoints import find_checkpoint
@@ -230,7 +230,7 @@ def test_an_evaluation_of_a_folder_of_seeds(
     tmp_path: Path, in_process: type[InProcessExecutor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its runs play, and their IQM and the worst seed are in the summary and on the terminal."""
-    from poise.training.benchmark.evaluation import run as evaluation
+    from poise.training.benchmarking.evaluation import run as evaluation
     from tests.support.evaluations import InProcess
 
     monkeypatch.setattr(evaluation, "Executor", InProcess)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from poise.configs.errors import PoiseError
-from poise.training.benchmark.evaluation.evaluate import evaluate
+from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.learning.train import train
 from poise.training.learning.train_seeds import train_seeds
 from poise.training.learning.tuning.search import TuneConfig, TuningPushes, tune

@@ -17,11 +17,11 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.files import new_folder
 from poise.envs.balance.plain_info import push_arrays
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmark.suites.plan import Plan
-from poise.training.benchmark.suites.suite import load_suite
-from poise.training.benchmark.trials.agents import Agent, load_agent
-from poise.training.benchmark.trials.push_limits import load_limits
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.suite import load_suite
+from poise.training.benchmarking.trials.agents import Agent, load_agent
+from poise.training.benchmarking.trials.push_limits import load_limits
+from poise.training.benchmarking.trials.trial import Trial
 
 from .libraries import library
 

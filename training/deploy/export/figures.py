@@ -9,8 +9,8 @@ from pathlib import Path
 from poise.configs.errors import ConfigError
 from poise.configs.reading import is_folder
 from poise.envs.robots.robot import Robot
-from poise.training.benchmark.results.summary import read_summary
-from poise.training.benchmark.trials.agents import load_agent
+from poise.training.benchmarking.results.summary import read_summary
+from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.learning.policy import Policy
 from poise.training.running.files import SUMMARY
 from poise.training.running.summary import Entry, Summary

@@ -22,7 +22,7 @@ from poise.configs.files import check_new_folder, new_folder
 from poise.configs.schema import to_dict
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmark.trials.push_limits import load_limits
+from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.running.provenance import commit, versions
 
 from .recordings import PUSH_DURATION, RecordedTick, Recovery, recoveries

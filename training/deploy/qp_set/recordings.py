@@ -18,8 +18,8 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
-from poise.training.benchmark.suites.draw import generator, start_seed
-from poise.training.benchmark.trials.push_limits import PushLimits
+from poise.training.benchmarking.suites.draw import generator, start_seed
+from poise.training.benchmarking.trials.push_limits import PushLimits
 
 End = Literal["recovered", "fell", "not quiet"]
 DIRECTIONS = 8

@@ -10,7 +10,7 @@ import numpy as np
 
 from poise.envs.physics.legs import Leg, find_legs
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.benchmark.trials.push_limits import PushLimits
+from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.running.files import plain
 
 from .dynamics import Dynamics, dynamics

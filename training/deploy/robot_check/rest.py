@@ -10,7 +10,7 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import PoiseError
 from poise.envs.balance import episode
 from poise.envs.robots.robot import Robot
-from poise.training.benchmark.trials.play import TINY, lean
+from poise.training.benchmarking.trials.play import TINY, lean
 
 CONTROLLER = "momentum-qp"
 DURATION = 2.0  # [s]

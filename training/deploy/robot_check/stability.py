@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from poise.envs.physics.pushes.sampler import LIMIT_DURATION
-from poise.training.benchmark.trials.push_limits import PushLimits
-from poise.training.benchmark.trials.step_limits import NStepLimit
+from poise.training.benchmarking.trials.push_limits import PushLimits
+from poise.training.benchmarking.trials.step_limits import NStepLimit
 
 DIRECTIONS = tuple(22.5 * i for i in range(16))  # [deg]
 

@@ -22,7 +22,7 @@ from poise.envs.physics.kinematics import update_state
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import Realism, load_realism
 from poise.envs.sensing.source import StateSource
-from poise.training.benchmark.trials.agents import Agent, load_agent
+from poise.training.benchmarking.trials.agents import Agent, load_agent
 
 from .readings import Readings
 from .sensed import SensedController

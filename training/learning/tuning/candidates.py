@@ -13,9 +13,9 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import IDEAL, load_realism
-from poise.training.benchmark.trials.agents import Agent
-from poise.training.benchmark.trials.play import run_trial
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.trials.agents import Agent
+from poise.training.benchmarking.trials.play import run_trial
+from poise.training.benchmarking.trials.trial import Trial
 
 if TYPE_CHECKING:  # it loads torch
     from poise.training.learning.policy import Policy

@@ -20,10 +20,10 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
-from poise.training.benchmark.trials.agents import Agent, load_agent
-from poise.training.benchmark.trials.play import Watch, run_trial
-from poise.training.benchmark.trials.push_limits import load_limits
-from poise.training.benchmark.trials.trial import Outcome, Trial
+from poise.training.benchmarking.trials.agents import Agent, load_agent
+from poise.training.benchmarking.trials.play import Watch, run_trial
+from poise.training.benchmarking.trials.push_limits import load_limits
+from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.motion.tracking.record import ANYWHERE, TrackingFigures
 
 PUSH_TIME = 0.1  # [s]

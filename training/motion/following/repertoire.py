@@ -22,7 +22,7 @@ from poise.configs.files import resolve
 from poise.configs.reading import is_file
 from poise.envs.balance.config import StartNoise
 from poise.envs.robots.robot import Robot
-from poise.training.benchmark.trials.jobs import Stage
+from poise.training.benchmarking.trials.jobs import Stage
 
 from .follow import LONGEST
 

@@ -17,12 +17,12 @@ from poise.configs.files import packaged, write_atomic
 from poise.configs.numbers import whole_number
 from poise.configs.outputs import check_out_folder
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.benchmark.evaluation.evaluate import evaluate
-from poise.training.benchmark.evaluation.tick_times import Clocked
-from poise.training.benchmark.suites.suite import load_suite
-from poise.training.benchmark.trials.agents import Agent, check_walks, load_agent
-from poise.training.benchmark.trials.play import run_trial
-from poise.training.benchmark.trials.trial import Outcome, Trial
+from poise.training.benchmarking.evaluation.evaluate import evaluate
+from poise.training.benchmarking.evaluation.tick_times import Clocked
+from poise.training.benchmarking.suites.suite import load_suite
+from poise.training.benchmarking.trials.agents import Agent, check_walks, load_agent
+from poise.training.benchmarking.trials.play import run_trial
+from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.running.folder_lock import FolderLock
 
 from .human import KneeMoment, load_knee_moment

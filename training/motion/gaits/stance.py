@@ -10,7 +10,7 @@ import numpy as np
 from poise.baselines.walking.models.legs import leg_arrays
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import Robot
-from poise.training.benchmark.trials.gait_record import knee_motors
+from poise.training.benchmarking.trials.gait_record import knee_motors
 
 from .human import POINTS
 

@@ -11,9 +11,9 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import ArrayLike
 
-from poise.training.benchmark.statistics.fits import Bound, LogisticFit, check_trials, trial_bins
-from poise.training.benchmark.statistics.rates import wilson_interval
-from poise.training.benchmark.trials.step_limits import shown_out_to
+from poise.training.benchmarking.statistics.fits import Bound, LogisticFit, check_trials, trial_bins
+from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.trials.step_limits import shown_out_to
 
 from .style import GREY, INK, Look, legend_below, look, saved_figure
 

@@ -8,8 +8,8 @@ from types import TracebackType
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.viewing.renderer import SceneRenderer
-from poise.training.benchmark.trials.play import Watch
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.trials.play import Watch
+from poise.training.benchmarking.trials.trial import Trial
 from poise.training.pictures.figures.encoder import Encoder
 from poise.training.pictures.sessions.ghost import Ghost, ghost_of
 

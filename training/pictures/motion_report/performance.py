@@ -12,8 +12,8 @@ from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.motion.feasibility.check import check_motion
 from poise.configs.reading import is_file, parse_json, parsing, read_text
 from poise.envs.robots.robot import load_robot
-from poise.training.benchmark.trials.play import Watch
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.trials.play import Watch
+from poise.training.benchmarking.trials.trial import Trial
 from poise.training.motion.following.follow import Followed
 
 from .over_time import errors_picture, zmp_picture

@@ -10,9 +10,9 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike
 
-from poise.training.benchmark.statistics.fits import LogisticFit
-from poise.training.benchmark.statistics.rates import wilson_interval
-from poise.training.benchmark.trials.step_limits import shown_out_to
+from poise.training.benchmarking.statistics.fits import LogisticFit
+from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.trials.step_limits import shown_out_to
 
 from .svg import Chart, Svg, colour, dash, right_angle, ticks
 

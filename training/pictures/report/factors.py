@@ -8,9 +8,9 @@ from typing import TypedDict, cast
 import numpy as np
 from markupsafe import Markup
 
-from poise.training.benchmark.results.read import Results
-from poise.training.benchmark.statistics.rates import wilson_interval
-from poise.training.benchmark.statistics.seeds import FIGURES
+from poise.training.benchmarking.results.read import Results
+from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.statistics.seeds import FIGURES
 from poise.training.running.summary import Level, MarginFigures, both_ends
 
 from .cells import Cell, Column, Table, cell, figure_cell, name_cell, p_cell

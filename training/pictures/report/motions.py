@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from poise.training.benchmark.results.read import Results
+from poise.training.benchmarking.results.read import Results
 from poise.training.motion.following.motion_tables import ALL, BOUNDS
 
 from .cells import Cell, Column, Table, cell, figure_cell, name_cell

@@ -16,8 +16,8 @@ from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
 from poise.envs.viewing.quantities import PUSH, SUPPORT
-from poise.training.benchmark.evaluation.tables import assisted
-from poise.training.benchmark.results.read import Record, Results, load_results
+from poise.training.benchmarking.evaluation.tables import assisted
+from poise.training.benchmarking.results.read import Record, Results, load_results
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
 from poise.training.running.terminal import print_paths
 

@@ -8,11 +8,11 @@ from typing import cast
 import numpy as np
 from markupsafe import Markup
 
-from poise.training.benchmark.metrics.played import DIRECTIONAL
-from poise.training.benchmark.results.read import Record, Results
-from poise.training.benchmark.statistics.fits import fit_logistic, trial_bins
-from poise.training.benchmark.statistics.rates import wilson_interval
-from poise.training.benchmark.trials.step_limits import DRAWN, line_name
+from poise.training.benchmarking.metrics.played import DIRECTIONAL
+from poise.training.benchmarking.results.read import Record, Results
+from poise.training.benchmarking.statistics.fits import fit_logistic, trial_bins
+from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.trials.step_limits import DRAWN, line_name
 from poise.training.running.summary import Interval, both_ends
 
 from .cells import Download, csv_text, download

@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import ArrayLike
 
-from poise.training.benchmark.diagnosis.words import towards
+from poise.training.benchmarking.diagnosis.words import towards
 from poise.training.pictures.figures.style import MANY
 
 COLOURS = len(MANY)  # classes s0, s1, … of the style sheet

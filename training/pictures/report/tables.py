@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import cast
 
-from poise.training.benchmark.evaluation.tables import BOUNDS, places
-from poise.training.benchmark.results.read import Results
-from poise.training.benchmark.statistics.rates import wilson_interval
+from poise.training.benchmarking.evaluation.tables import BOUNDS, places
+from poise.training.benchmarking.results.read import Results
+from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.running.summary import Bound, Direction, Sector
 
 from .cells import Cell, Column, Table, cell, figure_cell, name_cell, p_cell

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from markupsafe import Markup
 
-from poise.training.benchmark.evaluation.tables import BOUNDS
-from poise.training.benchmark.results.read import Results
+from poise.training.benchmarking.evaluation.tables import BOUNDS
+from poise.training.benchmarking.results.read import Results
 from poise.training.running.summary import PhaseJ50, WalkLevel, both_ends
 
 from .cells import Cell, Column, Table, cell, figure_cell, name_cell

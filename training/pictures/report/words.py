@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from poise.training.benchmark.diagnosis.words import towards
-from poise.training.benchmark.evaluation.tables import assisted, places
-from poise.training.benchmark.results.read import Record, Results
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.diagnosis.words import towards
+from poise.training.benchmarking.evaluation.tables import assisted, places
+from poise.training.benchmarking.results.read import Record, Results
+from poise.training.benchmarking.trials.trial import Trial
 from poise.training.running.summary import both_ends
 
 from .svg import number_text

@@ -13,9 +13,9 @@ from poise.configs.errors import PoiseError
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.viewing.camera import Camera, beside
 from poise.envs.viewing.renderer import SceneRenderer
-from poise.training.benchmark.results.read import Record, Results
-from poise.training.benchmark.results.replay import replay
-from poise.training.benchmark.trials.signals import Signals
+from poise.training.benchmarking.results.read import Record, Results
+from poise.training.benchmarking.results.replay import replay
+from poise.training.benchmarking.trials.signals import Signals
 
 FRAMES = 8  # of a strip
 SIZE = (216, 264)  # of a frame [pixels], shown at half of it: sharp on a phone

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from poise.baselines.policy_files.known import RIVALS
 from poise.configs.files import packaged
-from poise.training.benchmark.trials.names import NO_CONTROL
+from poise.training.benchmarking.trials.names import NO_CONTROL
 
 from .spec import SessionSpec, Spec
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
-from poise.training.benchmark.diagnosis.words import why
-from poise.training.benchmark.results.read import load_results
-from poise.training.benchmark.results.replay import replay
-from poise.training.benchmark.trials.trial import Outcome
+from poise.training.benchmarking.diagnosis.words import why
+from poise.training.benchmarking.results.read import load_results
+from poise.training.benchmarking.results.replay import replay
+from poise.training.benchmarking.trials.trial import Outcome
 
 from .frames import Frame, Observer
 from .live import Frames, Recorded

@@ -18,9 +18,9 @@ from poise.envs.physics.pushes.options import parse_pushes
 from poise.envs.physics.pushes.push import Push
 from poise.envs.robots.robot import Robot
 from poise.envs.sensing.realism import IDEAL, load_realism
-from poise.training.benchmark.trials.agents import Agent, load_agent
-from poise.training.benchmark.trials.play import SteppedTrial
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.trials.agents import Agent, load_agent
+from poise.training.benchmarking.trials.play import SteppedTrial
+from poise.training.benchmarking.trials.trial import Trial
 from poise.training.motion.following.follow import performer
 
 LONGEST = 1e5  # [s] after which a session would end by itself: a day

@@ -23,9 +23,9 @@ from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import load_realism
 from poise.envs.terrain.terrain import Terrain, make_terrain
 from poise.envs.viewing.camera import Camera, beside
-from poise.training.benchmark.trials.agents import Agent, check_may_walk, check_walks, load_agent
-from poise.training.benchmark.trials.play import run_trial
-from poise.training.benchmark.trials.trial import Outcome, Trial
+from poise.training.benchmarking.trials.agents import Agent, check_may_walk, check_walks, load_agent
+from poise.training.benchmarking.trials.play import run_trial
+from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.pictures.figures.encoder import FORMS
 from poise.training.pictures.figures.video import record
 

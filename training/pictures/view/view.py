@@ -8,7 +8,7 @@ from pathlib import Path
 from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError
 from poise.envs.sensing.realism import IDEAL
-from poise.training.benchmark.trials.names import check_names
+from poise.training.benchmarking.trials.names import check_names
 from poise.training.pictures.sessions.live import Play
 from poise.training.pictures.sessions.loading import load_live
 from poise.training.pictures.sessions.recorded import recorded_trial

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from poise.configs.errors import PoiseError
-from poise.training.benchmark.evaluation import run as run_module
+from poise.training.benchmarking.evaluation import run as run_module
 from poise.training.cli.entry import main
 from poise.training.deploy.export import export, libraries
 from poise.training.deploy.export.export import export_policy

@@ -19,7 +19,7 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.physics.pushes.options import parse_pushes
 from poise.envs.physics.simulation import Simulation
-from poise.training.benchmark.trials.agents import Agent, load_agent
+from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.deploy.standalone.controller import StandaloneController, load_standalone
 from poise.training.deploy.standalone.readings import Readings
 from tests.support.shared import robot

@@ -14,9 +14,9 @@ from poise.configs.files import packaged
 from poise.configs.schema import build, read_yaml, to_dict
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
-from poise.training.benchmark.trials import play as playing
-from poise.training.benchmark.trials.agents import Agent
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.trials import play as playing
+from poise.training.benchmarking.trials.agents import Agent
+from poise.training.benchmarking.trials.trial import Trial
 from poise.training.learning.tuning.candidates import Candidate, TuningPushes, follow, play, worth
 from poise.training.learning.tuning.gains import Gains
 from poise.training.learning.tuning.search import GAINS, HISTORY, TuneConfig, tune, tune_config

@@ -11,7 +11,7 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
-from poise.training.benchmark.trials.push_limits import load_limits
+from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.motion.following.fastest import fastest
 from poise.training.motion.following.follow import follow
 from tests.support.physics import robot_named

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from poise.training.benchmark.evaluation import run as evaluation
-from poise.training.benchmark.trials.trial import Outcome
+from poise.training.benchmarking.evaluation import run as evaluation
+from poise.training.benchmarking.trials.trial import Outcome
 from poise.training.cli.entry import main
 from poise.training.motion.gaits.compare import controller_of, figures_of
 from poise.training.motion.gaits.human import KneeMoment

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from poise.training.benchmark.statistics.fits import Bound, LogisticFit, fit_logistic
-from poise.training.benchmark.statistics.rates import wilson_interval
+from poise.training.benchmarking.statistics.fits import Bound, LogisticFit, fit_logistic
+from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.pictures.figures import style
 from poise.training.pictures.figures.envelope import fall_probability, polar_envelope
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from poise.training.benchmark.statistics.fits import fit_logistic
+from poise.training.benchmarking.statistics.fits import fit_logistic
 from poise.training.pictures.report.charts import (
     MIDDLE,
     RADIUS,

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from poise.configs.errors import ConfigError
-from poise.training.benchmark.evaluation.evaluate import benchmark
-from poise.training.benchmark.results.read import Results, load_results
+from poise.training.benchmarking.evaluation.evaluate import benchmark
+from poise.training.benchmarking.results.read import Results, load_results
 from poise.training.pictures.report import factors as factor_tables
 from poise.training.pictures.report.cells import Table
 from poise.training.pictures.report.tables import ranking

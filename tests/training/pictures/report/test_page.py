@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from poise.configs.errors import ConfigError, PoiseError
-from poise.training.benchmark.results.read import load_results
+from poise.training.benchmarking.results.read import load_results
 from poise.training.cli.entry import main
 from poise.training.pictures.report import page as html_report
 from poise.training.pictures.report.page import write_report

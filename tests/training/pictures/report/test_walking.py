@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from poise.training.benchmark.results.read import Results, load_results
+from poise.training.benchmarking.results.read import Results, load_results
 from poise.training.pictures.report import walking
 from poise.training.pictures.report.cells import Table
 from poise.training.pictures.report.page import render

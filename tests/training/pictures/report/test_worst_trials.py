@@ -1,4 +1,4 @@
-"""training/pictures/report/worst_trials.py and training/benchmark/trials/signals.py."""
+"""training/pictures/report/worst_trials.py and training/benchmarking/trials/signals.py."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from poise.training.benchmark.results.read import Record, Results, load_results
-from poise.training.benchmark.trials.table import COLUMNS
+from poise.training.benchmarking.results.read import Record, Results, load_results
+from poise.training.benchmarking.trials.table import COLUMNS
 from poise.training.pictures.report import worst_trials
 from poise.training.pictures.report.worst_trials import (
     choose_exhibits,

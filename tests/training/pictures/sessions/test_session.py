@@ -14,9 +14,9 @@ from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Push
-from poise.training.benchmark.trials.agents import load_agent
-from poise.training.benchmark.trials.play import run_trial
-from poise.training.benchmark.trials.trial import Trial
+from poise.training.benchmarking.trials.agents import load_agent
+from poise.training.benchmarking.trials.play import run_trial
+from poise.training.benchmarking.trials.trial import Trial
 from poise.training.pictures.sessions.frames import VALUES, Frame, between
 from poise.training.pictures.sessions.live import KEPT, Live
 from poise.training.pictures.sessions.loading import read_mapping

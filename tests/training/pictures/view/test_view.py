@@ -22,7 +22,7 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Push
 from poise.envs.viewing import window
-from poise.training.benchmark.results.replay import replay
+from poise.training.benchmarking.results.replay import replay
 from poise.training.cli.entry import main
 from poise.training.pictures.sessions import live as live_module
 from poise.training.pictures.sessions import loading

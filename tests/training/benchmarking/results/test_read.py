@@ -1,0 +1,174 @@
+"""training/benchmarking/results/read.py and training/running/summary.py."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from poise.configs.errors import ConfigError
+from poise.training.benchmarking.diagnosis.diagnosis import COLUMNS as DIAGNOSIS
+from poise.training.benchmarking.results.leaderboard import leaderboard
+from poise.training.benchmarking.results.read import load_results
+from poise.training.benchmarking.results.summary import read_summary
+from poise.training.running.summary import both_ends
+from tests.support.report_folders import copied, finished
+
+
+def test_the_files_are_read_back() -> None:
+    """Every trial of every controller, with its numbers; nothing without a push or a fall."""
+    results = load_results(finished("random"))
+    summary = json.loads((finished("random") / "summary.json").read_text())
+    assert results.controllers == tuple(summary["controllers"]) and len(results.records) == 16
+    for name in results.controllers:
+        records = results.of(name)
+        assert sum(r.recovered for r in records) == summary["controllers"][name]["recovered"]
+        assert all(math.isnan(r.fall_time) != r.fallen for r in records)
+        assert all(float(r.line["impulse"]) == r.impulse for r in records)
+
+
+def test_what_was_lost_says_why_and_older_results_say_nothing(tmp_path: Path) -> None:
+    """Every lost trial; the causes are counted in the summary."""
+    results = load_results(finished("random"))
+    for record in results.records:
+        assert bool(record.why) is not record.recovered
+    for name, entry in results.summary["controllers"].items():
+        lost = sum(not record.recovered for record in results.of(name))
+        assert sum(loss["trials"] for loss in entry.get("losses", [])) == lost
+    old = copied("random", tmp_path)
+    with (old / "trials.csv").open(newline="") as file:
+        rows = [
+            {k: v for k, v in row.items() if k not in DIAGNOSIS} for row in csv.DictReader(file)
+        ]
+    with (old / "trials.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    assert {record.why for record in load_results(old).records} == {""}
+
+
+def edit(name: str, old: str, new: str) -> Callable[[Path], None]:
+    """Changes a text in a file."""
+
+    def change(folder: Path) -> None:
+        text = (folder / name).read_text()
+        assert old in text
+        (folder / name).write_text(text.replace(old, new, 1))
+
+    return change
+
+
+def cut(name: str, share: float) -> Callable[[Path], None]:
+    """Cuts a file off."""
+
+    def change(folder: Path) -> None:
+        text = (folder / name).read_text()
+        (folder / name).write_text(text[: int(share * len(text))])
+
+    return change
+
+
+def summary(**changes: object) -> Callable[[Path], None]:
+    """Changes entries of the first controller in the summary."""
+
+    def change(folder: Path) -> None:
+        path = folder / "summary.json"
+        data = json.loads(path.read_text())
+        next(iter(data["controllers"].values())).update(changes)
+        path.write_text(json.dumps(data))
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda folder: (folder / "summary.json").unlink(), "summary.json missing"),
+        (lambda folder: (folder / "trials.csv").unlink(), "trials.csv missing"),
+        (lambda folder: (folder / "settings.yaml").unlink(), "settings.yaml missing"),
+        (lambda folder: (folder / "trials.csv").write_bytes(b"\xff\xfe\0"), "trials.csv: "),
+        (lambda folder: (folder / "summary.json").write_text("[]"), "must be a mapping"),
+        (lambda folder: (folder / "summary.json").write_text("{}"), "is of an older Poise"),
+        (cut("summary.json", 0.5), "summary.json: is not valid JSON"),
+        (cut("trials.csv", 0.5), "trials.csv"),
+        (cut("trials.csv", 0.0), "trials.csv: lacks the columns"),
+        (edit("trials.csv", ",recovered,", ",won,"), "lacks the columns recovered"),
+        (edit("trials.csv", "False", "Maybe"), "does not parse"),
+        (edit("trials.csv", ",zero,", ",one,"), "'one' is not in summary.json"),
+        (edit("summary.json", '"zero": {', '"other": {'), "ranking: must name all controllers"),
+        (edit("settings.yaml", "zero: ", "one: "), "not those of settings.yaml"),
+        (summary(played=9), "has 8 trials"),
+        (summary(recovered=99), "recovered: must be a whole number"),
+        (summary(recovered_rate="all"), "recovered_rate: must be a number, not 'all'"),
+        (summary(trials=0), "trials: must be at least 1"),
+        (summary(recovered_ci95=[1]), "recovered_ci95: must be a list of 2"),
+        (summary(sectors="all"), "sectors: must be a list"),
+        (summary(sectors=[{"direction": "north"}]), "sectors[0]"),
+        (summary(directions=[]), "j50_mean: is missing"),
+        (edit("summary.json", '"format": 2', '"format": 3'), "is of format 3, this one reads"),
+        (edit("settings.yaml", "format: 2", "benchmark: 1"), "is of an older Poise"),
+        (edit("summary.json", '"reference": "', '"reference": "other '), "no such controller"),
+        (edit("settings.yaml", "seed: 4", "seed: four"), "settings.yaml: seed"),
+    ],
+)
+def test_a_folder_that_is_not_whole_is_refused(
+    change: Callable[[Path], None], message: str, tmp_path: Path
+) -> None:
+    """Missing, cut off, foreign or contradicting files: one line that names the file."""
+    folder = copied("random", tmp_path)
+    change(folder)
+    with pytest.raises(ConfigError) as caught:
+        load_results(folder)
+    assert message in str(caught.value) and str(folder) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_stopped_evaluation_is_told_apart(tmp_path: Path) -> None:
+    """The text says how to finish it."""
+    folder = copied("random", tmp_path)
+    (folder / "summary.json").unlink()
+    with pytest.raises(ConfigError, match="summary.json missing; the command that began it"):
+        load_results(folder)
+    with pytest.raises(ConfigError, match="no such folder"):
+        load_results(tmp_path / "nowhere")
+
+
+def test_intervals_may_be_open() -> None:
+    """An end that is null is nothing to compute with."""
+    assert both_ends((1.0, 2.5)) == (1.0, 2.5)
+    assert both_ends((None, 2.5)) is None and both_ends(None) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "rated", "page"),
+    [
+        ("leaderboard", "mix", None),
+        ("leaderboard-residual-torque", "mix", None),
+        *(
+            (robot, "mix", f"leaderboard-{robot}.md")
+            for robot in ("unitree_g1", "unitree_h1", "booster_t1")
+        ),
+    ],
+)
+def test_the_committed_results_are_read(name: str, rated: str, page: str | None) -> None:
+    """Those of the leaderboards have the form of today, and the pages of robots are theirs."""
+    path = Path(__file__).parents[4] / f"docs/results/{name}.json"
+    summary = read_summary(path)
+    assert summary == json.loads(path.read_text(), object_hook=_as_read)
+    assert summary["rated"] == rated and summary["reference"] in summary["controllers"]
+    if page is not None:
+        source = f"docs/results/{name}.json"
+        assert (path.parents[1] / page).read_text() == leaderboard({source: summary})
+
+
+def _as_read(mapping: dict[str, Any]) -> dict[str, Any]:
+    """Intervals as pairs."""
+    pairs = {key: tuple(value) for key, value in mapping.items() if key.endswith("ci95") and value}
+    if "ankle_limit" in mapping and isinstance(mapping["ankle_limit"], list):
+        pairs["ankle_limit"] = [tuple(row) for row in mapping["ankle_limit"]]
+    return mapping | pairs

@@ -1,0 +1,115 @@
+"""training/benchmarking/results/walking_leaderboard.py: the page of controllers that walk."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from poise.configs.errors import ConfigError
+from poise.training.benchmarking.results.leaderboard import write_leaderboard
+from poise.training.benchmarking.results.summary import read_summary
+from poise.training.benchmarking.results.walking_leaderboard import walking_leaderboard
+from poise.training.cli.entry import main
+
+ROOT = Path(__file__).parents[4]
+ONE = ROOT / "docs/results/walkers-walk.json"
+OTHER = ROOT / "docs/results/walkers-walk-spring.json"
+
+
+def changed(path: Path, source: Path, change: Any) -> Path:
+    """A copy of a result, changed."""
+    data = json.loads(source.read_text())
+    change(data)
+    path.write_text(json.dumps(data))
+    return path
+
+
+def rows(text: str) -> list[list[str]]:
+    """The cells of all rows of tables."""
+    return [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
+
+
+def test_the_committed_page_is_generated() -> None:
+    """docs/walking-leaderboard.md is what the command that it names makes of the results that it
+    names."""
+    text = (ROOT / "docs/walking-leaderboard.md").read_text()
+    (command,) = re.findall("`poise leaderboard ([^`]+)`", text)
+    assert walking_leaderboard({n: read_summary(ROOT / n) for n in command.split()}) == text
+
+
+def test_walks_are_ranked_by_j50_whatever_the_order_of_results(tmp_path: Path) -> None:
+    """By the command; the same page but for its sources; falls are summed over the commands."""
+    pages = []
+    for k, order in enumerate(((ONE, OTHER), (OTHER, ONE))):
+        pages.append(tmp_path / f"{k}.md")
+        assert main(["leaderboard", *map(str, order), "--page", str(pages[-1])]) == 0
+    first, second = (rows(page.read_text()) for page in pages)
+    assert first == second
+    places = {row[1]: row for row in first if row[0] in ("1", "2")}
+    entry = read_summary(OTHER)["controllers"]["walk-spring"]
+    assert float(places["`walk`"][2].split()[0]) > float(places["`walk-spring`"][2].split()[0])
+    walks = [level for level in entry["walks"] if level["part"] == "walk"]
+    fallen, minutes = sum(w["fallen"] for w in walks), sum(w["minutes"] for w in walks)
+    assert fallen > 0 and places["`walk-spring`"][6] == f"{fallen} of {6 * len(walks)}"
+    assert places["`walk-spring`"][7].startswith(f"{fallen / minutes:.2f} [")
+
+
+def test_one_without_a_j50_comes_last_without_a_rank(tmp_path: Path) -> None:
+    """Its other columns stay."""
+
+    def forget(data: dict[str, Any]) -> None:
+        entry = data["controllers"]["walk"]
+        for key in [key for key in entry if key.startswith(("j50", "eta", "j90", "dir"))]:
+            del entry[key]
+
+    page = tmp_path / "page.md"
+    write_leaderboard([changed(tmp_path / "a.json", ONE, forget), OTHER], page)
+    ranked = [row[:3] for row in rows(page.read_text())[2:4]]
+    assert [row[:2] for row in ranked] == [["1", "`walk-spring`"], ["–", "`walk`"]]
+    assert ranked[1][2] == "–"
+
+
+def test_the_page_says_what_j50_is_of() -> None:
+    """The command, and how long a push takes, of those that say it."""
+    first, second = read_summary(ONE), read_summary(OTHER)
+    pushes = "J50 is of pushes while it walks (ahead 0.5)"
+
+    def told(*durations: float | None) -> str:
+        for summary, duration in zip((first, second), durations, strict=True):
+            (entry,) = summary["controllers"].values()
+            entry.pop("push_duration", None)
+            if duration is not None:
+                entry["push_duration"] = duration
+        (line,) = [line for line in walking_leaderboard({"a": first, "b": second}).splitlines()
+                   if line.startswith("J50 is")]  # fmt: skip
+        return line
+
+    assert told(None, None) == f"{pushes}."
+    assert told(0.2, 0.2) == f"{pushes}, of 0.2 s."
+    assert told(0.1, None) == f"{pushes}, of 0.1 s for `walk`."
+    assert told(0.2, 0.1) == f"{pushes}, of 0.1 s for `walk-spring`, of 0.2 s for `walk`."
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda d: d.update(seed=22), "seed: is not that of"),
+        (lambda d: d["robot"].update(mass=41.0), "robot.mass: is not that of"),
+        (
+            lambda d: d["controllers"]["walk-spring"]["walks"].pop(0),
+            "controllers.walk-spring: has no walks of the commands of",
+        ),
+        (lambda d: d["controllers"]["walk-spring"].update(walks=[]), "suite: is not of walks"),
+    ],
+)
+def test_results_that_do_not_fit_are_named(tmp_path: Path, change: Any, says: str) -> None:
+    """The file and the field; the page stays as it was."""
+    page = tmp_path / "page.md"
+    page.write_text("before")
+    with pytest.raises(ConfigError, match=says) as error:
+        write_leaderboard([ONE, changed(tmp_path / "b.json", OTHER, change)], page)
+    assert str(tmp_path / "b.json") in str(error.value) and page.read_text() == "before"

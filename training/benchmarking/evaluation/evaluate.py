@@ -1,0 +1,159 @@
+"""Playing a suite with several controllers: `poise evaluate` and `poise benchmark`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from poise.baselines.allowance import allows
+from poise.baselines.registry import walking_controllers
+from poise.configs.errors import ConfigError
+from poise.configs.files import packaged, packaged_folder
+from poise.configs.reading import read_json, read_yaml
+from poise.envs.physics.pushes.sampler import LimitTable
+from poise.envs.robots.robot import load_robot
+from poise.training.benchmarking.trials.push_limits import PushLimits, load_limits, write_limits
+from poise.training.running.summary import Summary
+
+from .run import Run
+
+REFERENCE = "momentum-qp"
+RESTLESS = ("simbicon",)  # always marks time, and so never counts as recovered
+
+
+@allows("controllers")
+def evaluate(
+    controllers: Sequence[str],
+    suite: str | Path = "strong",
+    *,
+    out: str | Path,
+    robot: str = "humanoid",
+    seed: int = 0,
+    workers: int | None = None,
+    backend: str = "local",
+    trials: int | None = None,
+    limits: str | Path | None = None,
+    motions: Sequence[str] = (),
+    realism: str | None = None,
+    overwrite: bool = False,
+    console: Console | None = None,
+    allow: str | Iterable[str] = (),
+) -> Summary:
+    """Play a suite with some controllers and write what came of it; returns the summary.
+
+    `out` gets settings.yaml, trials.jsonl, trials.csv, summary.json and, with pushes, plots. Trials
+    that `out` already holds are not played again, be it stopped or finished; controllers that it
+    holds besides stay in the result. The result is the same, bit for bit, for any `workers` and
+    `backend`.
+
+    Args:
+        controllers: names as `load_agent` takes them, or folders of several training seeds; all
+            different. The first is the reference of the others.
+        suite: a packaged suite or a path to a ``.yaml`` of one.
+        out: the folder to write to.
+        robot: a packaged robot or a path to its description.
+        seed: of the trials.
+        workers: number of processes; None for all cores.
+        backend: local, joblib or ray.
+        trials: instead of the number of the suite's only part (of an envelope, in its second
+            stage); of a suite of several parts, at most as many in every cell.
+        limits: what pushes are measured by, see `load_limits`.
+        motions: names and files of motions, for a suite that performs some, instead of its own.
+        realism: a packaged level of realism or a path to one, instead of the suite's.
+        overwrite: replace what `out` holds.
+        console: where progress and tables are printed; None: nowhere.
+        allow: controllers from outside (``module:Class``) that may run though they are not among
+            `controllers`, but named by what `out` holds, a policy's folder or a file.
+
+    Raises:
+        ConfigError: anything named does not exist or is not valid; nothing is written then.
+        PoiseError: a file cannot be written, or a worker has died.
+    """
+    if not controllers:
+        raise ConfigError("give at least one", field="controller")
+    run = Run(
+        controllers, suite, out, robot, seed, workers, backend, trials, overwrite, console,
+        reference=None, measured=lambda loaded: load_limits(loaded, limits), motions=motions,
+        realism=realism,
+    )  # fmt: skip
+    return run.play(plots=True)
+
+
+@allows("controllers")
+def benchmark(
+    controllers: Sequence[str] = (),
+    suite: str | Path = "standard",
+    *,
+    out: str | Path,
+    robot: str = "humanoid",
+    seed: int = 0,
+    workers: int | None = None,
+    backend: str = "local",
+    trials: int | None = None,
+    realism: str | None = None,
+    overwrite: bool = False,
+    console: Console | None = None,
+    allow: str | Iterable[str] = (),
+) -> Summary:
+    """Rank controllers by a suite: `evaluate` with pushes measured by the ankle limit.
+
+    That limit is physics, so a result stays comparable when a controller changes. All are compared
+    with momentum-qp, and the time of a control tick is measured, which alone is not the same for
+    any `workers`.
+
+    Args:
+        controllers: as of `evaluate`; none: `default_controllers`.
+        suite, out, robot, seed, workers, backend, trials, realism, overwrite, console, allow: as of
+            `evaluate`.
+
+    Raises:
+        ConfigError, PoiseError: as `evaluate`.
+    """
+    chosen = controllers or default_controllers(load_robot(robot).name)
+    run = Run(
+        chosen, suite, out, robot, seed, workers, backend, trials,
+        overwrite, console, reference=REFERENCE, measured=PushLimits, realism=realism,
+    )  # fmt: skip
+    return run.play(timed=True)
+
+
+def default_controllers(robot: str = "humanoid") -> tuple[str, ...]:
+    """The reference, all other packaged controllers that can rest, and the robot's policies.
+
+    Controllers that walk, and policies on them, are left out: where nothing is commanded they are
+    `feedback-step`.
+    """
+    elsewhere = {REFERENCE, *RESTLESS, *walking_controllers()}
+    others = (name for name in packaged("controllers") if name not in elsewhere)
+    policies = (name for name in packaged_policies(robot) if not walks(name))
+    return (REFERENCE, *others, *policies)
+
+
+def packaged_policies(robot: str) -> list[str]:
+    """The packaged policies that were trained on the robot of this name."""
+    folder = packaged_folder("policies")
+    states = {name: read_json(folder / name / "state.json") for name in packaged("policies")}
+    return [name for name, state in states.items() if state["robot"] == robot]
+
+
+def walks(policy: str) -> bool:
+    """Whether this packaged policy moves the steps of a walk."""
+    config = read_yaml(packaged_folder("policies") / policy / "config.yaml")
+    return bool(config.get("action") == "walk")
+
+
+def measured_limits(summary: Summary, path: Path, robot: str) -> None:
+    """Write the J50s of a result's first controller as a file of limits.
+
+    Raises ConfigError when the suite does not measure J50 in each direction.
+    """
+    name, entry = next(iter(summary["controllers"].items()))
+    directions = entry.get("directions")
+    if not directions:
+        raise ConfigError(f"the suite {summary['suite']!r} does not measure J50", field="suite")
+    table = LimitTable(
+        tuple(d["direction"] for d in directions), tuple(round(d["j50"], 3) for d in directions)
+    )
+    write_limits(path, load_robot(robot), name, table)

@@ -1,0 +1,153 @@
+"""The plots of an evaluation."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from poise.training.benchmarking.metrics.played import (
+    DIRECTIONAL,
+    Played,
+    ankle_limits,
+    fractions,
+    part,
+    pushes,
+    sectors,
+    won,
+)
+from poise.training.benchmarking.statistics.bootstrap import (
+    DirectionFit,
+    EnvelopeFit,
+    mean_over_directions,
+)
+from poise.training.benchmarking.statistics.fits import Bound, fit_logistic
+from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.trials.step_limits import (
+    COUNTS,
+    DRAWN,
+    NStepLimit,
+    groups,
+    line_name,
+)
+from poise.training.learning.seeds import KEPT
+from poise.training.pictures.figures.envelope import Band, Curve, fall_probability, polar_envelope
+from poise.training.pictures.figures.learning_curve import Point, learning_curve
+from poise.training.running.files import CURVE, PLOTS
+
+FEWEST = 5  # trials of a direction whose J50 is drawn
+
+
+def draw_plots(
+    folder: Path,
+    plan: Plan,
+    played: Mapping[str, Played],
+    steps: Mapping[str, NStepLimit] | None = None,
+    timesteps: Mapping[str, int | None] | None = None,
+) -> list[Path]:
+    """Write the plots of a result; returns their paths, none without pushes that have a limit.
+
+    Where J50 of directions is measured, they show what `steps` of the first controller that steps
+    could stop; else, the random pushes. Of the policies that a run has kept, J50 is also drawn over
+    the `timesteps` that they have learned from.
+    """
+    polar, fall = (folder / name for name in PLOTS)
+    limits = plan.limits
+    shown = {name: part(own, *DIRECTIONAL) for name, own in played.items()}
+    directional = all(shown.values())
+    if not directional:
+        shown = {name: part(own, "random") for name, own in played.items()}
+        if not all(shown.values()):
+            return []
+    label = None
+    if directional:
+        fits = {name: mean_over_directions(*pushes(own)[:2], won(own))
+                for name, own in shown.items()}  # fmt: skip
+        fraction = {name: pushes(own)[1] / ankle_limits(own, limits) for name, own in shown.items()}
+        fine, duration = np.arange(0.0, 360.0, 2.0), plan.suite.push_duration
+        around = limits.around(2.0)
+        limit = [limits.ankle(d, duration) for d in around]
+        lines = _step_lines(steps or {}, fine, duration)
+        polar_envelope(polar, _bands(fits), ankle_limit=(around, limit), step_limits=lines,
+                       bounds=_bounds(fits), note=_left_out(fits))  # fmt: skip
+    else:
+        fits = {name: sectors(own) for name, own in shown.items()}
+        fraction = {name: fractions(own) for name, own in shown.items()}
+        unit = f"of the {limits.scale}"
+        title = f"Recovered fraction of the {limits.scale} by push direction"
+        polar_envelope(polar, _bands(fits), title=title, unit=unit, bounds=_bounds(fits),
+                       note=_left_out(fits))  # fmt: skip
+        label = f"push impulse, as a fraction of the {limits.scale}"
+    fall_probability(
+        fall,
+        {name: (fraction[name], won(own)) for name, own in shown.items()},
+        {name: fit_logistic(fraction[name], won(own)) for name, own in shown.items()},
+        unit="fraction",
+        xlabel=label,
+    )
+    curve = _draw_curve(folder / CURVE, fits, timesteps or {}) if directional else []
+    return [polar, fall, *curve]
+
+
+def _draw_curve(
+    path: Path, fits: Mapping[str, EnvelopeFit], timesteps: Mapping[str, int | None]
+) -> list[Path]:
+    """Draw mean J50 over environment steps, if a run has kept more policies than one."""
+    runs: dict[str, list[Point]] = {}
+    kept = []
+    for name, fit in fits.items():
+        parent, learned_from = Path(name).parent, timesteps.get(name)
+        if parent.name == KEPT and learned_from is not None:
+            kept.append(name)
+            point = (learned_from, fit.j50_mean, *fit.j50_mean_ci)
+            runs.setdefault(str(parent.parent), []).append(point)
+    if not any(len(points) > 1 for points in runs.values()):
+        return []
+    bounded = any(fits[name].bounded for name in kept)
+    note = "In some directions J50 is only a bound." if bounded else ""
+    others = {name: fit.j50_mean for name, fit in fits.items() if name not in kept}
+    learning_curve(path, runs, others, note=note)
+    return [path]
+
+
+def _step_lines(
+    steps: Mapping[str, NStepLimit], fine: np.ndarray, duration: float
+) -> dict[str, Curve]:
+    """Limits of one and two steps, as `polar_envelope` takes them."""
+    whose = list(groups(steps).values())
+    return {
+        line_name(name, whose): (
+            fine,
+            [steps[whose[0][0]](angle, duration, COUNTS[name]) for angle in fine],
+        )
+        for name in (DRAWN if steps else ())
+    }
+
+
+def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, Band]:
+    """Direction, J50 and its interval, as `polar_envelope` takes them; NaN of too few trials."""
+    return {
+        name: (
+            list(fit.directions),
+            [f.fit.j50 if _enough(f) else np.nan for f in fit.fits],
+            [f.j50_ci.low if _enough(f) else np.nan for f in fit.fits],
+            [f.j50_ci.high if _enough(f) else np.nan for f in fit.fits],
+        )
+        for name, fit in fits.items()
+    }
+
+
+def _bounds(fits: Mapping[str, EnvelopeFit]) -> dict[str, list[Bound | None]]:
+    """Which J50s are only bounds."""
+    return {name: [f.fit.bound for f in fit.fits] for name, fit in fits.items()}
+
+
+def _left_out(fits: Mapping[str, EnvelopeFit]) -> str:
+    """What is not drawn, in words; empty where all is."""
+    enough = [_enough(f) for fit in fits.values() for f in fit.fits]
+    if not any(enough):
+        return f"Nothing is drawn: no direction has {FEWEST} trials."
+    return "" if all(enough) else f"Not drawn: directions with fewer than {FEWEST} trials."
+
+
+def _enough(direction: DirectionFit) -> bool:
+    return direction.fit.trials >= FEWEST

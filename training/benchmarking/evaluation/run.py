@@ -1,0 +1,284 @@
+"""The course of `evaluate` and `benchmark`: what is missing is played, then figures are written."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from itertools import combinations, pairwise
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from poise.baselines.allowance import allowing
+from poise.baselines.warmup import prepare
+from poise.configs.errors import ConfigError, shown
+from poise.configs.outputs import check_out_folder
+from poise.configs.schema import to_dict
+from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.sensing.realism import load_realism
+from poise.training.benchmarking.metrics.entry import controller_entry, robot_figures
+from poise.training.benchmarking.metrics.motions import suite_repertoire, suite_stage
+from poise.training.benchmarking.metrics.pairs import pair_figures
+from poise.training.benchmarking.metrics.played import RATED, Played, lost
+from poise.training.benchmarking.metrics.seed_groups import seed_groups
+from poise.training.benchmarking.suites.draw import MOST_TRIALS
+from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.suite import load_suite
+from poise.training.benchmarking.trials.agents import (
+    Agent,
+    check_follows,
+    check_may_walk,
+    check_walks,
+)
+from poise.training.benchmarking.trials.jobs import Job, play
+from poise.training.benchmarking.trials.names import check_name
+from poise.training.benchmarking.trials.push_limits import PushLimits
+from poise.training.benchmarking.trials.step_limits import NStepLimit, curves, stepping_limits
+from poise.training.benchmarking.trials.table import trial_row
+from poise.training.benchmarking.trials.trial import Trial
+from poise.training.learning.seeds import expand_seeds
+from poise.training.running.executor import Executor, check_backend
+from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS, plain
+from poise.training.running.provenance import circumstances, versions
+from poise.training.running.stopping import keeps
+from poise.training.running.summary import FORMAT, Summary
+from poise.training.running.terminal import print_paths, progress_bar
+
+from .folder import ResultFolder, Settings, check_folder
+from .plots import draw_plots
+from .tables import print_lost, print_summary, ranked
+from .tick_times import tick_times
+
+FEW = 5  # controllers, of which the rate of each is shown while they play
+
+
+class Run:
+    """One call of `evaluate` or `benchmark`, whose arguments it takes; checks them.
+
+    Args:
+        motions: that are performed instead of the suite's; none: its own.
+        reference: whom others are compared with, if it takes part; None: the first.
+        measured: what pushes on the robot are measured by.
+        realism: name or file of a level, instead of the suite's.
+    """
+
+    def __init__(
+        self, controllers: Sequence[str], suite: str | Path, out: str | Path, robot: str, seed: int,
+        workers: int | None, backend: str, trials: int | None, overwrite: bool,
+        console: Console | None, *, reference: str | None,
+        measured: Callable[[Robot], PushLimits], motions: Sequence[str] = (),
+        realism: str | None = None,
+    ):  # fmt: skip
+        self.started, self.console = time.perf_counter(), console or Console(quiet=True)
+        names = expand_seeds(controllers)
+        _check(names, seed, workers, trials)
+        check_backend(backend)
+        self.suite = load_suite(suite)
+        if motions:
+            self.suite = self.suite.performing(motions)
+        if trials is not None:
+            self.suite = self.suite.resized(trials)
+        if realism is not None:
+            self.suite = replace(self.suite, realism=realism)
+        load_realism(self.suite.realism)
+        self.out, self.overwrite, self.executor = Path(out), overwrite, Executor(backend, workers)
+        check_out_folder(out)
+        self.robot = load_robot(robot)
+        known: dict[str, Any] = {
+            "format": FORMAT,
+            "suite_name": str(suite),
+            "suite": to_dict(self.suite),
+            "robot": str(robot),
+            "robot_fingerprint": self.robot.fingerprint,
+            "seed": seed,
+            "versions": versions(("mujoco", "numpy", "numba")),
+        }
+        check_folder(self.out, known, overwrite)
+        self.limits, self.reference = measured(self.robot), reference
+        self.repertoire = suite_repertoire(self.suite, self.robot, self.out, overwrite)
+        self._plan(seed, names)  # refuses what does not fit the robot
+        if self.suite.walks:
+            for name in names:
+                check_may_walk(name, f"suite {suite}")
+        prepare()
+        self.stage = suite_stage(self.suite, robot, self.out)
+        self.agents = {name: self.stage.load(name, self.robot) for name in names}
+        if self.suite.walks:
+            for name, agent in self.agents.items():
+                check_walks(name, agent, f"suite {suite}")
+        if self.suite.motions is not None:
+            for name, agent in self.agents.items():
+                check_follows(name, agent, f"suite {suite}")
+        self.settings = Settings(
+            **known,
+            limits=self.limits.table,
+            controllers={name: agent.fingerprint for name, agent in self.agents.items()},
+            motions=self.repertoire.digests,
+        )
+
+    def _plan(self, seed: int, names: Sequence[str]) -> Plan:
+        return Plan(self.suite, self.limits, seed, names, self.repertoire.durations)
+
+    def play(self, plots: bool = False, timed: bool = False) -> Summary:
+        """Play what is missing and write the result; returns the summary."""
+        folder = ResultFolder(self.out, self.settings, self.overwrite, self.suite.paired,
+                              self._load_others)  # fmt: skip
+        keeps(self.out / LOG, f"the finished trials are kept in {self.out}; "
+              "the same command goes on")  # fmt: skip
+        with closing(folder):
+            self._announce(folder)
+            self.repertoire.write(self.out)
+            names = tuple(folder.settings.controllers)
+            agents = {name: self.agents[name] for name in names}
+            plan = self._plan(self.settings.seed, names)
+            _warm_up(agents.values())
+            self._play(folder, plan)
+            played: dict[str, Played] = {
+                name: [(trial, folder.finished[name, trial.number]) for trial in trials]
+                for name, trials in plan.trials(folder.finished).items()
+            }
+            outcomes = {name: [o for _, o in played[name]] for name in names}
+            steps = stepping_limits(agents.values(), outcomes, self.limits)
+            ticks = tick_times(agents) if timed else dict.fromkeys(names)
+            summary = self._summary(folder, plan, played, steps, ticks)
+            learned = {name: agent.timesteps for name, agent in agents.items()}
+            drawn = draw_plots(self.out, plan, played, steps, learned) if plots else []
+            rows = [(trial, name, outcome) for name in names for trial, outcome in played[name]]
+            rows.sort(key=lambda row: row[0].number)  # of one number, in the order of the names
+            folder.finish([trial_row(*row) for row in rows], summary)
+        print_summary(summary, self.console)
+        numbers = {name: lost(played[name]) for name in summary["ranking"]}
+        print_lost(numbers, summary["controllers"], self.out, self.console)
+        print_paths([*drawn, self.out / TRIALS, self.out / SUMMARY], self.console)
+        return summary
+
+    def _summary(
+        self,
+        folder: ResultFolder,
+        plan: Plan,
+        played: Mapping[str, Played],
+        steps: Mapping[str, NStepLimit],
+        ticks: Mapping[str, float | None],
+    ) -> Summary:
+        settings, suite = folder.settings, self.suite
+        entries = {name: controller_entry(played[name], plan, steps.get(name)) for name in played}
+        for name, entry in entries.items():
+            entry["tick_us"], entry["fingerprint"] = ticks[name], settings.controllers[name]
+            if (learned_from := self.agents[name].timesteps) is not None:
+                entry["timesteps"] = learned_from
+        first = next(iter(played))
+        reference = self.reference if self.reference and self.reference in played else first
+        pairs: Iterator[tuple[str, str]] = combinations(played, 2)
+        if self.reference is not None:
+            pairs = compared(reference, played, ranked(entries))
+        whole: Summary = {
+            "format": FORMAT,
+            "suite": settings.suite_name,
+            "seed": settings.seed,
+            "robot": robot_figures(self.limits),
+            "rated": next((name for name in RATED if name in suite.parts), None),
+            "scale": self.limits.scale,
+            "reference": reference,
+            "ranking": ranked(entries),
+            "controllers": entries,
+            "pairs": [pair_figures(a, b, played, entries) for a, b in pairs],
+            "step_limits": curves(steps, suite.push_duration) if "directions" in entries[first]
+            else [],
+            "seeds": seed_groups(tuple(played), entries),
+            **circumstances(self.started, self.executor.workers, self.executor.backend),
+        }  # fmt: skip
+        return plain(whole)
+
+    def _announce(self, folder: ResultFolder) -> None:
+        if folder.damaged:
+            self.console.print(f"{folder.damaged} lines of {self.out} could not be read: "
+                               "played again")  # fmt: skip
+        if folder.finished:
+            self.console.print(f"going on after {len(folder.finished)} finished trials")
+
+    def _load_others(self, settings: Settings) -> None:
+        """Load what the folder has besides; raises ConfigError for one that has changed."""
+        for name in [each for each in settings.controllers if each not in self.agents]:
+            with allowing(source=self.out / SETTINGS):
+                self.agents[name] = self.stage.load(name, self.robot)
+            if self.agents[name].fingerprint != settings.controllers[name]:
+                raise ConfigError(
+                    f"holds trials of {shown(name)}, which has changed since: choose another "
+                    "folder", source=self.out, field="controllers",
+                )  # fmt: skip
+
+    def _play(self, folder: ResultFolder, plan: Plan) -> None:
+        """Play what is missing: the first stage, then what follows from it."""
+
+        def missing(pairs: Iterable[tuple[str, Trial]]) -> list[Job]:
+            jobs = [Job(self.stage, name, trial) for name, trial in pairs
+                    if (name, trial.number) not in folder.finished]  # fmt: skip
+            return sorted(jobs, key=lambda job: job.trial.number)
+
+        def stages() -> Iterator[list[Job]]:
+            yield missing((name, trial) for trial in plan.first for name in plan.names)
+            second = plan.second(folder.finished)
+            yield missing((name, trial) for name, trials in second.items() for trial in trials)
+
+        rates = Rates(plan.names)
+        for (name, _), outcome in folder.finished.items():
+            rates.add(name, outcome.recovered)
+        with progress_bar(self.console) as bar, contextlib.ExitStack() as working:
+            task = bar.add_task("", total=plan.count, completed=len(folder.finished), rates="")
+            executor = None
+            for jobs in filter(None, stages()):
+                executor = executor or working.enter_context(self.executor)
+                for job, outcome in executor.each(play, jobs):
+                    folder.append(job.controller, job.trial.number, outcome)
+                    rates.add(job.controller, outcome.recovered)
+                    bar.update(task, completed=len(folder.finished), rates=str(rates))
+
+
+def compared(
+    reference: str, names: Iterable[str], ranking: Sequence[str]
+) -> Iterator[tuple[str, str]]:
+    """Pairs (a, b) of a ranking of many: all against the reference, each against the next best."""
+    yield from ((reference, name) for name in names if name != reference)
+    yield from ((b, a) for a, b in pairwise(ranking) if reference not in (a, b))
+
+
+class Rates:
+    """Recovered rates so far as text: of each controller, or of many taken together."""
+
+    def __init__(self, names: Sequence[str]):
+        self._together = len(names) > FEW
+        self._counts = {"" if self._together else name: [0, 0] for name in names}
+
+    def add(self, name: str, recovered: bool) -> None:
+        """Count a trial."""
+        count = self._counts.setdefault("" if self._together else name, [0, 0])
+        count[0] += recovered
+        count[1] += 1
+
+    def __str__(self) -> str:
+        rates = ((name, won / trials) for name, (won, trials) in self._counts.items() if trials)
+        return "  ".join(f"{name} {rate:.0%}".lstrip() for name, rate in rates)
+
+
+def _check(names: Sequence[str], seed: int, workers: int | None, trials: int | None) -> None:
+    for name in names:
+        if list(names).count(name) > 1:
+            raise ConfigError(f"{shown(name)} is given twice", field="controllers")
+        check_name(name)
+    for value, name, least in ((seed, "seed", 0), (workers, "workers", 1), (trials, "trials", 1)):
+        if value is not None and value < least:
+            raise ConfigError(f"must be at least {least}, not {value}", field=name)
+    if trials is not None and trials > MOST_TRIALS:
+        raise ConfigError(f"must be at most {MOST_TRIALS}", field="trials")
+
+
+def _warm_up(agents: Iterable[Agent]) -> None:
+    """Compile what is not yet compiled, once, before many processes would do it each."""
+    for agent in agents:
+        with contextlib.suppress(Exception):  # a controller from outside: its trials say what
+            observation, _ = agent.env.reset(seed=0, options={"push": []})
+            agent.env.step(agent.act(observation))

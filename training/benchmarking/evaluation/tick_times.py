@@ -1,0 +1,90 @@
+"""The time of a control tick is measured here, of all controllers in turn in one process."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from poise.baselines.controller import Controller, Targets, WrappedController
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.envs.physics.state import RobotState
+from poise.envs.robots.robot import Robot
+from poise.training.benchmarking.trials.agents import Agent
+
+ROUNDS = 3  # in which every controller has its turn
+SECONDS = 0.6  # of simulated time in a round, with a push at its start
+
+
+class Clocked(WrappedController):
+    """A controller whose calls of `torques` are timed."""
+
+    def __init__(self, controller: Controller, robot: Robot):
+        super().__init__(controller, robot)
+        self.seconds: list[float] = []
+
+    def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
+        begun = time.perf_counter()
+        try:
+            return self.inner.torques(state, targets)
+        finally:
+            self.seconds.append(time.perf_counter() - begun)
+
+
+def tick_times(agents: dict[str, Agent]) -> dict[str, float | None]:
+    """Median time of a control tick [µs] from Python; None for a controller that raises.
+
+    For a policy the time of one of its actions is shared among the ticks that it is held for.
+    """
+    clocks = {name: _Clock(agent) for name, agent in agents.items()}
+    for turn in range(ROUNDS):
+        for clock in clocks.values():
+            clock.play(seed=turn)
+    return {name: clock.median() for name, clock in clocks.items()}
+
+
+class _Clock:
+    def __init__(self, agent: Agent):
+        self.agent, self.broken = agent, False
+        self.acts: list[float] = []
+        self.ticks: list[float] = []
+
+    def play(self, seed: int) -> None:
+        env, act = self.agent.env, self._timed(self.agent.act)
+        inner = env.controller if isinstance(env, ResidualBalanceEnv) else None
+        try:
+            clocked = None
+            if isinstance(env, ResidualBalanceEnv):
+                clocked = env.controller = Clocked(env.controller, env.robot)
+            push = {"specific_impulse": 0.2, "start": 0.05}
+            observation, _ = env.reset(seed=seed, options={"push": push})
+            for _ in range(round(SECONDS / env.config.policy_period)):
+                env.step_without_info(act(observation))
+                observation = env.episode.observation.astype(np.float32)
+                if env.fallen:
+                    break
+            if clocked is not None:
+                self.ticks += clocked.seconds
+        except Exception:  # its trials say what it raised
+            self.broken = True
+        finally:
+            if isinstance(env, ResidualBalanceEnv) and inner is not None:
+                env.controller = inner
+
+    def _timed(self, act: Callable[[np.ndarray], np.ndarray]) -> Callable:
+        def timed(observation: np.ndarray) -> np.ndarray:
+            begun = time.perf_counter()
+            action = act(observation)
+            self.acts.append(time.perf_counter() - begun)
+            return action
+
+        return timed
+
+    def median(self) -> float | None:
+        if self.broken or not self.acts:
+            return None
+        env = self.agent.env
+        ticks = env.ticks if isinstance(env, ResidualBalanceEnv) else 1
+        tick = float(np.median(self.ticks)) if self.ticks else 0.0
+        return 1e6 * (tick + float(np.median(self.acts)) / ticks)

@@ -1,0 +1,90 @@
+"""Figures of factors that are varied alone, and EUROBENCH's indicators."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from poise.training.benchmarking.statistics.eurobench import (
+    Size,
+    energy_factor,
+    force_factor,
+    human_reach,
+    mean_or_none,
+    stability_margin,
+)
+from poise.training.benchmarking.statistics.rates import mcnemar
+from poise.training.benchmarking.suites.factors import STANDARD
+from poise.training.benchmarking.trials.push_limits import PushLimits
+from poise.training.running.summary import Eurobench, Factor, Level, MarginFigures
+
+from .played import Played, part, pushes, rate, won
+
+NAMED = ("body", "realism")  # factors whose levels are names, not numbers
+
+
+def factor_figures(played: Played, standard: Mapping[str, str]) -> list[Factor]:
+    """Recovered rate of every level, and what it lost and won against the standard case."""
+    cells: dict[tuple[str, str], list[bool]] = {}
+    for trial, outcome in played:
+        cells.setdefault((str(trial.factor), str(trial.level)), []).append(outcome.recovered)
+    base = cells.pop((STANDARD, STANDARD), [])
+    found: dict[str, list[Level]] = {}
+    for (factor, level), recovered in cells.items():
+        found.setdefault(factor, []).append(_level(level, recovered, base))
+    for factor, levels in found.items():
+        levels.append({**_level(standard[factor], base, base), "standard": True})
+        if factor not in NAMED:
+            levels.sort(key=lambda entry: float(entry["level"]))
+    return [{"factor": factor, "standard": standard[factor], "levels": levels}
+            for factor, levels in found.items()]  # fmt: skip
+
+
+def _level(level: str, recovered: Sequence[bool], base: Sequence[bool]) -> Level:
+    lost = sum(b and not r for r, b in zip(recovered, base, strict=True))
+    gained = sum(r and not b for r, b in zip(recovered, base, strict=True))
+    return {
+        "level": level,
+        "standard": False,
+        **rate(recovered),
+        "lost": lost,
+        "won": gained,
+        "p_mcnemar": mcnemar(lost, gained).p_value,
+    }
+
+
+def eurobench_figures(played: Played, limits: PushLimits) -> Eurobench:
+    """Sway and recovery time over recovered standard pushes; stability margins."""
+    plain = [outcome for _, outcome in part(played, "envelope") if outcome.recovered]
+    return {
+        "body_sway_mean": mean_or_none([outcome.sway for outcome in plain]),
+        "recovery_time_mean": mean_or_none([outcome.sway_recovery for outcome in plain]),
+        "recovery_time_trials": sum(outcome.sway_recovery is not None for outcome in plain),
+        "trials": len(plain),
+        "margins": _margins(part(played, "margin"), limits),
+    }
+
+
+def _margins(played: Played, limits: PushLimits) -> list[MarginFigures]:
+    """Stability margin per direction: force [N], energy [J], and both on a human's scale."""
+    if not played:
+        return []
+    direction, impulse, duration = pushes(played)
+    fallen = ~won(played)  # not recovered counts as a fall: the protocol knows no third end
+    robot, found = limits.robot, []
+    for angle in dict.fromkeys(direction.tolist()):
+        here = direction == angle
+        largest = stability_margin(impulse[here], fallen[here])
+        margin: MarginFigures = {"direction": angle, "impulse": largest}
+        if largest is not None:
+            size = Size(robot.mass, robot.height_com, limits.margin(angle))
+            reach = human_reach(angle)
+            force, energy = largest / float(duration[here][0]), largest**2 / (2.0 * robot.mass)
+            margin |= {
+                "force": force,
+                "force_normalised": force / force_factor(size, reach),
+                "energy": energy,
+                "energy_normalised": energy / energy_factor(size, reach),
+                "largest_tried": largest == float(impulse[here].max()),
+            }
+        found.append(margin)
+    return found

@@ -1,0 +1,148 @@
+"""Suites that perform motions: their stage, falls and errors by motion and share, J50 in motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from poise.envs.robots.robot import Robot
+from poise.training.benchmarking.statistics.bootstrap import EnvelopeFit, mean_over_directions
+from poise.training.benchmarking.statistics.differences import relative_gain
+from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.suites.motions import PART, STANDING
+from poise.training.benchmarking.suites.suite import Suite
+from poise.training.benchmarking.trials.jobs import Stage
+from poise.training.benchmarking.trials.trial import Outcome
+from poise.training.motion.following.repertoire import Repertoire, load_repertoire, stage_of
+from poise.training.running.summary import InMotion, Interval, MotionLevel, MotionMeans
+
+from .played import Played, part, pushes, won
+
+MEANS = tuple(MotionMeans.__annotations__)  # figures of a trial that a level has the mean of
+
+
+def suite_repertoire(suite: Suite, robot: Robot, folder: Path, anew: bool) -> Repertoire:
+    """The motions of a suite, empty where it has none; raises as `load_repertoire`."""
+    if suite.motions is None:
+        return Repertoire({}, {}, {})
+    return load_repertoire(suite.motions.names, suite.motions.labels, robot, folder, anew)
+
+
+def suite_stage(suite: Suite, robot: str | Path, folder: Path) -> Stage:
+    """What all trials of a suite share, whose results are in `folder`."""
+    chosen = suite.motions
+    if chosen is None:
+        return Stage(robot, suite.duration, suite.noise)
+    return stage_of(robot, suite.noise, chosen.names, chosen.labels, folder, chosen.tempo)
+
+
+def motion_levels(played: Played) -> list[MotionLevel]:
+    """Every share of J50: each motion, and all of several; [] where nothing is performed."""
+    cells: dict[tuple[float, str | None], list[Outcome]] = {}
+    moving = part(played, PART)
+    several = len({trial.motion for trial, _ in moving}) > 1
+    for trial, outcome in moving:
+        assert trial.share is not None  # of this part all have one
+        for name in (trial.motion, None) if several else (trial.motion,):
+            cells.setdefault((trial.share, name), []).append(outcome)
+    ordered = sorted(cells, key=lambda key: (key[0], key[1] is None))
+    return [_level(*key, cells[key]) for key in ordered]
+
+
+def _level(share: float, name: str | None, outcomes: Sequence[Outcome]) -> MotionLevel:
+    trials, fallen = len(outcomes), sum(outcome.fallen for outcome in outcomes)
+    stood = [each for each in outcomes if not each.fallen and each.error is None]
+    return {
+        "motion": name,
+        "share": share,
+        "trials": trials,
+        "fallen": fallen,
+        "fallen_rate": fallen / trials,
+        "fallen_ci95": wilson_interval(fallen, trials),
+        "solver_failures": sum(outcome.solver_failures for outcome in outcomes),
+        "steps_mean": _mean(stood, "steps"),
+        **cast(MotionMeans, {key: _mean(stood, key) for key in MEANS}),
+    }
+
+
+def _mean(outcomes: Sequence[Outcome], name: str) -> float | None:
+    """The mean over the trials that have such a value."""
+    values = [getattr(outcome, name) for outcome in outcomes]
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def in_motion(played: Played) -> list[InMotion]:
+    """J50 in each motion, their mean, and that of standing, as shares of the controller's J50.
+
+    Shares of all directions are fitted together. The ratio of two such shares is that of the J50s,
+    since both are of the same one. Its interval comes of those of the two [Zou08].
+    """
+    moving = part([(t, o) for t, o in played if t.push is not None], PART)
+    if not moving:
+        return []
+    shares = np.array([trial.share for trial, _ in moving], dtype=float)
+    names = list(dict.fromkeys(trial.motion for trial, _ in moving))
+    fit = mean_over_directions([names.index(t.motion) for t, _ in moving], shares, won(moving))
+    standing = _standing(played, moving)
+    found: list[InMotion] = []
+    if standing is not None:
+        found.append(_row(STANDING, standing, 0, None))
+    found += [_row(name, fit, k, standing) for k, name in enumerate(names)]
+    return [*found, *([_mean_row(fit, won(moving), standing)] if len(names) > 1 else [])]
+
+
+def _standing(played: Played, moving: Played) -> EnvelopeFit | None:
+    """The fit of the pushes that it stood for; None where there are none."""
+    stood = part(played, STANDING)
+    if not stood:
+        return None
+    j50 = {t.push.direction: t.push.impulse / t.share for t, _ in moving if t.push and t.share}
+    direction, impulse, _ = pushes(stood)
+    over = [j / j50[angle] for angle, j in zip(direction, impulse, strict=True)]
+    return mean_over_directions(np.zeros(len(over)), over, won(stood))
+
+
+def _row(name: str | None, fit: EnvelopeFit, k: int, standing: EnvelopeFit | None) -> InMotion:
+    one = fit.fits[k]
+    ratio, ends = _over(standing, one.fit.j50, one.j50_ci)
+    return {
+        "motion": name,
+        "trials": one.fit.trials,
+        "recovered": one.fit.recovered,
+        "share50": one.fit.j50,
+        "share50_ci95": one.j50_ci,
+        "share50_bound": one.fit.bound,
+        "over_standing": ratio,
+        "over_standing_ci95": ends,
+    }
+
+
+def _mean_row(fit: EnvelopeFit, recovered: np.ndarray, standing: EnvelopeFit | None) -> InMotion:
+    ratio, ends = _over(standing, fit.j50_mean, fit.j50_mean_ci)
+    return {
+        "motion": None,
+        "trials": len(recovered),
+        "recovered": int(recovered.sum()),
+        "share50": fit.j50_mean,
+        "share50_ci95": fit.j50_mean_ci,
+        "share50_bound": next((f.fit.bound for f in fit.fits if f.fit.bound), None),
+        "over_standing": ratio,
+        "over_standing_ci95": ends,
+    }
+
+
+def _over(
+    standing: EnvelopeFit | None, share: float, ends: Interval
+) -> tuple[float | None, Interval | None]:
+    """A share over that of standing, with its interval."""
+    if standing is None or None in ends:
+        return None, None
+    known = cast(tuple[float, float], ends)
+    gain, gains = relative_gain(standing.j50_mean, standing.j50_mean_ci, share, known)
+    if gain is None or gains is None:
+        return None, None
+    return 1.0 + gain, (1.0 + gains[0], 1.0 + gains[1])

@@ -1,0 +1,81 @@
+"""Two controllers compared: on the trials that both met, and by their mean J50."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from poise.training.benchmarking.statistics.bootstrap import j50_gain
+from poise.training.benchmarking.statistics.differences import paired_rates, relative_gain
+from poise.training.benchmarking.statistics.rates import mcnemar
+from poise.training.benchmarking.trials.trial import Outcome, Trial
+from poise.training.running.summary import Entry, Pair, Paired, both_ends
+
+from .played import DIRECTIONAL, Played, part, pushes, rated, won
+
+
+def pair_figures(
+    a: str, b: str, played: Mapping[str, Played], entries: Mapping[str, Entry]
+) -> Pair:
+    """b against a: McNemar on the rated trials that both met, and on all; gain in mean J50.
+
+    The gain is paired, with one for each direction, where both met the same pushes.
+    """
+    met = alike(played[a], played[b])
+    every, rated_numbers = paired(met), {trial.number for trial, _ in rated(played[a])}
+    pair: Pair = {"a": a, "b": b, "all": every}
+    if counted := paired([each for each in met if each[0].number in rated_numbers]):
+        pair |= counted
+    pair["identical"] = len(met) == len(played[a]) == len(played[b]) and all(
+        one == two for _, one, two in met
+    )
+    if "j50_mean" in entries[a] and "j50_mean" in entries[b]:
+        _add_gain(pair, [part(played[name], *DIRECTIONAL) for name in (a, b)], entries)
+    return pair
+
+
+def alike(a: Played, b: Played) -> list[tuple[Trial, Outcome, Outcome]]:
+    """The trials that both met, alike in all: second stages share numbers, but not pushes."""
+    others = {trial.number: (trial, outcome) for trial, outcome in b}
+    return [
+        (trial, outcome, others[trial.number][1])
+        for trial, outcome in a
+        if trial.number in others and others[trial.number][0] == trial
+    ]
+
+
+def paired(met: list[tuple[Trial, Outcome, Outcome]]) -> Paired | None:
+    """Counts of the trials that both met; None without any."""
+    if not met:
+        return None
+    table = {(True, True): 0, (True, False): 0, (False, True): 0, (False, False): 0}
+    for _, one, two in met:
+        table[one.recovered, two.recovered] += 1
+    both, only_a, only_b, neither = table.values()
+    rate, interval = paired_rates(both, only_a, only_b, neither)
+    return {
+        "both": both,
+        "only_a": only_a,
+        "only_b": only_b,
+        "neither": neither,
+        "p_mcnemar": mcnemar(only_a, only_b).p_value,
+        "rate_gain": rate,
+        "rate_gain_ci95": interval,
+    }
+
+
+def _add_gain(pair: Pair, directional: list[Played], entries: Mapping[str, Entry]) -> None:
+    met = alike(*directional)
+    if len(met) == len(directional[0]) == len(directional[1]):
+        direction, impulse, _ = pushes(directional[0])
+        gain = j50_gain(direction, impulse, won(directional[0]), won(directional[1]))
+        pair["j50_gain"], pair["j50_gain_ci95"] = gain.mean.relative, gain.mean.relative_ci
+        pair["directions"] = [
+            {"direction": angle, "j50_gain": g.relative, "j50_gain_ci95": g.relative_ci}
+            for angle, g in zip(gain.directions, gain.gains, strict=True)
+        ]
+        return
+    one, two = entries[pair["a"]], entries[pair["b"]]
+    around = both_ends(one["j50_mean_ci95"]), both_ends(two["j50_mean_ci95"])
+    if around[0] is not None and around[1] is not None:
+        found = relative_gain(one["j50_mean"], around[0], two["j50_mean"], around[1])
+        pair["j50_gain"], pair["j50_gain_ci95"] = found

@@ -1,0 +1,100 @@
+"""Figures of trials that walk: falls per minute, how exact, at what cost; J50 by phase."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+
+from poise.training.benchmarking.statistics.bootstrap import mean_over_directions
+from poise.training.benchmarking.statistics.rates import poisson_interval, wilson_interval
+from poise.training.benchmarking.suites.walking import WALKING
+from poise.training.benchmarking.trials.trial import Outcome
+from poise.training.running.summary import (
+    EnvelopeFigures,
+    PhaseJ50,
+    StepsAsTold,
+    WalkLevel,
+    WalkMeans,
+)
+
+from .played import Played, part, rate
+
+PHASES = 8  # of a stride
+AS_TOLD = 0.1  # of a step parameter, within which a walk follows its command
+#: figures of a trial that a level has the mean of
+MEANS = tuple(WalkMeans.__annotations__)
+
+
+def walk_levels(played: Played, duration: float) -> list[WalkLevel]:
+    """The levels of the parts that walk, in the order of the suite; trials last `duration` [s]."""
+    cells: dict[tuple[str, str], list[Outcome]] = {}
+    for trial, outcome in part(played, *WALKING):
+        cells.setdefault((trial.part, str(trial.level)), []).append(outcome)
+    return [_level(*key, outcomes, duration) for key, outcomes in cells.items()]
+
+
+def _level(name: str, text: str, outcomes: Sequence[Outcome], duration: float) -> WalkLevel:
+    fallen = sum(outcome.fallen for outcome in outcomes)
+    stood = sum(not outcome.fallen and outcome.error is None for outcome in outcomes)
+    played = [each for each in outcomes if each.error is None]
+    times = [duration if each.fall_time is None else each.fall_time for each in played]
+    minutes = sum(times) / 60.0
+    low, high = poisson_interval(fallen)
+    means = {key: _mean(outcomes, key) for key in MEANS}
+    told: StepsAsTold = {}
+    if name == "gait":
+        kept = [not each.fallen and each.error is None and (each.step_error or 0.0) <= AS_TOLD
+                for each in outcomes]  # fmt: skip
+        told = {"steps_as_told_rate": sum(kept) / len(kept)}
+    return {
+        "part": name,
+        "level": text,
+        **rate([outcome.recovered for outcome in outcomes]),
+        "fallen": fallen,
+        "never_fell_rate": stood / len(outcomes),
+        "never_fell_ci95": wilson_interval(stood, len(outcomes)),
+        "minutes": minutes,
+        "falls_per_minute": fallen / minutes if minutes else None,
+        "falls_per_minute_ci95": (low / minutes, high / minutes) if minutes else None,
+        **told,
+        **cast(WalkMeans, means),
+    }
+
+
+def _mean(outcomes: Sequence[Outcome], name: str) -> float | None:
+    """The mean over the trials that have such a value."""
+    values = [getattr(outcome, name) for outcome in outcomes]
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def phase_figures(played: Played, envelope: EnvelopeFigures) -> list[PhaseJ50]:
+    """J50 [N·s] in each of 8 phases of the stride, over all directions.
+
+    Impulses are measured by the J50 of their direction; the fraction of it that half of the pushes
+    of a phase are recovered from, times the mean J50, is the phase's. Trials whose phase is not
+    known, because the robot had not walked long enough, are left out.
+    """
+    j50 = {entry["direction"]: entry["j50"] for entry in envelope["directions"]}
+    phase, fraction, recovered = [], [], []
+    for trial, outcome in played:
+        if outcome.push_phase is not None and trial.push is not None and j50[trial.push.direction]:
+            phase.append(np.floor(PHASES * outcome.push_phase) % PHASES)
+            fraction.append(trial.push.impulse / j50[trial.push.direction])
+            recovered.append(outcome.recovered)
+    if not phase:
+        return []
+    fit, mean = mean_over_directions(phase, fraction, recovered), envelope["j50_mean"]
+    return [
+        {
+            "phase": (k + 0.5) / PHASES,
+            "trials": f.fit.trials,
+            "recovered": f.fit.recovered,
+            "j50": mean * f.fit.j50,
+            "j50_ci95": (mean * f.j50_ci.low, mean * f.j50_ci.high),
+            "j50_bound": f.fit.bound,
+        }
+        for k, f in zip(fit.directions, fit.fits, strict=True)
+    ]

@@ -1,0 +1,190 @@
+"""The folder of a finished result, read back and checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+from poise.configs.errors import ConfigError, shown
+from poise.configs.reading import is_file, is_folder, read_table
+from poise.training.benchmarking.diagnosis.diagnosis import COLUMNS as DIAGNOSIS_COLUMNS
+from poise.training.benchmarking.diagnosis.words import diagnosis_of, why
+from poise.training.benchmarking.evaluation.folder import Settings, read_settings
+from poise.training.benchmarking.trials.table import CASE_COLUMNS, COLUMNS, read_trial
+from poise.training.benchmarking.trials.trial import Trial
+from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS
+from poise.training.running.summary import Summary
+
+from .summary import read_summary
+
+FLAGS = {"True": True, "False": False}
+
+
+@dataclass(frozen=True)
+class Record:
+    """A controller in a trial: a line of trials.csv.
+
+    Attributes:
+        trial, controller: which.
+        recovered, fallen: whether.
+        impulse [N·s], direction [deg], duration [s]: of the first push; NaN without one.
+        fraction: impulse over the limit of the suite; NaN where it has none.
+        fall_time: [s] after the reset; NaN without a fall.
+        line: all columns of trials.csv, as they are written there.
+    """
+
+    trial: int
+    controller: str
+    recovered: bool
+    fallen: bool
+    impulse: float
+    direction: float
+    duration: float
+    fraction: float
+    fall_time: float
+    line: Mapping[str, str]
+
+    @property
+    def part(self) -> str:
+        """The part of the suite."""
+        return self.line["part"]
+
+    @property
+    def why(self) -> str:
+        """Why it was lost, in words; empty of a trial that was recovered, and of older results."""
+        fell = self.fall_time if math.isfinite(self.fall_time) else None
+        return why(diagnosis_of(self.line), fell)
+
+    @property
+    def error(self) -> str:
+        """The error that the controller raised, or nothing."""
+        return self.line["error"]
+
+    @cached_property
+    def met(self) -> tuple[str, ...]:
+        """Equal for two controllers that met the same: trials of one number may differ."""
+        return tuple(self.line[name] for name in CASE_COLUMNS if name != "controller")
+
+
+@dataclass(frozen=True)
+class Results:
+    """The content of a result's folder.
+
+    Attributes:
+        folder: where it was read.
+        settings: everything that decides the result.
+        summary: summary.json.
+        records: of every trial and controller, as in trials.csv.
+    """
+
+    folder: Path
+    settings: Settings
+    summary: Summary
+    records: tuple[Record, ...]
+
+    @property
+    def reference(self) -> str:
+        """The controller that others are compared with."""
+        return self.summary["reference"]
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Parts of the suite."""
+        return tuple(dict.fromkeys(record.part for record in self.records))
+
+    @property
+    def controllers(self) -> tuple[str, ...]:
+        """Names, in the order in which they came."""
+        return tuple(self.summary["controllers"])
+
+    def of(self, controller: str) -> list[Record]:
+        """All trials of a controller."""
+        return [record for record in self.records if record.controller == controller]
+
+    def record(self, controller: str, trial: int) -> Record:
+        """The line of a controller in a trial; raises ConfigError where there is none."""
+        if controller not in self.controllers:
+            raise ConfigError(f"{shown(controller)} took no part", source=self.folder,
+                              field="controller", choices=self.controllers)  # fmt: skip
+        numbers = {record.trial: record for record in self.of(controller)}
+        if trial not in numbers:
+            raise ConfigError(f"no trial {trial}; they are numbered from 0 to {max(numbers)}",
+                              source=self.folder / TRIALS, field="trial")  # fmt: skip
+        return numbers[trial]
+
+    def trial(self, record: Record) -> Trial:
+        """The trial of a record, exactly; raises ConfigError where its line does not parse."""
+        return read_trial(record.line, self.folder / TRIALS)
+
+
+def load_results(folder: str | Path) -> Results:
+    """Read the folder of a finished result of `evaluate` or `benchmark`.
+
+    Where controllers are being added, or this was stopped, it is that of those that are finished.
+
+    Raises:
+        ConfigError: no folder, no finished result, one of another format, or files that are cut
+            off, do not parse or do not belong together.
+    """
+    folder = Path(folder)
+    if not is_folder(folder):
+        raise ConfigError("no such folder", source=folder)
+    missing = [name for name in (SETTINGS, SUMMARY, TRIALS) if not is_file(folder / name)]
+    if missing:
+        why = f"holds no finished result: {', '.join(missing)} missing"
+        why += "; the command that began it goes on" if is_file(folder / LOG) else ""
+        raise ConfigError(why, source=folder)
+    settings, summary = read_settings(folder), read_summary(folder / SUMMARY)
+    added = settings.controllers.keys() - summary["controllers"].keys()  # not yet finished
+    records = tuple(r for r in _records(folder / TRIALS) if r.controller not in added)
+    _check(folder, settings, summary, records)
+    marks = {name: mark for name, mark in settings.controllers.items() if name not in added}
+    return Results(folder, replace(settings, controllers=marks), summary, records)
+
+
+def _records(path: Path) -> tuple[Record, ...]:
+    columns, lines = read_table(path, ": run the same command again, it writes the file anew "
+                                "without playing a trial")  # fmt: skip
+    lacking = [name for name in COLUMNS if name not in (*columns, *DIAGNOSIS_COLUMNS)]
+    if lacking:
+        raise ConfigError(f"lacks the columns {', '.join(lacking)}", source=path)
+    return tuple(_record(line, number, path) for number, line in enumerate(lines, 2))
+
+
+def _record(line: Mapping[str, str], number: int, path: Path) -> Record:
+    try:
+        impulse, direction, duration, fraction, fall_time = (
+            float(line[name] or "nan")
+            for name in ("impulse", "direction", "duration", "limit_fraction", "fall_time")
+        )
+        recovered, fallen = FLAGS[line["recovered"]], FLAGS[line["fallen"]]
+        return Record(
+            int(line["trial"]), line["controller"], recovered, fallen, impulse, direction, duration,
+            fraction, fall_time, line,
+        )  # fmt: skip
+    except (ValueError, KeyError) as error:
+        raise ConfigError(f"line {number} does not parse: {error}", source=path) from None
+
+
+def _check(folder: Path, settings: Settings, summary: Summary, records: tuple[Record, ...]) -> None:
+    """The three files must tell of one and the same."""
+    entries = summary["controllers"]
+    if not entries.keys() <= settings.controllers.keys():
+        raise ConfigError(f"its controllers are not those of {SETTINGS}", source=folder / SUMMARY,
+                          field="controllers")  # fmt: skip
+    counts = dict.fromkeys(entries, 0)
+    for record in records:
+        if record.controller not in counts:
+            raise ConfigError(f"{shown(record.controller)} is not in {SUMMARY}",
+                              source=folder / TRIALS, field="controller")  # fmt: skip
+        counts[record.controller] += 1
+    for name, entry in entries.items():
+        if counts[name] != entry["played"]:
+            raise ConfigError(
+                f"has {counts[name]} trials of {shown(name)}, but {SUMMARY} has "
+                f"{entry['played']}: cut off?",
+                source=folder / TRIALS,
+            )

@@ -1,0 +1,212 @@
+"""The page of the controllers that walk, generated from committed files summary.json."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from poise.configs.errors import ConfigError
+from poise.configs.texts import code, plain
+from poise.training.benchmarking.evaluation.tables import assisted
+from poise.training.benchmarking.statistics.rates import poisson_interval
+from poise.training.running.summary import Entry, Interval, Number, Summary, WalkLevel
+
+HEAD = """# Leaderboard of walks
+
+<!-- Written by `poise leaderboard {source}`: change the results, not this page. -->
+
+Suite {suite}, robot {robot}, seed {seed}; Poise {poise}, MuJoCo {mujoco}. Intervals are 95 %;
+what the columns mean: [walking.md](walking.md#figures). Falls a minute are of walks without a push.
+A controller that took a force from nowhere has no rank.
+
+{j50}
+
+"""
+NONE = "–"
+UNPUSHED, PUSHED = "walk", "walk_push"
+Cells = list[list[str]]
+
+
+def is_of_walks(summary: Summary) -> bool:
+    """Return whether this is the result of a suite that walks as commanded, without a push."""
+    return any(_levels(entry, UNPUSHED) for entry in summary["controllers"].values())
+
+
+def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
+    """The page as Markdown; `summaries` by where they come from, of one suite, seed and robot.
+
+    A controller of a later result takes the place of an earlier one of its name. The order is that
+    of the mean J50 [N·s], those without one last. Raises ConfigError for results of another suite,
+    seed or robot than the first, and for a controller without walks of the first one's commands.
+    """
+    (first, summary), *later = summaries.items()
+    entries: dict[str, Entry] = {}
+    origin: dict[str, str] = {}
+    for source, other in [(first, summary), *later]:
+        _expect_alike(summary, other, first, source)
+        entries |= other["controllers"]
+        origin |= dict.fromkeys(other["controllers"], source)
+    commands = [level["level"] for level in _levels(next(iter(entries.values())), UNPUSHED)]
+    for name, entry in entries.items():
+        if not commands or [each["level"] for each in _levels(entry, UNPUSHED)] != commands:
+            raise ConfigError(f"has no walks of the commands of {first}", source=origin[name],
+                              field=f"controllers.{name}")  # fmt: skip
+    names = sorted(entries, key=lambda name: _order(entries[name]))
+    versions = summary["versions"]
+    text = HEAD.format(
+        source=plain(" ".join(summaries)),
+        suite=code(summary["suite"]),
+        robot=code(summary["robot"]["name"]),
+        seed=summary["seed"],
+        poise=plain(versions.get("poise")),
+        mujoco=plain(versions.get("mujoco")),
+        j50=_pushed(entries),
+    )
+    text += _table(*_ranking(entries, names))
+    for command in commands:
+        text += f"\nCommand {command}:\n\n" + _table(*_walks(entries, names, command))
+    directions = _directions(entries, names)
+    if directions is not None:
+        text += "\nJ50 [N·s] per direction (0° is forward, 90° left):\n\n" + _table(*directions)
+    return text + "\n" + "".join(_played(each, summaries[each], origin) for each in summaries)
+
+
+def _expect_alike(summary: Summary, other: Summary, first: str, source: str) -> None:
+    for key, own, theirs in (
+        ("suite", summary["suite"], other["suite"]),
+        ("seed", summary["seed"], other["seed"]),
+        ("robot.name", summary["robot"]["name"], other["robot"]["name"]),
+        ("robot.mass", summary["robot"]["mass"], other["robot"]["mass"]),
+    ):
+        if own != theirs:
+            raise ConfigError(f"is not that of {first}", source=source, field=key)
+
+
+def _pushed(entries: Mapping[str, Entry]) -> str:
+    """What J50 is of, in a sentence: the command of the walks, and how long a push takes, as far as
+    the results say it."""
+    told = {level["level"] for entry in entries.values() for level in _levels(entry, PUSHED)}
+    known = {name: each["push_duration"] for name, each in entries.items()
+             if "push_duration" in each}  # fmt: skip
+    text = "J50 is of pushes while it walks" + (
+        f" ({plain(', '.join(sorted(told)))})" if told else ""
+    )
+    for duration in sorted(set(known.values())):
+        names = [code(name) for name, its in known.items() if its == duration]
+        whose = "" if len(names) == sum("j50_mean" in each for each in entries.values()) else (
+            f" for {', '.join(names)}")  # fmt: skip
+        text += f", of {duration:g} s{whose}"
+    return text + "."
+
+
+def _levels(entry: Entry, part: str) -> list[WalkLevel]:
+    return [level for level in entry.get("walks", ()) if level["part"] == part]
+
+
+def _order(entry: Entry) -> tuple[bool, bool, float]:
+    j50 = entry.get("j50_mean")
+    return assisted(entry), j50 is None, -(j50 or 0.0)
+
+
+def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> tuple[list[str], Cells]:
+    head = ["", "controller", "mean J50 [N·s]", "N·s/kg", "worst direction", "pushes recovered",
+            "fell unpushed", "falls a minute", "as told, unpushed"]  # fmt: skip
+    shown = {name: format(entries[name]["j50_mean"], ".1f") for name in names
+             if "j50_mean" in entries[name] and not assisted(entries[name])}  # fmt: skip
+    rows = []
+    for name in names:
+        entry, walks = entries[name], _levels(entries[name], UNPUSHED)
+        fallen, trials = sum(w["fallen"] for w in walks), sum(w["trials"] for w in walks)
+        told, minutes = sum(w["recovered"] for w in walks), sum(w["minutes"] for w in walks)
+        low, high = poisson_interval(fallen)
+        rank = NONE
+        if name in shown:
+            rank = str(1 + sum(float(other) > float(shown[name]) for other in shown.values()))
+        rate = (f"{fallen / minutes:.2f} [{low / minutes:.2f}, {high / minutes:.2f}]"
+                if minutes else NONE)  # fmt: skip
+        rows.append([rank, code(name), *_j50(entry), _pushes(entry), f"{fallen} of {trials}",
+                     rate, f"{told} of {trials}"])  # fmt: skip
+    return head, rows
+
+
+def _j50(entry: Entry) -> tuple[str, str, str]:
+    if "j50_mean" not in entry:
+        return NONE, NONE, NONE
+    worst = min(entry["directions"], key=lambda each: each["j50"])
+    bounded = entry["j50_bounded"]
+    mean = f"{entry['j50_mean']:.1f} {_interval(entry['j50_mean_ci95'], '.1f')}"
+    return (
+        mean + (f" ({bounded} bounds)" if bounded else ""),
+        f"{entry['j50_mean_per_mass']:.2f}",
+        f"{worst['j50']:.1f} ({worst['direction']:g}°)",
+    )
+
+
+def _interval(ends: Interval, form: str) -> str:
+    low, high = (NONE if end is None else format(end, form) for end in ends)
+    return f"[{low}, {high}]"
+
+
+def _pushes(entry: Entry) -> str:
+    levels = _levels(entry, PUSHED)
+    if not levels:
+        return NONE
+    return f"{sum(w['recovered'] for w in levels)} of {sum(w['trials'] for w in levels)}"
+
+
+def _figure(key: str, form: str) -> Callable[[WalkLevel], str]:
+    def text(level: WalkLevel) -> str:
+        value: Number = level.get(key)  # type: ignore[assignment]
+        return NONE if value is None else format(value, form)
+
+    return text
+
+
+WALKS: tuple[tuple[str, Callable[[WalkLevel], str]], ...] = (
+    ("fell", lambda level: f"{level['fallen']} of {level['trials']}"),
+    ("ahead [m/s]", _figure("speed_ahead", ".3f")),
+    ("RMS error [m/s]", _figure("speed_error_rms", ".3f")),
+    ("step [m]", _figure("step_length", ".2f")),
+    ("time [s]", _figure("step_time", ".2f")),
+    ("cost of transport", _figure("cost_of_transport", ".2f")),
+    ("of positive work", _figure("positive_cost_of_transport", ".2f")),
+    ("stance knee [N·m/kg]", _figure("knee_mean", ".2f")),
+)
+
+
+def _walks(
+    entries: Mapping[str, Entry], names: Sequence[str], command: str
+) -> tuple[list[str], Cells]:
+    rows = []
+    for name in names:
+        (level,) = (w for w in _levels(entries[name], UNPUSHED) if w["level"] == command)
+        rows.append([code(name), *(form(level) for _, form in WALKS)])
+    return ["controller", *(heading for heading, _ in WALKS)], rows
+
+
+def _directions(
+    entries: Mapping[str, Entry], names: Sequence[str]
+) -> tuple[list[str], Cells] | None:
+    found = {name: {d["direction"]: d for d in entries[name].get("directions", ())}
+             for name in names}  # fmt: skip
+    angles = sorted({angle for each in found.values() for angle in each})
+    rows = [
+        [code(name), *(f"{each[a]['j50']:.1f} {_interval(each[a]['j50_ci95'], '.1f')}"
+                        if a in each else NONE for a in angles)]
+        for name, each in found.items() if each
+    ]  # fmt: skip
+    return (["controller", *(f"{angle:g}°" for angle in angles)], rows) if rows else None
+
+
+def _played(source: str, summary: Summary, origin: Mapping[str, str]) -> str:
+    names = ", ".join(code(name) for name in summary["controllers"] if origin[name] == source)
+    if not names:
+        return ""
+    machine = summary["machine"]
+    return (f"- {names}: commit {code((summary['commit'] or 'unknown')[:10])}, "
+            f"{plain(machine['processor'])}, {machine['cores']} cores.\n")  # fmt: skip
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join("| " + " | ".join(c.replace("|", "\\|") for c in line) + " |\n"
+                   for line in lines)  # fmt: skip

@@ -1,0 +1,140 @@
+"""Parts that ask the same of every direction: the envelope of J50, the grid, and margins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Literal, Self
+
+from poise.envs.physics.pushes.options import to_impulse
+from poise.envs.physics.pushes.sampler import Range
+from poise.training.benchmarking.statistics.fits import fit_logistic
+from poise.training.benchmarking.trials.trial import Trial
+
+from .draw import MOST_TRIALS, Draw, Part, Recovered
+
+
+@dataclass(frozen=True)
+class Envelope(Part):
+    """J50 in each of many directions, in two stages.
+
+    The first spreads `first_trials` impulses over the whole range, one in each of as many equal
+    parts. Its fit gives each controller's rough J50; the second stage spreads `trials` more over
+    J50 · (1 ± spread). A controller plays its own, so that its trials do not depend on who else
+    takes part; `paired`, all controllers play those of all, so that they can be compared in pairs.
+    """
+
+    directions: int = field(default=16, metadata={"min": 1, "max": 3600})  # evenly around
+    fractions: Range = field(default=(0.2, 1.5), metadata={"above": 0.0})  # of the ankle limit
+    impulses: Range | None = field(default=None, metadata={"above": 0.0})  # instead [N·s/kg]
+    first_trials: int = field(default=8, metadata={"min": 2, "max": MOST_TRIALS})  # per direction
+    trials: int = field(default=12, metadata={"min": 1, "max": MOST_TRIALS})  # the same, second
+    spread: float = field(default=0.3, metadata={"above": 0.0, "max": 1.0})
+    paired: bool = False
+
+    def __post_init__(self) -> None:
+        for name, pair in (("fractions", self.fractions), ("impulses", self.impulses)):
+            if pair is not None and pair[0] >= pair[1]:
+                raise ValueError(f"{name}: {pair} must increase")
+
+    def capped(self, trials: int) -> Self:
+        most = replace(self, first_trials=max(min(self.first_trials, trials), 2))
+        return most.resized(min(self.trials, trials))
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        return draw.spread(
+            number, ((a, *self._range(draw, a), self.first_trials) for a in self.angles), stage=1
+        )
+
+    def second_count(self, controllers: int) -> int:
+        return self.directions * self.trials * (controllers if self.paired else 1)
+
+    def second(
+        self, draw: Draw, number: int, first: Sequence[Trial], recovered: Recovered
+    ) -> dict[str, list[Trial]]:
+        def around(names: Iterable[str]) -> list[Trial]:
+            rough = ((angle, self.rough(first, recovered[name], angle))
+                     for angle in self.angles for name in names)  # fmt: skip
+            ranges = ((angle, (1.0 - self.spread) * j50, (1.0 + self.spread) * j50, self.trials)
+                      for angle, j50 in rough)  # fmt: skip
+            return draw.spread(number, ranges, stage=2)
+
+        if self.paired:
+            return dict.fromkeys(recovered, around(tuple(recovered)))
+        return {name: around((name,)) for name in recovered}
+
+    @property
+    def angles(self) -> list[float]:
+        """The directions [deg]."""
+        return [360.0 * k / self.directions for k in range(self.directions)]
+
+    def _range(self, draw: Draw, angle: float) -> Range:
+        """Impulses of the first stage [N·s]."""
+        if self.impulses is not None:
+            low, high = (draw.robot.mass * j for j in self.impulses)
+        else:
+            limit = draw.limits.ankle(angle, draw.standard.push_duration)
+            low, high = (fraction * limit for fraction in self.fractions)
+        return low, high
+
+    def rough(self, first: Sequence[Trial], recovered: Sequence[bool], angle: float) -> float:
+        """J50 [N·s] by the first stage."""
+        here = [(trial.pushes[0].impulse, won) for trial, won in zip(first, recovered, strict=True)
+                if trial.pushes[0].direction == angle]  # fmt: skip
+        impulse, won = zip(*here, strict=True)
+        return fit_logistic(impulse, won).j50
+
+
+@dataclass(frozen=True)
+class Grid(Part):
+    """Every magnitude in every direction, `repeats` times from differently disturbed starts."""
+
+    directions: int = field(default=8, metadata={"min": 1, "max": 3600})
+    magnitudes: tuple[float, ...] = field(
+        default=(0.2, 0.3, 0.4, 0.5, 0.6), metadata={"above": 0.0}
+    )
+    unit: Literal["impulse", "force", "specific_impulse", "ankle_fraction"] = "specific_impulse"
+    repeats: int = field(default=5, metadata={"min": 1, "max": MOST_TRIALS})
+    SIZE: ClassVar[str] = "repeats"
+
+    def __post_init__(self) -> None:
+        if not self.magnitudes:
+            raise ValueError("magnitudes: must not be empty")
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        trials: list[Trial] = []
+        for k in range(self.directions):
+            angle = 360.0 * k / self.directions
+            for magnitude in self.magnitudes:
+                impulse = to_impulse(
+                    self.unit, magnitude, draw.robot, angle, draw.standard.push_duration, "square",
+                    draw.limits.margin,
+                )  # fmt: skip
+                for _ in range(self.repeats):
+                    push = draw.push(angle, impulse)
+                    trials.append(draw.trial(number + len(trials), [push], part="grid"))
+        return trials
+
+
+@dataclass(frozen=True)
+class Margin(Part):
+    """Equal pushes, repeated from differently disturbed starts: EUROBENCH's stability margin."""
+
+    directions: tuple[float, ...] = field(
+        default=(0.0, 90.0), metadata={"min": -360.0, "max": 360.0}
+    )
+    levels: tuple[float, ...] = field(default=(), metadata={"above": 0.0})  # of the ankle limit
+    runs: int = field(default=10, metadata={"min": 1, "max": MOST_TRIALS})
+    SIZE: ClassVar[str] = "runs"
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        trials: list[Trial] = []
+        for angle in self.directions:
+            for level in self.levels:
+                limit = draw.limits.ankle(angle, draw.standard.push_duration)
+                push = draw.push(angle, level * limit)
+                for _ in range(self.runs):
+                    trials.append(
+                        draw.trial(number + len(trials), [push], part="margin", level=f"{level:g}")
+                    )
+        return trials

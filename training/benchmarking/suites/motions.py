@@ -1,0 +1,136 @@
+"""The part of suites in which motions are performed, pushed by shares of the controller's J50."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+from pathlib import Path
+from typing import Literal, NamedTuple, Self
+
+from poise.baselines.balance.references.tempo import Tempo
+from poise.envs.physics.pushes.sampler import LimitTable
+from poise.training.benchmarking.trials.trial import Trial
+
+from .directions import Envelope
+from .draw import MOST_TRIALS, Draw, Part, Recovered, generator, start_seed
+
+STANDING = "standing"  # the motion, and the part, that J50 is first measured with
+PART = "motions"
+MARGIN = 0.1  # of a motion's duration, at its begin and at its end, in which no push begins
+CLIPS = ("stand", "squat", "reach_down", "reach_up", "punch")
+
+
+def label(name: str) -> str:
+    """What a motion is called in trials: its name, or that of its file."""
+    of_file = Path(name).suffix.lower() in (".npz", ".bvh", ".yaml", ".yml")
+    return Path(name).stem if of_file else name
+
+
+class Cell(NamedTuple):
+    """A motion, pushed by a share of J50 towards an angle [deg]; what else is drawn goes by
+    `drawn`, which depends on motion, direction and repeat alone."""
+
+    motion: str
+    share: float
+    angle: float
+    drawn: int
+
+
+@dataclass(frozen=True)
+class Motions(Part):
+    """Every motion × share of J50 × direction, `trials` times, at a random time of the motion.
+
+    A name is that of a packaged clip, which is put on the robot first, of a packaged motion, or of
+    a file. J50 is the controller's own: that of the file of limits where it is this controller's,
+    else what `standing` finds in the first stage, in which the robot stands. With `of: limits` it
+    is that of the file for all controllers, who then meet the same pushes; nothing is played
+    first. Start, direction and time of a trial are the same for all controllers and shares.
+    """
+
+    names: tuple[str, ...] = (*(f"cmu02_{clip}" for clip in CLIPS), "fair1_wave_hello")
+    directions: int = field(default=16, metadata={"min": 1, "max": 3600})  # evenly around
+    shares: tuple[float, ...] = field(
+        default=(0.0, 0.5, 0.8, 1.0, 1.2), metadata={"min": 0.0, "max": 10.0}
+    )
+    trials: int = field(default=1, metadata={"min": 1, "max": MOST_TRIALS})  # in every cell
+    of: Literal["own", "limits"] = "own"
+    tempo: Tempo = field(default_factory=Tempo, metadata={"omit": "default"})
+    standing: Envelope = field(
+        default_factory=lambda: Envelope(fractions=(0.3, 2.2), first_trials=16)
+    )
+
+    def __post_init__(self) -> None:
+        for name, values in (("names", self.labels), ("shares", self.shares)):
+            if not values:
+                raise ValueError(f"{name}: must not be empty")
+            if twice := [value for value, n in Counter(values).items() if n > 1]:
+                raise ValueError(f"{name}: {twice[0]} comes twice")
+        if STANDING in self.labels:
+            raise ValueError(f"names: {STANDING} is played by itself")
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What the motions are called in trials."""
+        return tuple(label(name) for name in self.names)
+
+    def performing(self, names: Sequence[str]) -> Self:
+        """The part with other motions."""
+        return replace(self, names=tuple(names))
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        if self.of == "limits":
+            return self._cells(draw, number, draw.limits.j50())
+        trials = self._standing.first(draw, number)
+        return [replace(trial, part=STANDING, motion=STANDING) for trial in trials]
+
+    def second_count(self, controllers: int) -> int:
+        if self.of == "limits":
+            return 0
+        return len(self.names) * len(self.shares) * self.directions * self.trials
+
+    def second(
+        self, draw: Draw, number: int, first: Sequence[Trial], recovered: Recovered
+    ) -> dict[str, list[Trial]]:
+        if self.of == "limits":
+            return {}
+        return {
+            name: self._cells(draw, number, self._own(draw, name, first, won), stage=2)
+            for name, won in recovered.items()
+        }
+
+    @property
+    def _standing(self) -> Envelope:
+        return replace(self.standing, directions=self.directions)
+
+    def _own(
+        self, draw: Draw, name: str, first: Sequence[Trial], recovered: Sequence[bool]
+    ) -> LimitTable:
+        """J50 [N·s] of a controller that stands, by direction."""
+        if draw.limits.controller == name:
+            return draw.limits.j50()
+        rough = [self._standing.rough(first, recovered, angle) for angle in self._standing.angles]
+        return LimitTable(tuple(self._standing.angles), tuple(rough))
+
+    def _cells(self, draw: Draw, number: int, j50: LimitTable, stage: int = 1) -> list[Trial]:
+        """All trials of the motions."""
+        return [
+            self._trial(draw, number + i, cell, j50, stage) for i, cell in enumerate(self._all())
+        ]
+
+    def _all(self) -> Iterator[Cell]:
+        for share, motion in product(self.shares, range(len(self.labels))):
+            for k in range(self.directions * self.trials):
+                angle = 360.0 * (k % self.directions) / self.directions
+                drawn = MOST_TRIALS + len(self.labels) * k + motion  # no other trial's number
+                yield Cell(self.labels[motion], share, angle, drawn)
+
+    def _trial(self, draw: Draw, number: int, cell: Cell, j50: LimitTable, stage: int) -> Trial:
+        moment = generator(draw.seed, cell.drawn).uniform(MARGIN, 1.0 - MARGIN)
+        start = float(moment) * draw.motions[cell.motion]
+        push = replace(draw.push(cell.angle, cell.share * j50(cell.angle)), start=start)
+        pushes = [push] if cell.share else []
+        trial = draw.trial(number, pushes, part=PART, stage=stage, motion=cell.motion,
+                           share=cell.share)  # fmt: skip
+        return replace(trial, seed=start_seed(draw.seed, cell.drawn))

@@ -1,0 +1,112 @@
+"""Parts of random pushes, of several in a trial, and of none.
+
+A trial depends on the seed and its number alone, so more of them leave the first ones as they
+were.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from poise.envs.physics.pushes.push import Push
+from poise.envs.physics.pushes.sampler import PushSampler, Range
+from poise.training.benchmarking.trials.push_limits import PushLimits
+from poise.training.benchmarking.trials.trial import Trial
+
+from .draw import MOST_TRIALS, Draw, Part, check_rising, generator, start_seed
+
+
+@dataclass(frozen=True)
+class Random(Part):
+    """Random pushes, one per trial.
+
+    Without `bodies` those of the robot's description are pushed. A magnitude in
+    controller_fraction is one in ankle_fraction for a robot whose baseline was not measured.
+    """
+
+    trials: int = field(default=1000, metadata={"min": 1, "max": MOST_TRIALS})
+    pushes: PushSampler = field(
+        default_factory=lambda: PushSampler(
+            magnitude=(0.5, 1.6), unit="controller_fraction", duration=(0.05, 0.3)
+        )
+    )
+
+    def __post_init__(self) -> None:
+        if self.pushes.count != (1, 1):
+            raise ValueError("pushes: a trial has exactly one push, and it is a force")
+        _check_forces(self.pushes)
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        limits = draw.limits
+        sampler = _measured(replace(self.pushes, bodies=self.pushes.bodies or draw.bodies), limits)
+        trials = []
+        for here in range(number, number + self.trials):
+            rng = generator(draw.seed, here)
+            drawn = sampler.sample(rng, limits.robot, limits.margin, limits.table)
+            pushes = [push for push in drawn if isinstance(push, Push)]
+            trials.append(draw.trial(here, pushes, part="random"))
+        return trials
+
+
+@dataclass(frozen=True)
+class Sequence(Part):
+    """Random pushes one after the other, `pushes.interval` apart, for `until` seconds.
+
+    `pushes.count` of them at most. The impulse of all but the first is multiplied by a number
+    drawn from `later`. Without `bodies` the robot's first push body is pushed; a magnitude in
+    controller_fraction is one of `--limits`, which may be a controller's own, or of what ankles
+    hold where no J50 of the robot was measured. `limit_fraction` is left out: no single push
+    decides a trial.
+    """
+
+    trials: int = field(default=50, metadata={"min": 1, "max": MOST_TRIALS})
+    until: float = field(default=60.0, metadata={"above": 0.0})  # [s] no push begins later
+    later: Range = field(default=(1.0, 1.0), metadata={"min": 0.0})
+    pushes: PushSampler = field(
+        default_factory=lambda: PushSampler(
+            magnitude=(0.35, 0.35), unit="specific_impulse", count=(60, 60), interval=(2.0, 5.0)
+        )
+    )
+
+    def __post_init__(self) -> None:
+        if self.pushes.count[0] < 2:
+            raise ValueError("pushes: a trial has at least two, and they are forces")
+        _check_forces(self.pushes)
+        check_rising(self.later, "later")
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        limits = draw.limits
+        bodies = self.pushes.bodies or draw.bodies[:1]
+        sampler, trials = _measured(replace(self.pushes, bodies=bodies), limits), []
+        for here in range(number, number + self.trials):
+            rng = generator(draw.seed, here)
+            drawn = sampler.sample(rng, limits.robot, limits.margin, limits.table)
+            first, *rest = [push for push in drawn if isinstance(push, Push)]
+            scaled = [replace(p, impulse=p.impulse * rng.uniform(*self.later)) for p in rest]
+            pushes = (first, *(push for push in scaled if push.start < self.until))
+            trials.append(Trial(here, start_seed(draw.seed, here), pushes, part="sequence"))
+        return trials
+
+
+@dataclass(frozen=True)
+class Quiet(Part):
+    """No push at all."""
+
+    trials: int = field(default=20, metadata={"min": 1, "max": MOST_TRIALS})
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        return [draw.trial(k, (), part="quiet") for k in range(number, number + self.trials)]
+
+
+def _measured(sampler: PushSampler, limits: PushLimits) -> PushSampler:
+    """The sampler, by the ankle limit where no J50 of the robot was measured."""
+    if sampler.unit == "controller_fraction" and limits.table is None:
+        return replace(sampler, unit="ankle_fraction")
+    return sampler
+
+
+def _check_forces(pushes: PushSampler) -> None:
+    if pushes.no_push or pushes.unit == "delta_v":
+        raise ValueError("pushes: they are forces, in every trial")
+    if pushes.limit_table is not None:
+        raise ValueError("pushes: limit_table belongs in a file of configs/limits")

@@ -1,0 +1,177 @@
+"""Parts for controllers that walk: how they follow commands, and what pushes them off a walk.
+
+A trial depends on the seed and its number alone, as in all parts. Pushes and kicks begin at a time
+that goes through the phases of the gait evenly from trial to trial (the golden ratio's fractions),
+whatever their size and direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import ClassVar
+
+import numpy as np
+
+from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.schedule import TimedCommand, parse_commands
+from poise.configs.errors import ConfigError
+from poise.envs.physics.pushes.push import Kick
+from poise.training.benchmarking.trials.trial import Trial
+
+from .directions import Envelope
+from .draw import MOST_TRIALS, Draw, Part, Recovered, generator
+from .random import Sequence as PushSequence
+
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+
+
+def from_start(command: GaitCommand) -> TimedCommand:
+    """The command from the reset on."""
+    return TimedCommand(**{**asdict(command), "start": 0.0})
+
+
+def command_text(command: GaitCommand) -> str:
+    """The command in words, such as `ahead 0.5, turn 0.25`."""
+    names = [each.name for each in fields(GaitCommand)]
+    said = [f"{name} {getattr(command, name):g}" for name in names if getattr(command, name)]
+    return ", ".join(said) or "stand"
+
+
+@dataclass(frozen=True)
+class Walk(Part):
+    """Every command, `trials` times, from differently disturbed starts and without a push."""
+
+    commands: tuple[GaitCommand, ...] = (GaitCommand(0.5),)
+    trials: int = field(default=20, metadata={"min": 1, "max": MOST_TRIALS})
+
+    def __post_init__(self) -> None:
+        if not self.commands:
+            raise ValueError("commands: must not be empty")
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        each = [command for command in self.commands for _ in range(self.trials)]
+        return [
+            draw.trial(number + k, (), part="walk", level=command_text(command),
+                       commands=(from_start(command),))
+            for k, command in enumerate(each)
+        ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Gait(Walk):
+    """The same for commands with step parameters: whether the steps are as told."""
+
+    commands: tuple[GaitCommand, ...] = (GaitCommand(0.5, step_length=0.2),)
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        return [replace(trial, part="gait") for trial in super().first(draw, number)]
+
+
+@dataclass(frozen=True)
+class Velocity(Part):
+    """Courses of commands that change while it walks, `trials` times each."""
+
+    courses: dict[str, tuple[TimedCommand, ...]] = field(
+        default_factory=lambda: {"circle": (TimedCommand(0.5, turn=0.25),)}
+    )
+    trials: int = field(default=10, metadata={"min": 1, "max": MOST_TRIALS})
+
+    def __post_init__(self) -> None:
+        for name, commands in self.courses.items():
+            try:
+                parse_commands(commands, f"courses.{name}")
+            except ConfigError as error:
+                raise ValueError(str(error)) from None
+        if not all(self.courses.values()) or not self.courses:
+            raise ValueError("courses: needs one command or more in each")
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        each = [(name, course) for name, course in self.courses.items() for _ in range(self.trials)]
+        return [
+            draw.trial(number + k, (), part="velocity", level=name, commands=course)
+            for k, (name, course) in enumerate(each)
+        ]
+
+
+@dataclass(frozen=True)
+class Walking:
+    """The walk that is pushed, and when: `start` [s] after the reset, within `window` [1/ω]."""
+
+    command: GaitCommand = field(default_factory=lambda: GaitCommand(0.5))
+    start: float = field(default=5.0, metadata={"min": 0.0})
+    window: float = field(default=12.0, metadata={"min": 0.0})  # some strides
+
+    def begins(self, draw: Draw, number: int) -> float:
+        """The start of the push of a trial [s]."""
+        shift = np.random.default_rng(np.random.SeedSequence([draw.seed, 3])).uniform()
+        return float(self.start + (shift + GOLDEN * number) % 1.0 * self.window / draw.robot.omega)
+
+    def walking(self, draw: Draw, trials: Iterable[Trial], part: str) -> list[Trial]:
+        """The trials with this command, their only push at its time."""
+        return [
+            replace(
+                trial, part=part, level=command_text(self.command),
+                commands=(from_start(self.command),),
+                pushes=tuple(replace(p, start=self.begins(draw, trial.number))
+                             for p in trial.pushes),
+            )
+            for trial in trials
+        ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class WalkPush(Walking, Envelope):
+    """J50 in each of many directions while it walks, as an `Envelope` finds it, at all phases."""
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        return self.walking(draw, super().first(draw, number), "walk_push")
+
+    def second(
+        self, draw: Draw, number: int, first: Sequence[Trial], recovered: Recovered
+    ) -> dict[str, list[Trial]]:
+        chosen = super().second(draw, number, first, recovered)
+        return {name: self.walking(draw, own, "walk_push") for name, own in chosen.items()}
+
+
+@dataclass(frozen=True)
+class WalkKick(Walking, Part):
+    """Kicks of the root while it walks: in each axis of the ground up to ± one of `speeds`."""
+
+    speeds: tuple[float, ...] = field(default=(0.5, 1.0), metadata={"above": 0.0})  # [m/s]
+    trials: int = field(default=400, metadata={"min": 1, "max": MOST_TRIALS})  # of each
+    SIZE: ClassVar[str] = "trials"
+
+    def __post_init__(self) -> None:
+        if not self.speeds:
+            raise ValueError("speeds: must not be empty")
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        each = [speed for speed in self.speeds for _ in range(self.trials)]
+        return [self._trial(draw, number + k, speed) for k, speed in enumerate(each)]
+
+    def _trial(self, draw: Draw, number: int, speed: float) -> Trial:
+        x, y = generator(draw.seed, number).uniform(-speed, speed, 2)
+        way = float(np.degrees(np.arctan2(y, x)))
+        kick = Kick(self.begins(draw, number), float(np.hypot(x, y)), way)
+        commands = (from_start(self.command),)
+        return draw.trial(number, (), part="walk_kick", level=f"± {speed:g} m/s",
+                          commands=commands, kicks=(kick,))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class WalkRepeated(PushSequence):
+    """Random pushes one after the other while it walks, see `Sequence`."""
+
+    command: GaitCommand = field(default_factory=lambda: GaitCommand(0.5))
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        level, commands = command_text(self.command), (from_start(self.command),)
+        return [
+            replace(trial, part="walk_repeated", level=level, commands=commands)
+            for trial in super().first(draw, number)
+        ]
+
+
+#: parts of a suite for controllers that walk
+WALKING = ("walk", "gait", "velocity", "walk_push", "walk_kick", "walk_repeated", "terrains")

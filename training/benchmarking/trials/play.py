@@ -1,0 +1,253 @@
+"""Playing one trial: the outcome depends on the trial and the agent alone, bit for bit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from poise.baselines.balance.references.feet import foot_signs
+from poise.baselines.environments.commanded import CommandedEnv
+from poise.baselines.environments.residual import ResidualBalanceEnv
+from poise.envs.balance import episode
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.physics.pushes.push import Kick, Push
+from poise.training.benchmarking.diagnosis.diagnosis import diagnose
+from poise.training.benchmarking.diagnosis.record import CourseRecord
+from poise.training.motion.tracking.record import Tracking
+
+from .agents import Agent
+from .gait_figures import AIR_TIME, Walk
+from .gait_record import WalkRecord
+from .signals import Sway
+from .trial import Outcome, Trial
+
+FOOT_DISPLACED = 0.05  # [m]
+TINY = 1e-9  # [s]
+SETTLED = 1.0  # [s] after which actions and drift count
+Watch = Callable[[BalanceEnv], object]  # called after the reset and after every step
+
+
+class SteppedTrial:
+    """A trial that begins when this is made, and goes on step by step.
+
+    Attributes:
+        done: whether it has ended, by a fall or by time.
+        tracking: the record of the motion that the trial performs, or None.
+    """
+
+    def __init__(self, agent: Agent, trial: Trial):
+        self._agent, self.done, env = agent, False, agent.env
+        self._observation, _ = env.reset(seed=trial.seed, options=trial.options)
+        if agent.begin is not None:
+            agent.begin()
+        self.tracking: Tracking | None = None
+        if trial.motion is not None and isinstance(env, ResidualBalanceEnv):
+            self.tracking = Tracking(env, [push.start for push in trial.pushes])
+
+    def step(self) -> np.ndarray:
+        """Take a policy step; returns its action (na,). Raises what the controller raises."""
+        env, action = self._agent.env, self._agent.act(self._observation)
+        _, terminated, truncated = env.step_without_info(action)
+        self._observation = env.episode.observation.astype(np.float32)
+        self.done = terminated or truncated
+        if self.tracking is not None:
+            self.tracking.update()
+            self.done |= self.tracking.ended
+        return action
+
+
+def run_trial(agent: Agent, trial: Trial, watch: Watch | None = None) -> Outcome:
+    """Play a trial to its end in the environment that the agent has."""
+    env, stepped = agent.env, SteppedTrial(agent, trial)
+    settled, course = Settled(), CourseRecord()
+    touchdowns = Touchdowns(len(env.robot.soles), env.config.policy_period)
+    stands = not trial.commands and stepped.tracking is None
+    sway = Sway() if trial.pushes and stands else None
+    walk = WalkRecord() if trial.commands else None
+    watches = [each for each in (course, sway, walk, watch) if each is not None]
+    while not stepped.done:
+        for each in watches:
+            each(env)
+        action = stepped.step()
+        touchdowns.update(env.simulation.state.contacts)
+        settled.update(env, action)
+    for each in watches:
+        each(env)
+    outcome, loss = _outcome(env, trial, settled, touchdowns.count), "not quiet"
+    if walk is not None:
+        outcome, loss = walked(env, trial, outcome, walk), "off command"
+    elif stepped.tracking is not None:
+        outcome, loss = followed(env, outcome, stepped.tracking), "motion"
+    elif sway is not None and outcome.recovered:
+        body, recovery = sway.of(trial.pushes[0], env.config.policy_period)
+        outcome = replace(outcome, sway=body, sway_recovery=recovery)
+    if outcome.recovered:
+        return outcome
+    return replace(outcome, **asdict(diagnose(env, course.course(), first_start(trial), loss)))
+
+
+def first_start(trial: Trial) -> float:
+    """When the first push or kick begins [s]; 0 without one."""
+    events: list[Push | Kick] = [*trial.pushes, *trial.kicks]
+    return min((each.start for each in events), default=0.0)
+
+
+def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) -> Outcome:
+    """The outcome of a trial with commands, with the figures of its walk.
+
+    Where it is to walk at the end, `recovered` is to have not fallen and to walk as commanded
+    (`Walk.as_commanded`), on a terrain to be beyond its last edge; there is no time of recovery
+    then, and no drift.
+    """
+    assert isinstance(env, CommandedEnv)  # it has taken the commands
+    walk = Walk(record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0)
+    figures: dict[str, Any] = {
+        name: _finite_or_none(value) for name, value in walk.figures().items()
+    }
+    weight = env.robot.mass * float(np.linalg.norm(env.model.opt.gravity))
+    for name, per_metre in (
+        ("cost_of_transport", "energy_per_metre"),
+        ("positive_cost_of_transport", "work_per_metre"),
+    ):
+        cost = figures.pop(per_metre)
+        figures[name] = None if cost is None else cost / weight
+    starts = [*(push.start for push in trial.pushes), *(kick.start for kick in trial.kicks)]
+    first = min(starts, default=None)
+    left = int(np.argmax(foot_signs(env.robot)))
+    phase = None if first is None else walk.phase_at(first, left)
+    outcome = replace(
+        outcome, **figures, push_phase=phase, com_drift=None, foot_drift=None, recovery_time=None
+    )
+    terrain = env.simulation.robot.terrain
+    if not terrain.flat:
+        last, passed = len(terrain.surfaces()) - 1, outcome.surfaces_passed
+        outcome = replace(outcome, recovered=not env.fallen and passed == last)
+    elif trial.commands[-1].array()[:3].any():
+        recovered = not env.fallen and walk.as_commanded(first)
+        outcome = replace(outcome, recovered=recovered)
+    return outcome
+
+
+def followed(env: BalanceEnv, outcome: Outcome, tracking: Tracking) -> Outcome:
+    """The outcome of a trial that performs a motion: `recovered` is to have not fallen."""
+    figures: dict[str, Any] = {
+        name: _finite(value) for name, value in asdict(tracking.figures()).items()
+    }
+    fallen, time = tracking.fallen, env.simulation.time
+    return replace(
+        outcome, **figures, fallen=fallen, fall_time=time if fallen else None,
+        recovered=not fallen, recovery_time=None, com_drift=None, foot_drift=None,
+    )  # fmt: skip
+
+
+def _outcome(env: BalanceEnv, trial: Trial, settled: Settled, touchdowns: int) -> Outcome:
+    """The outcome that the environment has recorded."""
+    m = env.episode.metrics
+    recovered = env.recovered and not env.fallen
+    pushed = max((push.start for push in trial.pushes), default=0.0)
+    return Outcome(
+        recovered=recovered,
+        fallen=env.fallen,
+        fall_time=env.simulation.time if env.fallen else None,
+        recovery_time=max(float(m[episode.LAST_MOVING]) - pushed, 0.0) if recovered else None,
+        foot_displaced=bool(m[episode.MAX_SLIDE] > FOOT_DISPLACED),
+        steps=touchdowns,
+        max_com=_finite(m[episode.MAX_COM]),
+        max_capture=_finite(m[episode.MAX_CAPTURE]),
+        min_cop_margin=_finite(m[episode.MIN_COP_MARGIN]),
+        max_slide=_finite(m[episode.MAX_SLIDE]),
+        energy=_finite(m[episode.ENERGY]),
+        peak_torque=_finite(m[episode.PEAK_TORQUE]),
+        saturation=float(m[episode.SATURATED] / max(m[episode.TICKS], 1.0)),
+        mean_power=_finite(m[episode.ENERGY] / max(m[episode.TORQUE_TIME], TINY)),
+        torque_variation=_finite(m[episode.TORQUE_VARIATION] / max(m[episode.TORQUE_TIME], TINY)),
+        solver_failures=int(m[episode.FAILURES]),
+        mean_abs_action=settled.actions / settled.steps if settled.steps else None,
+        com_drift=_finite(settled.drift) if settled.steps and not trial.pushes else None,
+        foot_drift=_finite(settled.foot_drift) if settled.steps and not trial.pushes else None,
+        final_speed=_finite(float(np.linalg.norm(env.simulation.state.com_vel))),
+        final_lean=_finite(lean(env)),
+        root_force=_finite(m[episode.ROOT_FORCE]),
+        edge_contacts=int(m[episode.EDGE_CONTACTS]),
+        surfaces_passed=surfaces_passed(env),
+        drawn=drawn_robot(env),
+    )
+
+
+def drawn_robot(env: BalanceEnv) -> str | None:
+    """What the episode's robot was drawn as, as JSON; None where it is the one that is known."""
+    return None if env.drawn is None else json.dumps(env.drawn.summary(env.arrays.timestep))
+
+
+def surfaces_passed(env: BalanceEnv) -> int | None:
+    """The surfaces of the terrain, without the start's, of which the CoM has passed the beginning;
+    None on level ground."""
+    surfaces, com = env.simulation.robot.terrain.surfaces(), env.simulation.state.com
+    return sum(bool(com[0] > each.x_min) for each in surfaces[1:]) if surfaces else None
+
+
+def lean(env: BalanceEnv) -> float:
+    """The tilt of the root from the standing posture, whatever the yaw [°]."""
+    standing = env.simulation.arrays.root_standing[2]
+    cosine = float(env.simulation.state.root_axes[2] @ standing)
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+class Settled:
+    """Actions and the drift of the CoM and of the feet after the first second.
+
+    Attributes:
+        steps: policy steps after it.
+        actions: sum of their mean |action|.
+        drift: largest horizontal distance of the CoM from where it was then [m].
+        foot_drift: the same of a sole.
+    """
+
+    def __init__(self) -> None:
+        self.actions, self.steps, self.drift, self.foot_drift = 0.0, 0, 0.0, 0.0
+        self._start: np.ndarray | None = None
+
+    def update(self, env: BalanceEnv, action: np.ndarray) -> None:
+        """Call it after every step."""
+        state = env.simulation.state
+        places = np.vstack([state.com[:2], state.sole_points[:, :2]])
+        if env.steps == round(SETTLED / env.config.policy_period):
+            self._start = places
+        elif self._start is not None:
+            self.actions += float(np.mean(np.abs(action)))
+            self.steps += 1
+            ways = np.linalg.norm(places - self._start, axis=1)
+            self.drift = max(self.drift, float(ways[0]))
+            self.foot_drift = max(self.foot_drift, float(ways[1:].max()))
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _finite_or_none(value: float | None) -> float | None:
+    return None if value is None else _finite(value)
+
+
+class Touchdowns:
+    """Counts touchdowns of feet that were in the air for at least `AIR_TIME`.
+
+    Args:
+        feet: number of feet.
+        period: seconds between two calls of `update`.
+    """
+
+    def __init__(self, feet: int, period: float):
+        self.count = 0
+        self._least = max(round(AIR_TIME / period), 1)
+        self._air = np.zeros(feet, dtype=int)  # updates in a row without contact
+
+    def update(self, contacts: np.ndarray) -> None:
+        """(feet,) 1 where a foot touches the ground, else 0."""
+        down = contacts > 0.5
+        self.count += int(np.sum(down & (self._air >= self._least)))
+        self._air = np.where(down, 0, self._air + 1)
