@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING
 from poise.lazy import lazy
 
 __all__ = [
+    "Measurement",
+    "MotorCommand",
     "Policy",
     "Readings",
+    "SensedController",
     "StandaloneController",
     "ThreadedVecEnv",
     "TrainConfig",
@@ -39,7 +42,9 @@ if TYPE_CHECKING:
     from poise.training.deploy.export.dataset import write_dataset
     from poise.training.deploy.export.export import export_policy
     from poise.training.deploy.standalone.controller import StandaloneController, load_standalone
+    from poise.training.deploy.standalone.measurement import Measurement
     from poise.training.deploy.standalone.readings import Readings
+    from poise.training.deploy.standalone.sensed import MotorCommand, SensedController
     from poise.training.learning.config import TrainConfig, train_config
     from poise.training.learning.policy import Policy, load_policy
     from poise.training.learning.train import train
@@ -66,7 +71,9 @@ else:
             "benchmarking.results.read": ("load_results",),
             "benchmarking.results.replay": ("replay",),
             "deploy.standalone.controller": ("StandaloneController", "load_standalone"),
+            "deploy.standalone.measurement": ("Measurement",),
             "deploy.standalone.readings": ("Readings",),
+            "deploy.standalone.sensed": ("MotorCommand", "SensedController"),
             "learning.tuning.search": ("tune",),
         },
     )

@@ -9,6 +9,7 @@ import pytest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ARGUMENTS = {
+    "measured_mujoco.py": ["momentum-qp"],
     "optuna_search.py": ["1", "64"],
     "own_controller.py": [],
     "plain_mujoco.py": ["feedback-step"],
@@ -45,6 +46,11 @@ def test_a_controller_outside_of_environments_stands(tmp_path):
     """It steps in a loop of MuJoCo alone, and stands; the loop is short enough to copy."""
     assert run("plain_mujoco.py", tmp_path) == "feedback-step stands\n"
     assert len((EXAMPLES / "plain_mujoco.py").read_text().splitlines()) <= 40
+
+
+def test_a_controller_stands_by_sensors_alone(tmp_path):
+    """Nobody tells it where it is; it is pushed, and stands."""
+    assert run("measured_mujoco.py", tmp_path).startswith("momentum-qp stands\n")
 
 
 @pytest.mark.weekly

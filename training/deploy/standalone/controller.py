@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import overload
 
 import mujoco
 import numpy as np
@@ -28,6 +29,18 @@ from .readings import Readings
 from .sensed import SensedController
 
 
+@overload
+def load_standalone(
+    name: str, robot: str | Path | Robot = ..., *, allow: str | Iterable[str] = ...
+) -> StandaloneController: ...
+@overload
+def load_standalone(
+    name: str,
+    robot: str | Path | Robot = ...,
+    *,
+    realism: str | Path | Mapping | Realism,
+    allow: str | Iterable[str] = ...,
+) -> SensedController: ...
 @allows("name")
 def load_standalone(
     name: str,
@@ -48,8 +61,8 @@ def load_standalone(
         allow: what may run though a file names it, as of `load_policy`.
 
     Raises:
-        ConfigError: no such controller, robot or level, or one that is no use outside: it pulls the root
-            by a force from nowhere, or it observes the push.
+        ConfigError: no such controller, robot or level, or one that is no use outside: it pulls the
+            root by a force from nowhere, or it observes the push.
     """
     body = robot if isinstance(robot, Robot) else load_robot(robot)
     agent = load_agent(name, body)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from poise.configs.errors import ConfigError
 from poise.configs.numbers import finite_array
 from poise.envs.compiled.maths.vectors import axes_of
 from poise.envs.robots.robot import Robot

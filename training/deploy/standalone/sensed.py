@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,13 +11,13 @@ import numpy as np
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled.calls import Program, run
-from poise.envs.robots.robot import Robot
+from poise.envs.physics.state import RobotState
 from poise.envs.sensing.drawn import DrawnRobot
 from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.measurement import RING
 from poise.envs.sensing.motors import DAMPING, STIFFNESS, TARGET, TORQUE
 from poise.envs.sensing.realism import PARTS, Realism
-from poise.training.benchmark.trials.agents import Agent
+from poise.training.benchmarking.trials.agents import Agent
 
 from .measurement import Measurement
 from .readings import Readings
@@ -50,12 +50,16 @@ class MeasuredState(EstimatedState):
         """The same of the plant and the estimator of `source`."""
         config = source.config
         if config.kind == "exact":
-            raise ConfigError("exact: is the true state, which no sensor gives",
-                              field="estimator.kind", choices=("auto", "odometry", "inekf"))  # fmt: skip
+            told = "exact is the true state, which no sensor gives"
+            raise ConfigError(told, field="estimator.kind", choices=("auto", "odometry", "inekf"))
         if config.kind == "auto":
             config = replace(config, kind="odometry")
         state = cls(source.plant, source.plant.robot, config)
-        state.believing, state.estimate, state.sense = state.estimate, Program.of(()), Program.of(())
+        state.believing, state.estimate, state.sense = (
+            state.estimate,
+            Program.of(()),
+            Program.of(()),
+        )
         return state
 
     believing: Program  #: of the estimator
@@ -118,11 +122,17 @@ class SensedController:
         self._agent, self._env = agent, env
         self.name, self.robot, self.fingerprint = agent.name, env.robot, agent.fingerprint
         self.joint_names, self.motor_names = env.robot.joint_names, env.robot.motor_names
-        residual = isinstance(env, ResidualBalanceEnv)
-        self.measurements = env.control_substeps if residual else env.substeps
+        self.measurements = (
+            env.control_substeps if isinstance(env, ResidualBalanceEnv) else env.substeps
+        )
         self.sensor_period = env.arrays.timestep
         self.period: float = self.measurements * self.sensor_period
         self._running = False
+
+    @property
+    def state(self) -> RobotState:
+        """What is believed of the robot, as of the last `reset` or `command`."""
+        return self._state.state
 
     def reset(self, start: Readings, measured: Measurement | Sequence[Measurement]) -> None:
         """Forget everything; the robot stands as `start` tells, and has measured `measured`.
