@@ -285,7 +285,10 @@ class EstimatedState(StateSource, Copyable):
 
     def _begin_invariant(self) -> None:
         """Start at the odometry's state, with what the sensors' noises are thought to be."""
-        f, d, c = self.invariant, self.drawn.noise, self.config
+        f, d, c, o = self.invariant, self.drawn.noise, self.config, self.odometry
+        turn = np.zeros(4)
+        quaternion_of(o.axes, turn)
+        self.known.reset(np.concatenate([o.position, turn, o.q]))  # not where an episode ended
         own, noise, dt = c.invariant, self.invariant.numbers, self.arrays.timestep
         drift = np.hypot(own.attitude, d["tilt_drift"] * np.sqrt(2.0 * DRIFT_TIME / dt))
         noise[GYRO], noise[FORCE] = (
