@@ -91,7 +91,7 @@ class MeasuredState(EstimatedState):
 
 
 class SensedController:
-    """What the motors are asked for, from measurements: the bits of the benchmark at a level of realism.
+    """What the motors are asked for, from measurements: the bits of the benchmark at that level.
 
     The estimator and the predictor are those of the benchmark. The level of realism says what is
     known of the robot: by how much measurements and commands are late, the motors' lag, and the
