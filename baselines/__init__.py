@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from poise.baselines.balance.references.motion import load_motion
     from poise.baselines.balance.references.reference_motion import ReferenceMotion
     from poise.baselines.balance.stepping.capture_step import CaptureStep
-    from poise.baselines.balance.stepping.config import CaptureStepConfig
     from poise.baselines.balance.stepping.controller import SteppingController
     from poise.baselines.controller import (
         BaseController,
@@ -67,10 +66,12 @@ if TYPE_CHECKING:
     )
     from poise.baselines.motion.space_time.retarget_clip import retarget_clip
     from poise.baselines.registry import load_controller
-    from poise.baselines.walking.command import GaitCommand
     from poise.baselines.walking.controller import WalkingController
     from poise.baselines.walking.schedule import CommandSampler
     from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+
+    from .balance.stepping.planning.config import CaptureStepConfig
+    from .walking.planner.command import GaitCommand
 else:
     __getattr__, __dir__ = lazy(
         __name__,

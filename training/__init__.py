@@ -48,11 +48,12 @@ if TYPE_CHECKING:
     from poise.training.learning.config import TrainConfig, train_config
     from poise.training.learning.policy import Policy, load_policy
     from poise.training.learning.train import train
-    from poise.training.learning.train_seeds import train_seeds
     from poise.training.learning.tuning.search import tune
     from poise.training.learning.vec_env import ThreadedVecEnv
     from poise.training.pictures.figures.video import frame_strip, record
     from poise.training.pictures.report.page import write_report
+
+    from .learning.seeds.train import train_seeds
 else:
     __getattr__, __dir__ = lazy(
         __name__,

@@ -3,7 +3,11 @@
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from poise.baselines.balance.stepping.config import CaptureStepConfig, StepLimits, SwingTask
+from poise.baselines.balance.stepping.planning.config import (
+    CaptureStepConfig,
+    StepLimits,
+    SwingTask,
+)
 from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 
 from .models.lip import Lip

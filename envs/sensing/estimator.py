@@ -60,9 +60,8 @@ from .odometry import (
     rate_gain,
 )
 from .plant import Plant
-from .prediction import allocate_promises, keep_promises, predict
+from .prediction import Rollout, allocate_promises, keep_promises, make_rollout, predict, roll_out
 from .realism import Realism
-from .rollout import Rollout, make_rollout, roll_out
 from .source import StateSource
 
 POSITIVE = {"above": 0.0}

@@ -21,9 +21,9 @@ from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.learning.checkpoints import STATE, find_checkpoint
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.policy_files import read_state
-from poise.training.learning.seeds import SEEDS, Evaluation, evaluations, start_and_best
+from poise.training.learning.seeds.records import SEEDS, Evaluation, evaluations, start_and_best
+from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import BEST, LAST, train
-from poise.training.learning.train_seeds import train_seeds
 from poise.training.running.executor import Backend
 from poise.training.running.options.described import Option, kind_of, options_of, sentences
 from poise.training.running.options.pages import grouped, print_options

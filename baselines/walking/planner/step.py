@@ -5,7 +5,7 @@ The law of the footholds is that of `dcm.py`.
 
 import numpy as np
 
-from poise.baselines.balance.references.offsets import (
+from poise.baselines.balance.references.targets import (
     COM_X,
     COM_Y,
     COM_Z,
@@ -15,15 +15,15 @@ from poise.baselines.balance.references.offsets import (
     FOOTHOLD_Y,
     TIME,
 )
-from poise.baselines.balance.stepping.cop_region import single_support_region
-from poise.baselines.balance.stepping.guidance import limit_posture
-from poise.baselines.balance.stepping.search import (
+from poise.baselines.balance.stepping.planning.cop_region import single_support_region
+from poise.baselines.balance.stepping.planning.guidance import limit_posture
+from poise.baselines.balance.stepping.planning.search import (
     clip_to_width,
     set_start,
     to_step_frame,
     to_world,
 )
-from poise.baselines.balance.stepping.swing import (
+from poise.baselines.balance.stepping.planning.swing import (
     FROZEN,
     advance_high,
     advance_over,
@@ -31,6 +31,7 @@ from poise.baselines.balance.stepping.swing import (
     time_left,
 )
 from poise.baselines.balance.stepping.tick import solve_contacts
+from poise.baselines.walking.models.reference import share_load
 from poise.envs.compiled.calls import run
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
@@ -40,7 +41,6 @@ from .arms import swing_arms
 from .blocks import Gait, WalkTick
 from .command import MOST_STEP_TIME, STEP_LENGTH, STEP_TIME, WIDTH
 from .dcm import constant_cop, gait_offset, step_to_offset, touchdown_target, transfer_factor
-from .models.reference import share_load
 from .treads import advance_over_edges, apex_of_step, follow_line, footholds_given, settle_on_tread
 
 ROOM = 0.01  # [m] between the soles of a step to the side, besides the least width

@@ -11,7 +11,7 @@ ahead while its own foot is behind. Only the joints of the robot's roles `should
 
 import numpy as np
 
-from poise.baselines.balance.references.feet import foot_signs
+from poise.baselines.balance.references.legs import foot_signs
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along, copy_into
 from poise.envs.compiled.memory import guarded_zeros

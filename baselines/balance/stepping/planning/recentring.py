@@ -8,7 +8,7 @@ near to its nominal place as it can with ξ between the feet at touchdown. Kerne
 
 import numpy as np
 
-from poise.baselines.balance.references.feet import nominal_feet
+from poise.baselines.balance.references.legs import nominal_feet
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import along

@@ -1,17 +1,48 @@
-"""The terms that tell of a controller's steps, besides those of `poise.envs.balance.mdp.terms`."""
+"""Terms that tell of a controller's motion and steps, besides those of `envs.balance.mdp.terms`."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.balance.stepping.blocks import StepMemory, SwingArrays
-from poise.baselines.balance.stepping.swing import time_left as remaining_time
+from poise.baselines.balance.references.targets import Motion
+from poise.baselines.balance.references.tempo import TIME
+from poise.baselines.balance.stepping.planning.blocks import StepMemory, SwingArrays
+from poise.baselines.balance.stepping.planning.swing import time_left as remaining_time
 from poise.envs.balance.mdp.observation import GROUND, SPACE, Terms, View
-from poise.envs.balance.mdp.terms import put_local
+from poise.envs.balance.mdp.terms import TERMS, put_local
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 
-from .motion_terms import MOTION_TERMS
+
+@dataclass(frozen=True, eq=False)
+class MotionView(Block):
+    """The block of a term about the motion: what it reads, and the place that it fills."""
+
+    seen: View
+    motion: Motion
+
+
+MOTION_TERMS = Terms(TERMS, MotionView)  #: by name; those of every environment come first
+
+
+@MOTION_TERMS.add(
+    ("sin", "cos", "left"),
+    "1",
+    "phase of the motion, a turn from begin to end, and the fraction of it that is left",
+    "number",
+    default=False,
+)
+def motion_phase(t: MotionView):
+    motion, v = t.motion, t.seen
+    begin, end = motion.knots[0], motion.knots[-1]
+    now = v.clock[0] * v.robot.timestep
+    if motion.pace.waits:
+        now = motion.pace.memory[TIME]
+    over = (now - begin) / (end - begin)
+    over = over % 1.0 if motion.loop else min(max(over, 0.0), 1.0)
+    v.out[0], v.out[1] = np.sin(2.0 * np.pi * over), np.cos(2.0 * np.pi * over)
+    v.out[2] = 1.0 - over
+
 
 # entries of what a controller tells of its steps, see `Stepping.entries`
 STEPS, FOOT, FOOTHOLD, PHASE, REMAINING, SINCE = 0, 1, 2, 4, 5, 6

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from poise.baselines.balance.stepping.config import SwingTask
+from poise.baselines.balance.stepping.planning.config import SwingTask
 from poise.envs.robots.robot import Robot
 
 ROUNDS = 200

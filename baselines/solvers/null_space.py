@@ -18,7 +18,6 @@ import numpy as np
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.physics.arrays import RobotArrays
 
 WHOLE_LEG = 6  # joints that place a foot anywhere
 DEPENDENT = 1e-6  # pivot, relative to the first, below which a row of J follows from the others
@@ -41,13 +40,13 @@ class NullSpace(Block):
     basis: np.ndarray  # (nh, 8 or more) null vectors, then v̇₀, as columns
 
 
-def allocate_null_space(robot: RobotArrays, points: Sequence[np.ndarray] = ()) -> NullSpace:
-    """Zeroed scratch for one robot: its soles, and points with these chains of joints."""
-    nv = len(robot.q_standing) + 6
-    k = 6 * len(robot.sole_body) + 3 * len(points)
-    chains = [chain[:n] for chain, n in zip(robot.chain, robot.chain_length, strict=True)]
+def allocate_null_space(
+    nv: int, chains: Sequence[np.ndarray], points: Sequence[np.ndarray] = ()
+) -> NullSpace:
+    """Zeroed scratch for a robot of `nv` dofs: soles and points at the ends of chains of joints."""
+    k = 6 * len(chains) + 3 * len(points)
     held = np.unique(np.concatenate([*chains, *points]))
-    nh, steps, spare = len(held), min(k, len(held)), int(short_legs(robot))
+    nh, steps, spare = len(held), min(k, len(held)), int(short_legs(chains))
     width, basis_width = (-(-columns // 8) * 8 for columns in (k, nh - steps + spare + 1))
     zeros = guarded_zeros
     return NullSpace(
@@ -65,11 +64,11 @@ def allocate_null_space(robot: RobotArrays, points: Sequence[np.ndarray] = ()) -
     )
 
 
-def short_legs(robot: RobotArrays) -> bool:
+def short_legs(chains: Sequence[np.ndarray]) -> bool:
     """Whether there are several legs, and one has fewer than six joints of its own."""
-    chains = [set(chain[:n]) for chain, n in zip(robot.chain, robot.chain_length, strict=True)]
-    others = [set().union(*chains[:i], *chains[i + 1 :]) for i in range(len(chains))]
-    own = [len(chain - other) for chain, other in zip(chains, others, strict=True)]
+    sets = [set(chain) for chain in chains]
+    others = [set().union(*sets[:i], *sets[i + 1 :]) for i in range(len(sets))]
+    own = [len(chain - other) for chain, other in zip(sets, others, strict=True)]
     return len(own) > 1 and min(own) < WHOLE_LEG
 
 

@@ -2,23 +2,15 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.offsets import FOOTHOLD_X, FOOTHOLD_Y
-from poise.baselines.balance.references.offsets import TIME as TIME_OFFSET
+from poise.baselines.balance.references.targets import FOOTHOLD_X, FOOTHOLD_Y
+from poise.baselines.balance.references.targets import TIME as TIME_OFFSET
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.pendulum import drifted_point
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import along, placed
 
-from .blocks import (
-    BEST_COST,
-    BEST_OFFSET,
-    BEST_TIME,
-    BEST_X,
-    BEST_Y,
-    Search,
-    SwingArrays,
-)
+from .blocks import BEST_COST, BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, Search, SwingArrays
 from .cop_region import distance_beyond, single_support_region
 from .feedback import (
     AHEAD,

@@ -1,12 +1,10 @@
 """Accelerations that leave the soles where they are, from random Jacobians."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from poise.baselines.whole_body.null_space import allocate_null_space, short_legs, solve_resting
-from poise.envs.physics.arrays import robot_arrays
+from poise.baselines.solvers.null_space import allocate_null_space, short_legs, solve_resting
+from poise.envs.physics.arrays import robot_arrays, sole_chains
 from tests.support.physics import robot_named
 
 
@@ -27,9 +25,15 @@ def random_jacobian(rng, space):
     return J
 
 
+def scratch(name: str, soles: int = 2):
+    """Scratch for a robot, with these of its soles alone."""
+    arrays = robot_arrays(robot_named(name))
+    return allocate_null_space(len(arrays.q_standing) + 6, sole_chains(arrays)[:soles])
+
+
 def test_least_solution_and_orthonormal_null_space():
     """J v̇₀ = rhs, J V = 0, VᵀV = 1, and v̇₀ is the least of all solutions."""
-    space = allocate_null_space(robot_arrays(robot_named("humanoid")))
+    space = scratch("humanoid")
     rng = np.random.default_rng(0)
     for _ in range(20):
         J, rhs = random_jacobian(rng, space), rng.normal(size=12)
@@ -43,7 +47,7 @@ def test_least_solution_and_orthonormal_null_space():
 def test_rows_that_follow_from_others_are_dropped():
     """A row that is another's multiple asks for nothing more: the others are met, V stays in J's
     null space."""
-    space = allocate_null_space(robot_arrays(robot_named("humanoid")))
+    space = scratch("humanoid")
     rng = np.random.default_rng(1)
     for _ in range(20):
         J, rhs = random_jacobian(rng, space), rng.normal(size=12)
@@ -55,7 +59,7 @@ def test_rows_that_follow_from_others_are_dropped():
 
 def test_joints_that_move_no_sole_are_free():
     """An arm's acceleration is one column of V by itself, and no part of v̇₀."""
-    space = allocate_null_space(robot_arrays(robot_named("humanoid")))
+    space = scratch("humanoid")
     rng = np.random.default_rng(2)
     vdot0, V = solved(random_jacobian(rng, space), rng.normal(size=12), space)
     nf = len(space.free)
@@ -68,9 +72,7 @@ def test_joints_that_move_no_sole_are_free():
 
 def test_a_robot_of_one_sole_has_more_null_vectors_than_rows():
     """The scratch is wide enough for both; the same equations hold."""
-    space = allocate_null_space(
-        replace(robot_arrays(robot_named("humanoid")), sole_body=np.zeros(1))
-    )
+    space = scratch("humanoid", soles=1)
     rng = np.random.default_rng(3)
     J, rhs = random_jacobian(rng, space)[:6].copy(), rng.normal(size=6)
     vdot0, V = solved(J, rhs, space)
@@ -83,7 +85,7 @@ def test_a_robot_of_one_sole_has_more_null_vectors_than_rows():
 def test_on_short_legs_the_weakest_row_is_left_out():
     """Five joints a leg: v̇₀ and V keep all rows but one, which the first column alone moves; with
     that of `weakest` it is met too, and the solution is the whole one."""
-    space = allocate_null_space(robot_arrays(robot_named("toddler")))
+    space = scratch("toddler")
     rng = np.random.default_rng(4)
     for _ in range(20):
         J, rhs = random_jacobian(rng, space), rng.normal(size=12)
@@ -103,6 +105,6 @@ def test_on_short_legs_the_weakest_row_is_left_out():
 def test_short_legs(name, short):
     """Only the toddler's ankles have one axis; one leg alone is no closed chain."""
     arrays = robot_arrays(robot_named(name))
-    assert short_legs(arrays) == short
-    alone = replace(arrays, chain=arrays.chain[:1], chain_length=arrays.chain_length[:1])
-    assert not short_legs(alone)
+    chains = sole_chains(arrays)
+    assert short_legs(chains) == short
+    assert not short_legs(chains[:1])

@@ -9,7 +9,7 @@ from poise.baselines.allowance import SCRIPTS, is_script
 from poise.configs.errors import ConfigError, shown
 from poise.configs.reading import MIB, is_file, is_folder, read_bytes, whole_path
 
-from .onnx_tensors import external_files
+from .tensors import external_files
 
 BYTES = 64 * MIB  # of each file
 ONNX = (".onnx",)

@@ -14,14 +14,14 @@ from poise.baselines.motion.clips.names import ROLES
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
+from poise.training.running.options.arguments import Switch
 from poise.training.running.options.pages import print_commands
 from poise.training.running.options.parsing import parsed
 from poise.training.running.terminal import terminal
 
-from .arguments import Switch
-from .motion_check import check, follow
-from .motion_join import join, match
-from .motion_script import graph, plan, synth
+from .check import check, follow
+from .join import join, match
+from .script import graph, plan, synth
 
 USAGE = """usage: poise motion COMMAND [OPTIONS]
 

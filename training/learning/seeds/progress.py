@@ -11,14 +11,14 @@ from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from poise.configs.errors import ConfigError
+from poise.training.learning.checkpoints import STATE, find_checkpoint
+from poise.training.learning.policy_files import read_state
 from poise.training.running.terminal import ProgressLines
 
-from .checkpoints import STATE, find_checkpoint
-from .policy_files import read_state
-from .seeds import SeedSummary, evaluations
+from .records import SeedSummary, evaluations
 
 if TYPE_CHECKING:
-    from .train_seeds import SeedRun
+    from .train import SeedRun
 
 PERIOD = 1.0  # [s] between looks
 

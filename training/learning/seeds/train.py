@@ -19,16 +19,17 @@ from poise.configs.outputs import check_out_folder
 from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
 from poise.training.benchmarking.statistics.seeds import seed_figures
+from poise.training.learning.checkpoints import CONFIG, STATE, find_checkpoint
+from poise.training.learning.config import TrainConfig
+from poise.training.learning.policy_files import read_state
+from poise.training.learning.train import LAST, check_folder, check_pushes, train
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.provenance import circumstances
 from poise.training.running.stopping import keeps
 
-from .checkpoints import CONFIG, STATE, find_checkpoint
-from .config import TrainConfig
-from .policy_files import read_state
-from .seed_progress import SeedProgress, print_seeds
-from .seeds import (
+from .progress import SeedProgress, print_seeds
+from .records import (
     SEEDS,
     SeedEntry,
     SeedSummary,
@@ -37,7 +38,6 @@ from .seeds import (
     seed_folder,
     start_and_best,
 )
-from .train import LAST, check_folder, check_pushes, train
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.offsets import (
+from poise.baselines.balance.references.targets import (
     COM_X,
     COM_Y,
     COM_Z,

@@ -7,7 +7,7 @@ touchdown is chosen so that the foothold that the capture point asks for is on i
 
 import numpy as np
 
-from poise.baselines.balance.stepping.swing import quintic, time_left
+from poise.baselines.balance.stepping.planning.swing import quintic, time_left
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import turned
 from poise.envs.terrain.arrays import X_MAX, X_MIN, surface_below, surface_height

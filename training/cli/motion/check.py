@@ -13,9 +13,8 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
+from poise.training.running.options.arguments import Allow, Switch
 from poise.training.running.terminal import terminal
-
-from .arguments import Allow, Switch
 
 
 def check(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.feet import bearing_polygon, nominal_feet
+from poise.baselines.balance.references.legs import bearing_polygon, nominal_feet
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import convex_hull, stacked

@@ -14,7 +14,6 @@ if TYPE_CHECKING:  # it loads scipy
     from poise.training.benchmarking.statistics.seeds import SeedFigures
 
 SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
-KEPT = "kept"  # folder of a run: its policies, by their steps
 
 
 class Evaluation(TypedDict):

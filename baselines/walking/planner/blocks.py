@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.balance.stepping.blocks import CaptureTick, StepMemory, SwingArrays
+from poise.baselines.balance.stepping.planning.blocks import CaptureTick, StepMemory, SwingArrays
+from poise.baselines.walking.models.reference import Reference
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program
-
-from .models.reference import Reference
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,12 +10,7 @@ import tyro
 
 from poise.baselines.motion.clips.bvh import write_bvh
 from poise.baselines.motion.graphs.adjacency import make_graph
-from poise.baselines.motion.graphs.motion_graph import (
-    StatePlace,
-    Thresholds,
-    Weight,
-    write_graph,
-)
+from poise.baselines.motion.graphs.motion_graph import StatePlace, Thresholds, Weight, write_graph
 from poise.baselines.motion.synthesis.scripts.library import between, find_script
 from poise.baselines.motion.synthesis.scripts.printer import sequence_text
 from poise.baselines.motion.synthesis.scripts.table import to_csv
@@ -28,9 +23,8 @@ from poise.training.motion.following.scripts import load_clips, open_synthesis, 
 from poise.training.pictures.motion_report.graph_chart import graph_pictures
 from poise.training.pictures.motion_report.page import check_page, write_page
 from poise.training.pictures.motion_report.performance import write_synthesis
+from poise.training.running.options.arguments import Switch
 from poise.training.running.terminal import terminal
-
-from .arguments import Switch
 
 ScriptFile = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCRIPT")]
 Kind = Literal["insert", "cross", "capture", "inertial", "physical"]
