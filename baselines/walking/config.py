@@ -1,4 +1,4 @@
-"""The configuration of controllers that walk; numbers have the units of `stepping/config.py`."""
+"""The configuration of controllers that walk; units are those of `stepping/planning/config.py`."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal

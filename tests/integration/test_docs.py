@@ -20,7 +20,7 @@ from typing import NamedTuple
 import pytest
 
 from poise.training.cli import entry, train
-from poise.training.cli.motion.commands import commands as motion
+from poise.training.cli.motion import commands as motion
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

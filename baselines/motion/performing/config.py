@@ -1,4 +1,4 @@
-"""The configuration of `MotionStep`; numbers have the units of `stepping/config.py`."""
+"""The configuration of `MotionStep`; numbers have the units of `stepping/planning/config.py`."""
 
 from dataclasses import dataclass, field
 from typing import Literal

@@ -25,7 +25,7 @@ from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.cli.train import run as train_command
 from poise.training.learning.checkpoints import find_checkpoint
 from poise.training.learning.config import PPOConfig
-from poise.training.learning.seeds.records import train as module
+from poise.training.learning.seeds import train as module
 from poise.training.learning.seeds.train import SeedRun, train_seeds
 from poise.training.learning.train import train
 from tests.support.benchmarks_small import InProcessExecutor
