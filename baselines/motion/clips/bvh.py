@@ -45,8 +45,8 @@ def read_bvh(
     """The clip of a BVH file, its z axis up, x forward in the rest pose, in metres.
 
     Joints above the hips, and beside them, are left out; what moves them moves the hips. Positions
-    of other joints must be those of rigid bones. A first frame from which the second is four times as
-    far as any two others is the rest pose, and left out.
+    of other joints must be those of rigid bones. A first frame four times as far from the second as
+    any two others are from each other is the rest pose, and left out.
 
     Args:
         path: a file whose name ends in ``.bvh``.

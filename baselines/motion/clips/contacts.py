@@ -50,10 +50,12 @@ class Contacts(NamedTuple):
 def measure_contacts(clip: Clip) -> Contacts:
     """Planted feet: those whose toe or heel is slow and within 5 cm of its floor.
 
-    Slow is below 0.45 m/s, or 0.15 of the 95th percentile of these speeds. The floor of a toe, or of an ankle, is the 2nd percentile of its heights. Bounds are for legs of
-    0.8 m. Times of less than 0.12 s count as what is around them. A clip on a treadmill is taken
-    `over_ground`. A skeleton without toes has its ankles for them. Raises ConfigError for a skeleton
-    whose feet are not known by name.
+    Slow is below 0.45 m/s, or 0.15 of the 95th percentile of these speeds. The floor of a toe, or
+    of an ankle, is the 2nd percentile of its heights. Bounds are for legs of 0.8 m. Times of less
+    than 0.12 s count as what is around them. A clip on a treadmill is taken `over_ground`. A
+    skeleton without toes has its ankles for them.
+
+    Raises ConfigError for a skeleton whose feet are not known by name.
     """
     clip = over_ground(clip)
     skeleton, size = clip.skeleton, clip.skeleton.leg_length / LEG
@@ -80,7 +82,7 @@ def measure_contacts(clip: Clip) -> Contacts:
 
 
 def over_ground(clip: Clip) -> Clip:
-    """A clip that walks or runs where it is, as on a treadmill, goes on; another one stays as it is.
+    """A clip that walks or runs where it is, as on a treadmill, goes on; others stay as they are.
 
     The ground's velocity is the median of that of the lowest toe or ankle. It is taken off where it
     is above 0.3 m/s and the hips move by less than a quarter of its way.
