@@ -10,6 +10,7 @@ import numpy as np
 from poise.baselines.balance.references.feet import foot_signs
 from poise.baselines.motion.clips.rotations import about_z, multiply, rotate
 from poise.baselines.motion.clips.skeleton import SIDES
+from poise.configs.errors import PoiseError
 from poise.envs.robots.robot import Robot
 
 from .freely import Tracks
@@ -86,6 +87,17 @@ class _TrackIk(FrameIk):
         self.soles.feet = [foot for foot, on in zip(self.hard, down, strict=True) if on]
         loose = [foot for foot, on in zip(self.feet, down, strict=True) if not on]
         self.frame.tasks = [self.segments, self.pelvis, self.posture, *loose]
+
+    def _step(self, tasks: list[mink.Task], damping: float) -> np.ndarray:
+        """(nv,) the displacement of one QP; soles that cannot be held go as near as they can."""
+        try:
+            return super()._step(tasks, damping)
+        except PoiseError:
+            held, self.soles.feet = self.soles.feet, []
+            try:
+                return super()._step([*tasks, *self.feet], damping)
+            finally:
+                self.soles.feet = held
 
     def near_tasks(self) -> list[mink.Task]:
         """The joints, and the root, as they are in the configuration."""
