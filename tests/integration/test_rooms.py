@@ -23,7 +23,7 @@ DOORS = 7  # folders in a folder
 # is not in a room is one by itself.
 FLOORS = """
  1 baselines/balance, baselines/motion, configs, training/benchmarking
- 1 training/benchmarking/statistics, training/deploy, training/motion, training/pictures
+ 1 training/benchmarking/statistics, training/deploy, training/pictures
  2 baselines/allowance, baselines/motion/synthesis/scripts, envs/compiled, envs/robots/models
  2 training/running/options
  3 baselines/policy_files/onnx, baselines/solvers, baselines/warmup, envs/compiled/maths
@@ -46,7 +46,7 @@ FLOORS = """
 14 baselines/environments
 15 baselines, training/benchmarking/diagnosis, training/deploy/policy_check, training/learning
 15 training/motion/tracking
-16 training/benchmarking/trials, training/learning/seeds
+16 training/benchmarking/trials, training/learning/seeds, training/motion
 17 training/benchmarking/suites, training/deploy/robot_check/standing, training/deploy/standalone
 17 training/learning/tuning, training/motion/following, training/pictures/figures
 18 training/benchmarking/metrics, training/deploy/qp_set, training/deploy/robot_check

@@ -134,6 +134,8 @@ def sole_poses(robot: Robot, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
             places[k, i] = point - ground
             turns[k, i] = rotation_vector(axes @ standing[i][1].T)
         com[k] = data.subtree_com[robot.root_body_id] - ground
+    for i in range(len(robot.soles)):
+        turns[:, i] = unwound(turns[:, i])
     return com, places, turns
 
 
@@ -189,7 +191,19 @@ def root_turns(robot: Robot, qpos: np.ndarray) -> np.ndarray:
     """(F, 3) rotation vectors of the root from where it is in standing, without jumps [rad]."""
     both = Rotation.from_quat(np.roll(qpos[:, 3:7], -1, axis=1))
     standing = Rotation.from_quat(np.roll(robot.standing_qpos[3:7], -1))
-    return np.asarray((both * standing.inv()).as_rotvec())
+    return unwound((both * standing.inv()).as_rotvec())
+
+
+def unwound(turns: np.ndarray) -> np.ndarray:
+    """Rotation vectors (F, 3) of the same rotations without jumps, so longer than π for more than
+    half a turn [rad]."""
+    out = turns.copy()
+    for k in range(1, len(out)):
+        angle = float(np.linalg.norm(out[k]))
+        if angle > 1.0:
+            axis = out[k] / angle
+            out[k] += 2.0 * np.pi * np.round((out[k - 1] - out[k]) @ axis / (2.0 * np.pi)) * axis
+    return out
 
 
 def stances_of(down: np.ndarray) -> list[tuple[int, int]]:

@@ -184,9 +184,12 @@ def _reached(
         q = guess[legs.legs]
         excess = np.maximum(q - high, 0.0) - np.maximum(low - q, 0.0)
         if (excess != 0.0).any():
-            rolls = legs.sensitivity(plan.root[k])[:, 3]
+            half = 0.5 * plan.root[k, 2]  # about the axis ahead, if φ is a turn θ about z, φ turns
+            axis = np.array([np.cos(half), np.sin(half), 0.0])  # along R(θ/2) x
+            rolls = legs.sensitivity(plan.root[k])[:, 3:] @ axis
             needed = np.where(np.abs(rolls) > ROLLED, -excess / rolls, 0.0)
-            turned[k, 0] = np.clip(needed[np.argmax(np.abs(needed))], -MOST_ROLL, MOST_ROLL)
+            roll = np.clip(needed[np.argmax(np.abs(needed))], -MOST_ROLL, MOST_ROLL)
+            turned[k] = roll * axis
     return qpos, turned
 
 

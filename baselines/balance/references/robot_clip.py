@@ -32,13 +32,20 @@ ABOUT, PLANTED = "about.json", "planted"
 
 @dataclass(frozen=True)
 class About:
-    """What a file of a robot's postures says of itself."""
+    """What a file of a robot's postures says of itself.
+
+    Attributes:
+        robot: its name; fingerprint: of its model.
+        name: of the motion; source: of which file; licence: of that.
+        unperformed: why no controller can perform it, so that it can only be seen; empty: one may.
+    """
 
     robot: str
     fingerprint: str
     name: str
     source: str = ""
     licence: str = ""
+    unperformed: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +57,7 @@ class RobotClip:
         dt: time between frames [s].
         qpos: (F, nq) as MuJoCo has them.
         planted: (F, 2) bool, which soles are on the ground; None: both, always.
+            One that can only be seen may have both in the air.
     """
 
     about: About
@@ -81,7 +89,8 @@ def write_robot_clip(clip: RobotClip, path: str | Path) -> None:
             member = io.BytesIO()
             np.lib.format.write_array(member, np.ascontiguousarray(array), version=(1, 0))
             archive.writestr(zipfile.ZipInfo(f"{name}.npy"), member.getvalue())
-        about = json.dumps(asdict(clip.about), ensure_ascii=False, indent=1)
+        said = {k: v for k, v in asdict(clip.about).items() if v or k != "unperformed"}
+        about = json.dumps(said, ensure_ascii=False, indent=1)
         archive.writestr(zipfile.ZipInfo(ABOUT), about)
     write_atomic(path, content.getvalue())
 
@@ -108,17 +117,19 @@ def read_robot_clip(path: str | Path) -> RobotClip:
     if not np.isfinite(clip.qpos).all():
         raise ConfigError("must be finite", source=path, field="qpos")
     if f"{PLANTED}.npy" in archive.names:
-        return replace(clip, planted=_read_planted(path, len(clip.qpos)))
+        planted = _read_planted(path, len(clip.qpos))
+        if not clip.about.unperformed:
+            check_planted(planted, str(path))
+        return replace(clip, planted=planted)
     return clip
 
 
 def _read_planted(path: str | Path, frames: int) -> np.ndarray:
-    """(F, 2) bool, see `check_planted`."""
+    """(F, 2) bool."""
     planted = read_arrays(path, (PLANTED,))[PLANTED]
     if planted.shape != (frames, 2) or not np.isin(planted, (0.0, 1.0)).all():
         raise ConfigError(f"must be {frames} rows of two numbers, 1 where a sole is planted, else "
                           "0", source=path, field=PLANTED)  # fmt: skip
-    check_planted(planted > 0.0, str(path))
     return np.asarray(planted > 0.0)
 
 
@@ -132,14 +143,13 @@ def reference_from(
     Without `rest` it is a piece of a motion: at its ends it moves on as its frames do.
 
     Raises:
-        ConfigError: postures of another robot, a joint out of its range, or soles that leave
-            their plane by 2 cm though they are planted.
+        ConfigError: postures of another robot, or such as can only be seen; a joint out of its
+            range, or soles that leave their plane by 2 cm though they are planted.
     """
-    if clip.about.fingerprint != robot.fingerprint:
-        raise ConfigError(
-            f"is a motion of the robot {clip.about.robot!r}, not of {robot.name!r} as it is here",
-            source=source, field="motion",
-        )  # fmt: skip
+    check_robot(clip, robot, source)
+    if clip.about.unperformed:
+        raise ConfigError(f"can be seen, but not performed: {clip.about.unperformed}",
+                          source=source, field="motion")  # fmt: skip
     if clip.planted is not None:
         return stepped_reference(
             clip.about.name, robot, clip.qpos, clip.dt, clip.planted, source
@@ -157,6 +167,15 @@ def reference_from(
     splines = [spline(times, values) for values in (joints, com, root)]
     knots, coeffs = piecewise(splines)
     return ReferenceMotion(clip.about.name, knots, coeffs, loop=False)
+
+
+def check_robot(clip: RobotClip, robot: Robot, source: str) -> None:
+    """Raise ConfigError unless the postures are of this robot."""
+    if clip.about.fingerprint != robot.fingerprint:
+        raise ConfigError(
+            f"is a motion of the robot {clip.about.robot!r}, not of {robot.name!r} as it is here",
+            source=source, field="motion",
+        )  # fmt: skip
 
 
 def stepped_reference(

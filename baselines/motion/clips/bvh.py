@@ -24,6 +24,7 @@ from .rotations import to_scipy
 from .skeleton import Skeleton, leg_length
 from .structure import structural_roles
 
+ALONE = 4.0  # times the largest move between frames: that of a first frame that is the rest pose
 Y_UP = axes_of("y", "z")  # what most programs write
 LEGS = tuple(f"{joint}_{side}" for joint in ("hip", "knee", "ankle") for side in SIDES)
 
@@ -45,7 +46,8 @@ def read_bvh(
     """The clip of a BVH file, its z axis up, x forward in the rest pose, in metres.
 
     Joints above the hips, and beside them, are left out; what moves them moves the hips. Positions
-    of other joints must be those of rigid bones.
+    of other joints must be those of rigid bones. A first frame four times as far from the second as
+    any two others are from each other is the rest pose, and left out.
 
     Args:
         path: a file whose name ends in ``.bvh``.
@@ -80,7 +82,14 @@ def read_bvh(
     skeleton = Skeleton(raw.names, raw.parents, axes.places(raw.offsets), raw.end_parents,
                         axes.places(raw.end_offsets), raw.orders, raw.known)  # fmt: skip
     clip = Clip(path.stem, skeleton, text.dt, axes.places(places), axes.turns(turns))
-    return BvhFile(clip, axes)
+    return BvhFile(_begun(clip), axes)
+
+
+def _begun(clip: Clip) -> Clip:
+    """The clip without a first frame that is no part of it: the rest pose, as CMU's files have."""
+    moved = np.linalg.norm(np.diff(clip.places(), axis=0), axis=2).max(axis=1)
+    alone = len(clip) > 8 and moved[0] > max(ALONE * moved[1:].max(), 0.1)
+    return clip.part(slice(1, None)) if alone else clip
 
 
 def _named(joints: Mapping[str, str], names: tuple[str, ...], source: str) -> dict[str, int]:

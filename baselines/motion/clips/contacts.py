@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from .clip import Clip
 from .skeleton import SIDES
 
-SLOW = 0.15  # [m/s] a planted toe is slower
-LOW = 0.08  # [m] a planted toe is nearer to the floor
-STEADY = 0.2  # [s] shorter changes are noise
+LEG = 0.8  # [m] legs for which these hold; they grow with the legs, speeds with their root
+SLOW = 0.45  # [m/s] a planted toe, or heel, is slower
+SHARE = 0.15  # or slower than so much of the speed that feet get to: low rates blur running
+LOW = 0.05  # [m] and nearer to where it is when it stands
+NOISE = 0.04  # [s] over which places are averaged before they are differentiated
+STEADY = 0.12  # [s] shorter changes are noise
+BELT, STAYS = 0.3, 0.25  # [m/s] least speed of a treadmill; of its way by which hips may move on it
 FLOOR = 2.0  # percentile of the lowest points that is the floor: noise goes below it
 IN_PLACE = 0.12  # [m] a planted foot may wander in the capture
 
@@ -22,7 +27,7 @@ class Contacts(NamedTuple):
 
     Attributes:
         planted: (F, 2) whether the foot stands.
-        skating: mean horizontal speed of planted toes [m/s]; 0 without any.
+        skating: mean horizontal speed of the slower of toe and heel of planted feet [m/s].
         skating_largest: largest of these speeds.
         floor: height of the floor [m].
         penetration: how far the lowest point goes below the floor [m].
@@ -43,20 +48,28 @@ class Contacts(NamedTuple):
 
 
 def measure_contacts(clip: Clip) -> Contacts:
-    """Planted feet: toes that are slower than 0.15 m/s and less than 8 cm above their lowest place.
+    """Planted feet: those whose toe or heel is slow and within 5 cm of its floor.
 
-    Times of less than 0.2 s count as what is around them. A skeleton without toes has its
-    ankles for them. Raises ConfigError for a skeleton whose feet are not known by name.
+    Slow is below 0.45 m/s, or 0.15 of the 95th percentile of these speeds. The floor of a toe, or
+    of an ankle, is the 2nd percentile of its heights. Bounds are for legs of 0.8 m. Times of less
+    than 0.12 s count as what is around them. A clip on a treadmill is taken `over_ground`. A
+    skeleton without toes has its ankles for them.
+
+    Raises ConfigError for a skeleton whose feet are not known by name.
     """
-    skeleton = clip.skeleton
+    clip = over_ground(clip)
+    skeleton, size = clip.skeleton, clip.skeleton.leg_length / LEG
     places, turns = skeleton.global_pose(clip.root, clip.rotations)
-    toes = np.stack([places[:, _toe(clip, side)] for side in SIDES], axis=1)
+    points = places[:, _foot_points(clip)]  # (F, 2, 2, 3): toe and ankle of either foot
+    toes = points[:, :, 0]
     lowest = np.concatenate([toes, skeleton.ends(places, turns)], axis=1)[..., 2].min(axis=1)
-    speeds = np.linalg.norm(np.gradient(toes, clip.dt, axis=0), axis=2)
-    heights = toes[..., 2] - np.percentile(toes[..., 2], FLOOR, axis=0)
+    speeds = np.linalg.norm(_velocities(points, clip.dt), axis=3)
+    slow = max(SLOW * np.sqrt(size), SHARE * float(np.percentile(speeds, 95.0)))
+    stands = (speeds < slow) & (_heights(points) < LOW * size)
     width = 2 * int(0.5 * STEADY / clip.dt) + 1
-    planted = median_filter(((speeds < SLOW) & (heights < LOW)).astype(np.uint8), (width, 1)) > 0
-    skating = np.linalg.norm(np.gradient(toes[..., :2], clip.dt, axis=0), axis=2)[planted]
+    planted = median_filter(stands.any(axis=2).astype(np.uint8), (width, 1), mode="nearest") > 0
+    skating = np.linalg.norm(np.gradient(points[..., :2], clip.dt, axis=0), axis=3)
+    skating = skating.min(axis=2)[planted]
     floor = float(np.percentile(lowest, FLOOR))
     return Contacts(
         planted,
@@ -66,6 +79,39 @@ def measure_contacts(clip: Clip) -> Contacts:
         float(max(floor - lowest.min(), 0.0)),
         np.linalg.norm(toes - np.median(toes, axis=0), axis=2).max(axis=0),
     )
+
+
+def over_ground(clip: Clip) -> Clip:
+    """A clip that walks or runs where it is, as on a treadmill, goes on; others stay as they are.
+
+    The ground's velocity is the median of that of the lowest toe or ankle. It is taken off where it
+    is above 0.3 m/s and the hips move by less than a quarter of its way.
+    """
+    points = clip.places()[:, _foot_points(clip)].reshape(len(clip), -1, 3)
+    heights, frames = _heights(points), np.arange(len(clip))
+    lowest = _velocities(points, clip.dt)[frames, heights.argmin(axis=1), :2]
+    belt = np.median(lowest, axis=0)
+    speed, moved = float(np.linalg.norm(belt)), float(np.ptp(clip.root[:, :2], axis=0).max())
+    if speed < BELT or moved > STAYS * speed * clip.duration:
+        return clip
+    return replace(clip, root=clip.root - clip.times[:, None] * np.append(belt, 0.0))
+
+
+def _heights(points: np.ndarray) -> np.ndarray:
+    """Heights (F, …) of points (F, …, 3) over where each stands [m]."""
+    return np.asarray(points[..., 2] - np.percentile(points[..., 2], FLOOR, axis=0))
+
+
+def _velocities(points: np.ndarray, dt: float) -> np.ndarray:
+    """Velocities (F, …, 3) of points [m/s], without the noise of high rates."""
+    smooth = uniform_filter1d(points, 2 * int(0.5 * NOISE / dt) + 1, axis=0, mode="nearest")
+    return np.asarray(np.gradient(smooth, dt, axis=0))
+
+
+def _foot_points(clip: Clip) -> np.ndarray:
+    """(2, 2) toe and ankle, left and right."""
+    return np.array([[_toe(clip, side), clip.skeleton.joint(f"ankle_{side}", clip.name)]
+                     for side in SIDES])  # fmt: skip
 
 
 def _toe(clip: Clip, side: str) -> int:

@@ -44,7 +44,9 @@ def find_roles(names: Sequence[str]) -> dict[str, int]:
     """
     exact: dict[tuple[str, str], int] = {}
     bare: dict[tuple[str, str], int] = {}  # without a number behind it: head1, leftarm09
-    for i, (base, side) in reversed(list(enumerate(sided(names)))):
+    found_sides = sided(names)
+    for i in sorted(range(len(names)), key=lambda i: (not names[i].startswith("_"), -i)):
+        base, side = found_sides[i]  # __UpLeg_L is a helper of UpLeg_L: it counts least
         exact[base, side] = bare[base.rstrip("0123456789"), side] = i
     found: dict[str, int] = {}
     for role, words in SIDED.items():

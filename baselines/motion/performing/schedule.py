@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.footing import COM, PLACE, SPIN
+from poise.baselines.balance.references.footing import COM, PLACE, SPIN, TURN
 from poise.baselines.balance.references.splines import evaluate
 from poise.baselines.balance.references.tempo import CHANGE, RATE, TIME
 from poise.baselines.balance.stepping.planning.cop_region import (
@@ -65,14 +65,32 @@ def put_frame(t: PerformTick) -> None:
     """Let the motion's frame be where its soles are as the robot's are now."""
     s, p = t.own.state, t.performance
     feet, place = s.sole_point, p.samples[0]
-    p.frame[COS], p.frame[SIN] = s.heading[0], s.heading[1]
+    yaw = heading_of(t)
+    p.frame[COS], p.frame[SIN] = turned(s.heading[0], s.heading[1], np.cos(yaw), -np.sin(yaw))
     x = 0.5 * (place[PLACE[0]] + place[PLACE[1]])
     y = 0.5 * (place[PLACE[0] + 1] + place[PLACE[1] + 1])
-    x, y = turned(s.heading[0], s.heading[1], x, y)
+    x, y = turned(p.frame[COS], p.frame[SIN], x, y)
     p.frame[X] = 0.5 * (feet[0, 0] + feet[1, 0]) - x
     p.frame[Y] = 0.5 * (feet[0, 1] + feet[1, 1]) - y
     p.frame[GROUND] = 0.5 * (feet[0, 2] + feet[1, 2])
-    set_level_frame(t.own.memory.level_frame, p.frame[COS], p.frame[SIN])
+    set_level_frame(t.own.memory.level_frame, s.heading[0], s.heading[1])
+
+
+@compiled
+def heading_of(t: PerformTick) -> float:
+    """The mean heading of the motion's soles, of both or of the one that bears [rad]."""
+    m, turns = t.own.memory, t.performance.samples[0]
+    if m.swinging[0]:
+        return turns[TURN[1 - m.foot[0]] + 2]
+    return 0.5 * (turns[TURN[0] + 2] + turns[TURN[1] + 2])
+
+
+@compiled
+def face(t: PerformTick) -> None:
+    """Let the level frame be along the motion's soles that bear."""
+    p, yaw = t.performance, heading_of(t)
+    x, y = turned(p.frame[COS], p.frame[SIN], np.cos(yaw), np.sin(yaw))
+    set_level_frame(t.own.memory.level_frame, x, y)
 
 
 @compiled
@@ -98,8 +116,12 @@ def stance_differs(t: PerformTick) -> bool:
     x, y = along(
         s.heading[0], s.heading[1], feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1]
     )  # fmt: skip
-    x -= place[PLACE[0]] - place[PLACE[1]]
-    y -= place[PLACE[0] + 1] - place[PLACE[1] + 1]
+    yaw = heading_of(t)
+    u, v = along(
+        np.cos(yaw), np.sin(yaw), place[PLACE[0]] - place[PLACE[1]],
+        place[PLACE[0] + 1] - place[PLACE[1] + 1],
+    )  # fmt: skip
+    x, y = x - u, y - v
     return np.sqrt(x * x + y * y) > p.stance_error
 
 

@@ -27,6 +27,7 @@ from .blocks import COS, GROUND, SIN, PerformTick
 from .catching import ask_to_rest, go_on, leave, may_go_on
 from .schedule import (
     beyond_reach,
+    face,
     lifted_foot,
     motion_time,
     next_switch,
@@ -134,6 +135,7 @@ def perform(t: PerformTick, time: float) -> bool:
     foot = lifted_foot(t, phase)
     if not m.swinging[0] and foot >= 0 and p.begun[0] != phase:
         lift_off(t, foot, phase)
+    face(t)
     corners = reached_region(t)
     if beyond_reach(t, corners) > (p.margin if m.swinging[0] else p.margin_both):
         leave(t)

@@ -80,7 +80,7 @@ def find_paces(clip: Clip) -> tuple[list[Pace], np.ndarray]:
         begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
         low = float(heights[planted[:, foot], foot].mean())
         for k, (a, b) in enumerate(zip(begins, ends, strict=True)):
-            if a == 0:
+            if a == 0 or (len(planted) - a) * clip.dt < BOTH:  # the clip shows no step's end
                 continue
             left = int(ends[k - 1]) if k else max(int(a) - round(SWING / clip.dt), 0)
             apex = float(heights[left : a + 1, foot].max()) - low

@@ -56,7 +56,7 @@ def solve_frames(robot: Robot, limbs: Limbs, targets: BodyTargets, smooth: float
 
     Raises PoiseError if a QP has no solution.
     """
-    ik = _FrameIk(robot, limbs, list(targets.directions))
+    ik = FrameIk(robot, limbs, list(targets.directions))
     qpos, times = np.empty((len(targets), robot.model.nq)), np.zeros(len(targets))
     for frame in range(len(targets)):
         begin = time.thread_time()
@@ -87,7 +87,7 @@ def plant(robot: Robot, limbs: Limbs, qpos: np.ndarray, close: float = 1e-5) -> 
 
     Raises PoiseError if there is none.
     """
-    ik, made = _FrameIk(robot, limbs, []), np.empty_like(qpos)
+    ik, made = FrameIk(robot, limbs, []), np.empty_like(qpos)
     low, high = robot.joint_range[:, 0] + MARGIN, robot.joint_range[:, 1] - MARGIN
     sole = robot.soles[0]
     wanted = ik.configuration.data
@@ -116,7 +116,7 @@ def _root_for(
     return np.concatenate([place + moved, root])
 
 
-class _FrameIk:
+class FrameIk:
     """The tasks of one robot, from frame to frame."""
 
     def __init__(self, robot: Robot, limbs: Limbs, names: list[str]):
@@ -151,18 +151,24 @@ class _FrameIk:
     def planted_near(self, qpos: np.ndarray, joints: np.ndarray) -> np.ndarray:
         """(nq,) the posture nearest to `joints` (nj,) with planted soles; begun at `qpos`."""
         self.configuration.update(np.concatenate([qpos[:7], joints]))
-        self.near.set_target(self.configuration.q)
+        tasks = self.near_tasks()
         for _ in range(PLANTING):
-            step = self._step([self.near], LEAST_DAMPING)
+            step = self._step(tasks, LEAST_DAMPING)
             self.configuration.integrate_inplace(step, 1.0)
         return self.configuration.q.copy()
+
+    def near_tasks(self) -> list[mink.Task]:
+        """What keeps a posture near to the one that it is begun at."""
+        self.near.set_target(self.configuration.q)
+        return [self.near]
 
     def _step(self, tasks: list[mink.Task], damping: float) -> np.ndarray:
         """(nv,) the displacement of one QP."""
         for parting in (True, False):  # soles and limits may leave no room to part
             self.clearance.parting = parting
-            problem = mink.build_ik(self.configuration, tasks, 1.0, damping,
-                                    limits=self.limits, constraints=[self.soles])  # fmt: skip
+            held = [self.soles] if self.soles.feet else None
+            problem = mink.build_ik(self.configuration, tasks, 1.0, damping, limits=self.limits,
+                                    constraints=held)  # fmt: skip
             step = qpsolvers.solve_problem(problem, solver="daqp").x
             if step is not None:
                 return step

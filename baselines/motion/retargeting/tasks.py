@@ -77,6 +77,22 @@ class HeightTask(mink.Task):
         return both[2:3]
 
 
+class PlaceTask(mink.Task):
+    """A point of the body is at `goal` (3,) [m]."""
+
+    def __init__(self, point: Point, cost: float):
+        super().__init__(cost=np.full(3, cost), gain=1.0, lm_damping=0.0)
+        self.point, self.goal = point, np.zeros(3)
+
+    def compute_error(self, configuration: mink.Configuration) -> np.ndarray:
+        """(3,) [m]."""
+        return self.point.place(configuration.data) - self.goal
+
+    def compute_jacobian(self, configuration: mink.Configuration) -> np.ndarray:
+        """(3, nv)."""
+        return self.point.jacobian(configuration.model, configuration.data)
+
+
 class SolesTask(mink.Task):
     """Feet that stay where they are in `configuration`, as equalities that never contradict.
 
@@ -92,8 +108,9 @@ class SolesTask(mink.Task):
             foot.set_target_from_configuration(configuration)
 
     def whole_error(self, configuration: mink.Configuration) -> np.ndarray:
-        """(12,) errors of both feet [m, rad]."""
-        return np.concatenate([foot.compute_error(configuration) for foot in self.feet])
+        """(6 f,) errors of the feet [m, rad]."""
+        errors = [foot.compute_error(configuration) for foot in self.feet]
+        return np.concatenate([np.zeros(0), *errors])
 
     def compute_error(self, configuration: mink.Configuration) -> np.ndarray:
         """(r,) motions along V that undo the errors, damped where they would be large."""

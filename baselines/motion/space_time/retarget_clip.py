@@ -10,10 +10,12 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from poise.baselines.balance.references.robot_clip import RATE, RobotClip
+from poise.baselines.balance.references.robot_clip import RATE, RobotClip, reference_from
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.retargeting.freely import retarget_freely
+from poise.baselines.motion.retargeting.limbs import find_limbs
 from poise.baselines.motion.retargeting.retarget import (
     LEAD,
     SMOOTH,
@@ -34,6 +36,7 @@ from .stance import standing_stance
 from .trajectory import jerk
 
 Solver = Literal["frame", "spacetime", "grid"]
+UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
 CROSSOVER = 2.0  # [Hz] what is asked faster than this is smoothed
 
 
@@ -48,6 +51,7 @@ class RetargetedClip(NamedTuple):
         time_per_frame: of the processor: of `frame` the median, of the others what they added,
             over the frames [s].
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
+        begins: when the clip begins in the motion [s].
     """
 
     clip: RobotClip
@@ -56,10 +60,51 @@ class RetargetedClip(NamedTuple):
     scale: float
     time_per_frame: float
     stride: float = 1.0
+    begins: float = LEAD
 
 
 def retarget_clip(
     clip: Clip | str | Path,
+    robot: Robot,
+    *,
+    solver: Solver | None = None,
+    constraints: str | Path | Sequence[Constraint] = (),
+    smooth: float = SMOOTH,
+    lead: float = LEAD,
+    planted: bool = False,
+    crossover: float = CROSSOVER,
+    kinematic: bool | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> RetargetedClip:
+    """A robot's motion of a clip: one that can be performed, else one that can be seen.
+
+    With `kinematic` it is what `retarget_freely` makes, with False what `performable` makes; with
+    None the latter, or the former where no controller could perform that, and nothing was asked
+    with `solver`, `constraints` or `planted`. Then `about.unperformed` says why. A clip may be the
+    name of a packaged one, or a path. All else, and what is raised, is as of these two.
+    """
+    clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
+    reason = "it was retargeted by kinematics alone (--kinematic)"
+    if not kinematic:
+        try:
+            made = performable(
+                clip, robot, solver=solver, constraints=constraints, smooth=smooth, lead=lead,
+                planted=planted, crossover=crossover, progress=progress,
+            )  # fmt: skip
+            reference_from(made.clip, robot, clip.name)
+            return made
+        except ConfigError as error:
+            reason, asked = error.message, solver is not None or constraints or planted
+            if kinematic is not None or asked or error.field not in UNPERFORMED:
+                raise
+    free = retarget_freely(clip, robot, smooth=smooth)
+    seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
+    scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
+    return _stepped(free._replace(clip=seen), scene)
+
+
+def performable(
+    clip: Clip,
     robot: Robot,
     *,
     solver: Solver | None = None,
@@ -82,8 +127,7 @@ def retarget_clip(
     keyframe, as `by_trial` says.
 
     Args:
-        clip: as for `retarget`; or a packaged one's name, or a path to a .bvh file. One with steps
-            is for ``frame`` alone, without constraints.
+        clip: as for `retarget`. One with steps is for ``frame`` alone, without constraints.
         robot: with two feet.
         solver: without one, spacetime if there are constraints, else frame.
         constraints: the user's, or the name of a packaged file or a path to one.
@@ -102,7 +146,6 @@ def retarget_clip(
         raise ConfigError(f"no such solver: {solver!r}", field="solver", choices=get_args(Solver))
     if not 0.1 <= crossover <= 100.0:
         raise ConfigError(f"must be from 0.1 to 100, not {crossover:g}", field="crossover")
-    clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
     if isinstance(constraints, (str, Path)):
         source: str | Path | None = constraints
         wanted = read_constraints(constraints)
@@ -140,7 +183,7 @@ def retarget_clip(
         spent = (time.thread_time() - begun) / len(scene)
     done = replace(made.clip, qpos=scene.qpos)
     quality = measure(scene, asked, wanted)
-    return RetargetedClip(done, quality, chosen, made.scale, spent)
+    return RetargetedClip(done, quality, chosen, made.scale, spent, begins=made.begins)
 
 
 def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
@@ -152,7 +195,8 @@ def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
         soles.error, soles.skating, soles.skating_largest, max(made.penetration, soles.depth),
         made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
     )  # fmt: skip
-    return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride)
+    return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
+                          made.begins)  # fmt: skip
 
 
 def _scene(
@@ -163,10 +207,10 @@ def _scene(
     scene = Scene(robot, limbs, qpos, RATE, lead, both if planted is None else planted)
     if planted is None:
         return scene
-    for frame in range(1, len(scene)):
+    for frame in range(len(scene)):
         scene.at(frame)
         for foot in range(2):
-            if planted[frame, foot] and planted[frame - 1, foot]:
+            if frame and planted[frame, foot] and planted[frame - 1, foot]:
                 scene.planted_corners[frame, foot] = scene.planted_corners[frame - 1, foot]
             elif planted[frame, foot]:
                 scene.planted_corners[frame, foot] = scene.padded_corners(foot)

@@ -11,9 +11,10 @@ from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.clips.names import ROLES
+from poise.baselines.motion.space_time.retarget_clip import RetargetedClip
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
-from poise.envs.robots.robot import load_robot
+from poise.envs.robots.robot import Robot, load_robot
 from poise.training.running.options.arguments import Switch
 from poise.training.running.options.pages import print_commands
 from poise.training.running.options.parsing import parsed
@@ -132,12 +133,15 @@ def bring(
     planted: Switch = False,
     solver: Solver | None = None,
     constraints: str | None = None,
+    kinematic: Switch = False,
+    video: Path | None = None,
 ) -> None:
     """Retarget a BVH file to a robot, its soles planted where the clip's are; see docs/motions.md.
 
     The .npz file is taken wherever a motion is named. A clip whose feet move by 12 cm becomes a
-    motion with steps, which motion-step performs. Needs pip install -e '.[motion]' in a
-    checkout.
+    motion with steps, which motion-step performs. What cannot be performed becomes a motion that
+    can be seen, by poise motion play and poise view, and the reason is said. Needs pip install -e
+    '.[motion]' in a checkout.
 
     Args:
         file: a .bvh file, or the name of a packaged clip.
@@ -156,12 +160,18 @@ def bring(
         solver: frame by frame, spacetime for the optimum of the whole clip, grid for constraints
             by trial in steps; without one spacetime if there are constraints, else frame.
         constraints: a packaged name (see poise list) or a .yaml file of what else is wanted.
+        kinematic: do what the clip does, whether or not it can be performed.
+        video: a .mp4 or .webp file of the robot, and beside it the skeleton of the file.
     """
-    from poise.baselines.balance.references.robot_clip import reference_from, write_robot_clip
+    from poise.baselines.balance.references.robot_clip import write_robot_clip
     from poise.baselines.motion.space_time.retarget_clip import retarget_clip
     from poise.training.motion.following.tables import print_retargeted
+    from poise.training.pictures.figures.playback import check_video
 
     check_out_file(out)
+    if video is not None:
+        check_video(video)
+        check_out_file(video)
     clip = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
     clip = clip.cut(*cut) if cut is not None else clip
     clip = clip.at_speed(speed) if speed != 1.0 else clip
@@ -175,11 +185,13 @@ def bring(
         smooth=smooth,
         lead=lead,
         planted=planted,
+        kinematic=kinematic or None,
         progress=partial(print, flush=True),
     )
-    reference_from(made.clip, body, str(file))  # nothing is written that cannot be followed
     write_robot_clip(made.clip, out)
     print_retargeted(made, terminal())
+    if video is not None:
+        _film(video, body, clip, made)
     print(out)
 
 
@@ -209,30 +221,38 @@ def play(
         size: width and height [pixels], even.
         planted: take the feet as planted though they move in the clip.
     """
-    from poise.baselines.balance.references.robot_clip import read_robot_clip, reference_from
-    from poise.baselines.motion.retargeting.paces import clip_heading
-    from poise.baselines.motion.retargeting.retarget import retarget
-    from poise.training.pictures.figures.playback import (
-        beside_of,
-        check_size,
-        check_video,
-        write_playback,
-    )
+    from poise.baselines.balance.references.robot_clip import check_robot, read_robot_clip
+    from poise.baselines.motion.space_time.retarget_clip import retarget_clip
+    from poise.training.pictures.figures.playback import check_size, check_video, write_playback
 
     check_video(video)
     check_out_file(video)
     check_size(size)
-    body, skeleton = load_robot(robot), None
+    body = load_robot(robot)
     if file.suffix == ".npz":
         clip = read_robot_clip(file)
-        reference_from(clip, body, str(file))  # of this robot
-    else:
-        source = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
-        made = retarget(source, body, planted=planted)
-        clip, heading = made.clip, None if made.clip.planted is None else clip_heading(source)
-        skeleton = beside_of(body, source, made.scale, made.begins, heading, made.stride)
-    frames = write_playback(video, body, clip.qpos, clip.dt, skeleton, size)
-    print(f"{frames} frames")
+        check_robot(clip, body, str(file))
+        print(f"{write_playback(video, body, clip.qpos, clip.dt, None, size)} frames")
+        print(video)
+        return
+    source = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
+    _film(video, body, source, retarget_clip(source, body, solver="frame" if planted else None,
+                                             planted=planted), size)  # fmt: skip
+
+
+def _film(
+    video: Path, body: Robot, source: Clip, made: RetargetedClip, size: tuple[int, int] = (640, 480)
+) -> None:
+    """Film a motion, with the skeleton of its clip beside it."""
+    from poise.baselines.motion.clips.contacts import over_ground
+    from poise.baselines.motion.retargeting.paces import clip_heading
+    from poise.training.pictures.figures.playback import beside_of, write_playback
+
+    clip, heading = made.clip, None
+    if clip.planted is not None and not clip.about.unperformed:
+        heading = clip_heading(source)
+    beside = beside_of(body, over_ground(source), made.scale, made.begins, heading, made.stride)
+    print(f"{write_playback(video, body, clip.qpos, clip.dt, beside, size)} frames")
     print(video)
 
 

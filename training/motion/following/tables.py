@@ -91,6 +91,7 @@ def print_retargeted(made: RetargetedClip, console: Console) -> None:
         ),
         ("legs over the clip's", f"{made.scale:.3f}"),
         ("steps", _steps(made)),
+        ("off the ground", _flight(made)),
         ("soles off their places", f"{1000 * quality.sole_error:.2g} mm at most"),
         ("skating, mean and largest", f"{100 * quality.skating:.2g}, "
          f"{100 * quality.skating_largest:.2g} cm/s"),
@@ -105,6 +106,8 @@ def print_retargeted(made: RetargetedClip, console: Console) -> None:
     console.print(table)
     if quality.violations:
         print_violations(quality.violations, console)
+    if made.clip.about.unperformed:
+        console.print(f"Can be seen, but not performed: {escape(made.clip.about.unperformed)}")
 
 
 def print_violations(violations: Sequence[Violation], console: Console) -> None:
@@ -126,6 +129,13 @@ def _steps(made: RetargetedClip) -> str:
         return "none"
     steps = int(np.sum(np.diff(planted.astype(int), axis=0) > 0))
     return f"{steps}, {made.stride:.0%} of the length that the legs' scale gives"
+
+
+def _flight(made: RetargetedClip) -> str:
+    planted = made.clip.planted
+    flying = np.zeros(0, int) if planted is None else np.flatnonzero(~planted.any(axis=1))
+    first = f", first at {flying[0] * made.clip.dt:.2f} s" if len(flying) else ""
+    return f"{len(flying) * made.clip.dt:.2f} s{first}"
 
 
 def print_feasibility(judged: Feasibility, title: str, console: Console) -> None:

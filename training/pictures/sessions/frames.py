@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from poise.baselines.balance.references.robot_clip import RobotClip
 from poise.baselines.balance.stepping.controller import SteppingController
 from poise.baselines.controller import BaseController
 from poise.envs.balance.base import BalanceEnv
@@ -14,7 +15,7 @@ from poise.envs.physics.simulation import Simulation
 from poise.envs.viewing.contact_forces import ContactForces
 from poise.envs.viewing.overlays import Mark, foothold_mark, marks
 
-from .ghost import Ghost, Poses, ghost_of
+from .ghost import Ghost, Poses, Seen, ghost_of
 
 #: value of a frame → title of its plot
 VALUES = {
@@ -69,12 +70,17 @@ def _between(first: Poses, second: Poses, fraction: float) -> Poses:
 
 
 class Observer:
-    """Makes the frames of an environment, which is only read."""
+    """Makes the frames of an environment, which is only read.
 
-    def __init__(self, env: BalanceEnv):
-        self._env = env
+    Args:
+        env: whose robot.
+        seen: postures that are seen beside it; None: those of the motion that it performs.
+    """
+
+    def __init__(self, env: BalanceEnv, seen: RobotClip | None = None):
+        self._env, self._seen = env, seen
         self._forces = ContactForces(env.simulation)
-        self._ghost: Ghost | None = None
+        self._ghost: Ghost | Seen | None = None
 
     def __call__(self, fall_time: float | None = None) -> Frame:
         """The frame of this moment, of a robot that fell at `fall_time` [s]."""
@@ -96,7 +102,8 @@ class Observer:
     def _reference(self, time: float) -> Poses | None:
         """The ghost's bodies at a time [s]; it stands anew where the robot has been reset."""
         if time == 0.0:
-            self._ghost = ghost_of(self._env)
+            robot, seen = self._env.robot, self._seen
+            self._ghost = ghost_of(self._env) if seen is None else Seen(seen, robot)
         return None if self._ghost is None else self._ghost(time)
 
 

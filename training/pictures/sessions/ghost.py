@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
+from poise.baselines.balance.references.robot_clip import RobotClip
 from poise.envs.balance.base import BalanceEnv
+from poise.envs.robots.robot import Robot
 from poise.training.motion.tracking.reference import ReferenceBodies, Stance
 
 
@@ -49,6 +52,19 @@ class Ghost:
         turns = Rotation.from_rotvec(sample.turns[:, 0]).as_matrix()
         axes = turn @ turns  # of standing they are the world's
         return self._stance._replace(points=points, axes=axes)
+
+
+class Seen:
+    """The bodies of postures that can only be seen, from where the robot stood at its reset."""
+
+    def __init__(self, clip: RobotClip, robot: Robot):
+        self._clip, self._robot, self._data = clip, robot, mujoco.MjData(robot.model)
+
+    def __call__(self, time: float) -> Poses:
+        """Where they are at a time [s]; they begin anew after the last frame."""
+        self._data.qpos[:] = self._clip.qpos[round(time / self._clip.dt) % len(self._clip.qpos)]
+        mujoco.mj_kinematics(self._robot.model, self._data)
+        return Poses(self._data.xpos.copy(), self._data.xquat.copy())
 
 
 def ghost_of(env: BalanceEnv) -> Ghost | None:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
+from poise.baselines.balance.references.robot_clip import RobotClip
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.planner.reach import Reach
 from poise.baselines.walking.schedule import TimedCommand
@@ -85,6 +86,7 @@ class Live:
         session: that goes on.
         spec: what it was loaded from.
         motion: that is performed; None: they stand.
+        seen: postures that are seen as a ghost while they stand.
     """
 
     live, ended = True, False
@@ -95,12 +97,13 @@ class Live:
         session: Session,
         spec: SessionSpec | None = None,
         motion: ReferenceMotion | None = None,
+        seen: RobotClip | None = None,
     ):
         names = tuple(session.names)
         self._spec = SessionSpec(names, session.robot.name) if spec is None else spec
         self.session, self._motion = session, motion
         self.names, self.robot, self.period = session.names, session.robot, session.period
-        self._observers = [Observer(side.env) for side in session.sides]
+        self._observers = [Observer(side.env, seen) for side in session.sides]
         self._begin()
 
     @property

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import yaml
 
 from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.balance.references.robot_clip import check_robot, read_robot_clip
 from poise.baselines.walking.schedule import parse_commands
 from poise.configs.errors import ConfigError, shown
 from poise.configs.yaml_loader import Loader
@@ -32,13 +34,21 @@ def load_live(spec: SessionSpec, say: Callable[[str], object] = lambda line: Non
     robot = load_robot(spec.robot)
     pushes = [push for text in spec.pushes for push in read_pushes(text, robot)]
     commands = parse_commands([read_mapping(text, "command") for text in spec.commands], "command")
-    motion = None if spec.motion == STANDING else load_motion(spec.motion, robot)
+    motion, seen = None, None
+    if (
+        Path(spec.motion).suffix == ".npz"
+        and (clip := read_robot_clip(spec.motion)).about.unperformed
+    ):
+        check_robot(clip, robot, spec.motion)
+        seen = clip
+    elif spec.motion != STANDING:
+        motion = load_motion(spec.motion, robot)
     say(f"loading {', '.join(spec.controllers)}")
     session = load_session(
         spec.controllers, robot, spec.seed, pushes, commands=commands, motion=motion,
         realism=spec.realism,
     )  # fmt: skip
-    return Live(session, spec, motion)
+    return Live(session, spec, motion, seen)
 
 
 def read_pushes(text: str, robot: Robot) -> list[Push]:
