@@ -1,8 +1,7 @@
 """The packaged clips: `python -m poise.training.motion.recording FOLDER` makes them again.
 
-They are the default humanoid's own: its keyframes (configs/motions, configs/clips/*.yaml) on soles
-that stay where they are, and a walk of its own controller. So no file of anybody else is needed to
-try retargeting, motion graphs and scripts.
+They are keyframes of the default humanoid, configs/motions and configs/clips/*.yaml. So no file of
+anybody else is needed to try retargeting, motion graphs and scripts.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from poise.baselines.balance.references.motion import (
 )
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.robot_clip import RATE
-from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.motion.clips.bvh import write_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.rotations import from_scipy
@@ -36,7 +34,6 @@ from poise.envs.robots.robot import Robot, load_robot
 from .tracking.reference import ReferenceBodies, Stance
 
 LICENCE = "MIT"
-SPEED, WALK = 0.5, 6.0  # [m/s], [s] of the walk
 TOE = 0.8  # of the way to the front of the sole
 END = 0.05  # [m] from the last joints to their ends, ahead
 #: joint → the one above, the body that turns with it, and the hinge or the geom where its place is
@@ -65,26 +62,24 @@ BONES = {
 def record_clips() -> list[Clip]:
     """All packaged clips, of the default humanoid, in the order of their names."""
     robot = load_robot("humanoid")
-    postures = {path.stem: _keyframes(robot, path) for path in _recipes()}
-    postures |= {name: load_steps(name, robot).qpos for name in motions_with_steps()}
-    made = {name: clip_of(robot, qpos, RATE, name) for name, qpos in postures.items()}
-    walked = clip_of(robot, *_walk(robot), "walk")
-    times = np.arange(0.0, walked.duration, RATE)
-    root, rotations = walked.sample(times)
-    made["walk"] = replace(walked, dt=RATE, root=root, rotations=rotations)
+    made = {path.stem: clip_of(robot, _postures(robot, path), RATE, path.stem) for path in _files()}
     return [replace(made[name], name=f"humanoid_{name}") for name in sorted(made)]
 
 
-def _recipes() -> list[Path]:
-    return [packaged_folder("motions") / "squat.yaml", *packaged_folder("clips").glob("*.yaml")]
+def _files() -> list[Path]:
+    motions = packaged_folder("motions")
+    recorded = [motions / f"{name}.yaml" for name in ("squat", *motions_with_steps())]
+    return [*recorded, *packaged_folder("clips").glob("*.yaml")]
 
 
-def _keyframes(robot: Robot, path: Path) -> np.ndarray:
+def _postures(robot: Robot, path: Path) -> np.ndarray:
     """The postures (F, nq) of a file of keyframes, in which joints are roles too."""
     own = {name: {name: 1.0} for name in robot.joint_names}
-    free = replace(robot, description=replace(
-        robot.description, roles={**robot.description.roles, **own}))  # fmt: skip
+    roles = {**robot.description.roles, **own}
+    free = replace(robot, description=replace(robot.description, roles=roles))
     description = build(MotionDescription, read_yaml(path), str(path))
+    if description.steps:
+        return load_steps(path, free).qpos
     return postures_of(make_motion(description, free, path.stem, str(path)), robot)
 
 
@@ -96,20 +91,6 @@ def postures_of(motion: ReferenceMotion, robot: Robot) -> np.ndarray:
         bodies.at(time, stance)
         found.append(bodies.posture)
     return np.array(found)
-
-
-def _walk(robot: Robot) -> tuple[np.ndarray, float]:
-    """Postures (F, nq) of a walk ahead from rest to rest, and the time between them [s]."""
-    command = {"ahead": SPEED, "left": 0.0, "turn": 0.0}
-    env = ResidualWalkEnv(robot, {"duration": WALK, "pushes": None}, controller="walk",
-                          command=command)  # fmt: skip
-    env.reset(seed=0)
-    found, action = [env.simulation.state.qpos.copy()], np.zeros(env.action_space.shape, np.float32)
-    while True:
-        _, _, terminated, truncated, _ = env.step(action)
-        found.append(env.simulation.state.qpos.copy())
-        if terminated or truncated:
-            return np.array(found), env.config.policy_period
 
 
 def clip_of(robot: Robot, qpos: np.ndarray, dt: float, name: str) -> Clip:
