@@ -14,12 +14,12 @@ from poise.baselines.balance.references.robot_clip import RATE, RobotClip, refer
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
-from poise.baselines.motion.retargeting.freely import retarget_freely
 from poise.baselines.motion.retargeting.limbs import find_limbs
 from poise.baselines.motion.retargeting.retarget import (
     LEAD,
     SMOOTH,
     Retargeted,
+    retarget_freely,
     retarget_to,
     targets_on,
 )
@@ -153,8 +153,8 @@ def performable(
         source, wanted = None, tuple(constraints)
     chosen: Solver = solver or ("spacetime" if wanted else "frame")
     given = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
-    limbs, targets, heading = given
-    if heading is not None and (chosen != "frame" or wanted):
+    limbs, targets, steps = given
+    if steps and (chosen != "frame" or wanted):
         raise ConfigError("its feet step: only the solver 'frame', without constraints, is for "
                           "such clips (--planted takes the feet as planted)", source=clip.name,
                           field="solver" if chosen != "frame" else "constraints")  # fmt: skip
@@ -168,7 +168,7 @@ def performable(
     from .solve import optimise
 
     scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted)
-    if heading is not None:
+    if steps:
         return _stepped(made, scene)
     stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
     spent, begun = made.time_per_frame, time.thread_time()
