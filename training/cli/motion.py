@@ -249,7 +249,8 @@ def _film(
     from poise.training.pictures.figures.playback import beside_of, write_playback
 
     clip, heading = made.clip, None if made.clip.planted is None else first_heading(source)
-    beside = beside_of(body, over_ground(source), made.scale, made.begins, heading, made.stride)
+    source = over_ground(source) if made.tempo == 1.0 else source.at_speed(made.tempo)
+    beside = beside_of(body, source, made.scale, made.begins, heading, made.stride)
     print(f"{write_playback(video, body, clip.qpos, clip.dt, beside, size)} frames")
     print(video)
 

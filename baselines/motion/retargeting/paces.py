@@ -44,6 +44,11 @@ class Pace(NamedTuple):
     end: float | None
     apex: float
 
+    def at_speed(self, factor: float) -> Pace:
+        """The step `factor` > 0 times as fast."""
+        end = None if self.end is None else self.end / factor
+        return self._replace(lift=self.lift / factor, land=self.land / factor, end=end)
+
 
 def find_paces(clip: Clip) -> list[Pace]:
     """The steps of a clip, in order.

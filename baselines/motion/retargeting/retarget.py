@@ -22,7 +22,10 @@ from .tracks import find_tracks, first_heading
 
 SMOOTH = 3.0  # [Hz] of the low-pass on what the clip asks for, and on the joints
 LEAD = 1.0  # [s] from standing into the clip, and back
-SHORTER, SHORTEST = 0.94, 0.3  # by which steps are shortened until legs reach, and the end of that
+SHORTER, SHORTEST = 0.94, 0.3  # by which ways are shortened until legs reach, and the end of that
+#: shares of the clip's lengths of steps and of its tempo, the fastest first
+TRIED = sorted(((stride, tempo) for stride in (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
+                for tempo in (1.0, 0.85, 0.7)), key=lambda each: -each[0] * each[1])  # fmt: skip
 LOWER = (0.98, 0.96, 0.94, 0.92, 0.9)  # heights of the CoM over standing that steps are tried at
 OFF = 0.003  # [m] by which a planted sole may be off
 SWIFTER = 2.0  # times `smooth` is what is kept of a motion that need not be performed
@@ -38,6 +41,7 @@ class Retargeted(NamedTuple):
         limit_excess: largest excess over a joint limit [rad]; 0 if there is none.
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
+        tempo: how many times as fast as the clip it is.
     """
 
     clip: RobotClip
@@ -49,6 +53,7 @@ class Retargeted(NamedTuple):
     limit_excess: float
     stride: float = 1.0
     begins: float = LEAD
+    tempo: float = 1.0
 
 
 def retarget(
@@ -135,25 +140,31 @@ def targets_on(clip: Clip, robot: Robot, *, smooth: float, lead: float, planted:
 
 
 def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float) -> Retargeted:
-    """The longest steps up to those of the clip that legs reach, the CoM as high as they let it."""
+    """The fastest motion up to the clip's that the robot can do: steps and tempo as of `TRIED`, the
+    CoM as high as legs reach then."""
     paces, scale = find_paces(clip), limbs.leg_length / clip.skeleton.leg_length
-    frames, stride = max(round(lead / RATE), 1), 1.0
-    solve = _solver("solve_tracks", "solve_tracks")
-    solved = solve(robot, limbs, find_tracks(clip, robot, limbs, smooth), smooth)
-    while True:
-        tracks = find_tracks(clip, robot, limbs, smooth, stride)
+    frames, solve = max(round(lead / RATE), 1), _solver("solve_tracks", "solve_tracks")
+    solved: dict[float, Any] = {}
+    reason = None
+    for stride, tempo in TRIED:
+        slower = clip if tempo == 1.0 else clip.at_speed(tempo)
+        tracks = find_tracks(slower, robot, limbs, smooth, stride)
+        if tempo not in solved:
+            solved[tempo] = solve(robot, limbs, tracks, smooth)
+        timed = [pace.at_speed(tempo) for pace in paces]
         for low in LOWER:
-            plan = plan_paces(paces, tracks, solved.qpos, robot, frames, scale, low)
+            plan = plan_paces(timed, tracks, solved[tempo].qpos, robot, frames, scale, low)
             try:
                 qpos = perform_plan(robot, plan, clip.name)
-            except ConfigError:
-                if stride * SHORTER < SHORTEST and low == LOWER[-1]:
-                    raise
+            except ConfigError as error:
+                reason = error
                 continue
-            begins = RATE * frames_before(paces, frames)
-            return _retargeted(solved._replace(qpos=qpos), clip, robot, limbs,
-                               planted=plan.planted, stride=stride, begins=begins)  # fmt: skip
-        stride *= SHORTER
+            made = _retargeted(solved[tempo]._replace(qpos=qpos), clip, robot, limbs,
+                               planted=plan.planted, stride=stride,
+                               begins=RATE * frames_before(timed, frames))  # fmt: skip
+            return made._replace(tempo=tempo)
+    assert reason is not None
+    raise reason
 
 
 def retarget_freely(clip: Clip, robot: Robot, *, smooth: float = SMOOTH) -> Retargeted:

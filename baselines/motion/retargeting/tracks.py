@@ -113,8 +113,10 @@ def find_tracks(
 
 
 def first_heading(clip: Clip) -> float:
-    """Where a clip faces at its begin [rad]: on the line through 1.2 s, since hips swing; or where it
-    goes, if that is within 20° and it does not turn by 45°."""
+    """Where a clip faces at its begin [rad]: on the line through 1.2 s, since hips swing.
+
+    Or where it goes, if that is within 20° and it does not turn by 45°.
+    """
     facing, count = np.unwrap(clip.facing()), int(np.searchsorted(clip.times, FACING))
     first = float(np.polyfit(clip.times[:count], facing[:count], 1)[1])
     way = clip.root[-1] - clip.root[0]

@@ -52,6 +52,7 @@ class RetargetedClip(NamedTuple):
             over the frames [s].
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
+        tempo: how many times as fast as the clip it is.
     """
 
     clip: RobotClip
@@ -61,6 +62,7 @@ class RetargetedClip(NamedTuple):
     time_per_frame: float
     stride: float = 1.0
     begins: float = LEAD
+    tempo: float = 1.0
 
 
 def retarget_clip(
@@ -196,7 +198,7 @@ def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
         made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
     )  # fmt: skip
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
-                          made.begins)  # fmt: skip
+                          made.begins, made.tempo)  # fmt: skip
 
 
 def _scene(
