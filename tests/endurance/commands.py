@@ -110,7 +110,7 @@ def commands(room: Path, trials: int = 60) -> list[Command]:
             _evaluation, lambda out: _lines(out / "trials.jsonl"),
         ),
         Command(
-            "motion", ("motion", "import", "cmu02_punch"), _files("punch.npz"), lambda out: 0,
+            "motion", ("motion", "import", "humanoid_punch"), _files("punch.npz"), lambda out: 0,
             has_workers=False, file="punch.npz",
         ),
     ]  # fmt: skip

@@ -30,8 +30,9 @@ CHAINS = {  # name → base, role of the end, whether its orientation is asked f
     "foot to hand": ("left_foot", "hand_right", False),
 }
 OTHER = "left_lower_arm"  # moves along: the prior has a say in it
-IN_PLACE = ("cmu02_stand", "cmu02_squat", "cmu02_reach_down", "cmu02_reach_up", "cmu02_punch",
-            "fair1_wave_hello")  # fmt: skip
+IN_PLACE = tuple(
+    f"humanoid_{name}" for name in ("stand", "squat", "reach_down", "reach_up", "punch", "wave")
+)
 
 
 class Row(NamedTuple):

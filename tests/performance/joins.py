@@ -40,8 +40,9 @@ from poise.training.motion.following.follow import performer
 from poise.training.motion.tracking.record import ANYWHERE, Footing, lies
 from poise.training.motion.tracking.reference import ReferenceBodies
 
-CLIPS = ("cmu02_stand", "cmu02_squat", "cmu02_reach_down", "cmu02_reach_up", "cmu02_punch",
-         "fair1_wave_hello")  # fmt: skip
+CLIPS = tuple(
+    f"humanoid_{name}" for name in ("stand", "squat", "reach_down", "reach_up", "punch", "wave")
+)
 CONTROLLER = "momentum-qp"
 FIXED = 0.3  # [s]
 GRID = np.geomspace(0.2, 2.5, 20)  # [s]

@@ -46,7 +46,9 @@ SCRIPTS = (
 def clips() -> dict[str, Clip]:
     """Three clips of a second or two, so that much is played quickly."""
     cuts = {"stand": (0.0, 0.9), "squat": (0.5, 2.5), "punch": (0.5, 2.5)}
-    return {name: read_bvh(find_bvh(f"cmu02_{name}")).clip.cut(*cut) for name, cut in cuts.items()}
+    return {
+        name: read_bvh(find_bvh(f"humanoid_{name}")).clip.cut(*cut) for name, cut in cuts.items()
+    }
 
 
 @cache

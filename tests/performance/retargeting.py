@@ -1,8 +1,8 @@
 """Retargeting of clips whose feet stay, by each solver: what is missed, and how long it takes.
 
     python -m tests.performance.retargeting                    # 6 clips, 4 robots, 2 solvers
-    python -m tests.performance.retargeting --robots humanoid --clips cmu02_punch
-    python -m tests.performance.retargeting --clips cmu02_punch --robots humanoid \
+    python -m tests.performance.retargeting --robots humanoid --clips humanoid_punch
+    python -m tests.performance.retargeting --clips humanoid_punch --robots humanoid \
         --solvers frame spacetime grid --constraints low_punch
 
 Bars: planted soles ≤ 1 mm off, skating ≤ 0.5 cm/s mean and 1 cm/s largest, no joint over its limit,
@@ -28,8 +28,9 @@ from poise.baselines.motion.space_time.retarget_clip import RetargetedClip, Solv
 from poise.envs.robots.robot import Robot, load_robot
 
 ROBOTS = ("humanoid", "compact", "tall", "toddler")
-CLIPS = ("cmu02_stand", "cmu02_squat", "cmu02_reach_down", "cmu02_reach_up", "cmu02_punch",
-         "fair1_wave_hello")  # fmt: skip
+CLIPS = tuple(
+    f"humanoid_{name}" for name in ("stand", "squat", "reach_down", "reach_up", "punch", "wave")
+)
 SOLVERS = ("frame", "spacetime")
 REACHED = 0.01  # [m] a hand can be where it is to be if the arm alone brings it so near
 EVERY = 5  # frames between those in which that is looked at

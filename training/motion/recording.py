@@ -33,7 +33,7 @@ from poise.envs.robots.robot import Robot, load_robot
 
 from .tracking.reference import ReferenceBodies, Stance
 
-LICENCE = "MIT"
+LICENCE = "Apache-2.0"
 TOE = 0.8  # of the way to the front of the sole
 END = 0.05  # [m] from the last joints to their ends, ahead
 #: joint → the one above, the body that turns with it, and the hinge or the geom where its place is
@@ -68,7 +68,7 @@ def record_clips() -> list[Clip]:
 
 def _files() -> list[Path]:
     motions = packaged_folder("motions")
-    recorded = [motions / f"{name}.yaml" for name in ("squat", *motions_with_steps())]
+    recorded = [motions / f"{name}.yaml" for name in motions_with_steps()]
     return [*recorded, *packaged_folder("clips").glob("*.yaml")]
 
 

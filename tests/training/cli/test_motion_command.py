@@ -16,11 +16,11 @@ from tests.support.robot_clips import ahead_clip, packaged_clip
 
 
 def test_info_convert_and_import(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["motion", "info", "cmu02_squat"]) == 0
+    assert main(["motion", "info", "humanoid_squat"]) == 0
     assert "31, 16 of them with a role" in capsys.readouterr().out
     part, squat, back = (tmp_path / name for name in ("part.bvh", "squat.npz", "robot.bvh"))
     cut = ["--cut", "1.0", "2.0", "--mirror", "--speed", "2"]
-    assert main(["motion", "convert", "cmu02_squat", str(part), *cut]) == 0
+    assert main(["motion", "convert", "humanoid_squat", str(part), *cut]) == 0
     assert read_bvh(part).clip.duration == pytest.approx(0.5, abs=0.04)
     assert main(["motion", "import", str(part), "--out", str(squat), "--robot", "compact"]) == 0
     assert "over joint limits" in capsys.readouterr().out
@@ -35,7 +35,7 @@ def test_constraints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     how much is missing."""
     file, out = tmp_path / "pelvis.yaml", tmp_path / "out.npz"
     file.write_text("constraints:\n- {kind: height, point: pelvis, most: 0.7, period: {at: 0.2}}\n")
-    words = ["motion", "import", "cmu02_punch", "--out", str(out), "--cut", "1.2", "1.7"]
+    words = ["motion", "import", "humanoid_punch", "--out", str(out), "--cut", "1.2", "1.7"]
     words += ["--lead", "0.3", "--constraints", str(file)]
     assert main([*words, "--solver", "frame"]) == 0
     printed = capsys.readouterr().out
@@ -51,7 +51,7 @@ def test_constraints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 def test_join(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """T₁ + D + T₂; without a duration that of the least coefficient."""
     out, lengths = tmp_path / "both.bvh", []
-    both = ["motion", "join", "cmu02_punch", "cmu02_squat", str(out)]
+    both = ["motion", "join", "humanoid_punch", "humanoid_squat", str(out)]
     for duration in (["--duration", "0.8"], []):
         assert main([*both, *duration]) == 0
         lengths.append(read_bvh(out, "m", "y", "z").clip.duration)
@@ -102,7 +102,7 @@ def test_steps_are_joined_and_put_together(
     assert main([*synth, *of_robot]) == 0
     made = read_robot_clip("made.npz").planted
     assert made is not None and (~made).sum() == (~ahead_clip(robot).planted).sum()
-    assert main(["motion", "graph", "ahead.npz", "cmu02_stand", "--out", "g.yaml"]) == 2
+    assert main(["motion", "graph", "ahead.npz", "humanoid_stand", "--out", "g.yaml"]) == 2
     assert "say which robot's (--robot)" in capsys.readouterr().err
 
 
@@ -118,17 +118,20 @@ def test_steps_are_joined_and_put_together(
         (["follow", "kick"], "motion: the feet of 'kick' leave the ground"),
         (["check", "kick", "--qp"], "kick: qp: is not for motions with steps"),
         (
-            ["import", "cmu02_stand", "--out", "x.npz", "--constraints", "nothing"],
+            ["import", "humanoid_stand", "--out", "x.npz", "--constraints", "nothing"],
             "constraints: no such name: 'nothing'; give a path to a .yaml file or a packaged name "
             "(choices: hand_on_hip, low_punch)",
         ),
-        (["convert", "cmu02_stand", "x.txt"], "x.txt: must be the name of a .bvh file"),
-        (["join", "cmu02_punch", "fair1_wave_hello", "x.bvh"], "has another skeleton than"),
+        (["convert", "humanoid_stand", "x.txt"], "x.txt: must be the name of a .bvh file"),
+        (["join", "humanoid_punch", "humanoid_wave", "x.bvh"], "has another skeleton than"),
         (
             ["join", "a.npz", "b.npz", "c.npz", "--kind", "physical", "--duration", "1"],
             "duration: a physical join lasts as long as the robot needs",
         ),
-        (["join", "cmu02_punch", "cmu02_squat", "x.bvh", "--enter", "1"], "enter: is for physical"),
+        (
+            ["join", "humanoid_punch", "humanoid_squat", "x.bvh", "--enter", "1"],
+            "enter: is for physical",
+        ),
         (["check", "squat", "--fit"], "out: --fit and --out go together"),
         (["check", "squat", "--fit", "--out", "x.npz"], "squat: fit: only a .npz of poise motion"),
         (["check", "squat", "--qp", "--controller", "pd"], "controller: 'pd' is of kind"),

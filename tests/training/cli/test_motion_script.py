@@ -11,13 +11,13 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.graphs.motion_graph import read_graph
 from poise.training.cli.entry import main
 
-THREE = ["cmu02_stand", "cmu02_squat", "cmu02_punch"]
+THREE = ["humanoid_stand", "humanoid_squat", "humanoid_punch"]
 
 
 @pytest.fixture(scope="module")
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("graph") / "graph.yaml"
-    state = ["--state", "up=cmu02_stand@0.5", "--plot", str(path.with_suffix(".png"))]
+    state = ["--state", "up=standing@0.5", "--plot", str(path.with_suffix(".png"))]
     assert main(["motion", "graph", *THREE, "--out", str(path), *state]) == 0
     return path
 
@@ -25,7 +25,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_graph_of_clips(graph: Path) -> None:
     made = read_graph(graph)
     assert list(made.names) == THREE and set(made.states) == {"up"}
-    assert made.between("cmu02_stand", "cmu02_squat")
+    assert made.between("humanoid_stand", "humanoid_squat")
     assert graph.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -57,7 +57,7 @@ def test_a_script_becomes_a_file_and_the_record_of_it(
     ("arguments", "text"),
     [
         (["plan", "squat ->"], 'script: line 1, column 9: after "->" a motion is missing'),
-        (["plan", "jump"], "script: line 1, column 1: no motion 'jump' (choices: cmu02_stand"),
+        (["plan", "jump"], "script: line 1, column 1: no motion 'jump' (choices: humanoid_stand"),
         (["plan", "no.motion"], "no.motion: cannot be read (No such file or directory)"),
         (["synth", "squat", "--out", "x.npz"], "x.npz: out: must be the name of a .npz or .bvh"),
         (["synth", "squat", "--out", "x.npz", "--robot", "humanoid"], "robot: is of no robot, not"),
@@ -78,18 +78,23 @@ def test_wrong_settings_of_a_graph(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "w.yaml").write_text("weights:\n- {before: cmu02_stand, after: x, weight: 1.0}\n")
+    (tmp_path / "w.yaml").write_text(
+        "weights:\n- {before: humanoid_stand, after: x, weight: 1.0}\n"
+    )
     (tmp_path / "v.yaml").write_text("weight: []\n")
     for more, text in (
         (["--least", "3"], "graph: least 3 s is more than most 2 s"),
-        (["--state", "up=cmu02_stand"], "state: must be NAME=CLIP@SECONDS, not 'up=cmu02_stand'"),
+        (
+            ["--state", "up=standing"],
+            "state: must be NAME=CLIP@SECONDS, not 'up=standing'",
+        ),
         (["--state", "up=x@1"], "graph: no clip is called 'x'"),
         (["--weights", "w.yaml"], "graph: no clip is called 'x'"),
         (["--weights", "v.yaml"], "v.yaml: must hold a list, weights, and nothing else"),
-        (["fair1_wave_hello"], "fair1_wave_hello: clips: has another skeleton than 'cmu02_stand'"),
+        (["humanoid_wave"], "humanoid_wave: clips: has another skeleton than 'humanoid_stand'"),
         (["x.npz"], "x.npz: cannot be read"),
     ):
-        assert main(["motion", "graph", "cmu02_stand", *more, "--out", "g.yaml"]) == 2
+        assert main(["motion", "graph", "humanoid_stand", *more, "--out", "g.yaml"]) == 2
         assert text in capsys.readouterr().err
 
 
@@ -101,4 +106,4 @@ def test_a_clip_that_changed_is_noticed(
     other = tmp_path / "other.yaml"
     other.write_text(text.replace(digest, "sha256:0"))
     assert main(["motion", "plan", "stand", "--graph", str(other)]) == 2
-    assert "clips.cmu02_stand: is not the file that it was" in capsys.readouterr().err
+    assert "clips.humanoid_stand: is not the file that it was" in capsys.readouterr().err

@@ -49,7 +49,7 @@ class Motions(Part):
     first. Start, direction and time of a trial are the same for all controllers and shares.
     """
 
-    names: tuple[str, ...] = (*(f"cmu02_{clip}" for clip in CLIPS), "fair1_wave_hello")
+    names: tuple[str, ...] = tuple(f"humanoid_{clip}" for clip in CLIPS)
     directions: int = field(default=16, metadata={"min": 1, "max": 3600})  # evenly around
     shares: tuple[float, ...] = field(
         default=(0.0, 0.5, 0.8, 1.0, 1.2), metadata={"min": 0.0, "max": 10.0}

@@ -78,7 +78,7 @@ def match(
     """Make a motion that does what is asked for, by motion matching; see docs/motion-synthesis.md.
 
     Args:
-        files: .bvh files or names of packaged clips, all of one skeleton. None: CMU's subject 02.
+        files: .bvh files or names of packaged clips, all of one skeleton. None: the packaged ones.
         commands: what is asked for from a time on, as SECONDS:FORWARD,LEFT,TURN in m/s and rad/s.
         out: the .bvh file to write.
         seconds: how long the motion lasts.

@@ -57,7 +57,7 @@ def matched(
     """The motion that does what is asked for, of clips of one skeleton.
 
     Args:
-        files: .bvh files or names of packaged clips; none for those of CMU's subject 02.
+        files: .bvh files or names of packaged clips; none for the packaged ones.
         commands: see `parse_commands`.
         seconds: how long.
         start: ``CLIP@SECONDS`` where it begins; empty for the first frame of the first clip.
@@ -67,7 +67,7 @@ def matched(
     asked = parse_commands(commands)
     if not 0.1 <= seconds <= LONGEST:
         raise ConfigError(f"must be from 0.1 to {LONGEST:g}, not {seconds:g}", field="seconds")
-    names = list(files) or [name for name in packaged_clips() if name.startswith("cmu02")]
+    names = list(files) or packaged_clips()
     database = MatchingDatabase([read_bvh(find_bvh(name)).clip for name in names])
     begin = _place(database, [Path(name).stem for name in names], start) if start else (0, 0)
     return match_motion(database, asked, seconds, start=begin), database

@@ -16,7 +16,7 @@ from poise.baselines.balance.references.robot_clip import (
 )
 from poise.baselines.balance.references.tempo import Tempo
 from poise.baselines.motion.clips.bvh import read_bvh
-from poise.baselines.motion.clips.library import find_bvh, packaged_clips
+from poise.baselines.motion.clips.library import find_bvh, known_clips
 from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.files import resolve
 from poise.configs.reading import is_file
@@ -68,7 +68,7 @@ def stage_of(
 
 def is_clip(name: str) -> bool:
     """True for what is a robot's postures, or becomes that; false for keyframes."""
-    return name in packaged_clips() or Path(name).suffix.lower() in (".npz", ".bvh")
+    return name in known_clips() or Path(name).suffix.lower() in (".npz", ".bvh")
 
 
 def load_repertoire(
@@ -101,6 +101,6 @@ def _clip(name: str, robot: Robot, stored: Path, anew: bool) -> RobotClip:
     """The robot's postures of a packaged clip, a .bvh or a .npz file."""
     if Path(name).suffix == ".npz":
         return read_robot_clip(name)
-    if name in packaged_clips() and is_file(stored) and not anew:
+    if name in known_clips() and is_file(stored) and not anew:
         return read_robot_clip(stored)
     return retarget(read_bvh(find_bvh(name)).clip, robot).clip

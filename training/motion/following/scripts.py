@@ -65,7 +65,7 @@ def open_synthesis(
         return Synthesis(made, {entry.name: clip for entry, clip in loaded}, kind,
                          robot_joins=joins)  # fmt: skip
     names = [name for name in packaged_clips() if _fits(name, robot)]
-    steps = [] if robot is None else [*_walks(), *motions_with_steps()]
+    steps = [] if robot is None else _stepping()
     said = set() if script is None else clip_names(script)
     names += [name for name in steps if any(name == n or name.endswith(f"_{n}") for n in said)]
     limits = Thresholds() if least is None else build(Thresholds, {"least": least}, "synth")
@@ -75,14 +75,15 @@ def open_synthesis(
                      robot_joins=joins, others=[n for n in steps if n not in names])  # fmt: skip
 
 
-def _walks() -> list[str]:
-    """The packaged clips whose feet move."""
-    return [name for name in packaged_clips() if name.endswith("walk")]
+def _stepping() -> list[str]:
+    """The packaged clips and motions whose feet move: the motion, where there are both."""
+    motions = motions_with_steps()
+    return [*(name for name in packaged_clips() if name.endswith("_walk")), *motions]
 
 
 def _fits(name: str, robot: str | None) -> bool:
-    """Without a robot the clips of one skeleton; with one those whose feet stay."""
-    return name.startswith("cmu02") if robot is None else name not in _walks()
+    """Without a robot every packaged clip; with one those whose feet stay."""
+    return robot is None or not name.endswith(("_walk", *(f"_{m}" for m in motions_with_steps())))
 
 
 def load_clips(

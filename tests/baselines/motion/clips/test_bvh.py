@@ -12,6 +12,7 @@ from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh, packaged_clips
 from poise.baselines.motion.clips.rotations import angle_between
 from poise.configs.errors import ConfigError, PoiseError
+from tests.support.captured import captured
 from tests.support.motion_files import FRAMES, mutated, small_bvh
 
 MUTATIONS = 150
@@ -39,6 +40,7 @@ def test_packaged_clips_are_read_written_and_read(name: str, tmp_path: Path) -> 
         assert again.dt == pytest.approx(each.dt, rel=1e-6)
 
 
+@captured
 def test_axes_and_unit_are_found() -> None:
     clip, axes = read_bvh(find_bvh("cmu02_squat"))
     assert axes.names == ("y", "z") and axes.unit == 1.0

@@ -8,6 +8,9 @@ from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.clips.rotations import angle_between, slerp
 from poise.configs.errors import ConfigError
+from tests.support.captured import captured
+
+pytestmark = captured
 
 
 @pytest.fixture(scope="module")

@@ -46,11 +46,11 @@ NAMES = ("stand", "squat", "punch", "walk")
 
 @pytest.fixture(scope="module")
 def clips() -> dict[str, Clip]:
-    return {name: read_bvh(find_bvh(f"cmu02_{name}")).clip for name in NAMES}
+    return {name: read_bvh(find_bvh(f"humanoid_{name}")).clip for name in NAMES}
 
 
 def entry(name: str, clip: Clip) -> GraphClip:
-    return GraphClip(name, f"cmu02_{name}", clip.duration)
+    return GraphClip(name, f"humanoid_{name}", clip.duration)
 
 
 def graph_of(clips: dict[str, Clip], **settings) -> MotionGraph:
@@ -151,7 +151,7 @@ def test_a_graph_and_what_an_expert_says(clips: dict[str, Clip]) -> None:
     assert said.between("stand", "squat") == (only,) and said.between("squat", "stand") == ()
     with pytest.raises(ConfigError, match="graph: no clip is called 'jump'"):
         graph_of(two, weights=[Weight("stand", "jump", 1.0)])
-    other = read_bvh(find_bvh("fair1_wave_hello")).clip
+    other = read_bvh(find_bvh("humanoid_wave")).clip
     with pytest.raises(ConfigError, match="wave: clips: has another skeleton than 'stand'"):
         graph_of({**two, "wave": other})
 

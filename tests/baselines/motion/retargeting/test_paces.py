@@ -15,7 +15,10 @@ from poise.baselines.motion.clips.rotations import about_z, multiply
 from poise.baselines.motion.retargeting.paces import clip_heading, find_paces
 from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
+from tests.support.captured import captured
 from tests.support.physics import robot_named
+
+pytestmark = captured
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,9 @@ from tests.support.physics import robot_named
 @cache
 def squat() -> Clip:
     """A second of squatting, of the humanoid, as far as it goes down."""
-    made = retarget(read_bvh(find_bvh("cmu02_squat")).clip.cut(1.0, 2.0), robot_named("humanoid"))
+    made = retarget(
+        read_bvh(find_bvh("humanoid_squat")).clip.cut(1.0, 2.0), robot_named("humanoid")
+    )
     robot = robot_named("humanoid")
     return clip_of_robot(robot, made.clip.qpos, made.clip.dt, "squat")
 
@@ -81,8 +83,8 @@ def test_files_of_clips(tmp_path: Path) -> None:
     clip, digest = load_clip(path, robot)
     assert robot_qpos(clip, robot) == pytest.approx(read_robot_clip(path).qpos, abs=1e-9)
     assert digest.startswith("sha256:") and clip.name == "squat"
-    plain, other = load_clip("cmu02_stand")
-    assert len(plain.skeleton.names) == 31 and other != digest
+    plain, other = load_clip("humanoid_stand")
+    assert len(plain.skeleton.names) == 20 and other != digest
     with pytest.raises(ConfigError, match=r"is a robot's motion: say which robot's \(--robot\)"):
         load_clip(path)
     with pytest.raises(ConfigError, match="is a motion of the robot 'humanoid', not of 'compact'"):

@@ -27,7 +27,7 @@ from tests.support.physics import robot_named
 
 @pytest.fixture(scope="module")
 def squat() -> Clip:
-    return read_bvh(find_bvh("cmu02_squat")).clip.cut(0.8, 2.0)
+    return read_bvh(find_bvh("humanoid_squat")).clip.cut(0.8, 2.0)
 
 
 @pytest.fixture(scope="module")

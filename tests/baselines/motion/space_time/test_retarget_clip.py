@@ -24,7 +24,10 @@ from poise.baselines.motion.space_time.retarget_clip import RetargetedClip, Solv
 from poise.baselines.motion.space_time.solve import optimise
 from poise.baselines.motion.space_time.stance import standing_stance
 from poise.configs.errors import ConfigError
+from tests.support.captured import captured
 from tests.support.physics import robot_named
+
+pytestmark = captured
 
 LEAD = 0.3
 WANTED: tuple[Constraint, ...] = (

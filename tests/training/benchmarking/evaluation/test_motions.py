@@ -96,17 +96,20 @@ def test_another_motion_is_another_result(tmp_path: Path, in_process: type[InPro
 
 def test_a_clip_is_put_on_the_robot_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = robot_named("humanoid")
-    found = load_repertoire(["cmu02_stand", "bow"], ["cmu02_stand", "bow"], robot, tmp_path)
-    assert list(found.clips) == ["cmu02_stand"] and set(found.digests) == {"cmu02_stand", "bow"}
-    assert found.durations["cmu02_stand"] == found.clips["cmu02_stand"].duration
+    found = load_repertoire(["humanoid_stand", "bow"], ["humanoid_stand", "bow"], robot, tmp_path)
+    assert list(found.clips) == ["humanoid_stand"] and set(found.digests) == {
+        "humanoid_stand",
+        "bow",
+    }
+    assert found.durations["humanoid_stand"] == found.clips["humanoid_stand"].duration
     found.write(tmp_path)
-    stored = read_robot_clip(tmp_path / "motions" / "cmu02_stand.npz")
-    assert np.array_equal(stored.qpos, found.clips["cmu02_stand"].qpos)
+    stored = read_robot_clip(tmp_path / "motions" / "humanoid_stand.npz")
+    assert np.array_equal(stored.qpos, found.clips["humanoid_stand"].qpos)
     monkeypatch.setattr("poise.training.motion.following.repertoire.retarget", None)
-    again = load_repertoire(["cmu02_stand"], ["cmu02_stand"], robot, tmp_path)
-    assert again.digests["cmu02_stand"] == found.digests["cmu02_stand"]
+    again = load_repertoire(["humanoid_stand"], ["humanoid_stand"], robot, tmp_path)
+    assert again.digests["humanoid_stand"] == found.digests["humanoid_stand"]
     with pytest.raises(TypeError):  # it would be put on the robot again
-        load_repertoire(["cmu02_stand"], ["cmu02_stand"], robot, tmp_path, anew=True)
+        load_repertoire(["humanoid_stand"], ["humanoid_stand"], robot, tmp_path, anew=True)
 
 
 def played(part: str, motion: str, share: float | None, impulse: float, won: bool) -> Any:

@@ -20,7 +20,7 @@ from tests.support.physics import robot_named
 def test_a_captured_clip_is_followed() -> None:
     """Both arms overhead: no fall, joints to 3°, bodies to 2 cm."""
     robot = robot_named("humanoid")
-    clip = read_bvh(find_bvh("cmu02_reach_up")).clip
+    clip = read_bvh(find_bvh("humanoid_reach_up")).clip
     motion = reference_from(retarget(clip, robot).clip, robot, "test")
     (trial,) = follow(motion, robot=robot, starts=1)
     assert not trial.fallen and trial.solver_failures == 0

@@ -10,8 +10,9 @@ import pytest
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.training.cli.entry import main
 from poise.training.motion.following.matched import parse_commands
+from tests.support.captured import captured
 
-TWO = ["cmu02_punch", "cmu02_walk"]
+TWO = ["humanoid_punch", "humanoid_walk"]
 
 
 def test_commands_hold_from_their_time_on() -> None:
@@ -21,13 +22,14 @@ def test_commands_hold_from_their_time_on() -> None:
     assert asked(9.0) == (0.8, 0.0, 0.0)
 
 
+@captured
 def test_a_walk_that_is_asked_for_is_walked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It punches in place for two seconds and then goes forward about as fast as asked."""
     out = tmp_path / "walk.bvh"
     ask = ["--commands", "2:1.2", "--seconds", "5", "--out", str(out)]
-    assert main(["motion", "match", *TWO, *ask]) == 0
+    assert main(["motion", "match", "cmu02_punch", "cmu02_walk", *ask]) == 0
     assert "cmu02_walk" in capsys.readouterr().out
     made = read_bvh(out, "m", "y", "z").clip
     assert made.duration == pytest.approx(5.0, abs=0.1)
@@ -48,7 +50,10 @@ def test_a_walk_that_is_asked_for_is_walked(
         (["--commands", "2:1", "1:1"], "commands: must begin after the one before it, not '1:1'"),
         (["--commands", "0:1", "--seconds", "0"], "seconds: must be from 0.1 to 120, not 0"),
         (["--commands", "0:1", "--start", "walk"], "start: must be CLIP@SECONDS, not 'walk'"),
-        (["--commands", "0:1", "--start", "cmu02_punch@9"], "must be before the end of 'cmu02_pu"),
+        (
+            ["--commands", "0:1", "--start", "humanoid_punch@9"],
+            "before the end of 'humanoid_punch",
+        ),
         (["--commands", "0:1", "--out", "x.npz"], "x.npz: must be the name of a .bvh file"),
     ],
 )
@@ -58,6 +63,6 @@ def test_errors_are_one_line(
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     out = [] if "--out" in more else ["--out", "x.bvh"]
-    assert main(["motion", "match", "cmu02_punch", *more, *out]) == 2
+    assert main(["motion", "match", "humanoid_punch", *more, *out]) == 2
     error = capsys.readouterr().err
     assert text in error and error.count("\n") == 1 and not Path("x.bvh").exists()

@@ -17,7 +17,7 @@ from tests.support.physics import robot_named
 
 def test_the_skeleton_stands_beside_and_moves_with_the_clip() -> None:
     robot = robot_named("humanoid")
-    clip = read_bvh(find_bvh("cmu02_squat")).clip
+    clip = read_bvh(find_bvh("humanoid_squat")).clip
     skeleton = beside_of(robot, clip, 0.9, begins=1.0)
     assert skeleton.places[..., 2].min() == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(skeleton.places[0, 0, :2],
@@ -33,7 +33,7 @@ def test_the_skeleton_stands_beside_and_moves_with_the_clip() -> None:
 
 def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_is_looked_at() -> None:
     robot = robot_named("humanoid")
-    clip = read_bvh(find_bvh("cmu02_walk")).clip
+    clip = read_bvh(find_bvh("humanoid_walk")).clip
     whole, half = (beside_of(robot, clip, 0.9, 1.0, clip_heading(clip), stride)
                    for stride in (1.0, 0.5))  # fmt: skip
     end = 1.0 + clip.duration
@@ -45,7 +45,7 @@ def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_is_looked_at() -> No
     seen = looked_at(root, 1.0 / 25.0, times, half)
     assert seen[-1] == pytest.approx(0.5 * half.root(end), abs=0.1)  # smoothed
     assert np.abs(np.diff(seen, axis=0)).max() < 0.05
-    still = beside_of(robot, read_bvh(find_bvh("cmu02_squat")).clip, 0.9, 1.0)
+    still = beside_of(robot, read_bvh(find_bvh("humanoid_squat")).clip, 0.9, 1.0)
     assert np.ptp(looked_at(root, 1.0 / 25.0, times, still), axis=0).max() == 0.0
 
 
@@ -54,5 +54,5 @@ def test_what_is_no_video_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[
         (["--video", str(tmp_path / "x.gif")], "the name of a video must end in .mp4 or .webp"),
         (["--video", str(tmp_path / "x.mp4"), "--size", "15", "16"], "size: must be two even"),
     ):
-        assert main(["motion", "play", "cmu02_squat", *more]) == 2
+        assert main(["motion", "play", "humanoid_squat", *more]) == 2
         assert text in capsys.readouterr().err

@@ -58,7 +58,7 @@ def test_what_goes_on_as_it_was_costs_nothing() -> None:
 
 
 def test_a_joint_moves_what_hangs_on_it() -> None:
-    skeleton = read_bvh(find_bvh("cmu02_punch")).clip.skeleton
+    skeleton = read_bvh(find_bvh("humanoid_punch")).clip.skeleton
     shares = moved_shares(skeleton).reshape(-1, 3)[:, 0]
     assert shares[0] == shares[1] == 1.0
     share = {role: shares[1 + joint] for role, joint in skeleton.roles.items()}

@@ -16,7 +16,7 @@ KEYS = np.array([3, 12, 20, 41, 50])
 
 @pytest.fixture(scope="module")
 def clip() -> Clip:
-    return read_bvh(find_bvh("cmu02_punch")).clip
+    return read_bvh(find_bvh("humanoid_punch")).clip
 
 
 def fine(clip: Clip, kind: str, by: int = 40) -> tuple[Clip, np.ndarray]:

@@ -13,6 +13,9 @@ from poise.baselines.motion.clips.rotations import angle_between
 from poise.baselines.motion.graphs.joining.overlay import Layer, overlay
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
+from tests.support.captured import captured
+
+pytestmark = captured
 
 ARMS = (GROUPS["arms"],)
 

@@ -5,18 +5,21 @@ import pytest
 
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
-from poise.baselines.motion.clips.library import find_bvh, packaged_clips
+from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.graphs.matching.database import MatchingDatabase
 from poise.baselines.motion.graphs.matching.features import clip_features, groups
 from poise.baselines.motion.graphs.matching.player import Command
 from poise.configs.errors import ConfigError
+from tests.support.captured import CMU, captured
+
+pytestmark = captured
 
 RNG = np.random.default_rng(0)
 
 
 @pytest.fixture(scope="module")
 def clips() -> list[Clip]:
-    names = [name for name in packaged_clips() if name.startswith("cmu02")]
+    names = CMU
     return [read_bvh(find_bvh(name)).clip for name in names]
 
 

@@ -7,6 +7,9 @@ from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.graphs.matching.features import FUTURE, LIMBS, clip_features, groups
+from tests.support.captured import captured
+
+pytestmark = captured
 
 AHEAD = (0.2, 0.5)
 

@@ -6,17 +6,20 @@ import numpy as np
 import pytest
 
 from poise.baselines.motion.clips.bvh import read_bvh
-from poise.baselines.motion.clips.library import find_bvh, packaged_clips
+from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.clips.rotations import angle_between
 from poise.baselines.motion.graphs.joining.states import minus
 from poise.baselines.motion.graphs.matching.database import MatchingDatabase
 from poise.baselines.motion.graphs.matching.player import Command, find_pieces, match_motion
 from poise.configs.errors import ConfigError
+from tests.support.captured import CMU, captured
+
+pytestmark = captured
 
 
 @pytest.fixture(scope="module")
 def database() -> MatchingDatabase:
-    names = [name for name in packaged_clips() if name.startswith("cmu02")]
+    names = CMU
     return MatchingDatabase([read_bvh(find_bvh(name)).clip for name in names])
 
 
