@@ -25,7 +25,9 @@ MARKS = '->|()<>*@[]:,{}=;#"\n\t aβя0.9e\x00\u2028'
 
 def random_script(rng: np.random.Generator, depth: int = 3) -> Script:
     names = rng.choice(["u", "v", "w"], size=int(rng.integers(0, 3)), replace=False)
-    defines = tuple(Define(str(name), random_sequence(rng, 1)) for name in names)
+    defines = tuple(
+        Define(str(name), random_sequence(rng, 1), bool(rng.random() < 0.3)) for name in names
+    )
     return Script(defines, random_sequence(rng, depth))
 
 

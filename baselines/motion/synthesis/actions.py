@@ -106,9 +106,9 @@ class Reader:
     def _body(self, term: Term, seen: int) -> tuple[ClipName | StateName | Sequence, int]:
         """What a term is, and how many definitions it sees: those before its own."""
         body = term.body
-        if isinstance(body, ClipName) and not body.quoted:
+        if isinstance(body, ClipName):
             for i, define in enumerate(self.script.defines[:seen]):
-                if define.name == body.name:
+                if define.clip == body:
                     return define.sequence, i
         return body, seen
 

@@ -66,8 +66,8 @@ class _Parser:
 
     def script(self) -> Script:
         defines: list[Define] = []
-        while self.next.kind == "name" and self.tokens[self.place + 1].text == "=":
-            defines.append(self.define([define.name for define in defines]))
+        while self.next.kind in ("name", "string") and self.tokens[self.place + 1].text == "=":
+            defines.append(self.define([define.clip for define in defines]))
         sequence = self.sequence()
         if self.next.text == ")":
             raise self.wrong('")" closes no bracket')
@@ -75,17 +75,18 @@ class _Parser:
             raise self.wrong(f"{self.shown()} cannot follow a motion", ("->", "|", *MODIFIERS))
         return Script(tuple(defines), sequence, self.text, self.source)
 
-    def define(self, known: list[str]) -> Define:
-        name = self.take()
-        if name.text in known:
-            raise self.wrong(f"{shown(name.text)} is defined twice", at=name.at)
+    def define(self, known: list[ClipName]) -> Define:
+        at = self.next.at
+        clip = self.quoted() if self.next.kind == "string" else ClipName(self.take().text, at=at)
+        if clip in known:
+            raise self.wrong(f"{shown(clip.name)} is defined twice", at=at)
         self.take()
         sequence = self.sequence()
         if self.next.text != ";":
-            raise self.wrong(f'after the definition of {shown(name.text)} ";" is missing, found '
+            raise self.wrong(f'after the definition of {shown(clip.name)} ";" is missing, found '
                              f"{self.shown()}", (";", "->", "|", *MODIFIERS))  # fmt: skip
         self.take()
-        return Define(name.text, sequence, name.at)
+        return Define(clip.name, sequence, clip.quoted, at)
 
     def sequence(self) -> Sequence:
         overlays, arrows = [self.overlay()], []

@@ -12,7 +12,7 @@ def text_of(script: Script) -> str:
 
     Raises ConfigError for a name with a quote or a line break in it, which no text has.
     """
-    lines = [f"{define.name} = {sequence_text(define.sequence)};" for define in script.defines]
+    lines = [f"{body_text(define.clip)} = {sequence_text(define.sequence)};" for define in script.defines]
     return "\n".join([*lines, sequence_text(script.sequence)]) + "\n"
 
 
@@ -31,7 +31,7 @@ def overlay_text(overlay: Overlay) -> str:
 
 def term_text(term: Term) -> str:
     """A motion and its modifiers."""
-    return " ".join([_body(term.body), *(_modifier(modifier) for modifier in term.modifiers)])
+    return " ".join([body_text(term.body), *(_modifier(modifier) for modifier in term.modifiers)])
 
 
 def arrow_text(arrow: Arrow) -> str:
@@ -47,7 +47,8 @@ def number_text(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-def _body(body: ClipName | StateName | Sequence) -> str:
+def body_text(body: ClipName | StateName | Sequence) -> str:
+    """A motion without its modifiers; raises ConfigError for a name that no text has."""
     if isinstance(body, Sequence):
         return f"({sequence_text(body)})"
     if isinstance(body, StateName):

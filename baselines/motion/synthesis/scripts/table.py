@@ -9,7 +9,7 @@ from collections.abc import Sequence as Rows
 from poise.configs.errors import ConfigError
 
 from .parser import parse
-from .printer import arrow_text, sequence_text, term_text
+from .printer import arrow_text, body_text, sequence_text, term_text
 from .tree import Overlay, Script, Sequence
 
 
@@ -24,7 +24,7 @@ def table_of(script: Script) -> list[list[str]]:
     Before them stands a row of two cells, `NAME =` and a sequence, for each definition.
     """
     sequence = _plain(script.sequence)
-    rows = [[f"{define.name} =", sequence_text(define.sequence)] for define in script.defines]
+    rows = [[f"{body_text(define.clip)} =", sequence_text(define.sequence)] for define in script.defines]
     rows.append(["", *(arrow_text(arrow) for arrow in sequence.arrows)])
     for i in range(max(len(overlay.terms) for overlay in sequence.overlays)):
         rows.append([term_text(o.terms[i]) if i < len(o.terms) else "" for o in sequence.overlays])

@@ -1,7 +1,7 @@
 """What a script says, as a tree. Places in the text are kept for errors and count in no comparison.
 
     script   = { define } sequence ;
-    define   = NAME "=" sequence ";" ;
+    define   = clip "=" sequence ";" ;
     sequence = overlay { arrow overlay } ;
     arrow    = "->" [ "{" kind { "," option } "}" ] ;
     overlay  = term { "|" term } ;
@@ -29,7 +29,7 @@ ModifierKind = Literal["*", "@", "[", "on", "mirrored", "weight"]
 
 @dataclass(frozen=True)
 class ClipName:
-    """A clip by its name; one that is quoted is never a name that the script defines."""
+    """A clip by its name. Quoted and bare names are two sets: "a" is not what defines a bare a."""
 
     name: str
     quoted: bool = False
@@ -99,7 +99,13 @@ class Define:
 
     name: str
     sequence: Sequence
+    quoted: bool = False
     at: int = field(default=0, compare=False)
+
+    @property
+    def clip(self) -> ClipName:
+        """The name as it stands where it is used."""
+        return ClipName(self.name, self.quoted, self.at)
 
 
 @dataclass(frozen=True)

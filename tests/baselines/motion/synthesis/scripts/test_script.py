@@ -100,7 +100,7 @@ def grammar() -> pp.ParserElement:
     term = (text | name | "<" + name + ">" | "(" + sequence + ")") + pp.ZeroOrMore(modifier)
     overlay = term + pp.ZeroOrMore("|" + term)
     sequence <<= overlay + pp.ZeroOrMore(arrow + overlay)
-    script = pp.ZeroOrMore(name + "=" + sequence + ";") + sequence + pp.StringEnd()
+    script = pp.ZeroOrMore((text | name) + "=" + sequence + ";") + sequence + pp.StringEnd()
     return script.ignore(pp.Regex(r"#[^\n]*"))
 
 
