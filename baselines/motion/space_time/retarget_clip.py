@@ -14,12 +14,12 @@ from poise.baselines.balance.references.robot_clip import RATE, RobotClip, refer
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
-from poise.baselines.motion.retargeting.freely import retarget_freely
 from poise.baselines.motion.retargeting.limbs import find_limbs
 from poise.baselines.motion.retargeting.retarget import (
     LEAD,
     SMOOTH,
     Retargeted,
+    retarget_freely,
     retarget_to,
     targets_on,
 )
@@ -52,6 +52,7 @@ class RetargetedClip(NamedTuple):
             over the frames [s].
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
+        tempo: how many times as fast as the clip it is.
     """
 
     clip: RobotClip
@@ -61,6 +62,7 @@ class RetargetedClip(NamedTuple):
     time_per_frame: float
     stride: float = 1.0
     begins: float = LEAD
+    tempo: float = 1.0
 
 
 def retarget_clip(
@@ -153,8 +155,8 @@ def performable(
         source, wanted = None, tuple(constraints)
     chosen: Solver = solver or ("spacetime" if wanted else "frame")
     given = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
-    limbs, targets, heading = given
-    if heading is not None and (chosen != "frame" or wanted):
+    limbs, targets, steps = given
+    if steps and (chosen != "frame" or wanted):
         raise ConfigError("its feet step: only the solver 'frame', without constraints, is for "
                           "such clips (--planted takes the feet as planted)", source=clip.name,
                           field="solver" if chosen != "frame" else "constraints")  # fmt: skip
@@ -168,7 +170,7 @@ def performable(
     from .solve import optimise
 
     scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted)
-    if heading is not None:
+    if steps:
         return _stepped(made, scene)
     stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
     spent, begun = made.time_per_frame, time.thread_time()
@@ -196,7 +198,7 @@ def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
         made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
     )  # fmt: skip
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
-                          made.begins)  # fmt: skip
+                          made.begins, made.tempo)  # fmt: skip
 
 
 def _scene(

@@ -10,6 +10,7 @@ import pytest
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.graphs.motion_graph import read_graph
 from poise.training.cli.entry import main
+from tests.support.motion_files import small_bvh
 
 THREE = ["humanoid_stand", "humanoid_squat", "humanoid_punch"]
 
@@ -17,7 +18,7 @@ THREE = ["humanoid_stand", "humanoid_squat", "humanoid_punch"]
 @pytest.fixture(scope="module")
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("graph") / "graph.yaml"
-    state = ["--state", "up=standing@0.5", "--plot", str(path.with_suffix(".png"))]
+    state = ["--state", "up=humanoid_stand@0.5", "--plot", str(path.with_suffix(".png"))]
     assert main(["motion", "graph", *THREE, "--out", str(path), *state]) == 0
     return path
 
@@ -96,6 +97,7 @@ def test_wrong_settings_of_a_graph(
         "weights:\n- {before: humanoid_stand, after: x, weight: 1.0}\n"
     )
     (tmp_path / "v.yaml").write_text("weight: []\n")
+    (tmp_path / "other.bvh").write_text(small_bvh())
     for more, text in (
         (["--least", "3"], "graph: least 3 s is more than most 2 s"),
         (
@@ -105,7 +107,7 @@ def test_wrong_settings_of_a_graph(
         (["--state", "up=x@1"], "graph: no clip is called 'x'"),
         (["--weights", "w.yaml"], "graph: no clip is called 'x'"),
         (["--weights", "v.yaml"], "v.yaml: must hold a list, weights, and nothing else"),
-        (["humanoid_wave"], "humanoid_wave: clips: has another skeleton than 'humanoid_stand'"),
+        (["other.bvh"], "other: clips: has another skeleton than 'humanoid_stand'"),
         (["x.npz"], "x.npz: cannot be read"),
     ):
         assert main(["motion", "graph", "humanoid_stand", *more, "--out", "g.yaml"]) == 2

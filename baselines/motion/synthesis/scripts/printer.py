@@ -12,9 +12,7 @@ def text_of(script: Script) -> str:
 
     Raises ConfigError for a name with a quote or a line break in it, which no text has.
     """
-    lines = [
-        f"{body_text(define.clip)} = {sequence_text(define.sequence)};" for define in script.defines
-    ]
+    lines = [f"{body_text(each.clip)} = {sequence_text(each.sequence)};" for each in script.defines]
     return "\n".join([*lines, sequence_text(script.sequence)]) + "\n"
 
 

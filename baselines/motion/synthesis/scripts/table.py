@@ -24,9 +24,7 @@ def table_of(script: Script) -> list[list[str]]:
     Before them stands a row of two cells, `NAME =` and a sequence, for each definition.
     """
     sequence = _plain(script.sequence)
-    rows = [
-        [f"{body_text(define.clip)} =", sequence_text(define.sequence)] for define in script.defines
-    ]
+    rows = [[f"{body_text(each.clip)} =", sequence_text(each.sequence)] for each in script.defines]
     rows.append(["", *(arrow_text(arrow) for arrow in sequence.arrows)])
     for i in range(max(len(overlay.terms) for overlay in sequence.overlays)):
         rows.append([term_text(o.terms[i]) if i < len(o.terms) else "" for o in sequence.overlays])
