@@ -54,9 +54,23 @@ def test_a_script_becomes_a_file_and_the_record_of_it(
     assert record["played"][-1]["ends"] == pytest.approx(record["duration"])
 
 
+def test_a_script_is_performed_by_one_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing is left of its motion, and the report has its timeline."""
+    script, page = tmp_path / "own.motion", tmp_path / "page.html"
+    script.write_text("stand[0:1] -> squat[0.7:2]\n")
+    follow = ["motion", "follow", str(script), "--starts", "1", "--report", str(page)]
+    assert main(follow) == 0
+    assert "own by momentum-qp on humanoid, not pushed" in capsys.readouterr().out
+    assert "squat" in page.read_text()
+    assert {path.name for path in tmp_path.iterdir()} == {"own.motion", "page.html"}
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
+        (["follow", "squat -> jump"], "script: line 1, column 10: no motion 'jump' (choices:"),
         (["plan", "squat ->"], 'script: line 1, column 9: after "->" a motion is missing'),
         (["plan", "jump"], "script: line 1, column 1: no motion 'jump' (choices: humanoid_stand"),
         (["plan", "no.motion"], "no.motion: cannot be read (No such file or directory)"),

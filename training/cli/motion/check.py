@@ -4,11 +4,13 @@ import json
 from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import tyro
 
 from poise.baselines.allowance import named
+from poise.baselines.motion.synthesis.scripts.library import find_script, names_script
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_file
@@ -99,7 +101,8 @@ def follow(
     """Perform a motion, pushed or not, and say how near the robot stayed to it.
 
     Args:
-        motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
+        motion: a .npz of poise motion import, a packaged motion, a .yaml of one; or a script, whose
+            motion is made first: a .motion file, the name of a packaged one, or its text.
         controller: as in poise evaluate.
         robot: a packaged robot (see poise list) or a .yaml description.
         starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
@@ -121,7 +124,8 @@ def follow(
     from poise.baselines.allowance import allowing
     from poise.training.benchmarking.trials.names import check_names
 
-    check_names([controller], robot=robot, motion=motion)
+    script = find_script(motion) if names_script(motion) else None
+    check_names([controller], robot=robot, motion=None if script else motion)
     from poise.baselines.balance.references.tempo import Tempo
     from poise.training.motion.following.fastest import STARTS, find_fastest
     from poise.training.motion.following.follow import follow as perform
@@ -142,7 +146,17 @@ def follow(
         check_video(video)
         check_out_file(video)
         check_size(size)
+    pushed = f"pushed by {push:g} N s" if push else "not pushed"
+    pushed = f"pushed by {share:g} of J50" if share else pushed
+    faster = f", {tempo:g} times as fast" if tempo != 1.0 else ""
     with allowing([*named(controller), *allow]), ExitStack() as stack:
+        if script is not None:
+            from poise.training.motion.following.scripts import open_synthesis, write_motion
+
+            synthesis = open_synthesis(None, robot, script=script)
+            folder = stack.enter_context(TemporaryDirectory(prefix="poise-"))
+            motion = str(Path(folder) / f"{Path(script.source).stem}.npz")
+            write_motion(synthesis, script, robot, Path(motion))
         if fastest:
             find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
             return
@@ -152,16 +166,14 @@ def follow(
         trials = perform(motion, controller, robot=robot, starts=20 if starts is None else starts,
                          impulse=push, share=share, directions=directions, seed=seed, speed=tempo,
                          tempo=waits_so, watch=film or watched, realism=realism)  # fmt: skip
-    pushed = f"pushed by {push:g} N s" if push else "not pushed"
-    pushed = f"pushed by {share:g} of J50" if share else pushed
-    faster = f", {tempo:g} times as fast" if tempo != 1.0 else ""
-    title = f"{Path(motion).stem} by {controller} on {robot}{faster}, {pushed}"
+        title = f"{Path(motion).stem} by {controller} on {robot}{faster}, {pushed}"
+        if report is not None and watched is not None:  # while a script's motion is there
+            write_performance(report, title, motion, robot, tempo, trials, watched)
     print_followed(trials, title, terminal())
     if out is not None:
         write_atomic(out, json.dumps([asdict(trial) for trial in trials], indent=1) + "\n")
         print(out)
     if video is not None:
         print(video)
-    if report is not None and watched is not None:
-        write_performance(report, title, motion, robot, tempo, trials, watched)
+    if report is not None:
         print(report)

@@ -1,25 +1,21 @@
 """`poise motion graph`, `plan` and `synth`: which clip may follow which, and a script performed."""
 
-import json
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
-from poise.baselines.motion.clips.bvh import write_bvh
 from poise.baselines.motion.graphs.adjacency import make_graph
 from poise.baselines.motion.graphs.motion_graph import StatePlace, Thresholds, Weight, write_graph
 from poise.baselines.motion.synthesis.scripts.library import between, find_script
 from poise.baselines.motion.synthesis.scripts.printer import sequence_text
 from poise.baselines.motion.synthesis.scripts.table import to_csv
 from poise.configs.errors import ConfigError, shown
-from poise.configs.files import write_atomic
 from poise.configs.reading import read_yaml
 from poise.configs.schema import build
 from poise.envs.robots.robot import load_robot
-from poise.training.motion.following.scripts import load_clips, open_synthesis, write_robot_motion
+from poise.training.motion.following.scripts import load_clips, open_synthesis, write_motion
 from poise.training.pictures.motion_report.graph_chart import graph_pictures
 from poise.training.pictures.motion_report.page import check_page, write_page
 from poise.training.pictures.motion_report.performance import write_synthesis
@@ -156,16 +152,8 @@ def synth(
         check_page(report)
     tree = between(find_script(script), start, goal)
     synthesis = open_synthesis(graph, robot, kind, least, tree)
-    begin = time.monotonic()
-    clip, record = synthesis.make(tree)
-    if robot is None:
-        write_bvh(clip, out)
-    else:
-        write_robot_motion(clip, load_robot(robot), out, tree.source)
-    record["seconds"] = round(time.monotonic() - begin, 3)
-    text = json.dumps(record, indent=1, ensure_ascii=False)
-    write_atomic(out.with_suffix(".plan.json"), text + "\n")
-    print(f"{clip.duration:.1f} s, made in {record['seconds']:.1f} s")
+    record = write_motion(synthesis, tree, robot, out)
+    print(f"{record['duration']:.1f} s, made in {record['seconds']:.1f} s")
     print(out)
     if report is not None:
         write_synthesis(report, record, out, robot)

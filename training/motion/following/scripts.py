@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from poise.baselines.balance.references.motion import motions_with_steps
 from poise.baselines.balance.references.robot_clip import write_robot_clip
@@ -19,6 +22,7 @@ from poise.baselines.motion.synthesis.robot_joins import RobotJoins
 from poise.baselines.motion.synthesis.scripts.tree import Script, clip_names
 from poise.baselines.motion.synthesis.synthesis import Synthesis
 from poise.configs.errors import ConfigError
+from poise.configs.files import write_atomic
 from poise.configs.reading import is_file
 from poise.configs.schema import build
 from poise.envs.robots.robot import Robot, load_robot
@@ -101,6 +105,26 @@ def _beside(file: str, graph_file: Path) -> str:
     """A clip's file, looked for beside the graph's file too."""
     beside = graph_file.parent / file
     return str(beside) if Path(file).suffix and not is_file(file) and is_file(beside) else file
+
+
+def write_motion(
+    synthesis: Synthesis, script: Script, robot: str | None, out: Path
+) -> dict[str, Any]:
+    """Make the motion of a script, and write it with the record of every choice beside it.
+
+    Returns the record, with the `duration` of the motion and the `seconds` that it took [s]. Raises
+    ConfigError and PoiseError as `Synthesis.make` and `robot_clip_of`.
+    """
+    begin = time.monotonic()
+    clip, record = synthesis.make(script)
+    if robot is None:
+        write_bvh(clip, out)
+    else:
+        write_robot_motion(clip, load_robot(robot), out, script.source)
+    record["seconds"] = round(time.monotonic() - begin, 3)
+    text = json.dumps(record, indent=1, ensure_ascii=False)
+    write_atomic(out.with_suffix(".plan.json"), text + "\n")
+    return record
 
 
 def write_robot_motion(clip: Clip, robot: Robot, out: Path, source: str) -> None:

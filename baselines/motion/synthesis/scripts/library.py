@@ -25,6 +25,11 @@ def find_script(script: str) -> Script:
     return read_script(script) if script.endswith(".motion") else parse(script)
 
 
+def names_script(text: str) -> bool:
+    """Whether a name of a motion is rather that of a script, or a script: a file, or an arrow."""
+    return text.endswith(".motion") or "->" in text or text in packaged_scripts()
+
+
 def between(script: Script, start: str | None, goal: str | None) -> Script:
     """The script from one posture to another, as if it began and ended with <NAME>."""
     at = script.sequence.overlays[0].terms[0].at

@@ -106,6 +106,11 @@ def test_a_definition_sees_those_before_it_alone() -> None:
     assert wanted(record) == ["humanoid_stand", "humanoid_squat"]
 
 
+def test_quoted_names_are_defined_apart_from_bare_ones() -> None:
+    _, record = make('"сесть" = squat -> stand; сесть = punch; "сесть" -> сесть')
+    assert [name.split("_")[-1] for name in wanted(record)] == ["squat", "stand", "punch"]
+
+
 def test_modifiers_are_what_clips_do() -> None:
     made, record = make("squat[1:3]@0.5 mirrored")
     own = clips()["humanoid_squat"].cut(1.0, 3.0).at_speed(0.5).mirrored()

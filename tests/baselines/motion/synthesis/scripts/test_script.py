@@ -8,6 +8,7 @@ import numpy as np
 import pyparsing as pp
 import pytest
 
+from poise.baselines.motion.synthesis.scripts.library import find_script
 from poise.baselines.motion.synthesis.scripts.parser import parse, read_script
 from poise.baselines.motion.synthesis.scripts.printer import text_of
 from poise.baselines.motion.synthesis.scripts.table import (
@@ -42,6 +43,15 @@ def test_the_dissertation_s_example_as_it_stands() -> None:
         ['"бег"', '"красться"', '"лечь"', '"идти"'],
         ["", '"достать оружие"', "", '"убрать оружие"'],
     ]
+
+
+def test_the_packaged_script_of_it_ends_with_the_line_unchanged() -> None:
+    script = find_script("semakin04")
+    assert script.text.rstrip().endswith("\n" + SEED)
+    assert script.sequence == parse(SEED).sequence
+    assert {define.name for define in script.defines if define.quoted} == set(
+        clip_names(parse(SEED))
+    )
 
 
 def test_all_that_the_grammar_has() -> None:
@@ -192,6 +202,8 @@ WRONG = [
     ("x = a -> b", 1, 11, "after the definition of 'x' \";\" is missing, found the end (choices: "
      f";, ->, |, {MODIFIERS})"),
     ("x = a;\nx = b;\nx", 2, 1, "'x' is defined twice"),
+    ('"x" = a;\nx = b;\n"x" = c;\nx', 3, 1, "'x' is defined twice"),
+    ('"" = a;\na', 1, 1, "a name is empty"),
     ("x = ;\nx", 1, 5, f'after "=" a motion is missing, found ";" (choices: {MOTIONS})'),
     ("x = a;", 1, 7, f'after ";" a motion is missing (choices: {MOTIONS})'),
     ("a * 1e999", 1, 5, "must be a whole number from 1 to 100, not inf"),
