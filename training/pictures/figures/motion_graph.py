@@ -10,7 +10,8 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 
 from poise.baselines.motion.graphs.motion_graph import MotionGraph
 
-from .style import BLUE, GREY, INK, PALE, saved_figure
+from .palette import BLUE, GREY, INK, PALE
+from .style import saved_figure
 
 LABEL = 17  # characters of a clip's name
 REASONS = {"K": "////", "other": "....", "never": "xxxx"}  # by their first word; else a turn

@@ -13,7 +13,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_file
 from poise.envs.viewing.quantities import PUSH, SUPPORT
-from poise.training.pictures.report.palette import CARDS, variables
+from poise.training.pictures.figures.palette import CARDS, variables
 
 
 class Picture(NamedTuple):

@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 from numpy.typing import ArrayLike
 
 from poise.training.benchmarking.diagnosis.words import towards
-from poise.training.pictures.figures.style import MANY
+from poise.training.pictures.figures.palette import SERIES as MANY
 
 COLOURS = len(MANY)  # classes s0, s1, … of the style sheet
 DASHES = ("", "7 3", "2 3")  # of the first eight series, the next eight, …
