@@ -142,7 +142,8 @@ def test_commands_parse(block: Block, parsed: list[str]) -> None:
 @pytest.mark.parametrize(("page", "command"), inline(), ids=lambda value: value)
 def test_commands_of_sentences_parse(page: str, command: str, parsed: list[str]) -> None:
     """Placeholders get a value; of `a|b|c` the first is taken; `--out` may be left out."""
-    words = [PLACES.get(word, word) for word in re.sub(r"(\\\|\w+)+", "", command).split()[1:]]
+    text = re.sub(r"(\\\|\w+)+", "", command).replace("\\|", "|")
+    words = [PLACES.get(word, word) for word in shlex.split(text)[1:]]
     words = [word for word in words if word]
     if words[:1] == ["policies"] and len(words) > 1:  # that one's own parser is not replaced
         assert words[1] == "check", page

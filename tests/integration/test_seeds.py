@@ -50,7 +50,7 @@ def rows() -> list[Row]:
 
 def commands(document: str) -> list[tuple[str, int]]:
     """Of a document's rows: each once, with its exit code."""
-    text = "\n".join(row.command for row in rows() if row.document == document)
+    text = "\n".join(row.command for row in rows() if row.document == document).replace("\\|", "|")
     return list({words: int(code or 0) for words, code in COMMAND.findall(text)}.items())
 
 

@@ -15,6 +15,7 @@ from poise.envs.physics.body_points import (
     standing_frame,
     update_point,
 )
+from poise.envs.physics.legs import standing_data
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
@@ -26,8 +27,11 @@ class PositionBlock(Block):
     """A position task in SI units. Write `reference` to move the place."""
 
     point: BodyPoint
-    reference: np.ndarray  # (3, 3) x_ref, ẋ_ref, ẍ_ref [m, s], heading frame or world
-    turns: bool  # true: the reference is in the heading frame
+    reference: np.ndarray  # (3, 3) x_ref, ẋ_ref, ẍ_ref [m, s], in the task's frame
+    turns: bool  # true: the reference turns with the heading
+    about_com: bool  # true: from the CoM, else from the soles' mean or the world's origin
+    mass: float  # of the robot [kg]
+    gravity: float  # [m/s²]
     k: float  # [1/s²]
     d: float  # [1/s]
     weight: float  # per (m/s²)²
@@ -43,10 +47,18 @@ def fill_position(t: TaskTick[PositionBlock]):
     if o.turns:
         ox, oy, oz = s.origin[0], s.origin[1], s.origin[2]
         cos, sin = s.heading[0], s.heading[1]
+    if o.about_com:
+        ox, oy, oz = s.com[0], s.com[1], s.com[2]
     for a in range(3):
         rows.b[a] = -o.k * point.position[a] - o.d * point.J_v[a] - point.Jdot_v[a]
         rows.weights[a] = o.weight
         copy_into(point.J[a], rows.A[a])
+        if o.about_com:
+            rows.b[a] += o.d * s.com_vel[a] + s.A_bias[a] / o.mass
+            for j in range(len(s.qvel)):
+                rows.A[a, j] -= s.A[a, j] / o.mass
+    if o.about_com:
+        rows.b[2] -= o.gravity
     x, y = placed(ox, oy, cos, sin, reference[0, 0], reference[0, 1])
     vx, vy = placed(0.0, 0.0, cos, sin, reference[1, 0], reference[1, 1])
     ax, ay = placed(0.0, 0.0, cos, sin, reference[2, 0], reference[2, 1])
@@ -60,8 +72,9 @@ class Position(Task[PositionBlock]):
     """J v̇ + J̇ v = ẍ_ref + k (x_ref − x) + d (ẋ_ref − ẋ): a point of a body keeps to a place.
 
     k is `stiffness` ω², d = 2 ζ √k. x_ref is in the heading frame, whose origin is the mean of the
-    soles, or with `frame: world` in the world. Left out, it is where the point is when the robot
-    stands. The heading frame is taken to be at rest.
+    soles, or with `frame: world` in the world. With `frame: com` x is from the CoM, along the
+    heading, and J is J − A_P/m: the head over the CoM of [Zhao]. Left out, x_ref is where the point
+    is when the robot stands. The heading is taken to be at rest.
     """
 
     size: ClassVar[int] = 3
@@ -71,7 +84,7 @@ class Position(Task[PositionBlock]):
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: in the body's axes [m]
     kind: Literal["position"] = "position"
     place: tuple[float, float, float] | None = None  #: x_ref in h
-    frame: Literal["heading", "world"] = "heading"  #: what `place` is relative to
+    frame: Literal["heading", "world", "com"] = "heading"  #: what `place` is relative to
     weight: float = field(default=1.0, metadata={"min": 0.0})  #: per g²
     stiffness: float = field(default=20.0, metadata={"min": 0.0})  #: k in ω²
     damping_ratio: float = field(default=1.0, metadata={"min": 0.0})  #: ζ
@@ -81,11 +94,14 @@ class Position(Task[PositionBlock]):
         units, point = robot.units, body_point(robot, self.body, self.point)
         k, d = spring(units, self.stiffness, self.damping_ratio)
         place = standing_frame(robot, point)[0]
+        if self.frame == "com":
+            place = place - standing_data(robot).subtree_com[robot.root_body_id]
         if self.place is not None:
             place = units.height * np.array(self.place)
         return PositionBlock(
             point=point, reference=np.array([place, np.zeros(3), np.zeros(3)]),
-            turns=self.frame == "heading", k=k, d=d, weight=float(self.weight / units.gravity**2),
+            turns=self.frame != "world", about_com=self.frame == "com", mass=robot.mass,
+            gravity=units.gravity, k=k, d=d, weight=float(self.weight / units.gravity**2),
         )  # fmt: skip
 
     def rows(self, state: RobotState, block: PositionBlock) -> Rows:
@@ -95,8 +111,13 @@ class Position(Task[PositionBlock]):
         if block.turns:
             cos, sin = state.heading
             turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-            place, velocity, accel = state.origin + turn @ place, turn @ velocity, turn @ accel
-        desired = (
-            accel + block.k * (place - motion.position) + block.d * (velocity - motion.J_v[:3])
-        )
-        return Rows(motion.J[:3], desired - motion.Jdot_v[:3], np.full(3, block.weight))
+            place, velocity, accel = turn @ place, turn @ velocity, turn @ accel
+        x, J, J_v, Jdot_v = motion.position, motion.J[:3], motion.J_v[:3], motion.Jdot_v[:3]
+        if block.about_com:
+            m = block.mass
+            x, J, J_v = x - state.com, J - state.A[:3] / m, J_v - state.com_vel
+            Jdot_v = Jdot_v - state.Adot_v[:3] / m
+        elif block.turns:
+            x = x - state.origin
+        desired = accel + block.k * (place - x) + block.d * (velocity - J_v)
+        return Rows(J, desired - Jdot_v, np.full(3, block.weight))

@@ -22,25 +22,30 @@ def bound(**gains):
     return bind_tasks({"hand": Position(**HAND, **gains)}, ROBOT)["hand"]
 
 
-def test_standing_is_what_it_wants():
+@pytest.mark.parametrize("frame", ["heading", "com"])
+def test_standing_is_what_it_wants(frame):
     """At rest in the standing posture nothing is asked for; the soles stand 1e-9 m below z = 0."""
-    np.testing.assert_allclose(filled(bound(), Simulation(ROBOT).state).b, 0.0, atol=1e-6)
+    rows = filled(bound(frame=frame), Simulation(ROBOT).state)
+    np.testing.assert_allclose(rows.b, 0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize("frame", ["heading", "world"])
+@pytest.mark.parametrize("frame", ["heading", "world", "com"])
 def test_the_reference_is_of_its_frame(frame):
     """k times the way to a place, d times the velocity, and the acceleration, all turned alike."""
     state, height, ω = generic_state().state, ROBOT.height_com, ROBOT.omega
     task = bound(frame=frame, place=(0.3, -0.2, 1.1), stiffness=9.0, damping_ratio=0.5)
     task.block.reference[1:] = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
-    cos, sin = state.heading if frame == "heading" else (1.0, 0.0)
+    cos, sin = state.heading if frame != "world" else (1.0, 0.0)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    origin = state.origin if frame == "heading" else np.zeros(3)
+    origin = {"heading": state.origin, "world": np.zeros(3), "com": state.com}[frame]
+    still = float(frame == "com")  # the frame moves with the CoM
     motion, k, d = point_motion(state, task.block.point), 9.0 * ω**2, 3.0 * ω
-    wanted = turn @ [4.0, 5.0, 6.0] + d * (turn @ [1.0, 2.0, 3.0] - motion.J_v[:3])
+    speed = motion.J_v[:3] - still * state.com_vel
+    wanted = turn @ [4.0, 5.0, 6.0] + d * (turn @ [1.0, 2.0, 3.0] - speed)
     wanted += k * (origin + height * turn @ [0.3, -0.2, 1.1] - motion.position)
     rows = filled(task, state)
-    np.testing.assert_allclose(rows.b, wanted - motion.Jdot_v[:3], atol=1e-9 * k)
+    bias = motion.Jdot_v[:3] - still * state.Adot_v[:3] / state.mass
+    np.testing.assert_allclose(rows.b, wanted - bias, atol=1e-9 * k)
     np.testing.assert_allclose(rows.weights, 1.0 / ROBOT.units.gravity**2)
 
 

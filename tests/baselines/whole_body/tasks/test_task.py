@@ -46,8 +46,10 @@ def test_every_kind_has_an_example():
     assert set(EXAMPLES) == set(Task.kinds())
 
 
-@pytest.mark.parametrize("frame", ["heading", "world"])
-@pytest.mark.parametrize("kind", EXAMPLES)
+@pytest.mark.parametrize(
+    ("kind", "frame"),
+    [*((kind, frame) for kind in EXAMPLES for frame in ("heading", "world")), ("position", "com")],
+)
 def test_the_kernel_fills_the_rows_that_NumPy_has(kind, frame):
     """In generic states: 1e-9, relative."""
     task = bound(kind, frame=frame)
@@ -59,10 +61,12 @@ def test_the_kernel_fills_the_rows_that_NumPy_has(kind, frame):
             np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-9 * scale)
 
 
-@pytest.mark.parametrize("kind", EXAMPLES)
-def test_without_gains_the_rows_ask_for_no_acceleration(kind):
+@pytest.mark.parametrize(
+    "fields", [*({"kind": kind} for kind in EXAMPLES), {"kind": "position", "frame": "com"}]
+)
+def test_without_gains_the_rows_ask_for_no_acceleration(fields):
     """Then b = −Ȧ v: A v, the task's velocity, does not change along q̇ = v where A v̇ = b."""
-    task, state, h = bound(kind, stiffness=0.0, damping_ratio=0.0), flying(1), 1e-6
+    task, state, h = bound(**fields, stiffness=0.0, damping_ratio=0.0), flying(1), 1e-6
     change = []
     for sign in (-1.0, 1.0):
         qpos = state.qpos.copy()
