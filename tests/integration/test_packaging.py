@@ -19,6 +19,7 @@ import pytest
 import yaml
 
 import poise
+from poise.baselines.motion.clips.library import captured_clips, packaged_clips
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = {
@@ -65,6 +66,21 @@ def test_the_wheel_holds_exactly_the_tracked_files(tmp_path: Path) -> None:
     (wheel,) = tmp_path.glob("*.whl")
     content = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     assert content == {installed_name(path) for path in tracked}
+
+
+def test_no_captured_clip_is_in_the_repository() -> None:
+    """Every BVH file is one that `poise.training.motion.recording` makes, and no file of the
+    folder beside the repository, where captured ones are, is also in it."""
+    listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True,
+                             check=False).stdout  # fmt: skip
+    tracked = [Path(name) for name in listing.split("\0") if (ROOT / name).is_file()]
+    if not tracked:
+        pytest.skip("not a git checkout")
+    clips = sorted(path for path in tracked if path.suffix.lower() in (".bvh", ".amc", ".asf"))
+    assert clips == [Path(f"configs/clips/{name}.bvh") for name in packaged_clips()]
+    assert all(path.stem.startswith("humanoid_") for path in clips)
+    others = {path.read_bytes() for path in captured_clips().values()}
+    assert [path for path in clips if (ROOT / path).read_bytes() in others] == []
 
 
 def python_files(folder: str) -> Iterator[Path]:
