@@ -29,11 +29,13 @@ def middle(path: ElementTree.Element) -> np.ndarray:
 
 
 def groups(out: Inline, word: str = "series") -> Iterator[ElementTree.Element]:
-    """The groups of this class."""
+    """The groups of this class; of an empty one, all."""
     root = drawing(out.svg)
-    return (group for group in root.iter("g") if word in group.get("class", "").split())
+    return (g for g in root.iter("g") if not word or word in g.get("class", "").split())
 
 
-def marks(out: Inline) -> dict[str, ElementTree.Element]:
+def marks(out: Inline, word: str = "series") -> dict[str, ElementTree.Element]:
     """What a page tells of a mark → its path."""
-    return {group[0].text or "": group[-1] for group in groups(out) if group[0].tag == "title"}
+    return {
+        group[0].text or "": group[-1] for group in groups(out, word) if group[0].tag == "title"
+    }

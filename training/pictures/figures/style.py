@@ -15,6 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.transforms import IdentityTransform
 
 from poise.configs.files import write_atomic
 
@@ -132,13 +134,23 @@ def saved_figure(out: Out, width: float, height: float) -> Iterator[Figure]:
     write_atomic(out, buffer.getvalue())
 
 
-def sample(colour: str, line: object, marker: str = "") -> Markup:
-    """How a line looks, for a legend of a page; its name stands beside it."""
+def sample(colour: str, line: object = "", marker: Any = "") -> Markup:
+    """How a line with its marks looks, for a legend of a page; its name stands beside it."""
+    return _sample(Line2D([1, 15, 29], [6] * 3, color=colour, ls=line, lw=1.9,
+                          marker=marker, markevery=[1]))  # fmt: skip
+
+
+def area_sample(**look: Any) -> Markup:
+    """How an area of this look is filled, for a legend of a page."""
+    return _sample(Rectangle((5, 1), 20, 10, **look))
+
+
+def _sample(artist: Artist) -> Markup:
     out = Inline("", 30.0 / POINTS, "swatch")
     with saved_figure(out, 30.0, 12.0) as figure:
         figure.set_layout_engine("none")
-        figure.add_artist(Line2D([0.03, 0.5, 0.97], [0.5] * 3, color=colour, ls=line, lw=1.9,
-                                 marker=marker, markevery=[1]))  # fmt: skip
+        artist.set_transform(IdentityTransform())  # in points
+        figure.add_artist(artist)
     return out.svg
 
 

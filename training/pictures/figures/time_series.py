@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 from numpy.typing import ArrayLike
@@ -15,7 +16,7 @@ from poise.envs.viewing.quantities import CAPTURE_POINT, COM, COP, PUSH, Quantit
 
 from .page_svg import tag
 from .palette import GREY, INK, PALE, PURPLE, SERIES
-from .style import Out, headline, legend_below, look, saved_figure
+from .style import Out, area_sample, headline, legend_below, look, sample, saved_figure
 
 FAR = 0.3  # beyond the support, not shown [m]
 LINES: dict[str, tuple[Quantity, Any, float]] = {  # signal → what it is, its dashes and width
@@ -23,6 +24,8 @@ LINES: dict[str, tuple[Quantity, Any, float]] = {  # signal → what it is, its 
     "com": (COM, "-", 2.0),
     "cop": (COP, "-", 1.1),
 }
+SOLES: dict[str, Any] = {"fc": PALE, "alpha": 0.6, "ec": GREY, "lw": 0.8, "zorder": 0.1}
+SHADE: dict[str, Any] = {"color": PUSH.hexadecimal, "alpha": 0.35, "lw": 0}  # of pushes
 PANELS = {"angular_momentum": 2.2, "torque": 1.6}  # further signals → height of their panel
 AXES: dict[str, tuple[str, Any]] = {  # of the angular momentum → colour, dashes
     "forward": (SERIES[6], "-"), "left": (SERIES[7], (0, (5, 2))), "up": (PURPLE, (0, (2, 2))),
@@ -127,14 +130,29 @@ def trial_timeseries(
             else:
                 _over_support(ax, panels.index(panel), t, data)
                 ax.set_ylabel(f"{panel} [m]")
-            for start, duration in pushes:
-                ax.axvspan(start, min(start + duration, t[-1]), color=PUSH.hexadecimal, alpha=0.35,
-                           lw=0, label="push", gid=tag(tip="push"))  # fmt: skip
+            shade_pushes(ax, pushes, t[-1])
         axes[-1].set_xlabel("time [s]")
         axes[-1].set_xlim(t[0], t[-1])
         figure.align_ylabels()
         headline(figure, title)
         legend_below(figure)
+
+
+def signal_keys() -> dict[str, Markup]:
+    """name → look of what `trial_timeseries` draws, for a legend of a page."""
+    keys = {quantity.label: sample(quantity.hexadecimal, style)
+            for quantity, style, _ in LINES.values()}  # fmt: skip
+    keys |= {"support": area_sample(**SOLES), "push": area_sample(**SHADE)}
+    return keys | {f"L about {name}": sample(*look) for name, look in AXES.items()}
+
+
+def shade_pushes(ax: Axes, pushes: Sequence[tuple[float, float]], end: float) -> None:
+    """The time of each push, of (start, duration) [s], up to the end."""
+    for start, duration in pushes:
+        if start < end:
+            ax.axvspan(
+                start, min(start + duration, end), label="push", gid=tag(tip="push"), **SHADE
+            )
 
 
 def inside(ax: Axes, values: np.ndarray) -> np.ndarray:
@@ -147,8 +165,7 @@ def _over_support(ax: Axes, axis: int, t: np.ndarray, data: Mapping[str, np.ndar
     _limit_view(ax, axis, data)
     if "support" in data:
         low, high = np.clip(data["support"][:, axis], *ax.get_ylim()).T
-        ax.fill_between(t, low, high, fc=PALE, alpha=0.6, ec=GREY, lw=0.8, label="support",
-                        zorder=0.1)  # fmt: skip
+        ax.fill_between(t, low, high, label="support", **SOLES)
     for name, (quantity, style, width) in LINES.items():
         if name in data:
             ax.plot(t, inside(ax, data[name][:, axis]), ls=style, color=quantity.hexadecimal,

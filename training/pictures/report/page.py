@@ -15,12 +15,11 @@ from poise.baselines.allowance import allowing, named
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
-from poise.envs.viewing.quantities import PUSH, SUPPORT
 from poise.training.benchmarking.evaluation.tables import assisted
 from poise.training.benchmarking.results.read import Record, Results, load_results
 from poise.training.pictures.figures.palette import CARDS, variables
 from poise.training.pictures.figures.style import Inline
-from poise.training.pictures.figures.time_series import trial_timeseries
+from poise.training.pictures.figures.time_series import signal_keys, trial_timeseries
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
 from poise.training.running.terminal import print_paths
 
@@ -130,14 +129,13 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         curves=curves,
         factors=factors.factor_plots(results, order),
         cases=cases,
+        signal_keys=signal_keys(),
         notes=notes,
         facts=_facts(results),
         trials=_trials(results),
         summary_file=_summary_file(results),
         crowded=len(order) > CROWD,
         colours={scheme: variables(scheme) for scheme in CARDS},
-        push=PUSH.hexadecimal,
-        support=SUPPORT.hexadecimal,
     )  # fmt: skip
 
 
