@@ -124,7 +124,8 @@ def write_bvh(clip: Clip, path: str | Path, axes: FileAxes = Y_UP) -> None:
     with tempfile.TemporaryDirectory() as folder:
         part = Path(folder) / "clip.bvh"
         from_clip.write(part)
-        write_atomic(path, part.read_bytes())
+        # the sign of a zero is that of rounding, which differs between processors
+        write_atomic(path, part.read_bytes().replace(b"-0.000000", b"0.000000"))
 
 
 def depth_first(clip: Clip) -> Clip:
