@@ -19,7 +19,7 @@ from .draw import MOST_TRIALS, Draw, Part, Recovered, generator, start_seed
 STANDING = "standing"  # the motion, and the part, that J50 is first measured with
 PART = "motions"
 MARGIN = 0.1  # of a motion's duration, at its begin and at its end, in which no push begins
-CLIPS = ("stand", "squat", "reach_down", "reach_up", "punch")
+CLIPS = ("stand", "squat", "reach_down", "reach_up", "punch", "wave")
 
 
 def label(name: str) -> str:
