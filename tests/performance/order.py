@@ -13,7 +13,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.training.pictures.figures.style import AMBER, legend_below, look, saved_figure
+from poise.training.pictures.figures.palette import AMBER
+from poise.training.pictures.figures.style import legend_below, look, saved_figure
 
 NAMES = ("momentum-qp", "macchietto09", "lqr-lip", "capture-point", "lip-mpc")
 PUSH = {"impulse": 16.0, "direction": 180.0, "duration": 0.1, "start": 0.5, "body": "torso"}

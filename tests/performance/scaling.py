@@ -29,7 +29,8 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
-from poise.training.pictures.figures.style import BLUE, GREEN, GREY, ORANGE, saved_figure
+from poise.training.pictures.figures.palette import BLUE, GREEN, GREY, ORANGE
+from poise.training.pictures.figures.style import saved_figure
 from tests.performance.scaling_robots import make_robot, with_soles
 
 SIZES = ((3, 0), (6, 0), (6, 6), (6, 12), (6, 18), (6, 24), (6, 30), (6, 36), (6, 42))

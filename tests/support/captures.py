@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from poise.baselines.motion.clips.bvh import write_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.rotations import from_scipy
 from poise.baselines.motion.clips.skeleton import Skeleton
 from tests.support.conventions import CONVENTIONS
 
 GRAVITY = 9.81
-Path = Callable[[np.ndarray], np.ndarray]  # times (n,) → x, y, yaw (n, 3)
+Course = Callable[[np.ndarray], np.ndarray]  # times (n,) → x, y, yaw (n, 3)
 
 
 class Capture(NamedTuple):
@@ -28,7 +31,7 @@ class Capture(NamedTuple):
     leg: float
     rate: float
     length: float
-    path: Path
+    path: Course
     stances: tuple[list[tuple[float, float]], list[tuple[float, float]]]
     low: Callable[[np.ndarray], np.ndarray]
 
@@ -39,7 +42,7 @@ def _gait(length: float, period: float, duty: float) -> tuple[list[tuple[float, 
     return tuple([(k * period, (k + duty) * period) for k in counts + phase] for phase in (0, 0.5))
 
 
-def _way(vx: float, vy: float = 0.0, turn: float = 0.0) -> Path:
+def _way(vx: float, vy: float = 0.0, turn: float = 0.0) -> Course:
     """Straight, or on a circle, at a speed [m/s] and a rate of turning [rad/s]."""
 
     def path(t: np.ndarray) -> np.ndarray:
@@ -52,7 +55,7 @@ def _way(vx: float, vy: float = 0.0, turn: float = 0.0) -> Path:
     return path
 
 
-def _leap(ahead: float, turn: float, start: float, flight: float) -> Path:
+def _leap(ahead: float, turn: float, start: float, flight: float) -> Course:
     def path(t: np.ndarray) -> np.ndarray:
         u = np.clip((t - start) / flight, 0.0, 1.0)
         return np.column_stack([ahead * u, 0.0 * u, turn * u])
@@ -213,3 +216,8 @@ def _skeleton(
         np.array([joint for joint, _ in ends]), np.array([end for _, end in ends]),
         ("ZYX",) * len(joints),
     )  # fmt: skip
+
+
+if __name__ == "__main__":  # python -m tests.support.captures FOLDER: the files
+    for capture in CAPTURES:
+        write_bvh(make(capture)[0], Path(sys.argv[1]) / f"{capture}.bvh")

@@ -1,8 +1,12 @@
-"""Small BVH files for tests, and ways to damage one."""
+"""Small BVH files for tests, and ways to damage one; the packaged clips."""
 
 from __future__ import annotations
 
 import numpy as np
+
+from poise.baselines.motion.clips.bvh import read_bvh
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.library import find_bvh, packaged_clips
 
 LEGS = ("UpLeg", "Leg", "Foot")
 FRAMES = 12
@@ -71,3 +75,9 @@ def mutated(text: str, rng: np.random.Generator) -> str:
             lines = (text[:at] + chr(int(rng.integers(1, 300))) + text[at + 1 :]).split("\n")
         text = "\n".join(lines)
     return text
+
+
+def matching_clips() -> list[Clip]:
+    """The packaged clips in the order of their names; the walk, number 7, goes at 0.4 m/s."""
+    clips = [read_bvh(find_bvh(name)).clip for name in packaged_clips()]
+    return [clip.at_speed(4.0) if clip.name == "humanoid_walk" else clip for clip in clips]

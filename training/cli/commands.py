@@ -135,7 +135,7 @@ def benchmark(
     controllers: Names = (),
     /,
     *,
-    out: Path,
+    out: Path | None = None,
     suite: str = "standard",
     robot: str = "humanoid",
     seed: int = 0,
@@ -145,6 +145,7 @@ def benchmark(
     realism: str | None = None,
     overwrite: Switch = False,
     report: bool = True,
+    submit: Path | None = None,
     json: Json = False,
     allow: Allow = (),
 ) -> int:
@@ -158,7 +159,7 @@ def benchmark(
         controllers: names as poise evaluate takes them, also my_file.py:Class (one that a file or
             a folder names needs --allow my_file.py:Class besides); all packaged ones that can rest
             if not given.
-        out: folder to write to.
+        out: folder to write to; needed, but with --submit.
         suite: quick (minutes), standard (an hour), full (many hours), those of poise evaluate, or a
             .yaml file.
         robot: a packaged robot or a .yaml description.
@@ -170,7 +171,18 @@ def benchmark(
         realism: ideal, lab, field or a .yaml file of a level; that of the suite if not given.
         overwrite: replace what the folder holds.
         report: write report.html at the end, as poise report does.
+        submit: play nothing, but check this finished folder and pack it, without any code, into a
+            .zip beside it: the issue form for results takes that.
     """
+    if submit is not None:
+        from poise.training.benchmarking.results.submission import pack_submission
+
+        print(pack_submission(submit))
+        return 0
+    if out is None:
+        from poise.configs.errors import ConfigError
+
+        raise ConfigError("name a folder to write to", source="poise benchmark", field="--out")
     from poise.envs.viewing.gl import choose_gl_backend
 
     choose_gl_backend()

@@ -20,7 +20,7 @@ from poise.training.benchmarking.statistics.bootstrap import (
     EnvelopeFit,
     mean_over_directions,
 )
-from poise.training.benchmarking.statistics.fits import Bound, fit_logistic
+from poise.training.benchmarking.statistics.fits import fit_logistic
 from poise.training.benchmarking.suites.plan import Plan
 from poise.training.benchmarking.trials.step_limits import (
     COUNTS,
@@ -30,8 +30,10 @@ from poise.training.benchmarking.trials.step_limits import (
     line_name,
 )
 from poise.training.learning.checkpoints import KEPT
-from poise.training.pictures.figures.envelope import Band, Curve, fall_probability, polar_envelope
+from poise.training.pictures.figures.envelope import Curve, polar_envelope
 from poise.training.pictures.figures.learning_curve import Point, learning_curve
+from poise.training.pictures.figures.rates import fall_probability
+from poise.training.pictures.figures.series import SIDES, Series, series
 from poise.training.running.files import CURVE, PLOTS
 
 FEWEST = 5  # trials of a direction whose J50 is drawn
@@ -67,15 +69,14 @@ def draw_plots(
         around = limits.around(2.0)
         limit = [limits.ankle(d, duration) for d in around]
         lines = _step_lines(steps or {}, fine, duration)
-        polar_envelope(polar, _bands(fits), ankle_limit=(around, limit), step_limits=lines,
-                       bounds=_bounds(fits), note=_left_out(fits))  # fmt: skip
+        polar_envelope(polar, _series(fits), ankle_limit=(around, limit), step_limits=lines,
+                       note=_left_out(fits))  # fmt: skip
     else:
         fits = {name: sectors(own) for name, own in shown.items()}
         fraction = {name: fractions(own) for name, own in shown.items()}
         unit = f"of the {limits.scale}"
         title = f"Recovered fraction of the {limits.scale} by push direction"
-        polar_envelope(polar, _bands(fits), title=title, unit=unit, bounds=_bounds(fits),
-                       note=_left_out(fits))  # fmt: skip
+        polar_envelope(polar, _series(fits), title=title, unit=unit, note=_left_out(fits))
         label = f"push impulse, as a fraction of the {limits.scale}"
     fall_probability(
         fall,
@@ -123,22 +124,16 @@ def _step_lines(
     }
 
 
-def _bands(fits: Mapping[str, EnvelopeFit]) -> dict[str, Band]:
-    """Direction, J50 and its interval, as `polar_envelope` takes them; NaN of too few trials."""
-    return {
-        name: (
-            list(fit.directions),
-            [f.fit.j50 if _enough(f) else np.nan for f in fit.fits],
-            [f.j50_ci.low if _enough(f) else np.nan for f in fit.fits],
-            [f.j50_ci.high if _enough(f) else np.nan for f in fit.fits],
-        )
-        for name, fit in fits.items()
-    }
-
-
-def _bounds(fits: Mapping[str, EnvelopeFit]) -> dict[str, list[Bound | None]]:
-    """Which J50s are only bounds."""
-    return {name: [f.fit.bound for f in fit.fits] for name, fit in fits.items()}
+def _series(fits: Mapping[str, EnvelopeFit]) -> list[Series]:
+    """Direction, J50 and its interval, and whether it is a bound; NaN of too few trials."""
+    nothing = (np.nan,) * 3
+    return [
+        series(name, index, [
+            (direction, *((f.fit.j50, *f.j50_ci) if _enough(f) else nothing), SIDES[f.fit.bound])
+            for direction, f in zip(fit.directions, fit.fits, strict=True)
+        ])
+        for index, (name, fit) in enumerate(fits.items())
+    ]  # fmt: skip
 
 
 def _left_out(fits: Mapping[str, EnvelopeFit]) -> str:

@@ -88,6 +88,5 @@ def replay(
 def _draw(signals: Signals, path: Path, trial: Trial, title: str) -> None:
     from poise.training.pictures.figures.time_series import trial_timeseries
 
-    shown = {k: v for k, v in signals.columns.items() if k != "angular_momentum"}
     pushes = [(push.start, push.duration) for push in trial.pushes]
-    trial_timeseries(path, signals.t, shown, pushes=pushes, title=title)
+    trial_timeseries(path, signals.t, signals.columns, pushes=pushes, title=title)

@@ -16,9 +16,8 @@ from poise.configs.reading import read_yaml
 from poise.configs.schema import build
 from poise.envs.robots.robot import load_robot
 from poise.training.motion.following.scripts import load_clips, open_synthesis, write_motion
-from poise.training.pictures.motion_report.graph_chart import graph_pictures
 from poise.training.pictures.motion_report.page import check_page, write_page
-from poise.training.pictures.motion_report.performance import write_synthesis
+from poise.training.pictures.motion_report.performance import graph_pictures, write_synthesis
 from poise.training.running.options.arguments import Switch
 from poise.training.running.terminal import terminal
 

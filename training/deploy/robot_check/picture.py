@@ -12,7 +12,8 @@ from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.renderer import SceneRenderer
-from poise.training.pictures.figures.style import BLUE, GREEN, INK, PALE, legend_below, saved_figure
+from poise.training.pictures.figures.palette import BLUE, GREEN, INK, PALE
+from poise.training.pictures.figures.style import legend_below, saved_figure
 
 SIZE = (420, 620)  # of a view [pixels]
 VIEWS = {"in front": (0.0, 6.0), "left": (90.0, 6.0), "obliquely": (40.0, 30.0)}  # [deg]

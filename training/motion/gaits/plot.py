@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from poise.training.pictures.figures.style import GREY, legend_below, look, saved_figure
+from poise.training.pictures.figures.palette import GREY
+from poise.training.pictures.figures.style import legend_below, look, saved_figure
 
 from .human import POINTS, KneeMoment
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from matplotlib.ticker import EngFormatter
 
-from .style import GREY, legend_below, look, saved_figure
+from .palette import GREY
+from .style import headline, legend_below, look, saved_figure
 
 DASHES = ((0, (6, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)), (0, (3, 4)))  # of what does not learn
 Point = tuple[int, float, float, float]  # environment steps; J50, its interval's ends
@@ -49,10 +50,6 @@ def learning_curve(
         ax.xaxis.set_major_formatter(EngFormatter(sep=""))
         ax.set_xlabel("environment steps")
         ax.set_ylabel(f"mean J50 [{unit}]")
-        figure.suptitle("Recovered impulse while it learns", x=0.01, ha="left")
-        ax.set_title(
-            "J50: half of the pushes are recovered. Band: 95 % interval."
-            + (f"\n{note}" if note else ""),
-            color=GREY, size=10, weight="normal",
-        )  # fmt: skip
+        said = "J50: half of the pushes are recovered. Band: 95 % interval."
+        headline(figure, "Recovered impulse while it learns", said, note)
         legend_below(figure)

@@ -20,7 +20,7 @@ from poise.envs.viewing.overlays import BAR, SPHERE, Mark, draw
 from poise.envs.viewing.renderer import LOOK_AT
 
 from .encoder import FORMS, Encoder
-from .style import ORANGE
+from .palette import ORANGE
 
 RATE = 25.0  # [1/s] of the frames
 BESIDE = 1.0  # to the robot's left, over the CoM height

@@ -9,20 +9,19 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib
+from markupsafe import Markup
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.transforms import IdentityTransform
 
 from poise.configs.files import write_atomic
 
-# Okabe and Ito's palette: told apart with any colour vision. Line and marker repeat what the colour
-# says, for prints in grey.
-BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
-AMBER = "#E69F00"
-SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY)  # in the order in which they are given
-MANY = (*SERIES, "#6250B5", "#B3263E")  # where there is room for more: violet and crimson
-INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
+from .page_svg import POINTS, PageCanvas
+from .palette import GREY, INK, PALE, SERIES
 
 RC: dict[Any, Any] = {
     "font.family": "sans-serif",
@@ -66,6 +65,9 @@ RC: dict[Any, Any] = {
 }
 
 
+INLINE = 5.4  # width of a picture in a page, unless it says otherwise [in]
+
+
 class Look(NamedTuple):
     """Colour, line and marker of one series."""
 
@@ -77,38 +79,100 @@ class Look(NamedTuple):
 def look(index: int) -> Look:
     """Look of the series number `index`; the first is the baseline.
 
-    Colours repeat after six, with other markers; after 36 everything repeats.
+    Colours repeat after eight, with other markers; after 48 everything repeats.
     """
     lines = ("-", "-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)), ":")
     markers = ("o", "s", "^", "D", "v", "P")
     k, turn = index % len(SERIES), index // len(SERIES)
-    other = (k + turn) % len(SERIES)
+    other = (k + turn) % len(lines)
     return Look(SERIES[k], lines[other], markers[other])  # type: ignore[arg-type]
 
 
-@contextmanager
-def saved_figure(path: str | Path, width: float, height: float) -> Iterator[Figure]:
-    """A figure to draw on, [in], saved as a PNG when the block ends well.
+class Inline:
+    """Where a picture goes that is part of a page; title and legend are then the page's.
 
-    The file appears complete or not at all, and the same drawing gives the same bytes.
+    Args:
+        label: what the picture shows, for those who do not see it; empty if the text beside it
+            says so.
+        width: of the picture [in]; its height keeps the proportion, its letters their size.
+        class_: of the svg element.
+
+    Attributes:
+        svg: the picture, once it is drawn.
+    """
+
+    def __init__(self, label: str = "", width: float = INLINE, class_: str = "plot"):
+        self.label, self.width, self.class_ = label, width, class_
+        self.svg = Markup()
+
+
+Out = str | Path | Inline  # a PNG file, or a part of a page
+
+
+@contextmanager
+def saved_figure(out: Out, width: float, height: float) -> Iterator[Figure]:
+    """A figure to draw on, [in], saved as a PNG or put into a page when the block ends well.
+
+    A file appears complete or not at all, and the same drawing gives the same bytes.
 
     Raises:
         PoiseError: the file cannot be written.
     """
     with matplotlib.rc_context(RC):
+        if isinstance(out, Inline):
+            size = out.width, out.width / width * height
+            figure = Figure(figsize=size, dpi=POINTS, layout="constrained")
+            page = PageCanvas(figure)
+            yield figure
+            out.svg = page.svg(out.label, out.class_)
+            return
         figure = Figure(figsize=(width, height), dpi=160, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         yield figure
         buffer = BytesIO()
         canvas.print_png(buffer, metadata={"Software": "poise"})
-    write_atomic(path, buffer.getvalue())
+    write_atomic(out, buffer.getvalue())
+
+
+def sample(colour: str, line: object = "", marker: Any = "") -> Markup:
+    """How a line with its marks looks, for a legend of a page; its name stands beside it."""
+    return _sample(Line2D([1, 15, 29], [6] * 3, color=colour, ls=line, lw=1.9,
+                          marker=marker, markevery=[1]))  # fmt: skip
+
+
+def area_sample(**look: Any) -> Markup:
+    """How an area of this look is filled, for a legend of a page."""
+    return _sample(Rectangle((5, 1), 20, 10, **look))
+
+
+def _sample(artist: Artist) -> Markup:
+    out = Inline("", 30.0 / POINTS, "swatch")
+    with saved_figure(out, 30.0, 12.0) as figure:
+        figure.set_layout_engine("none")
+        artist.set_transform(IdentityTransform())  # in points
+        figure.add_artist(artist)
+    return out.svg
+
+
+def headline(figure: Figure, title: str, *notes: str, centred: bool = False) -> None:
+    """The title of a picture with notes below it; empty ones do not count. A page has its own."""
+    if isinstance(figure.canvas, PageCanvas):
+        return
+    if not any(notes):
+        figure.axes[0].set_title(title)
+        return
+    figure.suptitle(title, **({} if centred else {"x": 0.01, "ha": "left"}))
+    figure.axes[0].set_title("\n".join(filter(None, notes)), loc="center" if centred else "left",
+                             color=GREY, size=10, weight="normal")  # fmt: skip
 
 
 def legend_below(figure: Figure, axes: Axes | None = None, columns: int = 3) -> None:
     """One legend under all axes, never over the data, in as many columns as fit the width.
 
-    It lists the entries of `axes`, or of all axes, each label once.
+    It lists the entries of `axes`, or of all axes, each label once. A page has its own.
     """
+    if isinstance(figure.canvas, PageCanvas):
+        return
     handles: dict[str, Artist] = {}
     for ax in [axes] if axes is not None else figure.axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
-from markupsafe import Markup
+from matplotlib.axes import Axes
 
 from poise.baselines.motion.feasibility.check import Feasibility
-from poise.training.pictures.report.svg import Chart, Svg, ticks
+from poise.envs.viewing.quantities import COM, COP
+from poise.training.pictures.figures.page_svg import tag
+from poise.training.pictures.figures.palette import SERIES
+from poise.training.pictures.figures.style import Inline, area_sample, sample, saved_figure
+from poise.training.pictures.figures.time_series import SOLES, shade_pushes
 
 from .page import Picture
 from .trace import Trace
 
-WIDTH, LEFT, RIGHT, TOP = 440.0, 46.0, 432.0, 24.0
-PANEL, GAP = 110.0, 48.0
 CHANGE = 0.01  # [m] by which the reach of the soles changes from one sample to the next in a step
 OUTSIDE = 0.06  # [m] beyond the soles that is still shown
+ZMP: dict[str, Any] = {"color": COP.hexadecimal, "lw": 1.5}
+MEASURED: dict[str, Any] = {"color": COM.hexadecimal, "lw": 1.1}
 
 
 def zmp_picture(judged: Feasibility, trace: Trace | None = None) -> Picture:
@@ -27,10 +32,11 @@ def zmp_picture(judged: Feasibility, trace: Trace | None = None) -> Picture:
         caption += f"at least {least:.1f} cm inside."
     else:
         caption += f"outside for {outside.mean():.1%} of the time, by {-least:.1f} cm at most."
-    key = {"zmp": "ZMP of the motion", "support": "soles"}
+    key = {"ZMP of the motion": sample(COP.hexadecimal, "-")}
     if trace is not None:
         caption += " Measured is the centre of pressure under the soles as they stand."
-        key = {"zmp": key["zmp"], "measured": "measured", "support": "soles"}
+        key["measured"] = sample(COM.hexadecimal, "-")
+    key["soles"] = area_sample(**SOLES)
     return Picture("ZMP inside the soles", _zmp(judged, trace), caption, key=key)
 
 
@@ -44,69 +50,52 @@ def errors_picture(trace: Trace) -> Picture:
     return Picture("Errors while performed", _errors(trace), caption)
 
 
-def _zmp(judged: Feasibility, trace: Trace | None) -> Markup:
+def _zmp(judged: Feasibility, trace: Trace | None) -> Inline:
     middle = judged.support.mean(axis=0)
     reach, points = judged.reach - middle, judged.zmp - middle
     end = float(judged.times[-1])
-    svg = Svg(WIDTH, TOP + 2.0 * PANEL + GAP + 42.0, "ZMP of the motion inside the soles.")
-    for axis, title in enumerate(("forward [m]", "left [m]")):
-        top = TOP + axis * (PANEL + GAP)
-        low, high = (reach[:, side, axis] for side in range(2))
-        chart = Chart(svg, (LEFT, top, RIGHT, top + PANEL), (0.0, end),
-                      (low.min() - OUTSIDE, high.max() + OUTSIDE))  # fmt: skip
-        _band(chart, judged.times, low, high)
-        chart.y_axis(ticks(*chart.y_range, 5))
-        svg.text(LEFT, top - 8.0, title, "axis")
-        if trace is not None:
-            _pushes(chart, trace)
-            seen = trace.time <= end
-            svg.path(chart.x(trace.time[seen]), _inside(chart, trace.cop[seen, axis]),
-                     "line measured")  # fmt: skip
-        svg.path(chart.x(judged.times), _inside(chart, points[:, axis]), "line zmp")
-        chart.x_axis(ticks(0.0, end, 6), "g", "time [s]" if axis else "")
-    return svg.render()
+    out = Inline("ZMP of the motion inside the soles.")
+    with saved_figure(out, 7.2, 6.0) as figure:
+        axes = figure.subplots(2, sharex=True)
+        for axis, (ax, name) in enumerate(zip(axes, ("forward", "left"), strict=True)):
+            low, high = (reach[:, side, axis] for side in range(2))
+            ax.set(xlim=(0.0, end), ylim=(low.min() - OUTSIDE, high.max() + OUTSIDE),
+                   ylabel=f"{name} [m]")  # fmt: skip
+            _band(ax, judged.times, low, high)
+            if trace is not None:
+                shade_pushes(ax, trace.pushes, end)
+                seen = trace.time <= end
+                cop = np.clip(trace.cop[seen, axis], *ax.get_ylim())
+                ax.plot(trace.time[seen], cop, **MEASURED)
+            ax.plot(judged.times, np.clip(points[:, axis], *ax.get_ylim()), **ZMP)
+        axes[-1].set_xlabel("time [s]")
+        figure.align_ylabels()
+    return out
 
 
-def _errors(trace: Trace) -> Markup:
+def _errors(trace: Trace) -> Inline:
     panels = (
-        ("bodies [mm]", 1e3 * trace.bodies, "bodies"),
-        ("centre of mass [mm]", 1e3 * trace.com, "centre"),
-        ("joints [°]", np.degrees(trace.joints), "joints"),
+        ("bodies [mm]", 1e3 * trace.bodies),
+        ("centre of mass [mm]", 1e3 * trace.com),
+        ("joints [°]", np.degrees(trace.joints)),
     )
-    height = TOP + len(panels) * PANEL + (len(panels) - 1) * GAP + 42.0
-    svg = Svg(WIDTH, height, "Errors of bodies, centre of mass and joints over time.")
-    end = float(trace.time[-1])
-    for k, (title, values, class_) in enumerate(panels):
-        top = TOP + k * (PANEL + GAP)
-        most = 1.05 * max(float(np.nanmax(values)), 1e-6)
-        chart = Chart(svg, (LEFT, top, RIGHT, top + PANEL), (0.0, end), (0.0, most))
-        _pushes(chart, trace)
-        chart.y_axis(ticks(0.0, most, 4))
-        svg.text(LEFT, top - 8.0, title, "axis")
-        svg.path(chart.x(trace.time), chart.y(values), f"line {class_}")
-        chart.x_axis(ticks(0.0, end, 6), "g", "time [s]" if k == len(panels) - 1 else "")
-    return svg.render()
+    out, end = Inline("Errors of bodies, centre of mass and joints over time."), trace.time[-1]
+    with saved_figure(out, 7.2, 7.6) as figure:
+        axes = figure.subplots(len(panels), sharex=True)
+        for k, (ax, (title, values)) in enumerate(zip(axes, panels, strict=True)):
+            shade_pushes(ax, trace.pushes, end)
+            ax.plot(trace.time, values, color=SERIES[k], lw=1.6)
+            ax.set(xlim=(0.0, end), ylabel=title)
+            ax.set_ylim(0.0, 1.05 * max(float(np.nanmax(values)), 1e-6))
+        axes[-1].set_xlabel("time [s]")
+        figure.align_ylabels()
+    return out
 
 
-def _pushes(chart: Chart, trace: Trace) -> None:
-    top, bottom = chart.box[1], chart.box[3]
-    for start, length in trace.pushes:
-        left, right = chart.x(np.minimum([start, start + length], chart.x_range[1]))
-        chart.svg.add("rect", x=left, y=top, width=max(right - left, 1.5), height=bottom - top,
-                      class_="push")  # fmt: skip
-
-
-def _band(chart: Chart, times: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+def _band(ax: Axes, times: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
     """What the planted soles reach: a box for each time between two steps."""
     changes = np.abs(np.diff(np.stack([low, high]), axis=1)).max(axis=0) > CHANGE
     edges = [0, *(np.flatnonzero(changes) + 1), len(times)]
     for a, b in pairwise(edges):
-        left, right = chart.x(np.array([times[a], times[min(b, len(times) - 1)]]))
-        top, bottom = chart.y(np.array([np.median(high[a:b]), np.median(low[a:b])]))
-        chart.svg.add("rect", x=left, y=top, width=right - left, height=bottom - top,
-                      class_="support")  # fmt: skip
-
-
-def _inside(chart: Chart, values: np.ndarray) -> np.ndarray:
-    """Ordinates; what lies beyond the panel stops at its edge."""
-    return chart.y(np.clip(values, *chart.y_range))
+        ends = np.median(low[a:b]), np.median(high[a:b])
+        ax.fill_between(times[[a, min(b, len(times) - 1)]], *ends, **SOLES, gid=tag(tip="soles"))

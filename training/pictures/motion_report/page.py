@@ -12,8 +12,8 @@ from markupsafe import Markup
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_file
-from poise.envs.viewing.quantities import PUSH, SUPPORT
-from poise.training.pictures.report.palette import CARDS, variables
+from poise.training.pictures.figures.palette import CARDS, variables
+from poise.training.pictures.figures.style import Inline
 
 
 class Picture(NamedTuple):
@@ -21,17 +21,17 @@ class Picture(NamedTuple):
 
     Attributes:
         title: its heading.
-        svg: the drawing.
+        out: the drawing.
         caption: what it shows, below it.
         wide: whether it keeps its size on a narrow screen, and is moved there by hand.
-        key: class of the style sheet → name of a line in the legend.
+        key: name → sample of a line in the legend.
     """
 
     title: str
-    svg: Markup
+    out: Inline
     caption: str
     wide: bool = False
-    key: dict[str, str] = {}  # noqa: RUF012 - a default that nothing changes
+    key: dict[str, Markup] = {}  # noqa: RUF012 - a default that nothing changes
 
 
 def check_page(path: Path) -> None:
@@ -58,7 +58,5 @@ def write_page(path: Path, title: str, lead: str, pictures: Sequence[Picture]) -
         lead=lead,
         pictures=pictures,
         colours={scheme: variables(scheme) for scheme in CARDS},
-        push=PUSH.hexadecimal,
-        support=SUPPORT.hexadecimal,
     )
     write_atomic(path, text)

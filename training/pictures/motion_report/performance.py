@@ -1,4 +1,4 @@
-"""The pictures of `poise motion follow`: one trial against the motion that it performs."""
+"""The pages of graphs, of scripts, and of one trial against the motion that it performs."""
 
 from __future__ import annotations
 
@@ -10,11 +10,20 @@ import numpy as np
 
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.motion.feasibility.check import check_motion
+from poise.baselines.motion.graphs.motion_graph import MotionGraph
 from poise.configs.reading import is_file, parse_json, parsing, read_text
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.trials.play import Watch
 from poise.training.benchmarking.trials.trial import Trial
 from poise.training.motion.following.follow import Followed
+from poise.training.pictures.figures.motion_graph import (
+    REASONS,
+    picture_size,
+    plot_graph,
+    reason_of,
+)
+from poise.training.pictures.figures.palette import GREY
+from poise.training.pictures.figures.style import Inline, sample
 
 from .over_time import errors_picture, zmp_picture
 from .page import Picture, write_page
@@ -74,3 +83,26 @@ def write_synthesis(path: Path, record: dict[str, Any], motion: Path, robot: str
         pictures.append(zmp_picture(check_motion(load_motion(motion, body), body)))
     lead = f"{record['script']}".strip()
     write_page(path, f"{motion.stem}, {record['duration']:.1f} s", lead, pictures)
+
+
+def graph_pictures(graph: MotionGraph) -> list[Picture]:
+    """The pictures of a graph."""
+    count, size, reasons = len(graph.names), picture_size(graph), {}
+    matrix = Inline(f"Adjacency matrix of {count} clips, {len(graph.transitions)} transitions.",
+                    size, "plot wide" if count > 9 else "plot")  # fmt: skip
+    circle = Inline(f"Graph of {count} clips.")
+    plot_graph(matrix, graph, ("matrix",))
+    plot_graph(circle, graph, ("circle",))
+    for text in [why for _, _, why in graph.refused]:
+        mark, meaning = REASONS[reason_of(text)]
+        reasons[meaning] = sample(GREY, "", mark)
+    matrix_caption = ("K of the cheapest transition from each clip (row) to each (column): the "
+                      "deeper the colour, the smaller K. Cells without a number have no "
+                      "transition; their mark says why, and pointing at it tells it.")  # fmt: skip
+    circle_caption = ("An arrow leads to each clip that may follow, the stronger the smaller K "
+                      "is. Clips in a broken outline are not in the part in which every clip "
+                      "reaches every other.")  # fmt: skip
+    return [
+        Picture("Which clip may follow which", matrix, matrix_caption, count > 9, reasons),
+        Picture("The graph", circle, circle_caption),
+    ]

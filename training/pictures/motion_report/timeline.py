@@ -6,21 +6,25 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
 
 from poise.baselines.motion.synthesis.scripts.parser import parse
 from poise.baselines.motion.synthesis.scripts.printer import term_text
 from poise.configs.errors import ConfigError
-from poise.training.pictures.report.svg import Chart, Svg, ticks
+from poise.training.pictures.figures.page_svg import POINTS, tag
+from poise.training.pictures.figures.palette import AMBER, GREEN, GREY, ORANGE, PALE, PURPLE
+from poise.training.pictures.figures.style import Inline, area_sample, sample, saved_figure
+from poise.training.pictures.figures.time_series import shade_pushes
 
 from .page import Picture
 from .trace import Trace
 
-WIDTH, LEFT, RIGHT = 1000.0, 64.0, 990.0
-TOP, ROW, LANE, GAP = 34.0, 34.0, 64.0, 30.0
+WIDTH, ROW = 13.9, 0.47  # of the picture, and height of one layer [in]
 LETTER = 6.1  # width of one at the size of names
-NARROW = 14.0  # a box that is narrower has its name beside it no more
+ROOM = 0.92 * WIDTH * POINTS  # width of the axes, nearly
 BOUNDS = 0.0, 1.3  # of tempo and β
+TEMPO = (ORANGE, (0, (5, 2)))
 #: what, begin, end, wanted, whether it is a transition, its physics
 Part = tuple[str, float, float, bool, bool, Mapping[str, Any] | None]
 
@@ -40,37 +44,43 @@ def timeline_picture(record: Mapping[str, Any], trace: Trace | None = None) -> P
     caption = ("Columns follow each other, rows happen at once. Between the clips stand the "
                "transitions, filled, with their durations; broken outlines are clips that the "
                "script did not ask for.")  # fmt: skip
-    key = {"joining": "transition"}
+    key = {"transition": area_sample(color=AMBER)}
     if trace is not None:
         caption += (" Below: the tempo of the motion's time, and β, which is 1 where the centre "
                     "of mass is where the motion has it. Shaded is the push.")  # fmt: skip
-        key |= {"tempo": "tempo", "beta": "β"}
+        key |= {"tempo": sample(*TEMPO), "β": sample(GREEN, "-")}
     svg = _timeline(played, duration, trace)
     return Picture("The script", svg, caption, wide=True, key=key)
 
 
-def _timeline(played: Sequence[Part], duration: float, trace: Trace | None) -> Markup:
+def _timeline(played: Sequence[Part], duration: float, trace: Trace | None) -> Inline:
     rows = [[] if part[4] else layers_of(part[0]) for part in played]
     count = max([1, *(len(row) for row in rows)])
     end = max(duration, 0.0 if trace is None else float(trace.motion_time[-1]), 1e-3)
-    bottom = TOP + ROW * count + 18.0
-    height = bottom + (GAP + LANE + 14.0 if trace is not None else 0.0) + 44.0
-    svg = Svg(WIDTH, height, f"Timeline of {duration:.1f} s, {len(played)} parts.")
-    chart = Chart(svg, (LEFT, TOP, RIGHT, bottom), (0.0, end), (0.0, 1.0))
-    for k in range(count):
-        svg.text(LEFT - 8.0, TOP + ROW * k + 20.0, "base" if k == 0 else f"over {k}", "tick end")
-    for part, row in zip(played, rows, strict=True):
-        what, begins, ends, wanted, _, physics = part
-        left, right = (float(x) for x in chart.x(np.array([begins, ends])))
-        if row:
+    heights = [ROW * count + 0.3, *([0.9] if trace is not None else [])]
+    out = Inline(f"Timeline of {duration:.1f} s, {len(played)} parts.", WIDTH, "plot wide")
+    with saved_figure(out, WIDTH, sum(heights) + 0.7) as figure:
+        axes = figure.subplots(len(heights), sharex=True, squeeze=False,
+                               gridspec_kw={"height_ratios": heights})[:, 0]  # fmt: skip
+        script = axes[0]
+        script.set(xlim=(0.0, end), ylim=(count - 0.05, -0.4))
+        script.set_yticks([k + 0.4 for k in range(count)],
+                          ["base", *(f"over {k}" for k in range(1, count))])  # fmt: skip
+        script.grid(False)
+        for part, row in zip(played, rows, strict=True):
             for k, text in enumerate(row):
-                _box(svg, left, right, TOP + ROW * k, "clip" if wanted else "clip own", text)
-            continue
-        _join(svg, (left, right), TOP, what, ends - begins, physics)
-    chart.x_axis(ticks(0.0, end, 12), "g", "" if trace is not None else "time of the motion [s]")
-    if trace is not None:
-        _lanes(svg, chart, bottom + GAP + 12.0, trace)
-    return svg.render("plot wide")
+                _box(script, part, k, text, end)
+            if not row:
+                _join(script, part)
+        if trace is not None:
+            shown = trace.time <= end
+            shade_pushes(axes[1], trace.pushes, end)
+            beta, tempo = (np.clip(v[shown], *BOUNDS) for v in (trace.beta, trace.tempo))
+            axes[1].plot(trace.time[shown], beta, color=GREEN)
+            axes[1].plot(trace.time[shown], tempo, color=TEMPO[0], ls=TEMPO[1])
+            axes[1].set(ylim=BOUNDS, ylabel="tempo, β", yticks=[0.0, 0.5, 1.0])
+        axes[-1].set_xlabel("time [s]" if trace is not None else "time of the motion [s]")
+    return out
 
 
 def layers_of(what: str) -> list[str]:
@@ -89,43 +99,28 @@ def layers_of(what: str) -> list[str]:
     return terms
 
 
-def _box(svg: Svg, left: float, right: float, y: float, class_: str, text: str) -> None:
-    width = max(right - left, 1.0)
-    with svg.group():
-        svg.add("title", text)
-        svg.add("rect", x=left, y=y, width=width, height=ROW - 6.0, rx=2.0, class_=class_)
-        room = int((width - 6.0) / LETTER)
-        if room >= 2:
-            shown = text if len(text) <= room else f"{text[: room - 1]}…"
-            svg.text(left + 4.0, y + 18.0, shown, "name small")
+def _box(ax: Axes, part: Part, row: int, text: str, end: float) -> None:
+    """A clip with as much of its name as there is room for."""
+    _, begins, ends, wanted, _, _ = part
+    ax.add_patch(Rectangle((begins, row), ends - begins, 0.8, facecolor=PALE, edgecolor=GREY,
+                           ls="-" if wanted else (0, (4, 2)), gid=tag(tip=text)))  # fmt: skip
+    room = int(((ends - begins) / end * ROOM - 6.0) / LETTER)
+    if room >= 2:
+        shown = text if len(text) <= room else f"{text[: room - 1]}…"
+        ax.annotate(shown, (begins, row + 0.4), (4, 0), textcoords="offset points", va="center",
+                    size=10, zorder=3)  # fmt: skip
 
 
-def _join(
-    svg: Svg, span: tuple[float, float], y: float, kind: str, seconds: float,
-    physics: Mapping[str, Any] | None,
-) -> None:  # fmt: skip
-    told = f"{kind}, {seconds:.2f} s"
+def _join(ax: Axes, part: Part) -> None:
+    """A transition, filled, with its duration above it."""
+    kind, begins, ends, _, _, physics = part
+    told = f"{kind}, {ends - begins:.2f} s"
     if physics:
         told += (f", ZMP {100.0 * physics['zmp_inside']:.1f} cm inside, torque "
                  f"{physics['torque']:.0%}{', bent' if physics['bent'] else ''}"
                  f"{', by standing' if physics['through_standing'] else ''}")  # fmt: skip
-    with svg.group():
-        svg.add("title", told)
-        width = max(span[1] - span[0], 1.5)
-        svg.add("rect", x=span[0], y=y - 4.0, width=width, height=ROW + 2.0,
-                class_="join" if kind == "physical" else "join insert")  # fmt: skip
-        svg.text(0.5 * sum(span), y - 8.0, f"{seconds:.1f}", "small middle")
-
-
-def _lanes(svg: Svg, above: Chart, top: float, trace: Trace) -> None:
-    chart = Chart(svg, (LEFT, top, RIGHT, top + LANE), above.x_range, BOUNDS)
-    for start, length in trace.pushes:
-        left, right = chart.x(np.array([start, start + length]))
-        svg.add("rect", x=left, y=top, width=max(right - left, 1.5), height=LANE, class_="push")
-    chart.y_axis([0.0, 0.5, 1.0])
-    svg.text(LEFT, top - 7.0, "tempo and β", "axis")
-    shown = trace.time <= above.x_range[1]
-    x = chart.x(trace.time[shown])
-    svg.path(x, chart.y(np.clip(trace.beta[shown], *BOUNDS)), "line beta")
-    svg.path(x, chart.y(np.clip(trace.tempo[shown], *BOUNDS)), "line tempo")
-    chart.x_axis(ticks(*above.x_range, 12), "g", "time [s]")
+    colour = AMBER if kind == "physical" else PURPLE
+    ax.add_patch(Rectangle((begins, -0.08), ends - begins, 0.96, facecolor=colour, edgecolor=colour,
+                           lw=1.0, gid=tag(tip=told)))  # fmt: skip
+    middle = 0.5 * (begins + ends)
+    ax.text(middle, -0.14, f"{ends - begins:.1f}", ha="center", va="bottom", size=9)

@@ -14,8 +14,6 @@ from markupsafe import Markup
 
 from poise.training.running.summary import Interval, both_ends
 
-from .svg import number_text
-
 
 class Column(NamedTuple):
     """A column.
@@ -121,6 +119,12 @@ def csv_text(header: Sequence[str], lines: Sequence[Sequence[object]]) -> str:
     writer.writerow(header)
     writer.writerows(lines)
     return text.getvalue()
+
+
+def number_text(value: float, form: str) -> str:
+    """A number for people: with a real minus, and none before a zero."""
+    text = format(value, form)
+    return (text if set(text) & set("123456789") else text.lstrip("-")).replace("-", "−")
 
 
 def cell(

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TypedDict, cast
 
-import numpy as np
 from markupsafe import Markup
 
 from poise.training.benchmarking.results.read import Results
-from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.statistics.seeds import FIGURES
+from poise.training.pictures.figures.envelope import right_angle
+from poise.training.pictures.figures.rates import level_curves, level_text
+from poise.training.pictures.figures.series import rate_series
+from poise.training.pictures.figures.style import Inline
 from poise.training.running.summary import Level, MarginFigures, both_ends
 
 from .cells import Cell, Column, Table, cell, figure_cell, name_cell, p_cell
-from .charts import Series, level_curves, level_text
-from .svg import right_angle
 
 TITLES = {
     "duration": "duration of the push [s]",
@@ -50,26 +50,30 @@ def factor_levels(results: Results) -> list[tuple[str, str, Level]]:
 def factor_plots(results: Results, order: Sequence[str]) -> list[FactorPlot]:
     """A picture of every factor, controllers as in `order`."""
     pictures: list[FactorPlot] = []
-    found = factor_levels(results)
-    for factor in dict.fromkeys(factor for _, factor, _ in found):
+    every = factor_levels(results)
+    for factor in dict.fromkeys(factor for _, factor, _ in every):
         entries: dict[str, list[Level]] = {}
-        for name, own, level in found:
-            if own == factor:
+        for name, own_factor, level in every:
+            if own_factor == factor:
                 entries.setdefault(name, []).append(level)
         levels = list(dict.fromkeys(e["level"] for each in entries.values() for e in each))
         standard = [levels.index(e["level"]) for each in entries.values() for e in each
                     if e["standard"]]  # fmt: skip
-        series = []
+        found = []
         for name in order:
-            own_levels = entries.get(name, [])
-            around = [wilson_interval(e["recovered"], e["trials"]) for e in own_levels]
-            low, high = np.array(around, dtype=float).reshape(-1, 2).T
-            x = np.array([levels.index(e["level"]) for e in own_levels], dtype=float)
-            y = np.array([e["recovered_rate"] for e in own_levels], dtype=float)
-            series.append(Series(name, results.controllers.index(name), x, y, low, high))
+            own = entries.get(name, [])
+            counts = [(e["recovered"], e["trials"]) for e in own]
+            at = [levels.index(e["level"]) for e in own]
+            found.append(rate_series(name, results.controllers.index(name), at, counts))
         title = TITLES.get(factor, factor)
-        picture = level_curves(series, levels, title, standard[0] if standard else None)
-        pictures.append({"title": title[:1].upper() + title[1:], "picture": picture})
+        told = "; ".join(
+            f"{s.name} "
+            + ", ".join(f"{levels[int(x)]}: {y:.0%}" for x, y in zip(s.x, s.y, strict=True))
+            for s in found
+        )
+        out = Inline(f"Recovery rate over {title}: {told}.")
+        level_curves(out, found, levels, standard[0] if standard else None)
+        pictures.append({"title": title[:1].upper() + title[1:], "picture": out.svg})
     return pictures
 
 

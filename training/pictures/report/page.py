@@ -15,19 +15,27 @@ from poise.baselines.allowance import allowing, named
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
-from poise.envs.viewing.quantities import PUSH, SUPPORT
 from poise.training.benchmarking.evaluation.tables import assisted
 from poise.training.benchmarking.results.read import Record, Results, load_results
+from poise.training.pictures.figures.palette import CARDS, variables
+from poise.training.pictures.figures.style import Inline
+from poise.training.pictures.figures.time_series import signal_keys, trial_timeseries
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
 from poise.training.running.terminal import print_paths
 
 from . import factors, motions, plots, walking, words
 from . import tables as report_tables
 from .cells import Download, download
-from .palette import CARDS, variables
-from .svg import swatch
-from .time_chart import signals_csv, time_plot
-from .worst_trials import AFTER, Exhibit, Film, can_draw, choose_exhibits, film, frame_times
+from .worst_trials import (
+    AFTER,
+    Exhibit,
+    Film,
+    can_draw,
+    choose_exhibits,
+    film,
+    frame_times,
+    signals_csv,
+)
 
 CROWD = 4  # of controllers; with more, bands and bars are shown for the one that is pointed at
 EMBEDDED = 600_000  # [bytes] trials.csv is embedded up to this size, beyond it packed
@@ -105,7 +113,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         trial_count=len({record.trial for record in results.records}),
         controllers=[
             {"name": name, "index": results.controllers.index(name),
-             "swatch": swatch(results.controllers.index(name))}
+             "swatch": plots.swatch(results.controllers.index(name))}
             for name in order
         ],
         baseline=baseline,
@@ -115,20 +123,19 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         forests=plots.forests(results),
         envelope=envelope,
         own_envelopes=own_envelopes,
-        step_lines=list(plots.step_lines(results)) if envelope else [],
+        keys=plots.limit_keys(results) if envelope else {},
         phases=walking.phase_plot(results, order),
         falls=falls,
         curves=curves,
         factors=factors.factor_plots(results, order),
         cases=cases,
+        signal_keys=signal_keys(),
         notes=notes,
         facts=_facts(results),
         trials=_trials(results),
         summary_file=_summary_file(results),
         crowded=len(order) > CROWD,
         colours={scheme: variables(scheme) for scheme in CARDS},
-        push=PUSH.hexadecimal,
-        support=SUPPORT.hexadecimal,
     )  # fmt: skip
 
 
@@ -196,16 +203,19 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
         label = (f"Trial {who.trial}, {who.controller}: centre of mass, centre of pressure, "
                  f"capture point, angular momentum and torque over {end:.1f} s.")  # fmt: skip
         name = re.sub(r"[^\w.-]+", "-", f"trial-{who.trial}-{Path(who.controller).name}")
+        seen, picture = t <= end + 1e-9, Inline(label, class_="plot time")
+        shown = {key: values[seen] for key, values in columns.items()}
+        trial_timeseries(picture, t[seen], shown, pushes=pushes)
         parts.append({
             "name": who.controller,
-            "swatch": swatch(results.controllers.index(who.controller)),
+            "swatch": plots.swatch(results.controllers.index(who.controller)),
             "end": _ending(who),
             "same": played.same,
             "frames": [
                 (time, "data:image/webp;base64," + base64.b64encode(picture).decode())
                 for time, picture in played.frames
             ],
-            "plot": time_plot(t, columns, end, pushes, label),
+            "plot": picture.svg,
             "download": signals_csv(name, t, columns),
         })  # fmt: skip
     return {

@@ -13,18 +13,27 @@ from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.statistics.fits import fit_logistic, trial_bins
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.benchmarking.trials.step_limits import DRAWN, line_name
+from poise.training.pictures.figures.envelope import LIMIT, polar_envelope, step_dashes
+from poise.training.pictures.figures.palette import GREY, INK
+from poise.training.pictures.figures.rates import BINS, fall_probability, forest
+from poise.training.pictures.figures.series import SIDES, Series, series
+from poise.training.pictures.figures.style import INLINE, Inline, look, sample
 from poise.training.running.summary import Interval, both_ends
 
 from .cells import Download, csv_text, download
-from .charts import Series, fall_curves, forest, polar, rate_series
 from .tables import bound_of, per_direction
 
-BINS = 8
+SMALL = 2.2  # width of one controller's own picture [in]
 PARTS = {"envelope": "Standard pushes", "grid": "Grid of pushes", "random": "Random pushes",
          "mix": "Random mix"}  # fmt: skip
 CURVES = ("part", "controller", "push_share", "not_recovered", "trials", "rate_low", "rate_high",
           "fit_half_at", "fit_bound", "fit_scale")  # fmt: skip
 NONE = (np.nan, np.nan)
+
+
+def swatch(index: int) -> Markup:
+    """How series number `index` looks, for a legend."""
+    return sample(*look(index))
 
 
 def forests(results: Results) -> list[Markup]:
@@ -34,13 +43,18 @@ def forests(results: Results) -> list[Markup]:
     for name in results.summary["ranking"]:
         entry, index = entries[name], order.index(name)
         if "j50_mean" in entry:
-            j50.append(
-                _one(name, index, entry["j50_mean"], both_ends(entry["j50_mean_ci95"]) or NONE)
-            )
+            ends = both_ends(entry["j50_mean_ci95"]) or NONE
+            j50.append(series(name, index, [(0.0, entry["j50_mean"], *ends)]))
         count, of = entry["recovered"], entry["trials"]
-        rates.append(_one(name, index, count / of, wilson_interval(count, of)))
-    pictures = [forest(j50, "mean J50 [N·s]", ".1f")] if j50 else []
-    return [*pictures, forest(rates, "recovered trials [%]", ".1f", 100.0)]
+        ends = wilson_interval(count, of)
+        rates.append(series(name, index, [100.0 * np.array([0.0, count / of, *ends])]))
+    pictures = []
+    for found, title in ((j50, "mean J50 [N·s]"), (rates, "recovered trials [%]")):
+        if found:
+            out = Inline(f"{title}: {'; '.join(s.told(0, '.1f') for s in found)}.")
+            forest(out, found, title, ".1f")
+            pictures.append(out.svg)
+    return pictures
 
 
 def envelopes(results: Results) -> tuple[Markup | None, list[tuple[str, Markup]]]:
@@ -48,13 +62,35 @@ def envelopes(results: Results) -> tuple[Markup | None, list[tuple[str, Markup]]
 
     None and nothing where no suite measured directions.
     """
-    unit, series, limit = _envelopes(results)
+    unit, found, limit = _envelopes(results)
     steps = step_lines(results)
-    if not series:
+    if not found:
         return None, []
-    alone = series if len(series) > 1 else []
-    picture = polar(series, unit, limit, steps=steps)
-    return picture, [(s.name, polar(series, unit, limit, s)) for s in alone]
+
+    def draw(shown: Sequence[Series], width: float, marked: str | None = None) -> Markup:
+        what = spans(f"Recovered impulse [{unit}] by push direction", shown, ".3g")
+        out = Inline(what, width)
+        polar_envelope(out, found, ankle_limit=limit, unit=unit, marked=marked,
+                       step_limits=None if marked else steps)  # fmt: skip
+        return out.svg
+
+    alone = found if len(found) > 1 else []
+    return draw(found, INLINE), [(s.name, draw([s], SMALL, s.name)) for s in alone]
+
+
+def spans(what: str, found: Sequence[Series], form: str) -> str:
+    """What a picture shows, in words: the least and the largest value of each series."""
+    told = [f"{s.name} {np.nanmin(s.y):{form}} to {np.nanmax(s.y):{form}}" for s in found]
+    return f"{what}: {'; '.join(told)}."
+
+
+def limit_keys(results: Results) -> dict[str, Markup]:
+    """name → look of the lines of limits, for a legend."""
+    measured = any("eta_mean" in entry for entry in results.summary["controllers"].values())
+    keys = {"ankle limit": sample(INK, LIMIT)} if measured else {}
+    for k, name in enumerate(step_lines(results)):
+        keys[name] = sample(GREY, step_dashes(k))
+    return keys
 
 
 def step_lines(results: Results) -> dict[str, tuple[list[float], list[float]]]:
@@ -86,23 +122,23 @@ def falls(results: Results) -> tuple[list[tuple[str, Markup]], Download | None]:
 
 def _falls(results: Results, part: str) -> tuple[Markup, list[tuple[object, ...]]]:
     fraction, title = limit_fractions(results, part)
-    series, fits = [], {}
+    trials, fits = {}, {}
     lines: list[tuple[object, ...]] = []
-    for index, name in enumerate(results.controllers):
+    for name in results.controllers:
         mine = [k for k, record in enumerate(results.records)
                 if record.controller == name and np.isfinite(fraction[k])]  # fmt: skip
         recovered = np.array([results.records[k].recovered for k in mine])
-        fits[name] = fit_logistic(fraction[mine], recovered)
-        bins = trial_bins(fraction[mine], recovered, BINS)
-        series.append(rate_series(name, index, [b[0] for b in bins], [b[1:] for b in bins]))
-        own, fit = series[-1], fits[name]
+        trials[name] = fraction[mine], recovered
+        fits[name] = fit = fit_logistic(*trials[name])
         lines += [
-            (part, name, *bins[k], own.low[k], own.high[k], fit.j50, fit.bound, fit.scale)
-            for k in range(len(bins))
+            (part, name, *found, *wilson_interval(*found[1:]), fit.j50, fit.bound, fit.scale)
+            for found in trial_bins(*trials[name], BINS)
         ]
-    tried = fraction[np.isfinite(fraction)]
-    picture = fall_curves(series, fits, title, (float(tried.min()), float(tried.max())))
-    return picture, lines
+    told = "; ".join(f"{name} {'half at' if fit.bound is None else 'only a bound,'} {fit.j50:.2f}"
+                     for name, fit in fits.items())  # fmt: skip
+    out = Inline(f"Fraction of trials not recovered, over the {title}: {told}.")
+    fall_probability(out, trials, fits, unit="fraction", xlabel=title)
+    return out.svg, lines
 
 
 def limit_fractions(results: Results, part: str) -> tuple[np.ndarray, str]:
@@ -137,19 +173,15 @@ def _envelopes(
         measured = measured or "j50" in entry
         key = "j50" if measured else "fraction50"
         value, around = cast(float, entry.get(key)), cast(Interval, entry.get(f"{key}_ci95"))
-        side = {"lower": 1.0, "upper": -1.0}.get(bound_of(entry) or "", 0.0)
+        side = SIDES[bound_of(entry)]
         row = (entry["direction"], value, *(both_ends(around) or NONE), side)
         rows.setdefault((name, index), []).append(row)
     order = results.summary["ranking"]
-    series = [
-        Series(name, index, *np.array(sorted(points)).T)
+    found = [
+        series(name, index, sorted(points))
         for (name, index), points in sorted(rows.items(), key=lambda item: order.index(item[0][0]))
     ]
     if not measured:
-        return f"of the {results.summary['scale']}", series, None
+        return f"of the {results.summary['scale']}", found, None
     angles, limit = zip(*results.summary["robot"]["ankle_limit"], strict=True)
-    return "N·s", series, (angles, limit)
-
-
-def _one(name: str, index: int, value: float, around: Sequence[float]) -> Series:
-    return Series(name, index, np.zeros(1), *(np.array([v]) for v in (value, *around)))
+    return "N·s", found, (angles, limit)

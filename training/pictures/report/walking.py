@@ -9,11 +9,13 @@ from markupsafe import Markup
 
 from poise.training.benchmarking.evaluation.tables import BOUNDS
 from poise.training.benchmarking.results.read import Results
+from poise.training.pictures.figures.rates import phase_curves
+from poise.training.pictures.figures.series import SIDES, series
+from poise.training.pictures.figures.style import Inline
 from poise.training.running.summary import PhaseJ50, WalkLevel, both_ends
 
 from .cells import Cell, Column, Table, cell, figure_cell, name_cell
-from .charts import Series
-from .svg import Chart, Svg, colour, dash, ticks
+from .plots import spans
 
 PARTS = {"walk": "walk", "gait": "steps", "velocity": "course", "walk_push": "pushed",
          "walk_kick": "kicked", "walk_repeated": "pushed again and again",
@@ -135,39 +137,19 @@ def phase_table(results: Results, order: Sequence[str]) -> Table | None:
 
 def phase_plot(results: Results, order: Sequence[str]) -> Markup | None:
     """J50 over the phase of the stride, with intervals; None where no walk was pushed."""
-    series = [_series(results, name, found) for name, found in _phases(results, order).items()]
-    if not series:
+    found = [
+        series(name, results.controllers.index(name), [
+            (each["phase"], each["j50"], *(both_ends(each["j50_ci95"]) or (np.nan, np.nan)),
+             SIDES[each["j50_bound"]])
+            for each in phases
+        ])
+        for name, phases in _phases(results, order).items()
+    ]  # fmt: skip
+    if not found:
         return None
-    spans = "; ".join(f"{s.name} {s.y.min():.1f} to {s.y.max():.1f}" for s in series)
-    svg = Svg(440.0, 320.0, f"J50 [N·s] over the phase of the stride: {spans}.")
-    top = float(np.nanmax(np.concatenate([np.r_[s.y, s.high] for s in series])))
-    chart = Chart(svg, (44.0, 30.0, 428.0, 268.0), (0.0, 1.0), (0.0, 1.04 * top))
-    chart.y_axis(ticks(0.0, top), "g", "J50 [N·s]")
-    chart.x_axis([0.0, 0.25, 0.5, 0.75, 1.0], "g", "phase: left foot lands at 0, right at 0.5")
-    for k, s in enumerate(series):
-        _draw(chart, s, 3.0 * (k - (len(series) - 1) / 2))
-    return svg.render()
-
-
-def _draw(chart: Chart, s: Series, shift: float) -> None:
-    """Line, marks and intervals of a controller, moved a little beside those of the others."""
-    svg, x, y = chart.svg, chart.x(s.x) + shift, chart.y(s.y)
-    low, high = chart.y(s.low), chart.y(s.high)
-    with svg.group(class_=f"series {colour(s.index)}", data_series=str(s.index)):
-        svg.path(x, y, "line", dash=dash(s.index))
-        with svg.group(class_="detail"):
-            for at in np.flatnonzero(np.isfinite(s.low) & np.isfinite(s.high)):
-                svg.line(x[at], low[at], x[at], high[at], "whisker")
-        for k, phase in enumerate(s.x):
-            tip = f"{s.name}, {phase:.3f}: {s.y[k]:.1f} ({s.low[k]:.1f} to {s.high[k]:.1f}) N·s"
-            svg.marker(x[k], y[k], s.index, tip)
-
-
-def _series(results: Results, name: str, entries: Sequence[PhaseJ50]) -> Series:
-    ends = [both_ends(entry["j50_ci95"]) or (np.nan, np.nan) for entry in entries]
-    low, high = np.array(ends, dtype=float).reshape(-1, 2).T
-    x, y = (np.array([entry[key] for entry in entries], dtype=float) for key in ("phase", "j50"))
-    return Series(name, results.controllers.index(name), x, y, low, high)
+    out = Inline(spans("J50 [N·s] over the phase of the stride", found, ".1f"))
+    phase_curves(out, found)
+    return out.svg
 
 
 def _phases(results: Results, order: Sequence[str]) -> dict[str, Sequence[PhaseJ50]]:

@@ -10,7 +10,7 @@ from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.trials.trial import Trial
 from poise.training.running.summary import both_ends
 
-from .svg import number_text
+from .cells import number_text
 
 
 def lead(results: Results) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +17,16 @@ from poise.training.benchmarking.results.read import Record, Results
 from poise.training.benchmarking.results.replay import replay
 from poise.training.benchmarking.trials.signals import Signals
 
+from .cells import Download, csv_text, download
+
 FRAMES = 8  # of a strip
 SIZE = (216, 264)  # of a frame [pixels], shown at half of it: sharp on a phone
 QUALITY = 72  # of the pictures
 CAMERA = Camera(azimuth=50.0, elevation=18.0, distance=4.6)
 AFTER = 0.4  # [s] shown after the last moment that matters
+POINTS = {"com": ("com_x", "com_y"), "cop": ("cop_x", "cop_y"),
+          "capture_point": ("capture_x", "capture_y"),
+          "angular_momentum": ("L_x", "L_y", "L_z")}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -159,6 +164,18 @@ class _FrameTaker:
     def close(self) -> None:
         if self._renderer is not None:
             self._renderer.close()
+
+
+def signals_csv(name: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> Download:
+    """All signals as CSV, to a hundredth of what the plot shows."""
+    header, blocks = ["t"], [t[:, None]]
+    for key, titles in POINTS.items():
+        header += titles
+        blocks.append(columns[key])
+    header += ["support_x_low", "support_x_high", "support_y_low", "support_y_high", "torque"]
+    blocks += [columns["support"].reshape(len(t), 4), columns["torque"][:, None]]
+    lines = [[f"{value:.5g}" for value in line] for line in np.hstack(blocks)]
+    return download(f"{name}.csv", csv_text(header, lines))
 
 
 def compressed(frame: np.ndarray) -> bytes:

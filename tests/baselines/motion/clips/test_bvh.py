@@ -1,6 +1,7 @@
 """BVH files: what is read is what was written, axes and units are found, faults have their line."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -40,18 +41,32 @@ def test_packaged_clips_are_read_written_and_read(name: str, tmp_path: Path) -> 
         assert again.dt == pytest.approx(each.dt, rel=1e-6)
 
 
-@captured
-def test_axes_and_unit_are_found() -> None:
-    clip, axes = read_bvh(find_bvh("cmu02_squat"))
+def check_upright(clip: Clip) -> None:
+    """The head is above, the left hip to the left of who faces x."""
+    places, roles = clip.faced().places()[0], clip.skeleton.roles
+    assert places[roles["head"], 2] > 1.2
+    assert places[roles["hip_left"], 1] > 0.05 > -0.05 > places[roles["hip_right"], 1]
+
+
+def test_axes_and_unit_are_found(tmp_path: Path) -> None:
+    """As most programs write them, and in those of a file with z up, whose unit is no usual one."""
+    clip, axes = read_bvh(find_bvh("humanoid_squat"))
     assert axes.names == ("y", "z") and axes.unit == 1.0
-    assert 0.8 < clip.skeleton.leg_length < 0.9
-    wave, axes = read_bvh(find_bvh("fair1_wave_hello"))
+    assert 0.7 < clip.skeleton.leg_length < 0.75  # of the default humanoid
+    check_upright(clip)
+    write_bvh(clip, tmp_path / "other.bvh", axes_of("z", "-y", 3.7))
+    other, axes = read_bvh(tmp_path / "other.bvh")
     assert axes.names == ("z", "-y")
+    assert other.skeleton.leg_length == pytest.approx(0.8)
+    check_upright(other)
+
+
+def test_axes_and_unit_of_captures_are_found() -> None:
+    clip, wave = captured("cmu02_squat"), captured("fair1_wave_hello")
+    assert 0.8 < clip.skeleton.leg_length < 0.9
     assert wave.skeleton.leg_length == pytest.approx(0.8)
-    for each in (clip, wave):  # the head is above, the left hip to the left of who faces x
-        places, roles = each.faced().places()[0], each.skeleton.roles
-        assert places[roles["head"], 2] > 1.2
-        assert places[roles["hip_left"], 1] > 0.05 > -0.05 > places[roles["hip_right"], 1]
+    check_upright(clip)
+    check_upright(wave)
 
 
 def test_another_frame_of_axes_is_the_same_motion(small: Path, tmp_path: Path) -> None:
@@ -61,6 +76,34 @@ def test_another_frame_of_axes_is_the_same_motion(small: Path, tmp_path: Path) -
     again, axes = read_bvh(path)
     assert axes.names == ("-x", "y") and axes.unit == 0.01
     assert np.abs(again.places() - clip.places()).max() < 1e-7
+
+
+def test_joints_in_any_order_are_written_as_what_they_are(tmp_path: Path) -> None:
+    """Files have joints depth first; a skeleton may have them breadth first."""
+    clip = read_bvh(find_bvh("humanoid_wave")).clip
+    skeleton = clip.skeleton
+    levels = [0] * len(skeleton.names)
+    for i, parent in enumerate(skeleton.parents[1:], start=1):
+        levels[i] = levels[parent] + 1
+    order = sorted(range(len(levels)), key=levels.__getitem__)
+    assert order != sorted(order)
+    new = {old: i for i, old in enumerate(order)}
+    broad = replace(
+        clip, rotations=clip.rotations[:, order],
+        skeleton=replace(
+            skeleton, names=tuple(skeleton.names[i] for i in order),
+            parents=np.array([new.get(int(skeleton.parents[i]), -1) for i in order]),
+            offsets=skeleton.offsets[order], orders=tuple(skeleton.orders[i] for i in order),
+            end_parents=np.array([new[int(i)] for i in skeleton.end_parents]),
+        ),
+    )  # fmt: skip
+    write_bvh(broad, tmp_path / "broad.bvh")
+    again = read_bvh(tmp_path / "broad.bvh", "m", "y", "z").clip
+    assert again.skeleton.names == skeleton.names
+    assert np.abs(again.places() - clip.places()).max() < 1e-5
+    ends = [each.skeleton.ends(*each.skeleton.global_pose(each.root, each.rotations))
+            for each in (clip, again)]  # fmt: skip
+    assert np.abs(ends[1] - ends[0]).max() < 1e-5
 
 
 def test_places_are_those_that_the_file_says(small: Path) -> None:

@@ -8,14 +8,11 @@ from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.clips.rotations import angle_between, slerp
 from poise.configs.errors import ConfigError
-from tests.support.captured import captured
-
-pytestmark = captured
 
 
 @pytest.fixture(scope="module")
 def walk() -> Clip:
-    return read_bvh(find_bvh("cmu02_walk")).clip
+    return read_bvh(find_bvh("humanoid_walk")).clip
 
 
 def test_mirrored_is_the_mirror_image(walk: Clip) -> None:
@@ -33,7 +30,7 @@ def test_turned_and_moved_as_a_whole(walk: Clip) -> None:
     faced = walk.turned(1.0).faced()
     assert abs(faced.facing()[0]) < 1e-12
     assert faced.root[0, :2] == pytest.approx([0, 0], abs=1e-12)
-    assert faced.root[-1, 0] > 2.0  # who walks, walks ahead
+    assert faced.root[-1, 0] > 0.45  # who walks, walks ahead
     with pytest.raises(ConfigError, match="turn: must be finite, not nan"):
         walk.turned(np.nan)
 
@@ -45,9 +42,9 @@ def test_cut_speed_and_reverse(walk: Clip) -> None:
     assert fast.dt == walk.dt and fast.duration == pytest.approx(walk.duration / 2, abs=walk.dt)
     assert np.abs(fast.root[7] - walk.root[14]).max() < 1e-12
     assert np.all(walk.reversed().places() == walk.places()[::-1])
-    with pytest.raises(ConfigError, match="cut: must be two times within 0 and 2.83"):
-        walk.cut(1.0, 5.0)
-    with pytest.raises(ConfigError, match="cut: must be two times within 0 and 2.83"):
+    with pytest.raises(ConfigError, match="cut: must be two times within 0 and 7.9"):
+        walk.cut(1.0, 9.0)
+    with pytest.raises(ConfigError, match="cut: must be two times within 0 and 7.9"):
         walk.cut(np.nan, np.inf)
     with pytest.raises(ConfigError, match="speed: must be above 0"):
         walk.at_speed(0.0)
@@ -58,7 +55,7 @@ def test_a_clip_has_two_frames_and_no_more_than_a_million(walk: Clip) -> None:
     for made, field in (
         (lambda: walk.at_speed(1e3), "speed: must give 2 to 1000000 frames, not 1"),
         (lambda: walk.at_speed(1e-9), "speed: must give 2 to 1000000 frames, not"),
-        (lambda: walk.resampled(10.0), "rate: must give 2 to 1000000 frames, not 1"),
+        (lambda: walk.resampled(20.0), "rate: must give 2 to 1000000 frames, not 1"),
         (lambda: walk.resampled(1e-9), "rate: must give 2 to 1000000 frames, not"),
         (lambda: walk.repeated(10**9), "loop: must give 2 to 1000000 frames, not"),
     ):

@@ -9,6 +9,8 @@ import pytest
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.contacts import measure_contacts
 from poise.baselines.motion.clips.library import find_bvh, packaged_clips
+from poise.configs.files import packaged_folder
+from poise.configs.schema import read_yaml
 from tests.support.captured import captured
 from tests.support.motion_files import small_bvh
 
@@ -22,13 +24,25 @@ def test_clips_in_place_have_planted_feet(name: str) -> None:
     assert contacts.planted.mean() > 0.9
 
 
-@captured
-def test_walking_feet_take_turns() -> None:
-    contacts = measure_contacts(read_bvh(find_bvh("cmu02_walk")).clip)
+def test_captured_walking_feet_take_turns() -> None:
+    contacts = measure_contacts(captured("cmu02_walk"))
     assert not contacts.in_place
     left, right = contacts.planted.T
     assert 0.2 < left.mean() < 0.7 and 0.2 < right.mean() < 0.7
     assert np.mean(left != right) > 0.5
+
+
+def test_feet_of_the_own_walk_are_in_the_air_within_its_steps() -> None:
+    """Its keyframes say when: a foot is never in the air outside of its steps, and is in each."""
+    clip = read_bvh(find_bvh("humanoid_walk")).clip
+    steps = read_yaml(packaged_folder("clips") / "walk.yaml")["steps"]
+    contacts = measure_contacts(clip)
+    assert not contacts.in_place and len(steps) == 5
+    for foot, side in enumerate(("left", "right")):
+        spans = [(step["lift"], step["land"]) for step in steps if step["foot"] == side]
+        inside = [(clip.times > lift) & (clip.times < land) for lift, land in spans]
+        assert contacts.planted[~np.any(inside, axis=0), foot].all()
+        assert all(not contacts.planted[span, foot].all() for span in inside)
 
 
 def test_skating_and_sinking_are_measured(tmp_path: Path) -> None:

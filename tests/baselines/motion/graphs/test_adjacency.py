@@ -121,7 +121,8 @@ def test_transitions_keep_apart_and_one_plays_both_clips(clips: dict[str, Clip])
 
 
 def test_thresholds_refuse_with_the_reason(clips: dict[str, Clip]) -> None:
-    a, b = frames_of(clips["squat"]), frames_of(clips["punch"])
+    """The bottom of a squat and a punch: both clips begin and end standing."""
+    a, b = frames_of(clips["squat"].cut(1.2, 2.4)), frames_of(clips["punch"].cut(0.9, 1.7))
     for limits, said in (
         (replace(OPEN, coefficient=0.5), r"^K = \d.*> 0\.5$"),
         (replace(OPEN, angle=2.0), r"^\w+ turns by \d+° > 2°$"),
@@ -151,7 +152,8 @@ def test_a_graph_and_what_an_expert_says(clips: dict[str, Clip]) -> None:
     assert said.between("stand", "squat") == (only,) and said.between("squat", "stand") == ()
     with pytest.raises(ConfigError, match="graph: no clip is called 'jump'"):
         graph_of(two, weights=[Weight("stand", "jump", 1.0)])
-    other = read_bvh(find_bvh("humanoid_wave")).clip
+    longer = replace(two["stand"].skeleton, offsets=2.0 * two["stand"].skeleton.offsets)
+    other = replace(two["stand"], skeleton=longer)
     with pytest.raises(ConfigError, match="wave: clips: has another skeleton than 'stand'"):
         graph_of({**two, "wave": other})
 

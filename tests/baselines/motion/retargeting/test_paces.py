@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.references.robot_clip import reference_from
-from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts
-from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.retargeting.paces import find_paces
 from poise.baselines.motion.retargeting.retarget import retarget
 from poise.configs.errors import ConfigError
@@ -17,12 +15,10 @@ from tests.support.captured import captured
 from tests.support.captures import make
 from tests.support.physics import robot_named
 
-pytestmark = captured
-
 
 @pytest.fixture(scope="module")
 def walk() -> Clip:
-    return read_bvh(find_bvh("cmu02_walk")).clip
+    return captured("cmu02_walk")
 
 
 def test_feet_land_when_they_do_in_the_clip_one_after_the_other(walk: Clip) -> None:

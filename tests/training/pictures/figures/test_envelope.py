@@ -2,16 +2,19 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from poise.training.benchmarking.statistics.fits import Bound, LogisticFit, fit_logistic
+from poise.training.benchmarking.statistics.fits import LogisticFit, fit_logistic
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.pictures.figures import style
-from poise.training.pictures.figures.envelope import fall_probability, polar_envelope
+from poise.training.pictures.figures.envelope import polar_envelope
+from poise.training.pictures.figures.rates import fall_probability
+from poise.training.pictures.figures.series import SIDES, Series
 
 ANGLES = np.arange(8) * 45.0
 BLUE = np.array([0x00, 0x72, 0xB2]) / 255
@@ -31,10 +34,15 @@ def figures(monkeypatch):
     return drawn
 
 
-def circle(radius, width=1.0):
+def circle(name, radius, width=1.0, index=0):
     """An envelope that is the same in all directions."""
     j50 = np.full(8, float(radius))
-    return ANGLES, j50, j50 - width, j50 + width
+    return Series(name, index, ANGLES, j50, j50 - width, j50 + width)
+
+
+def exact(directions, j50):
+    """An envelope with intervals of no width."""
+    return Series("a", 0, directions, j50, j50, j50)
 
 
 def falls(n=200, j50=14.0, seed=0):
@@ -57,7 +65,7 @@ def blue_centroid(path):
 def test_forward_is_up_and_left_is_left(tmp_path, angle, axis, sign):
     """A controller that is strong in one direction bulges there: 0° up, 90° left."""
     j50 = np.where(angle == ANGLES, 20.0, 2.0)
-    polar_envelope(tmp_path / "a.png", {"a": (ANGLES, j50, j50, j50)})
+    polar_envelope(tmp_path / "a.png", [exact(ANGLES, j50)])
     assert sign * blue_centroid(tmp_path / "a.png")[axis] > 0.1
 
 
@@ -65,7 +73,7 @@ def test_envelope_is_closed_whatever_the_order(tmp_path, figures):
     """Directions are sorted, taken modulo 360° and the curve ends where it starts."""
     directions = np.array([270.0, 0.0, -180.0, 90.0])
     j50 = np.array([4.0, 1.0, 3.0, 2.0])
-    polar_envelope(tmp_path / "a.png", {"a": (directions, j50, j50, j50)})
+    polar_envelope(tmp_path / "a.png", [exact(directions, j50)])
     (line,) = (x for x in figures[0].axes[0].lines if x.get_label() == "a")
     np.testing.assert_allclose(np.degrees(line.get_xdata()), [0, 90, 180, 270, 360])
     np.testing.assert_allclose(line.get_ydata(), [1, 2, 3, 4, 1])
@@ -75,7 +83,7 @@ def test_envelope_shows_bands_limit_and_rings_from_zero(tmp_path, figures):
     """Each controller has its band, the ankle limit its line, and the radius starts at zero."""
     polar_envelope(
         tmp_path / "a.png",
-        {"momentum-qp": circle(15), "residual": circle(18, 2)},
+        [circle("momentum-qp", 15), circle("residual", 18, 2, index=1)],
         ankle_limit=(np.arange(0, 360, 5), np.full(72, 21.0)),
     )
     ax = figures[0].axes[0]
@@ -91,7 +99,7 @@ def test_envelope_shows_what_steps_can_stop(tmp_path, figures):
         "one": (ANGLES, np.full(len(ANGLES), 30.0)),
         "two": (ANGLES, np.full(len(ANGLES), 38.0)),
     }
-    polar_envelope(tmp_path / "a.png", {"a": circle(15)}, step_limits=lines)
+    polar_envelope(tmp_path / "a.png", [circle("a", 15)], step_limits=lines)
     ax = figures[0].axes[0]
     assert {x.get_label() for x in ax.lines} >= {"a", "one", "two"}
     assert ax.get_ylim()[1] >= 38
@@ -100,25 +108,24 @@ def test_envelope_shows_what_steps_can_stop(tmp_path, figures):
 def test_limits_far_out_do_not_squash_the_envelope(tmp_path, figures):
     """What is many times as far out as all else is cut off."""
     far = {"two": (ANGLES, np.full(len(ANGLES), 400.0))}
-    polar_envelope(tmp_path / "a.png", {"a": circle(15)}, step_limits=far)
+    polar_envelope(tmp_path / "a.png", [circle("a", 15)], step_limits=far)
     assert 2.0 * 15 < figures[0].axes[0].get_ylim()[1] < 4.0 * 15
 
 
 def test_envelope_with_a_missing_direction(tmp_path):
     """A direction without a figure is a gap, not an error."""
-    directions, j50, low, high = circle(15)
-    j50[2] = low[2] = high[2] = np.nan
-    polar_envelope(tmp_path / "a.png", {"a": (directions, j50, low, high)})
+    found = circle("a", 15)
+    found.y[2] = found.low[2] = found.high[2] = np.nan
+    polar_envelope(tmp_path / "a.png", [found])
     assert (tmp_path / "a.png").stat().st_size > 10_000
 
 
 def test_bounds_are_hollow_and_point_to_where_j50_is(tmp_path, figures):
     """Outwards where more was recovered than was tried, inwards where less; inside the rings."""
-    sides: list[Bound | None] = [None, "lower", None, "upper", None, None, None, None]
-    polar_envelope(tmp_path / "a.png", {"a": circle(15), "b": circle(4)}, bounds={"a": sides})
+    sides = np.array([SIDES[b] for b in (None, "lower", None, "upper", None, None, None, None)])
+    bounds = replace(circle("a", 15), side=sides)
+    polar_envelope(tmp_path / "a.png", [bounds, circle("b", 4, index=1)])
     ax = figures[0].axes[0]
-    (line,) = (x for x in ax.lines if x.get_label() == "a")
-    assert line.get_markevery() == [0, 2, 4, 5, 6, 7, 8]  # the first again at the end
     hollow = [x for x in ax.lines if x.get_markerfacecolor() == "white" and len(x.get_xdata())]
     assert [np.degrees(x.get_xdata()[0]) for x in hollow] == pytest.approx([45.0, 135.0])
     assert {x.get_ydata()[0] for x in hollow} == {15.0}
@@ -130,7 +137,7 @@ def test_bounds_are_hollow_and_point_to_where_j50_is(tmp_path, figures):
 def test_a_picture_of_too_few_trials_says_so(tmp_path, figures):
     """Also where nothing at all is drawn."""
     nothing = np.full(8, np.nan)
-    polar_envelope(tmp_path / "a.png", {"a": (ANGLES, nothing, nothing, nothing)}, note="None.")
+    polar_envelope(tmp_path / "a.png", [exact(ANGLES, nothing)], note="None.")
     assert figures[0].axes[0].get_title().endswith("None.")
 
 
@@ -138,7 +145,9 @@ def test_a_picture_of_too_few_trials_says_so(tmp_path, figures):
 def test_the_legend_lies_beside_the_data_and_in_the_picture(tmp_path, figures, count):
     """However many controllers there are, the legend covers no axes and is not cut off."""
     names = [f"a controller with a name {k}" for k in range(count)]
-    polar_envelope(tmp_path / "a.png", {name: circle(10 + k) for k, name in enumerate(names)})
+    polar_envelope(
+        tmp_path / "a.png", [circle(name, 10 + k, index=k) for k, name in enumerate(names)]
+    )
     fall_probability(tmp_path / "b.png", {name: falls(seed=k) for k, name in enumerate(names)})
     for figure in figures:
         (legend,) = figure.legends
@@ -150,19 +159,24 @@ def test_the_legend_lies_beside_the_data_and_in_the_picture(tmp_path, figures, c
 
 def test_text_stays_in_the_picture(tmp_path, figures):
     """Titles and labels do not run over the edge, nor into each other."""
-    polar_envelope(tmp_path / "a.png", {"a": circle(10)})
+    polar_envelope(tmp_path / "a.png", [circle("a", 10)])
     title = figures[0].get_suptitle() and figures[0]._suptitle.get_window_extent()
     assert title.y1 <= figures[0].bbox.y1
     assert not title.overlaps(figures[0].axes[0].title.get_window_extent())
 
 
 def test_series_differ_without_colour(tmp_path):
-    """Six colours and markers, then 36 different pairs."""
-    looks = [style.look(k) for k in range(6)]
-    assert len({x.colour for x in looks}) == len({x.marker for x in looks}) == 6
-    every = [style.look(k) for k in range(36)]
-    assert len({(look.colour, look.marker) for look in every}) == 36
-    assert style.look(36) == looks[0]
+    """Eight colours, six markers, then 48 different pairs."""
+    looks = [style.look(k) for k in range(8)]
+    assert len({x.colour for x in looks}) == 8 and len({x.marker for x in looks}) == 6
+    every = [style.look(k) for k in range(48)]
+    assert len({(look.colour, look.marker) for look in every}) == 48
+    assert style.look(48) == looks[0]
+
+
+def dots(ax):
+    """Where the marks are."""
+    return [(x.get_xdata()[0], x.get_ydata()[0]) for x in ax.lines if len(x.get_xdata()) == 1]
 
 
 def test_dots_are_falls_with_wilson_bars(tmp_path, figures):
@@ -170,18 +184,16 @@ def test_dots_are_falls_with_wilson_bars(tmp_path, figures):
     impulse = np.repeat([10.0, 14.0], [10, 20])
     recovered = np.r_[np.ones(9), 0, np.ones(5), np.zeros(15)]
     fall_probability(tmp_path / "a.png", {"a": (impulse, recovered)})
-    bars = figures[0].axes[0].containers
-    dots = [(bar[0].get_xdata()[0], bar[0].get_ydata()[0]) for bar in bars]
-    assert dots == [(10.0, 0.1), (14.0, 0.75)]
-    ends = [bar[2][0].get_segments()[0][:, 1] for bar in bars]
+    ax = figures[0].axes[0]
+    assert dots(ax) == [(10.0, 0.1), (14.0, 0.75)]
+    ends = [bar.get_segments()[0][:, 1] for bar in ax.collections]
     np.testing.assert_allclose(ends, [wilson_interval(1, 10), wilson_interval(15, 20)])
 
 
 def test_bins_hold_all_trials_evenly(tmp_path, figures):
     """Many distinct impulses make the wanted number of dots, rising with the impulse."""
     fall_probability(tmp_path / "a.png", {"a": falls(n=100)}, bins=5)
-    x = [bar[0].get_xdata()[0] for bar in figures[0].axes[0].containers]
-    y = [bar[0].get_ydata()[0] for bar in figures[0].axes[0].containers]
+    x, y = zip(*dots(figures[0].axes[0]), strict=True)
     assert len(x) == 5 and np.all(np.diff(x) > 0)
     assert np.mean(y) == pytest.approx(1 - falls(n=100)[1].mean())
 
@@ -211,7 +223,7 @@ def test_a_bound_has_no_curve(tmp_path, figures):
 def test_the_same_figures_give_the_same_file(tmp_path):
     """No date or random number goes into the picture."""
     for name in ("a.png", "b.png"):
-        polar_envelope(tmp_path / name, {"a": circle(15)})
+        polar_envelope(tmp_path / name, [circle("a", 15)])
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
@@ -220,7 +232,7 @@ def test_a_failed_drawing_leaves_the_old_file(tmp_path):
     path = tmp_path / "a.png"
     path.write_bytes(b"old")
     with pytest.raises(ValueError, match="shape"):
-        polar_envelope(path, {"a": (ANGLES, [1.0], [1.0], [1.0])})
+        polar_envelope(path, [circle("a", 1)], ankle_limit=(ANGLES, [1.0]))
     with pytest.raises(ValueError, match="shape"):
         fall_probability(path, {"a": ([1.0, 2.0], [1])})
     assert path.read_bytes() == b"old"
@@ -229,7 +241,7 @@ def test_a_failed_drawing_leaves_the_old_file(tmp_path):
 
 def test_missing_folders_are_made_and_no_part_file_stays(tmp_path):
     """A picture may go into a folder that does not exist yet."""
-    polar_envelope(tmp_path / "new" / "a.png", {"a": circle(15)})
+    polar_envelope(tmp_path / "new" / "a.png", [circle("a", 15)])
     assert [p.name for p in (tmp_path / "new").iterdir()] == ["a.png"]
     assert (tmp_path / "new" / "a.png").read_bytes().startswith(b"\x89PNG")
 
@@ -238,9 +250,9 @@ def test_settings_of_the_user_are_left_alone(tmp_path):
     """Drawing changes no matplotlib setting, even if it fails."""
     with matplotlib.rc_context({"font.size": 7.5, "axes.grid": False, "axes.titlesize": 31.0}):
         before = dict(matplotlib.rcParams)
-        polar_envelope(tmp_path / "a.png", {"a": circle(15)})
+        polar_envelope(tmp_path / "a.png", [circle("a", 15)])
         with pytest.raises(ValueError):
-            polar_envelope(tmp_path / "a.png", {"a": (ANGLES, [1.0], [1.0], [1.0])})
+            polar_envelope(tmp_path / "a.png", [circle("a", 1)], ankle_limit=(ANGLES, [1.0]))
         assert dict(matplotlib.rcParams) == before
 
 
@@ -248,9 +260,9 @@ def test_pyplot_is_never_imported(tmp_path):
     """Plotting needs no pyplot and so touches no global figure or display."""
     code = (
         "import sys, numpy as np\n"
-        "from poise.training.pictures.figures import envelope, time_series\n"
-        "a = np.arange(4) * 90.0\n"
-        f"envelope.polar_envelope({str(tmp_path / 'a.png')!r}, {{'a': (a, a + 1, a, a + 2)}})\n"
+        "from poise.training.pictures.figures import envelope, series, time_series\n"
+        "s = series.series('a', 0, [(90.0 * k, 1.0, 1.0, 2.0) for k in range(4)])\n"
+        f"envelope.polar_envelope({str(tmp_path / 'a.png')!r}, [s])\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from poise.training.pictures.figures import style
+from poise.training.pictures.figures.style import Inline
 from poise.training.pictures.figures.time_series import FAR, training_curve, trial_timeseries
+from tests.support.drawings import drawing, points
 
 
 @pytest.fixture
@@ -154,3 +156,18 @@ def test_unknown_signals_are_refused(tmp_path):
     with pytest.raises(ValueError, match="capture_point"):
         trial_timeseries(tmp_path / "a.png", [0.0, 1.0], {"zmp": np.zeros((2, 2))})
     assert not list(tmp_path.iterdir())
+
+
+def test_a_page_cuts_off_what_lies_outside_of_the_panels(tmp_path):
+    """Nothing is drawn beside them where the CoM runs away; all panels have the push and words."""
+    t, signals = trial()
+    out, momentum = Inline("A trial."), np.column_stack([t, -t, 0 * t])
+    far = signals["com"] + 5 * t[:, None]
+    trial_timeseries(out, t, signals | {"com": far, "angular_momentum": momentum},
+                     pushes=[(0.5, 0.1)])  # fmt: skip
+    assert out.svg.count("<title>push</title>") == 4
+    width, height = (float(v) for v in drawing(out.svg).get("viewBox", "").split()[2:])
+    every = np.concatenate([points(path) for path in drawing(out.svg).iter("path")])
+    assert every.min() >= 0 and (every <= (width, height)).all()
+    words = [text.text for text in drawing(out.svg).iter("text")]
+    assert {"forward [m]", "left [m]", "L [kg·m²/s]", "peak torque", "time [s]"} <= set(words)

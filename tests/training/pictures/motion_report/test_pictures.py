@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.motion.feasibility.check import check_motion
@@ -20,16 +20,12 @@ from poise.baselines.motion.graphs.motion_graph import (
 )
 from poise.configs.errors import ConfigError
 from poise.training.motion.following.follow import follow
-from poise.training.pictures.motion_report.graph_chart import (
-    best_transitions,
-    circle_chart,
-    graph_pictures,
-    matrix_chart,
-)
+from poise.training.pictures.figures.motion_graph import best_coefficients, plot_graph
 from poise.training.pictures.motion_report.over_time import errors_picture, zmp_picture
 from poise.training.pictures.motion_report.page import check_page, write_page
-from poise.training.pictures.motion_report.performance import Watched
+from poise.training.pictures.motion_report.performance import Watched, graph_pictures
 from poise.training.pictures.motion_report.timeline import layers_of, timeline_picture
+from tests.support.drawings import drawing, groups, marks, middle, points
 from tests.support.physics import robot_named
 from tests.support.robot_clips import ahead_clip
 
@@ -46,23 +42,38 @@ GRAPH = MotionGraph(
 
 
 def test_the_matrix_has_every_pair_and_the_reasons() -> None:
-    table = best_transitions(GRAPH)
+    """Deeper is the smaller K; a pair that is refused has the mark of its reason and its words."""
+    table = best_coefficients(GRAPH)
     assert table[0, 1] == 2.0 and table[1, 0] == 0.0 and np.isnan(table[0, 2])
-    drawing = ElementTree.fromstring(str(matrix_chart(GRAPH)))
-    cells = [e for e in drawing.iter("rect") if "cell" in e.get("class", "")]
-    assert len(cells) == 9 and sum("yes" in e.get("class", "") for e in cells) == 2
-    kinds = {e.get("class") for e in drawing.iter("g")}
-    assert {"mark-k", "mark-feet", "mark-never", "mark-turn"} <= kinds
-    titles = {e.text for e in drawing.iter("title")}
-    assert "squat <deep> → walk: other feet are planted" in titles
+    matrix, _ = graph_pictures(GRAPH)
+    cells = [p for p in drawing(matrix.out.svg).iter("path") if p.get("stroke") == "var(--card)"]
+    depth = {p.get("fill-opacity") for p in cells if p.get("fill") == "var(--s0)"}
+    assert len(cells) == 9 and depth == {"0.6", "0.1"}
+    told = marks(matrix.out, "")
+    assert "squat <deep> → walk: other feet are planted" in told and len(told) == 7
+    kinds = {
+        re.sub(r"[^-\d]+", "", str(np.round(points(p) - middle(p)) + 0.0)) for p in told.values()
+    }
+    assert len(kinds) == 4
+    assert len(matrix.key) == 4 and "K is too large" in matrix.key
 
 
 def test_the_circle_names_every_clip_and_has_an_arrow_for_each_pair() -> None:
-    drawing = ElementTree.fromstring(str(circle_chart(GRAPH)))
-    assert {e.text for e in drawing.iter("text")} == set(NAMES)
-    assert sum(e.get("class") == "arrow" for e in drawing.iter("path")) == 2
-    apart = [e for e in drawing.iter("circle") if "apart" in e.get("class", "")]
-    assert len(apart) == 1  # walk: nobody leads there
+    _, circle = graph_pictures(GRAPH)
+    root = drawing(circle.out.svg)
+    assert {e.text for e in root.iter("text")} == set(NAMES)
+    assert {e.text for e in root.iter("title")} == {
+        "stand → squat <deep>: K = 2", "squat <deep> → stand: K = 0"
+    }  # fmt: skip
+    nodes = [p for p in root.iter("path") if p.get("fill") == "var(--card)"]
+    assert [p.get("stroke-dasharray") is not None for p in nodes] == [False, False, True]
+
+
+def test_a_png_has_both_parts(tmp_path: Path) -> None:
+    """The same drawings side by side."""
+    plot_graph(tmp_path / "a.png", GRAPH)
+    height, width, _ = imread(tmp_path / "a.png").shape
+    assert width == 2 * height
 
 
 def test_without_any_transition_there_is_still_a_picture() -> None:
@@ -83,14 +94,13 @@ def test_a_timeline_has_a_row_for_each_layer_and_the_durations_of_transitions() 
          "physics": physics},
         {**part, "what": "stand", "begins": 2.6, "ends": 5.0},
     ]}  # fmt: skip
-    drawing = ElementTree.fromstring(str(timeline_picture(record).svg))
-    boxes = [e for e in drawing.iter("rect") if e.get("class") == "clip"]
-    assert [float(e.get("width", 0)) for e in boxes] == pytest.approx(
-        [926 * s / 5.0 for s in (2.0, 2.0, 2.4)], abs=0.1
-    )
-    said = {e.text for e in drawing.iter("title")}
-    assert "physical, 0.60 s, ZMP 5.0 cm inside, torque 70%, bent" in said
-    assert "over 1" in {e.text for e in drawing.iter("text")}
+    out = timeline_picture(record).out
+    boxes = [np.ptp(points(mark)[:, 0]) for text, mark in marks(out, "").items()
+             if not text.startswith("physical")]  # fmt: skip
+    assert boxes == pytest.approx([boxes[0] * s / 2.0 for s in (2.0, 2.0, 2.4)], abs=0.3)
+    assert "physical, 0.60 s, ZMP 5.0 cm inside, torque 70%, bent" in marks(out, "")
+    words = [e.text for e in drawing(out.svg).iter("text")]
+    assert {"base", "over 1", "squat", "punch on arms", "stand", "0.6"} <= set(words)
     for wrong in ({}, {"played": [{}]}, {"played": "x", "duration": 1.0}, []):
         with pytest.raises(ConfigError, match="holds no record of a script"):
             timeline_picture(wrong)
@@ -118,7 +128,11 @@ def test_a_performance_is_seen_with_its_push(tmp_path: Path) -> None:
     pictures = [errors_picture(trace), zmp_picture(judged, trace)]
     write_page(path, "a <title>", "lead", pictures)
     text = path.read_text()
-    assert "a &lt;title&gt;" in text and text.count("<svg") == 2 and "prefers-color-scheme" in text
+    assert (
+        "a &lt;title&gt;" in text
+        and text.count('class="plot"') == 2
+        and "prefers-color-scheme" in text
+    )
     assert not re.search(r"(src|href)=", text)
 
 
@@ -127,14 +141,13 @@ def test_the_soles_of_steps_are_those_that_are_planted() -> None:
     reaches as far as both, so there are three, the last one further up than the first."""
     robot = robot_named("humanoid")
     judged = check_motion(ahead_clip(robot), robot)
-    drawing = ElementTree.fromstring(str(zmp_picture(judged).svg))
-    boxes = [e for e in drawing.iter("rect") if e.get("class") == "support"]
+    out = zmp_picture(judged).out
+    boxes = [points(group[-1]) for group in groups(out, "") if group[0].text == "soles"]
     assert len(boxes) == 8
-    first, apart, last = ([float(box.get(name, 0)) for name in ("y", "height")]
-                          for box in boxes[:3])  # fmt: skip
+    (first, apart, last) = ((box[:, 1].min(), np.ptp(box[:, 1])) for box in boxes[:3])
     assert last[0] < first[0] - 10.0 and last[1] == pytest.approx(first[1], abs=1.0)
     assert apart[0] == pytest.approx(last[0], abs=1.0) and apart[1] > first[1] + 10.0
-    sides = [float(box.get("height", 0)) for box in boxes[3:]]
+    sides = [np.ptp(box[:, 1]) for box in boxes[3:]]
     assert max(sides[1], sides[3]) < 0.6 * min(sides[0], sides[2], sides[4])
 
 

@@ -14,6 +14,7 @@ from poise.training.pictures.report.cells import (
     cell,
     download,
     name_cell,
+    number_text,
     p_cell,
 )
 
@@ -63,3 +64,12 @@ def test_a_download_holds_the_file() -> None:
     content = base64.b64decode(packed.url.split(";base64,")[1])
     assert gzip.decompress(content) == text.encode() and packed.size == len(content)
     assert packed == download("x.csv", text, pack=True)
+
+
+def test_a_minus_is_one_and_none_stands_before_a_zero() -> None:
+    assert [number_text(v, ".1f") for v in (-1.25, -0.01, 0.0, 3.0)] == [
+        "−1.2",
+        "0.0",
+        "0.0",
+        "3.0",
+    ]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from markupsafe import escape
 
 from poise.configs.errors import ConfigError
 from poise.training.benchmarking.evaluation.evaluate import benchmark
@@ -49,9 +50,12 @@ def test_every_level_is_in_the_table_and_a_picture(results: Results) -> None:
     assert [p["title"] for p in pictures] == [
         "Friction", "Delay of the sensors [s]", "Error of the masses", "Number of pushes",
     ]  # fmt: skip
-    assert all(
-        "standard" in p["picture"] and p["picture"].count("data-series") == 2 for p in pictures
-    )
+    for row in table:
+        rate, low, high = (
+            f"{float(row[f'recovered_rate{end}']):.0%}" for end in ("", "_low", "_high")
+        )
+        picture = pictures[factors.index(row["factor"])]["picture"]
+        assert str(escape(f"{row['controller']}: {rate} ({low} to {high})")) in picture
 
 
 def test_sensitivity_is_the_worst_level(results: Results) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import csv
 import dataclasses
 import io
 import math
@@ -17,6 +19,7 @@ from poise.training.pictures.report.worst_trials import (
     choose_exhibits,
     film,
     frame_times,
+    signals_csv,
     smallest_lost,
 )
 from tests.support.report_folders import finished
@@ -95,3 +98,15 @@ def test_frames_are_taken_at_their_times(results: Results) -> None:
         image = Image.open(io.BytesIO(picture))
         assert image.size == worst_trials.SIZE and np.asarray(image).std() > 10.0
         assert len(picture) < 20_000
+
+
+def test_signals_are_handed_out_in_numbers() -> None:
+    """A line for every time with all columns."""
+    t = np.linspace(0.0, 2.0, 5)
+    columns = {name: np.column_stack([0 * t, t**3]) for name in ("com", "cop", "capture_point")}
+    columns["support"] = np.tile([[-0.1, 0.1], [-0.15, 0.15]], (5, 1, 1))
+    columns |= {"angular_momentum": np.zeros((5, 3)), "torque": 0.5 + 0 * t}
+    text = base64.b64decode(signals_csv("trial", t, columns).url.split(",")[1]).decode()
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert len(rows) == 5 and float(rows[-1]["t"]) == 2.0 and float(rows[-1]["com_y"]) == 8.0
+    assert float(rows[0]["support_y_high"]) == 0.15 and float(rows[0]["L_z"]) == 0.0

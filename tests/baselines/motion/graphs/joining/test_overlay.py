@@ -13,18 +13,15 @@ from poise.baselines.motion.clips.rotations import angle_between
 from poise.baselines.motion.graphs.joining.overlay import Layer, overlay
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
-from tests.support.captured import captured
-
-pytestmark = captured
 
 ARMS = (GROUPS["arms"],)
 
 
 @pytest.fixture(scope="module")
 def clips() -> tuple[Clip, Clip]:
-    """A squat of 5.3 s and 4 s of punching."""
-    punch = read_bvh(find_bvh("cmu02_punch")).clip
-    return read_bvh(find_bvh("cmu02_squat")).clip, punch.cut(0.0, 4.0)
+    """A squat of 3.6 s and 2.6 s of punching."""
+    punch = read_bvh(find_bvh("humanoid_punch")).clip
+    return read_bvh(find_bvh("humanoid_squat")).clip, punch.cut(0.0, 2.6)
 
 
 def held(clip: Clip, frame: int = 0) -> Clip:
@@ -47,13 +44,13 @@ def test_inside_the_layer_has_its_joints_and_the_base_all_others(
     made = overlay(base, [Layer(over, ARMS, start=0.5, blend=0.2)])
     chosen = ARMS[0].joints(base.skeleton)
     others = np.setdiff1d(np.arange(len(base.skeleton.names)), chosen)
-    inside = slice(round(0.7 / base.dt) + 1, round(4.3 / base.dt))
+    inside = slice(round(0.7 / base.dt) + 1, round(2.9 / base.dt))
     begin = round(0.5 / base.dt)
     theirs = over.rotations[inside.start - begin : inside.stop - begin]
     assert angle_between(made.rotations[inside][:, chosen], theirs[:, chosen]).max() < 1e-6
     assert np.array_equal(made.rotations[:, others], base.rotations[:, others])
     assert np.array_equal(made.root, base.root) and len(made) == len(base)
-    for part in (slice(0, begin + 1), slice(round(4.5 / base.dt) + 1, None)):
+    for part in (slice(0, begin + 1), slice(round(3.1 / base.dt) + 1, None)):
         assert angle_between(made.rotations[part], base.rotations[part]).max() < 1e-7
 
 
@@ -88,24 +85,25 @@ def test_additive_on_its_own_first_posture_is_the_clip(clips: tuple[Clip, Clip])
 def test_with_weights_the_later_layer_is_above(clips: tuple[Clip, Clip]) -> None:
     base, over = clips
     both = overlay(base, [Layer(over, ARMS, 1.0), Layer(base, ARMS, 1.0)])
-    assert angle_between(both.rotations[20:100], base.rotations[20:100]).max() < 1e-6
+    assert angle_between(both.rotations[20:60], base.rotations[20:60]).max() < 1e-6
 
 
 def test_what_is_refused(clips: tuple[Clip, Clip]) -> None:
     base, over = clips
     with pytest.raises(ConfigError, match="both move '.*': give both a weight"):
         overlay(base, [Layer(over, ARMS), Layer(over, ARMS, 0.5, start=1.0)])
-    overlay(base.repeated(2), [Layer(over, ARMS), Layer(over, ARMS, start=4.5)])  # not at a time
+    overlay(base.repeated(2), [Layer(over, ARMS), Layer(over, ARMS, start=3.1)])  # not at a time
     with pytest.raises(ConfigError, match="on: the base keeps its root and legs: '"):
         overlay(base, [Layer(over, (GROUPS["left_leg"],))])
     with pytest.raises(ConfigError, match=f"keeps its root and legs: {base.skeleton.names[0]!r}"):
         overlay(base, [Layer(over, (LinkGroup(include=("*",)),))])
     with pytest.raises(ConfigError, match=r"overlay\.weight: must be from 0 to 1, not 1\.5"):
         overlay(base, [Layer(over, ARMS, 1.5)])
-    with pytest.raises(ConfigError, match=r"overlay\.start: must be within the base's 5\.3 s"):
+    with pytest.raises(ConfigError, match=r"overlay\.start: must be within the base's 3\.6 s"):
         overlay(base, [Layer(over, ARMS, start=9.0)])
     with pytest.raises(ConfigError, match=r"overlay\.blend: must be above 0"):
         overlay(base, [Layer(over, ARMS, blend=0.0)])
-    other = read_bvh(find_bvh("fair1_wave_hello")).clip
-    with pytest.raises(ConfigError, match="has another skeleton than 'cmu02_squat'"):
+    skeleton = replace(over.skeleton, offsets=2.0 * over.skeleton.offsets)
+    other = replace(over, skeleton=skeleton)
+    with pytest.raises(ConfigError, match="has another skeleton than 'humanoid_squat'"):
         overlay(base, [Layer(other)])

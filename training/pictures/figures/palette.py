@@ -1,23 +1,43 @@
-"""The colours of the page, from the tables that pictures and the viewer have theirs from."""
+"""The colours of all pictures, and in pages, where they are variables for light and dark."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from matplotlib.colors import to_hex, to_rgb
 
 from poise.envs.viewing.quantities import CAPTURE_POINT, COM, COP, RGB
-from poise.training.pictures.figures.style import MANY
+
+# Okabe and Ito's palette: told apart with any colour vision. Line and marker repeat what the colour
+# says, for prints in grey.
+BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
+AMBER = "#E69F00"
+SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, "#6250B5", "#B3263E")  # violet and crimson last
+INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
 
 CARDS = {"light": "#ffffff", "dark": "#1a1e22"}  # scheme → what is drawn on, as in report.css
 CONTRAST = 3.0  # to the card: WCAG's least for graphics
 QUANTITIES = {"com": COM, "cop": COP, "capture": CAPTURE_POINT}
+DRAWN = {f"s{k}": to_rgb(colour) for k, colour in enumerate(SERIES)} | {
+    name: quantity.colour for name, quantity in QUANTITIES.items()
+}  # variable → colour of a series or a quantity
+ROLES = {"card": "white", "ink": INK, "muted": GREY, "rule": PALE}  # report.css gives both schemes
+NAMES = {to_hex(colour): name for name, colour in reversed(DRAWN.items())} | {
+    to_hex(to_rgb(colour)): name for name, colour in ROLES.items()
+}
+
+
+def themed(colour: Sequence[float]) -> str:
+    """A colour of a picture as the style sheet's variable, if one stands for it."""
+    red, green, blue = colour[:3]
+    value = to_hex((red, green, blue))
+    return f"var(--{NAMES[value]})" if value in NAMES else value
 
 
 def variables(scheme: str) -> dict[str, str]:
     """CSS variable → colour, of a scheme of `CARDS`: series s0, s1, … and quantities."""
-    series = {f"s{k}": to_rgb(colour) for k, colour in enumerate(MANY)}
-    quantities = {name: quantity.colour for name, quantity in QUANTITIES.items()}
     card = to_rgb(CARDS[scheme])
-    return {name: to_hex(readable(colour, card)) for name, colour in (series | quantities).items()}
+    return {name: to_hex(readable(colour, card)) for name, colour in DRAWN.items()}
 
 
 def readable(colour: RGB, ground: RGB, least: float = CONTRAST) -> RGB:
