@@ -36,15 +36,16 @@ class Row(NamedTuple):
 
 
 def rows() -> list[Row]:
-    """All of the page, in order."""
-    found, document = [], ""
+    """All of the tables that begin with `described`, in order."""
+    found, document, table = [], "", False
     for line in PAGE.read_text().splitlines():
         if match := re.match(r"## (\d{3}): ", line):
             document = match[1]
         cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
-        if document and cells and cells[0] != "described" and set(cells[0]) != {"-"}:
+        if table and cells and set(cells[0]) != {"-"}:
             assert len(cells) == len(Row._fields) - 1, line
             found.append(Row(document, *cells))
+        table = bool(cells) and (table or cells[0] == "described")
     return found
 
 

@@ -88,8 +88,10 @@ def picture(path: str, rows: dict[tuple[str, float], dict[str, float]]) -> None:
             for k, name in enumerate(WEIGHTS):
                 style = look(k)
                 values = [rows[name, factor][key] for factor in FACTORS]
-                ax.plot(FACTORS, values, "o-", label=name, color=style.colour, ls=style.line)
+                ax.plot(FACTORS, values, marker="o", label=name, color=style.colour, ls=style.line)
             ax.set(xscale="log", ylabel=label)
+            ax.set_xticks(FACTORS, [f"{factor:g}" for factor in FACTORS])
+            ax.minorticks_off()
         axes[0].set_title(f"{MOTION}, pushed by {SHARE:g} of J50, one weight changed")
         axes[-1].set_xlabel("times its own value")
         legend_below(figure, axes[0])

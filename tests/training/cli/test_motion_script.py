@@ -70,7 +70,6 @@ def test_a_script_is_performed_by_one_command(
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["follow", "squat -> jump"], "script: line 1, column 10: no motion 'jump' (choices:"),
         (["plan", "squat ->"], 'script: line 1, column 9: after "->" a motion is missing'),
         (["plan", "jump"], "script: line 1, column 1: no motion 'jump' (choices: humanoid_stand"),
         (["plan", "no.motion"], "no.motion: cannot be read (No such file or directory)"),
