@@ -18,7 +18,7 @@ from tests.support.captures import make
 from tests.support.physics import robot_named
 
 
-def test_a_captured_clip_is_followed() -> None:
+def test_a_packaged_clip_is_followed() -> None:
     """Both arms overhead: no fall, joints to 3°, bodies to 2 cm."""
     robot = robot_named("humanoid")
     clip = read_bvh(find_bvh("humanoid_reach_up")).clip
