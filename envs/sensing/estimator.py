@@ -220,6 +220,7 @@ class EstimatedState(StateSource, Copyable):
         super().__init__(plant.simulation)
         self.plant, self.config = plant, config
         self.known = Simulation(without_contacts(on_terrain(robot, plant.simulation.robot.terrain)))
+        self.ahead = Simulation(on_terrain(robot, plant.simulation.robot.terrain))
         self.sensors: Sensors = allocate_sensors(plant.simulation)
         self.bus = self.sensors.bus
         self.motors = allocate_motors(plant.simulation, self.bus)
@@ -235,7 +236,7 @@ class EstimatedState(StateSource, Copyable):
         nv, zeros = plant.simulation.model.nv, guarded_zeros
         self.belief = Belief(
             rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
-            make_rollout(robot, plant.simulation.robot.terrain, self.motors),
+            make_rollout(self.ahead, self.motors),
             zeros(6, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
         self.drive = Program.of([(drive_motors, self.motors)])
@@ -289,7 +290,8 @@ class EstimatedState(StateSource, Copyable):
         f, d, c, o = self.invariant, self.drawn.noise, self.config, self.odometry
         turn = np.zeros(4)
         quaternion_of(o.axes, turn)
-        self.known.reset(np.concatenate([o.position, turn, o.q]))  # not where an episode ended
+        for each in (self.known, self.ahead):  # not where an episode ended
+            each.reset(np.concatenate([o.position, turn, o.q]))
         own, noise, dt = c.invariant, self.invariant.numbers, self.arrays.timestep
         drift = np.hypot(own.attitude, d["tilt_drift"] * np.sqrt(2.0 * DRIFT_TIME / dt))
         noise[GYRO], noise[FORCE] = (

@@ -17,8 +17,6 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1, mj_step2
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.simulation import Simulation
-from poise.envs.robots.robot import Robot, on_terrain
-from poise.envs.terrain.terrain import Terrain
 
 from .motors import DAMPING, STIFFNESS, TARGET, TORQUE, Motors
 
@@ -102,9 +100,8 @@ class Rollout(Block):
     motors: Motors  # what they were asked for, which the computer knows
 
 
-def make_rollout(robot: Robot, terrain: Terrain, motors: Motors) -> Rollout:
-    """The rollout of `robot` on `terrain`."""
-    simulation = Simulation(on_terrain(robot, terrain))
+def make_rollout(simulation: Simulation, motors: Motors) -> Rollout:
+    """The rollout in a simulation of its own, of the known robot."""
     return Rollout(simulation.arrays, simulation.views, motors)
 
 

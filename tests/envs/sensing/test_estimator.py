@@ -90,10 +90,13 @@ def test_auto_is_exact_where_no_sensor_errs():
     assert estimated(level, predictor="none").belief.steps[:4].tolist() == [5, 7, 0, 1]
 
 
-@pytest.mark.parametrize("kind", ["odometry", "inekf"])
-def test_an_episode_forgets_the_one_before(kind):
+@pytest.mark.parametrize(
+    ("kind", "predictor"), [("odometry", "promised"), ("odometry", "rollout"), ("inekf", "auto")]
+)
+def test_an_episode_forgets_the_one_before(kind, predictor):
     """The same robot and torques give the same beliefs, whatever was estimated before."""
-    source, torques = estimated("field", 1, kind=kind), 0.1 * robot().torque_limit
+    source = estimated("field", 1, kind=kind, predictor=predictor)
+    torques = 0.1 * robot().torque_limit
     seen = []
     for seed in (1, 2, 1):
         start(source, "field", seed)
