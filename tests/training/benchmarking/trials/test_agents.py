@@ -95,10 +95,7 @@ def test_a_packaged_policy_is_known_by_its_folder(
     others = ["residual-walk", "residual-whole-g1", "residual-whole-g1-field"]
     assert packaged("policies") == [*names, *others]
     assert default_controllers()[-7:] == tuple(names)
-    assert default_controllers("unitree_g1")[-2:] == [
-        "residual-whole-g1",
-        "residual-whole-g1-field",
-    ]
+    assert default_controllers("unitree_g1")[-2:] == tuple(others[1:])
     with pytest.raises(ConfigError, match=", ".join([*names, *others, "zero"])):
         load_agent("residual-abe07", robot)
 
@@ -131,7 +128,8 @@ def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
         steps = "residual-torque" if found.step_residual.torque > 0.0 else "residual-step"
         others = {"torque": "ppo-torque", "step": steps, "whole": "residual-whole-g1"}
         others |= {"walk": "residual-walk", "position": "ppo-position"}
-        assert name == others[found.action]
+        level = "" if found.env.realism.ideal else f"-{found.env.realism.name}"
+        assert name == f"{others[found.action]}{level}"
     else:
         on_baseline = found.controller == "momentum-qp"
         assert name == ("residual" if on_baseline else f"residual-{found.controller}")
