@@ -124,6 +124,9 @@ def _stored(path: Path, robot: Robot) -> RobotClip:
     if stored.about.fingerprint != robot.fingerprint:
         raise ConfigError(f"is a motion of the robot {stored.about.robot!r}, not of "
                           f"{robot.name!r}", source=path, field="robot")  # fmt: skip
+    if stored.free:
+        raise ConfigError("no postures of it are performed, so it cannot be joined", source=path,
+                          field="motion")  # fmt: skip
     return stored
 
 

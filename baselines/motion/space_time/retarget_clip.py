@@ -23,6 +23,7 @@ from poise.baselines.motion.retargeting.retarget import (
     retarget_to,
     targets_on,
 )
+from poise.baselines.motion.retargeting.walked import find_commands
 from poise.baselines.motion.space_time.constraints.constraint import Constraint
 from poise.baselines.motion.space_time.constraints.reading import (
     check_constraints,
@@ -37,6 +38,7 @@ from .trajectory import jerk
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
+ENOUGH = 0.7  # of the length of steps: where they are shorter, the planner of walks does better
 CROSSOVER = 2.0  # [Hz] what is asked faster than this is smoothed
 
 
@@ -52,6 +54,7 @@ class RetargetedClip(NamedTuple):
             over the frames [s].
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
+        tempo: how many times as fast as the clip it is.
     """
 
     clip: RobotClip
@@ -61,6 +64,7 @@ class RetargetedClip(NamedTuple):
     time_per_frame: float
     stride: float = 1.0
     begins: float = LEAD
+    tempo: float = 1.0
 
 
 def retarget_clip(
@@ -79,12 +83,14 @@ def retarget_clip(
     """A robot's motion of a clip: one that can be performed, else one that can be seen.
 
     With `kinematic` it is what `retarget_freely` makes, with False what `performable` makes; with
-    None the latter, or the former where no controller could perform that, and nothing was asked
-    with `solver`, `constraints` or `planted`. Then `about.unperformed` says why. A clip may be the
+    None the latter. Where no controller could perform that, or steps are shorter than 0.7 of what
+    the legs' ratio gives, and nothing was asked with `solver`, `constraints` or `planted`, it is
+    the former, with what `find_commands` has for a planner that walks. Of what does not walk either
+    `about.unperformed` says why. A clip may be the
     name of a packaged one, or a path. All else, and what is raised, is as of these two.
     """
     clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
-    reason = "it was retargeted by kinematics alone (--kinematic)"
+    reason, short = "it was retargeted by kinematics alone (--kinematic)", None
     if not kinematic:
         try:
             made = performable(
@@ -92,15 +98,28 @@ def retarget_clip(
                 planted=planted, crossover=crossover, progress=progress,
             )  # fmt: skip
             reference_from(made.clip, robot, clip.name)
-            return made
+            if kinematic is not None or made.stride >= ENOUGH:
+                return made
+            short = made
         except ConfigError as error:
             reason, asked = error.message, solver is not None or constraints or planted
             if kinematic is not None or asked or error.field not in UNPERFORMED:
                 raise
-    free = retarget_freely(clip, robot, smooth=smooth)
+    free, tempo = retarget_freely(clip, robot, smooth=smooth), 1.0
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
+    if not kinematic:
+        try:
+            commands, tempo = find_commands(clip, robot, free.scale)
+            walks = replace(free.clip, commands=commands, dt=free.clip.dt / tempo)
+            reference_from(walks, robot, clip.name)
+            seen = walks
+        except ConfigError as error:
+            if short is not None:
+                return short
+            if error.field == "contacts":
+                seen = replace(seen, about=replace(seen.about, unperformed=error.message))
     scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
-    return _stepped(free._replace(clip=seen), scene)
+    return _stepped(free._replace(clip=seen), scene)._replace(tempo=tempo)
 
 
 def performable(
