@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from poise.baselines.balance.references.motion import load_motion
     from poise.baselines.balance.references.reference_motion import ReferenceMotion
     from poise.baselines.balance.stepping.capture_step import CaptureStep
-    from poise.baselines.balance.stepping.config import CaptureStepConfig
     from poise.baselines.balance.stepping.controller import SteppingController
+    from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
     from poise.baselines.controller import (
         BaseController,
         CompiledController,
@@ -67,8 +67,8 @@ if TYPE_CHECKING:
     )
     from poise.baselines.motion.space_time.retarget_clip import retarget_clip
     from poise.baselines.registry import load_controller
-    from poise.baselines.walking.command import GaitCommand
     from poise.baselines.walking.controller import WalkingController
+    from poise.baselines.walking.planner.command import GaitCommand
     from poise.baselines.walking.schedule import CommandSampler
     from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
 else:
@@ -96,9 +96,9 @@ else:
             "registry": ("load_controller",),
             "motion.space_time.retarget_clip": ("retarget_clip",),
             "balance.stepping.capture_step": ("CaptureStep",),
-            "balance.stepping.config": ("CaptureStepConfig",),
+            "balance.stepping.planning.config": ("CaptureStepConfig",),
             "balance.stepping.controller": ("SteppingController",),
-            "walking.command": ("GaitCommand",),
+            "walking.planner.command": ("GaitCommand",),
             "walking.controller": ("WalkingController",),
             "walking.schedule": ("CommandSampler",),
             "whole_body.momentum_qp": ("MomentumQP", "MomentumQPConfig"),

@@ -14,8 +14,8 @@ from poise.baselines.balance.in_place.lqr_lip import LQRLIP, LQRLIPConfig
 from poise.baselines.balance.in_place.macchietto09 import Macchietto09, Macchietto09Config
 from poise.baselines.balance.in_place.pd import PD, PDConfig, StablePD, StablePDConfig
 from poise.baselines.balance.stepping.capture_step import CaptureStep
-from poise.baselines.balance.stepping.config import CaptureStepConfig, IPMStepConfig
 from poise.baselines.balance.stepping.ipm_step import IPMStep
+from poise.baselines.balance.stepping.planning.config import CaptureStepConfig, IPMStepConfig
 from poise.baselines.motion.performing.config import MotionStepConfig
 from poise.baselines.motion.performing.motion_step import MotionStep
 from poise.baselines.policy_files.config import PolicyFileConfig

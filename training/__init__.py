@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from poise.training.deploy.standalone.sensed import MotorCommand, SensedController
     from poise.training.learning.config import TrainConfig, train_config
     from poise.training.learning.policy import Policy, load_policy
+    from poise.training.learning.seeds.train import train_seeds
     from poise.training.learning.train import train
-    from poise.training.learning.train_seeds import train_seeds
     from poise.training.learning.tuning.search import tune
     from poise.training.learning.vec_env import ThreadedVecEnv
     from poise.training.pictures.figures.video import frame_strip, record
@@ -64,7 +64,7 @@ else:
             "learning.config": ("TrainConfig", "train_config"),
             "learning.policy": ("Policy", "load_policy"),
             "learning.train": ("train",),
-            "learning.train_seeds": ("train_seeds",),
+            "learning.seeds.train": ("train_seeds",),
             "learning.vec_env": ("ThreadedVecEnv",),
             "pictures.report.page": ("write_report",),
             "benchmarking.results.compare": ("compare",),

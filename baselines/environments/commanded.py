@@ -7,14 +7,14 @@ import numpy as np
 
 from poise.baselines.controller import BaseController
 from poise.baselines.registry import walking_controllers
-from poise.baselines.walking.command import GaitCommand, command_of
 from poise.baselines.walking.controller import (
     LimitedWalker,
     ReachingWalker,
     TerrainWalker,
     WalkingController,
 )
-from poise.baselines.walking.reach import Reach
+from poise.baselines.walking.planner.command import GaitCommand, command_of
+from poise.baselines.walking.planner.reach import Reach
 from poise.baselines.walking.schedule import (
     Follower,
     TimedCommand,

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from poise.baselines.balance.stepping.blocks import CaptureTick
 from poise.baselines.balance.stepping.ipm_step import energy_foothold
-from poise.baselines.balance.stepping.swing import time_left
+from poise.baselines.balance.stepping.planning.blocks import CaptureTick
+from poise.baselines.balance.stepping.planning.swing import time_left
 from poise.baselines.balance.stepping.tick import capture_tick
 from poise.baselines.controller import Targets
 from poise.baselines.motion.performing.motion_step import MotionStep

@@ -31,9 +31,9 @@ from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot
 
 from .controlled import ControlledEnv
-from .motion_terms import MOTION_TERMS, MotionView
 from .policy_step import TargetInputs, set_targets
 from .scales import Lag, ResidualScales, action_term, make_residual
+from .terms import MOTION_TERMS, MotionView
 
 
 class ResidualBalanceEnv(ControlledEnv):

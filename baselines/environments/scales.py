@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from poise.baselines.balance.references.offsets import MOMENTUM_X, MOMENTUM_Y, STEPS, TARGETS
+from poise.baselines.balance.references.targets import MOMENTUM_X, MOMENTUM_Y, STEPS, TARGETS
 from poise.envs.balance.mdp.observation import Term
 from poise.envs.compiled.memory import guarded_zeros
 

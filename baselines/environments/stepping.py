@@ -21,7 +21,7 @@ from poise.envs.robots.robot import Robot
 
 from .residual import ResidualBalanceEnv
 from .scales import StepScales
-from .step_terms import REPORTED, STEP_TERMS, StepReporter, StepView, report_steps
+from .terms import REPORTED, STEP_TERMS, StepReporter, StepView, report_steps
 
 
 class ResidualStepEnv(ResidualBalanceEnv):

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from poise.baselines.balance.stepping.blocks import StepMemory
-from poise.baselines.walking.blocks import Gait
-from poise.baselines.walking.step import step_time
+from poise.baselines.balance.stepping.planning.blocks import StepMemory
+from poise.baselines.walking.planner.blocks import Gait
+from poise.baselines.walking.planner.step import step_time
 from poise.envs.balance.mdp.observation import GROUND, Terms
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
@@ -14,7 +14,7 @@ from poise.envs.compiled.maths.vectors import along
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
 
-from .step_terms import PHASE, STEP_TERMS, StepView
+from .terms import PHASE, STEP_TERMS, StepView
 
 # entries of what is told of a walk
 WALKING, SIDE, CYCLE = range(3)  # 1 while it walks; the foot it stands on next; phase of the step

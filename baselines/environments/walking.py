@@ -9,8 +9,8 @@ import numpy as np
 
 from poise.baselines.controller import Controller, as_base_controller
 from poise.baselines.registry import ControllerConfig, walking_controllers
-from poise.baselines.walking.command import GaitCommand
 from poise.baselines.walking.controller import WalkingController
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import CommandSampler, TimedCommand, command_sampler
 from poise.configs.errors import ConfigError
 from poise.envs.balance.config import EnvConfig
@@ -21,8 +21,8 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.robots.robot import Robot
 
 from .commanded import check_reach
-from .step_terms import StepView
 from .stepping import ResidualStepEnv
+from .terms import StepView
 from .walk_terms import (
     WALK_REPORTED,
     WALK_TERMS,

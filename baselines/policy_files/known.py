@@ -15,7 +15,7 @@ from poise.configs.reading import is_folder, read_bytes, read_yaml
 from poise.configs.schema import build
 
 from .config import KnownFile, Origin, PolicyFileConfig
-from .files import BYTES, ONNX
+from .onnx.files import BYTES, ONNX
 
 RIVALS = "rivals"  # folder of descriptions of policies of others, which are for one robot each
 PLACES = "POISE_POLICIES"  # environment variable: folders, with the system's separator between them

@@ -15,9 +15,9 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.extras import how_to_install
 from poise.configs.reading import read_bytes
 
-from .bounds import Clocked
 from .config import Memory, PolicyFileConfig
-from .files import BYTES
+from .onnx.bounds import Clocked
+from .onnx.files import BYTES
 
 MEMORY = 10_000_000  # numbers that a network may remember, of each kind
 HOW = f"needs the package onnxruntime: {how_to_install('onnx')}"

@@ -13,13 +13,13 @@ from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
 from poise.configs.schema import build
 
-from .bounds import try_network
 from .config import Origin, PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
-from .files import description, digest, is_network, is_policy_place, only_network
 from .known import RIVALS, expect_network
-from .metadata import metadata_fields
 from .networks import onnx_session
+from .onnx.bounds import try_network
+from .onnx.files import description, digest, is_network, is_policy_place, only_network
+from .onnx.metadata import metadata_fields
 
 
 def advice(network: str | Path) -> str:

@@ -1,9 +1,13 @@
-"""The configuration of controllers that walk; numbers have the units of `stepping/config.py`."""
+"""The configuration of controllers that walk; units are those of `stepping/planning/config.py`."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from poise.baselines.balance.stepping.config import CaptureStepConfig, StepLimits, SwingTask
+from poise.baselines.balance.stepping.planning.config import (
+    CaptureStepConfig,
+    StepLimits,
+    SwingTask,
+)
 from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 
 from .models.lip import Lip

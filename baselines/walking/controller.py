@@ -2,12 +2,12 @@
 
 from typing import Protocol, runtime_checkable
 
-from poise.baselines.balance.stepping.blocks import StepMemory
+from poise.baselines.balance.stepping.planning.blocks import StepMemory
 from poise.envs.terrain.terrain import Terrain
 
-from .blocks import Gait
-from .command import GaitCommand, command_of
-from .reach import Reach
+from .planner.blocks import Gait
+from .planner.command import GaitCommand, command_of
+from .planner.reach import Reach
 
 
 @runtime_checkable

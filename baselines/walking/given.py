@@ -9,9 +9,9 @@ from poise.envs.robots.robot import Robot
 from poise.envs.terrain.arrays import surface_arrays
 from poise.envs.terrain.terrain import Surface, Terrain
 
-from .blocks import Treads
 from .config import TreadConfig
-from .treads import FREE, LEVEL
+from .planner.blocks import Treads
+from .planner.treads import FREE, LEVEL
 
 STEEPEST = 10.0  # [°] of ground that is walked on as if it were level
 

@@ -13,7 +13,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.pushes.sampler import Range
 
-from .command import ENTRIES, GaitCommand
+from .planner.command import ENTRIES, GaitCommand
 
 MOST_COMMANDS = 256  # of an episode
 SOON = 1e-9  # [s] by which times may round

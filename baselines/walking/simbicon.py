@@ -6,9 +6,9 @@ from typing import Literal
 import numpy as np
 
 from poise.baselines.balance.in_place.pd import PDGains, joint_gains, motor_torques
-from poise.baselines.balance.references.feet import foot_signs
+from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.balance.stepping.capture_step import allocate_step_memory
-from poise.baselines.balance.stepping.cop_region import CopRegion
+from poise.baselines.balance.stepping.planning.cop_region import CopRegion
 from poise.baselines.controller import BaseController, Targets
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.vectors import rotation_between, turn
@@ -16,10 +16,10 @@ from poise.envs.physics.arrays import robot_arrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .command import STEP_PARAMETERS, GaitCommand
 from .config import GaitConfig
 from .controller import Commanded
 from .models.leg_joints import leg_joints
+from .planner.command import STEP_PARAMETERS, GaitCommand
 from .walk import allocate_gait
 
 

@@ -5,10 +5,13 @@
 
 import numpy as np
 
-from poise.baselines.balance.stepping.cop_region import distance_beyond, double_support_region
-from poise.baselines.balance.stepping.guidance import copy_reference
-from poise.baselines.balance.stepping.recentring import set_level_frame, stop_recentring
-from poise.baselines.balance.stepping.swing import LANDING, start_swing
+from poise.baselines.balance.stepping.planning.cop_region import (
+    distance_beyond,
+    double_support_region,
+)
+from poise.baselines.balance.stepping.planning.guidance import copy_reference
+from poise.baselines.balance.stepping.planning.recentring import set_level_frame, stop_recentring
+from poise.baselines.balance.stepping.planning.swing import LANDING, start_swing
 from poise.baselines.balance.stepping.tick import (
     FIRST_LOAD,
     capture_tick,
@@ -20,10 +23,10 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import along, copy_into, turned
 
-from .blocks import Gait, WalkTick
-from .dcm import gait_offset, transfer_point
-from .step import ask_for, offset_from, put_middle, step_time, step_width, swing_tick
-from .treads import feet_are_level, footholds_given, lean_ahead, meet_treads
+from .planner.blocks import Gait, WalkTick
+from .planner.dcm import gait_offset, transfer_point
+from .planner.step import ask_for, offset_from, put_middle, step_time, step_width, swing_tick
+from .planner.treads import feet_are_level, footholds_given, lean_ahead, meet_treads
 
 LOADED, UNLOADED = 1.5, 1.15  # rates at which the load may go to a foot, and must leave one [1/T_d]
 HELD_UP = 0.013  # [h] above where the swing leads it: the ground holds the foot up

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.balance.stepping.blocks import CaptureTick
 from poise.baselines.balance.stepping.capture_step import CaptureStep, check_qps
-from poise.baselines.balance.stepping.config import StepLimits
 from poise.baselines.balance.stepping.planner import search_limits
-from poise.baselines.balance.stepping.swing import swing_gains, swing_task
-from poise.baselines.balance.stepping.swing_speed import possible_limits
+from poise.baselines.balance.stepping.planning.blocks import CaptureTick
+from poise.baselines.balance.stepping.planning.config import StepLimits
+from poise.baselines.balance.stepping.planning.swing import swing_gains, swing_task
+from poise.baselines.balance.stepping.planning.swing_speed import possible_limits
 from poise.baselines.controller import Targets
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
@@ -24,16 +24,16 @@ from poise.envs.robots.robot import Robot
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.terrain import Surface, Terrain
 
-from .arms import allocate_arms
-from .blocks import Gait, WalkTick
-from .command import ENTRIES, GaitCommand
 from .config import GaitConfig, WalkConfig
 from .controller import Commanded
 from .given import allocate_treads, given_footholds
 from .models.leg_rows import leg_task
 from .models.legs import leg_arrays, no_legs
 from .models.reference import allocate_reference
-from .reach import Reach, check_command, reach_of
+from .planner.arms import allocate_arms
+from .planner.blocks import Gait, WalkTick
+from .planner.command import ENTRIES, GaitCommand
+from .planner.reach import Reach, check_command, reach_of
 from .tick import walk_tick
 
 

@@ -25,27 +25,25 @@ from poise.baselines.solvers import QP
 from poise.envs.physics.state import RobotState
 
 from .constraint_rows import (
+    accel_rows,
+    angular_momentum_rows,
     contact_jacobian,
     contact_motion,
     joint_limits,
+    linear_momentum_rows,
     point_cones,
+    posture_rows,
     root_dynamics,
+    root_rows,
     sole_cones,
     torque_limits,
     torque_matrix,
+    torque_rows,
+    wrench_rows,
 )
 from .contacts.contact import ContactRows
 from .limits.limit import BoundLimit, Bounds
 from .parameters import QPParameters
-from .task_rows import (
-    accel_rows,
-    angular_momentum_rows,
-    linear_momentum_rows,
-    posture_rows,
-    root_rows,
-    torque_rows,
-    wrench_rows,
-)
 from .tasks.task import Rows
 
 

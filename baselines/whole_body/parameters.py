@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from poise.baselines.solvers.null_space import short_legs
 from poise.envs.compiled.block import Block
-from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.arrays import RobotArrays, sole_chains
 from poise.envs.robots.robot import Robot
 
 from .contacts.wrench_cone import robot_cones
 from .gains import JointLimit
-from .null_space import short_legs
 
 if TYPE_CHECKING:
     from .momentum_qp import MomentumQPConfig
@@ -83,7 +83,7 @@ def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig")
     torque_limit = np.zeros(nj)  # a joint without a motor has none
     torque_limit[arrays.motor_dofs - 6] = config.torque.share * arrays.torque_limit
     joint = config.joint or JointLimit()
-    weakest = WEAKEST_WEIGHT if short_legs(arrays) else 0.0
+    weakest = WEAKEST_WEIGHT if short_legs(sole_chains(arrays)) else 0.0
     com_stiffness = np.array([com.stiffness, com.stiffness, com.height_stiffness])
     return QPParameters(
         accel_weight=accel_weight / omega**4,

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.baselines.controller import TargetArrays
+from poise.baselines.solvers.null_space import solve_resting
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import Program, run
 from poise.envs.compiled.jit import compiled
@@ -26,7 +27,6 @@ from poise.envs.physics.kinematics import StateArrays
 
 from .constraints import build_constraints
 from .contacts.contact import ContactArrays
-from .null_space import solve_resting
 from .objective import (
     build_objective,
     carry_momentum,

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from poise.baselines.solvers.dual_active_set import iscratch_size, scratch_size
+from poise.baselines.solvers.null_space import NullSpace, allocate_null_space
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.memory import guarded_zeros
-from poise.envs.physics.arrays import RobotArrays
-
-from .null_space import NullSpace, allocate_null_space
+from poise.envs.physics.arrays import RobotArrays, sole_chains
 
 
 class Layout(NamedTuple):
@@ -155,7 +154,7 @@ def allocate_workspace(
         point_rows: how many rows the cones of these have together.
         limit_rows: how many rows there are of limits besides those of torques and joints.
     """
-    space = allocate_null_space(robot, point_chains)
+    space = allocate_null_space(len(robot.q_standing) + 6, sole_chains(robot), point_chains)
     points = len(point_chains)
     lay = lay_out(robot, space, cone_rows, soft_root, points, point_rows, limit_rows)
     n, m, r, k, nj, z = lay.n, lay.m, lay.r, lay.k, lay.nj, guarded_zeros

@@ -143,6 +143,11 @@ def sim_views(model: mujoco.MjModel, data: mujoco.MjData) -> SimViews:
     return views
 
 
+def sole_chains(robot: RobotArrays) -> list[np.ndarray]:
+    """The degrees of freedom that move each sole, in order."""
+    return [chain[:n] for chain, n in zip(robot.chain, robot.chain_length, strict=True)]
+
+
 def dof_chain(model: mujoco.MjModel, body: int) -> list[int]:
     """Degrees of freedom between the world and `body`, from the root outwards."""
     while model.body_dofnum[body] == 0:

@@ -30,9 +30,9 @@ from .ground import (
     switch_on,
 )
 from .guess import MODELS, guess
-from .humanoid import humanoid_spec
 from .menagerie import model_file, ros_file
 from .model_check import check_bodies, check_numbers, check_standing
+from .models.humanoid import humanoid_spec
 from .models.mjcf import pointing_to_scenes, read_mjcf
 from .models.urdf import read_urdf
 from .soles import Sole, build_sole, find_sole_plane, sole_geoms

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass, field, replace
 from typing import Literal
+from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
@@ -59,9 +60,8 @@ from .odometry import (
     rate_gain,
 )
 from .plant import Plant
-from .prediction import allocate_promises, keep_promises, predict
+from .prediction import Rollout, allocate_promises, keep_promises, make_rollout, predict, roll_out
 from .realism import Realism
-from .rollout import Rollout, make_rollout, roll_out
 from .source import StateSource
 
 POSITIVE = {"above": 0.0}
@@ -69,6 +69,7 @@ SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT = range(6)  # entries of `B
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 #: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
+WITHOUT_CONTACTS: WeakKeyDictionary[Robot, Robot] = WeakKeyDictionary()
 SINK = 0.05  # of the height error of the soles that a tick takes away
 
 
@@ -324,8 +325,13 @@ def check_latency(level: Realism, timestep: float) -> None:
 
 
 def without_contacts(robot: Robot) -> Robot:
-    """A copy of `robot` whose model has no contacts and no constraints to look for."""
-    model = copy.copy(robot.model)
-    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    model.opt.disableflags |= int(off)
-    return replace(robot, model=model)
+    """A copy of `robot` whose model has no contacts and no constraints to look for.
+
+    Environments of one robot share it: a model with its meshes may have 75 MB.
+    """
+    if robot not in WITHOUT_CONTACTS:
+        model = copy.copy(robot.model)
+        off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        model.opt.disableflags |= int(off)
+        WITHOUT_CONTACTS[robot] = replace(robot, model=model)
+    return WITHOUT_CONTACTS[robot]

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from poise.training.benchmarking.evaluation import run
 from poise.training.cli import entry
 from poise.training.deploy.qp_set import export
-from poise.training.learning import train_seeds
+from poise.training.learning.seeds import train as train_seeds
 from poise.training.learning.tuning import search
 from poise.training.pictures.figures import video
 from poise.training.pictures.report import page

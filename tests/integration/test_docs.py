@@ -19,7 +19,8 @@ from typing import NamedTuple
 
 import pytest
 
-from poise.training.cli import entry, motion, train
+from poise.training.cli import entry, train
+from poise.training.cli.motion import commands as motion
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -16,43 +16,46 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("configs", "envs", "baselines", "training")
-MOST = 14  # files in a room
+MOST = 13  # files in a room
 DOORS = 7  # folders in a folder
 
 # A room imports rooms of lower floors only; those of one floor do not know each other. A file that
 # is not in a room is one by itself.
 FLOORS = """
- 1 configs, training/benchmarking/statistics
- 2 baselines/allowance, baselines/motion/synthesis/scripts, envs/compiled
- 3 baselines/solvers, baselines/warmup, envs/compiled/maths, envs/robots/models, envs/terrain
- 3 training/running, training/running/options
+ 1 baselines/balance, baselines/motion, configs, training/benchmarking
+ 1 training/benchmarking/statistics, training/deploy, training/pictures
+ 2 baselines/allowance, baselines/motion/synthesis/scripts, envs/compiled, envs/robots/models
+ 2 training/running/options
+ 3 baselines/policy_files/onnx, baselines/solvers, baselines/warmup, envs/compiled/maths
+ 3 envs/terrain, training/running
  4 baselines/motion/clips, envs/robots
  5 baselines/motion/graphs/joining, envs/physics/pushes
  6 baselines/motion/graphs, baselines/motion/graphs/matching
  6 baselines/motion/retargeting/inverse_kinematics, envs/physics
  7 baselines/controller, baselines/whole_body/contacts, baselines/whole_body/limits
  7 baselines/whole_body/tasks, envs/balance/mdp, envs/sensing, envs/viewing
- 8 baselines/balance/references, baselines/plugins, baselines/whole_body, envs/balance
- 9 baselines/balance/in_place, baselines/balance/stepping, baselines/motion/feasibility
- 9 baselines/motion/retargeting, baselines/policy_files, baselines/walking/models
- 9 envs/balance/vector
-10 baselines/motion/performing, baselines/motion/space_time/constraints
-10 baselines/motion/synthesis, baselines/walking
-11 baselines/motion/space_time, baselines/registry
-12 baselines/environments
-13 training/benchmarking/diagnosis, training/learning, training/motion/tracking
-14 training/benchmarking/trials
-15 training/benchmarking/suites, training/deploy/standalone, training/learning/tuning
-15 training/motion/following, training/motion/open_loop, training/pictures/figures
-16 training/benchmarking/metrics, training/deploy/policy_check, training/deploy/qp_set
-16 training/deploy/robot_check
-17 training/benchmarking/evaluation
-18 training/benchmarking/results, training/motion/gaits
-19 training/deploy/export, training/pictures/report, training/pictures/sessions
-20 training/pictures/motion_report, training/pictures/view
-21 training/cli
-22 baselines, baselines/balance, baselines/motion, envs, training, training/benchmarking
-22 training/deploy, training/motion, training/pictures
+ 8 baselines/balance/references, baselines/plugins, baselines/walking/models
+ 8 baselines/whole_body, envs/balance
+ 9 baselines/balance/in_place, baselines/balance/stepping/planning, baselines/motion/feasibility
+ 9 baselines/motion/retargeting, baselines/policy_files, envs/balance/vector
+10 baselines/balance/stepping, baselines/motion/space_time/constraints
+10 baselines/motion/synthesis, envs, training/motion/open_loop
+11 baselines/motion/performing, baselines/motion/space_time, baselines/walking/planner
+12 baselines/walking
+13 baselines/registry
+14 baselines/environments
+15 baselines, training/benchmarking/diagnosis, training/deploy/policy_check, training/learning
+15 training/motion/tracking
+16 training/benchmarking/trials, training/learning/seeds, training/motion
+17 training/benchmarking/suites, training/deploy/robot_check/standing, training/deploy/standalone
+17 training/learning/tuning, training/motion/following, training/pictures/figures
+18 training/benchmarking/metrics, training/deploy/qp_set, training/deploy/robot_check
+19 training/benchmarking/evaluation
+20 training/benchmarking/results, training/motion/gaits
+21 training/deploy/export, training/pictures/report, training/pictures/sessions
+22 training, training/pictures/motion_report, training/pictures/view
+23 training/cli/motion
+24 training/cli
 """
 FLOOR = {
     room: int(line.split()[0])

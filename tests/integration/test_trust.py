@@ -44,8 +44,8 @@ from poise.training.deploy.standalone.controller import load_standalone
 from poise.training.learning.checkpoints import check_controller, controller_fingerprint
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
+from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import train
-from poise.training.learning.train_seeds import train_seeds
 from poise.training.learning.tuning.candidates import Candidate
 from poise.training.learning.tuning.candidates import play as play_candidate
 from poise.training.learning.tuning.gains import Gains

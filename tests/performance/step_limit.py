@@ -32,8 +32,8 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 
-from poise.baselines.balance.references.feet import nominal_feet
-from poise.baselines.balance.stepping.cop_region import CopRegion
+from poise.baselines.balance.references.legs import nominal_feet
+from poise.baselines.balance.stepping.planning.cop_region import CopRegion
 from poise.baselines.registry import controller_config
 from poise.baselines.whole_body.momentum_qp import com_offset
 from poise.envs.compiled.maths.polygons import half_planes

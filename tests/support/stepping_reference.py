@@ -2,10 +2,14 @@
 
 import numpy as np
 
-from poise.baselines.balance.stepping.cop_region import DIRECTIONS, LOAD_FRACTIONS, rest_ahead
-from poise.baselines.balance.stepping.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planner import StepPlan
-from poise.baselines.balance.stepping.recentring import LOADING, SHIFTING
+from poise.baselines.balance.stepping.planning.cop_region import (
+    DIRECTIONS,
+    LOAD_FRACTIONS,
+    rest_ahead,
+)
+from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
+from poise.baselines.balance.stepping.planning.recentring import LOADING, SHIFTING
 from poise.envs.compiled.maths.pendulum import drifted
 from poise.envs.compiled.maths.polygons import nearest_inside
 from poise.envs.compiled.maths.vectors import turn

@@ -12,7 +12,7 @@ import yaml
 
 from poise.configs.files import packaged_folder
 from poise.envs.physics.simulation import Simulation
-from poise.envs.robots.humanoid import humanoid_spec
+from poise.envs.robots.models.humanoid import humanoid_spec
 from poise.envs.robots.robot import Robot, load_robot
 from tests.support.shared import robot
 

@@ -6,9 +6,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from poise.training.running.options.arguments import (
+    Allow,
+    Json,
+    Names,
+    RobotName,
+    Switch,
+    print_json,
+)
 from poise.training.running.terminal import terminal
 
-from .arguments import Allow, Json, Names, RobotName, Switch, print_json
 from .policies import dataset, export
 from .results import compare, leaderboard, replay, report
 from .view import view

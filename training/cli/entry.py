@@ -13,6 +13,7 @@ import tyro
 
 import poise
 from poise.configs.errors import ConfigError, PoiseError, meant, shown
+from poise.training.running.options.arguments import check_flags
 from poise.training.running.options.pages import print_commands
 from poise.training.running.options.parsing import parsed
 from poise.training.running.options.spelling import respelled, suggestion
@@ -25,7 +26,6 @@ from poise.training.running.stopping import (
 )
 from poise.training.running.terminal import speak_plainly, terminal
 
-from .arguments import check_flags
 from .commands import COMMANDS
 
 SHELLS = ("bash", "zsh", "fish")  # for which tyro writes completions
@@ -138,7 +138,7 @@ def _run(args: list[str]) -> int:
         run(given)
         return 0
     if name == "motion":  # it has sub-commands
-        from .motion import run as run_motion
+        from .motion.commands import run as run_motion
 
         return run_motion(given)
     if name == "policies":  # it has one, too

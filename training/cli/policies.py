@@ -7,10 +7,9 @@ from typing import Annotated
 import tyro
 
 from poise.configs.errors import ConfigError, shown
+from poise.training.running.options.arguments import Allow, PolicyName
 from poise.training.running.options.parsing import parsed
 from poise.training.running.terminal import terminal
-
-from .arguments import Allow, PolicyName
 
 Checked = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 

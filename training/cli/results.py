@@ -8,9 +8,8 @@ import tyro
 
 from poise.configs.errors import ConfigError
 from poise.configs.texts import printable
+from poise.training.running.options.arguments import Allow, Folder, Json, check_folders, print_json
 from poise.training.running.terminal import terminal
-
-from .arguments import Allow, Folder, Json, check_folders, print_json
 
 if TYPE_CHECKING:
     from poise.envs.physics.pushes.push import Kick, Push

@@ -15,14 +15,15 @@ from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
 from poise.configs.schema import build, to_dict
+from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.statistics.differences import difference
 from poise.training.benchmarking.statistics.rates import wilson_interval
 from poise.training.learning.checkpoints import STATE, find_checkpoint
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.policy_files import read_state
-from poise.training.learning.seeds import SEEDS, Evaluation, evaluations, start_and_best
+from poise.training.learning.seeds.records import SEEDS, Evaluation, evaluations, start_and_best
+from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import BEST, LAST, train
-from poise.training.learning.train_seeds import train_seeds
 from poise.training.running.executor import Backend
 from poise.training.running.options.described import Option, kind_of, options_of, sentences
 from poise.training.running.options.pages import grouped, print_options
@@ -34,7 +35,7 @@ from .commands import Allow
 DEFAULT, ANY_ROBOT, QUICK = "residual-torque", "any-robot", "quick"
 HUMANOID = TrainConfig.robot  # whose bodies and limits DEFAULT names
 BASIC = ("out", "config", "quick", "steps", "seed", "robot", "controller", "resume", "threads",
-         "start-from", "seeds", "workers", "keep-every", "allow")  # fmt: skip
+         "realism", "start-from", "seeds", "workers", "keep-every", "allow")  # fmt: skip
 GROUPS = {
     "env": "the environment",
     "env.pushes": "pushes, each range drawn from uniformly",
@@ -64,6 +65,8 @@ class Command:
             replace its fields. If not given: residual-torque, with another --robot any-robot, with
             --resume the run's own.
         quick: Train a first policy in some ten minutes: the configuration quick.
+        realism: How real the robot is: ideal (its state is known exactly and at once), lab, field,
+            or a .yaml file of a level; that of the configuration if not given.
         resume: Go on with the run, or the runs, that the folder holds.
         seeds: Train a run for each of these seeds, in folders seed-SEED of the folder.
         backend: What the runs of several seeds go on: processes of this machine (local), the same
@@ -77,6 +80,7 @@ class Command:
     out: Path = Path("runs/quick")
     config: str | None = None
     quick: tyro.conf.FlagCreatePairsOff[bool] = False
+    realism: str | None = None
     resume: tyro.conf.FlagCreatePairsOff[bool] = False
     seeds: tuple[int, ...] = ()
     backend: Backend = "local"
@@ -208,7 +212,10 @@ def parse(args: Sequence[str]) -> Command:
             default=Command(base) if quick else Command(base, out=tyro.MISSING),
             config=(tyro.conf.AvoidSubcommands,),
         )
-    settings = build(TrainConfig, to_dict(command.settings), "command line")
+    fields = to_dict(command.settings)
+    if command.realism is not None:
+        fields["env"]["realism"] = to_dict(load_realism(command.realism))
+    settings = build(TrainConfig, fields, "command line")
     return replace(command, settings=settings)
 
 

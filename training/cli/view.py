@@ -6,8 +6,7 @@ from typing import Annotated
 import tyro
 
 from poise.configs.errors import ConfigError
-
-from .arguments import Allow, Switch, check_folders
+from poise.training.running.options.arguments import Allow, Switch, check_folders
 
 Shown = Annotated[
     tuple[str, ...],

@@ -9,9 +9,8 @@ import tyro
 import yaml
 
 from poise.configs.errors import ConfigError, shown
+from poise.training.running.options.arguments import Allow, Switch
 from poise.training.running.terminal import terminal
-
-from .arguments import Allow, Switch
 
 
 def walk(

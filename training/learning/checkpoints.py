@@ -28,6 +28,7 @@ from poise.configs.schema import to_yaml
 from .config import TrainConfig
 from .policy_files import MOMENTS, read_parameters, read_state, read_statistics
 
+KEPT = "kept"  # folder of a run: its policies, by their steps
 POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.yaml", "state.json"
 FILES = (POLICY, STATISTICS, CONFIG, STATE)
 #: made anew by `PPO.load`, or of the running process alone

@@ -105,14 +105,17 @@ class PPOConfig:
 
 @dataclass(frozen=True)
 class Curriculum:
-    """The largest push grows from `start` times its final size over a fraction of the run.
+    """Pushes and errors of the robot grow to their final size over a fraction of the run.
 
     Attributes:
         start: Largest push at the start of the run, over its final size.
-        share: Fraction of the run over which the largest push grows.
+        realism: Level of realism at the start of the run, over its final one: see
+            `Realism.scaled`.
+        share: Fraction of the run over which both grow.
     """
 
     start: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})
+    realism: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0, "omit": "default"})
     share: float = field(default=0.3, metadata={"min": 0.0, "max": 1.0})
 
 
@@ -171,7 +174,7 @@ class TrainConfig:
         smoothing: Time constant τ of the low-pass that an action goes through [s].
         gate: Distance of the capture point from its reference below which the action fades out [m].
         ppo: Stable-Baselines3's PPO.
-        curriculum: How pushes grow over the run.
+        curriculum: How pushes and the level of realism grow over the run.
         evaluation: Held-out pushes during the run.
     """
 

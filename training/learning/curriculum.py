@@ -1,4 +1,4 @@
-"""The curriculum of a training run: pushes that grow."""
+"""The curriculum of a training run: pushes, and errors of the robot, that grow."""
 
 from dataclasses import replace
 
@@ -8,22 +8,27 @@ from .config import TrainConfig
 
 
 class CurriculumCallback(BaseCallback):
-    """Scales the largest push of the training environments as the run goes on."""
+    """Scales the training environments' largest push and level of realism as the run goes on."""
 
     def __init__(self, config: TrainConfig):
         super().__init__()
         self.config = config
 
     def _on_rollout_start(self) -> None:
-        curriculum, pushes = self.config.curriculum, self.config.env.pushes
-        if pushes is None or curriculum.share == 0.0:
+        curriculum, env = self.config.curriculum, self.config.env
+        if curriculum.share == 0.0:
             return
         done = min(self.num_timesteps / (curriculum.share * self.config.steps), 1.0)
-        factor = curriculum.start + (1.0 - curriculum.start) * done
-        low, high = pushes.magnitude
-        scaled = replace(pushes, magnitude=(min(low, factor * high), factor * high))
-        self.training_env.set_attr("push_sampler", scaled)
-        self.logger.record("curriculum/largest", scaled.magnitude[1])
+        if env.pushes is not None:
+            factor = curriculum.start + (1.0 - curriculum.start) * done
+            low, high = env.pushes.magnitude
+            scaled = replace(env.pushes, magnitude=(min(low, factor * high), factor * high))
+            self.training_env.set_attr("push_sampler", scaled)
+            self.logger.record("curriculum/largest", scaled.magnitude[1])
+        if curriculum.realism < 1.0:
+            factor = curriculum.realism + (1.0 - curriculum.realism) * done
+            self.training_env.set_attr("realism", env.realism.scaled(factor))
+            self.logger.record("curriculum/realism", factor)
 
     def _on_step(self) -> bool:
         return True

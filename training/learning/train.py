@@ -30,13 +30,12 @@ from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
 
 from .callbacks import Checkpoints, Progress, RewardTerms, Throughput
-from .checkpoints import CONFIG, STATE, check_controller, find_checkpoint, restore
+from .checkpoints import CONFIG, KEPT, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
 from .curriculum import CurriculumCallback
 from .exploration import ExplorationCallback, correlate_exploration
 from .imported import import_policy
 from .policy import locate_policy
-from .seeds import KEPT
 from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
 

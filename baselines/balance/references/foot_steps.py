@@ -12,9 +12,9 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
-from .feet import foot_signs, nominal_feet
 from .footing import root_turns, sole_poses
 from .footwork import FootPlan
+from .legs import foot_signs, nominal_feet
 from .robot_clip import RATE
 from .splines import rest_spline
 

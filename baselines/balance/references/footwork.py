@@ -14,9 +14,8 @@ from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
-from .feet import bearing_polygon, nominal_feet
 from .footing import momentum_offset
-from .legs import PlantedLegs
+from .legs import PlantedLegs, bearing_polygon, nominal_feet
 from .splines import rest_spline
 
 SHIFT = 0.8  # [s] that the ZMP takes from one foot to the other at most

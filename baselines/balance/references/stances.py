@@ -11,9 +11,8 @@ from poise.configs.errors import PoiseError
 from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
-from .feet import nominal_feet
 from .footing import root_turns, sole_poses, stances_of
-from .legs import PlantedLegs
+from .legs import PlantedLegs, nominal_feet
 
 NEAR, NEARLY = 5e-3, 0.02  # [m, rad] by which soles that are home may be elsewhere
 UNREACHED = 1e-4  # [m, rad] that a sole may be off

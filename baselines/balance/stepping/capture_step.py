@@ -23,14 +23,14 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .blocks import CaptureTick, RegionArrays, StepGains, StepMemory
-from .config import CaptureStepConfig, StepLimits
 from .controller import STANDING, Stepping, SteppingController
-from .cop_region import CopRegion, rest_ahead
 from .planner import StepPlanner
-from .recentring import recentring_arrays, stop_recentring
-from .swing import Swing, swing_gains, swing_task
-from .swing_speed import possible_limits
+from .planning.blocks import CaptureTick, RegionArrays, StepGains, StepMemory
+from .planning.config import CaptureStepConfig, StepLimits
+from .planning.cop_region import CopRegion, rest_ahead
+from .planning.recentring import recentring_arrays, stop_recentring
+from .planning.swing import Swing, swing_gains, swing_task
+from .planning.swing_speed import possible_limits
 from .tick import capture_tick
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from poise.baselines.balance.references.offsets import (
+from poise.baselines.balance.references.targets import (
     COM_X,
     COM_Z,
     COP_X,
@@ -18,7 +18,7 @@ from poise.baselines.controller import BaseController
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.memory import guarded_zeros
 
-from .config import StepLimits
+from .planning.config import StepLimits
 
 
 def _entry(first: int, doc: str) -> property:

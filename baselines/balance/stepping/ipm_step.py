@@ -8,12 +8,12 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.pendulum import pendulum
 from poise.envs.robots.robot import Robot
 
-from .blocks import Search
 from .capture_step import CaptureStep
-from .config import IPMStepConfig, StepLimits
-from .cop_region import CopRegion
 from .planner import StepPlanner
-from .search import clip_to_limits, to_step_frame, to_world, with_offsets
+from .planning.blocks import Search
+from .planning.config import IPMStepConfig, StepLimits
+from .planning.cop_region import CopRegion
+from .planning.search import clip_to_limits, to_step_frame, to_world, with_offsets
 
 
 @compiled

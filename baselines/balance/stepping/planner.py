@@ -6,7 +6,7 @@ from typing import NamedTuple, TypedDict
 
 import numpy as np
 
-from poise.baselines.balance.references.feet import foot_signs
+from poise.baselines.balance.references.legs import foot_signs
 from poise.envs.compiled.calls import NO_KERNEL, address_of
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.maths.pendulum import Units
@@ -14,13 +14,13 @@ from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .blocks import Search
-from .config import FallFeedback, FootholdChoice, PivotConfig, StepFeedback, StepLimits
 from .controller import StepOffsets
-from .cop_region import CopRegion
-from .feedback import feedback_arrays
-from .search import capture_foothold, plan_step, replan_step, set_foot
-from .swing import Swing
+from .planning.blocks import Search
+from .planning.config import FallFeedback, FootholdChoice, PivotConfig, StepFeedback, StepLimits
+from .planning.cop_region import CopRegion
+from .planning.feedback import feedback_arrays
+from .planning.search import capture_foothold, plan_step, replan_step, set_foot
+from .planning.swing import Swing
 
 
 class StepPlan(NamedTuple):

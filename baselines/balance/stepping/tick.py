@@ -5,17 +5,24 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.offsets import TRIGGER
+from poise.baselines.balance.references.targets import TRIGGER
 from poise.baselines.whole_body.tick import ContactTick
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
 
-from .blocks import BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, CaptureTick
-from .cop_region import distance_beyond, double_support_region, single_support_region
-from .feedback import LATER_STEP, LX, LY
-from .guidance import copy_reference, crouch, guide_com, moves, return_to_motion, turned_away
-from .recentring import (
+from .planning.blocks import BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, CaptureTick
+from .planning.cop_region import distance_beyond, double_support_region, single_support_region
+from .planning.feedback import LATER_STEP, LX, LY
+from .planning.guidance import (
+    copy_reference,
+    crouch,
+    guide_com,
+    moves,
+    return_to_motion,
+    turned_away,
+)
+from .planning.recentring import (
     INACTIVE,
     SWINGING,
     end_recentring_swing,
@@ -27,15 +34,8 @@ from .recentring import (
     slipped_foot,
     stop_recentring,
 )
-from .search import plan_step, replan_step, set_capture_point
-from .swing import (
-    FROZEN,
-    LANDING,
-    advance_swing,
-    aim_swing,
-    start_swing,
-    time_left,
-)
+from .planning.search import plan_step, replan_step, set_capture_point
+from .planning.swing import FROZEN, LANDING, advance_swing, aim_swing, start_swing, time_left
 
 LEAD = 0.7  # [1/ω] by which the turn of the root is looked ahead; in a crouch by less
 DEEP = 0.1  # [h] of a crouch in which it is not

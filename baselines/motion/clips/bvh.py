@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -112,6 +113,7 @@ def write_bvh(clip: Clip, path: str | Path, axes: FileAxes = Y_UP) -> None:
     """
     if Path(path).suffix.lower() != ".bvh":
         raise ConfigError("must be the name of a .bvh file", source=path, choices=("*.bvh",))
+    clip = depth_first(clip)
     from_clip = _library().Bvh(
         nodes=_nodes(clip.skeleton, axes),
         root_pos=axes.file_places(clip.root),
@@ -123,6 +125,27 @@ def write_bvh(clip: Clip, path: str | Path, axes: FileAxes = Y_UP) -> None:
         part = Path(folder) / "clip.bvh"
         from_clip.write(part)
         write_atomic(path, part.read_bytes())
+
+
+def depth_first(clip: Clip) -> Clip:
+    """The clip with its joints in the order of a file: all that hangs on a joint follows it."""
+    skeleton, order, left = clip.skeleton, [], [0]
+    while left:
+        order.append(left.pop())
+        left += reversed(np.flatnonzero(skeleton.parents == order[-1]).tolist())
+    if order == list(range(len(order))):
+        return clip
+    places = {old: new for new, old in enumerate(order)}
+    moved = replace(
+        skeleton,
+        names=tuple(skeleton.names[i] for i in order),
+        parents=np.array([places.get(int(skeleton.parents[i]), -1) for i in order]),
+        offsets=skeleton.offsets[order],
+        end_parents=np.array([places[int(i)] for i in skeleton.end_parents]),
+        orders=tuple(skeleton.orders[i] for i in order),
+        known={role: places[i] for role, i in skeleton.known.items()},
+    )
+    return replace(clip, skeleton=moved, rotations=clip.rotations[:, order])
 
 
 def _library():  # a module
@@ -190,7 +213,7 @@ def _signed(axis: str) -> str:
 
 
 def _nodes(skeleton: Skeleton, axes: FileAxes) -> list[object]:
-    """pybvh's tree of a skeleton, depth first, as files have it."""
+    """pybvh's tree of a skeleton whose joints are depth first, as files have them."""
     library = _library()
     offsets, tips = axes.file_places(skeleton.offsets), axes.file_places(skeleton.end_offsets)
     nodes: list[object] = []

@@ -17,8 +17,8 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.compiled.maths.polygons import half_planes, nearest_inside
 from poise.envs.robots.robot import Robot
 
-from .bearable import bearable_region
 from .check import RATE, Feasibility, FeasibilityLimits, check_motion, judge
+from .split import bearable_region
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 
 TEMPOS = (0.9, 0.8, 0.7, 0.6, 0.5)

@@ -12,11 +12,11 @@ from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.solvers import QP, make_solver
 from poise.envs.compiled.maths.polygons import half_planes
 
-from .bearable import bearable_region
 from .check import Feasibility, FeasibilityLimits, check_joints, judge
 from .curve import Boundary, Curve, bend_shapes, jerk_matrix
 from .edges import EDGE, between_clips
 from .ends import Attempt, End
+from .split import bearable_region
 from .trajectory import PlantedRobot, Trajectory, joints_of, sample_trajectory
 
 NEIGHBOURS = 10  # frames of the clips beside a join that are looked at with it

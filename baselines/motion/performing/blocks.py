@@ -6,7 +6,7 @@ import numpy as np
 
 from poise.baselines.balance.references.footing import COLUMNS, Footing
 from poise.baselines.balance.references.tempo import Pace
-from poise.baselines.balance.stepping.blocks import CaptureTick
+from poise.baselines.balance.stepping.planning.blocks import CaptureTick
 from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.maths.pendulum import Units

@@ -1,6 +1,6 @@
 """How the planner of steps takes over from a performance, and how the motion goes on after it."""
 
-from poise.baselines.balance.stepping.recentring import stop_recentring
+from poise.baselines.balance.stepping.planning.recentring import stop_recentring
 from poise.baselines.whole_body.tick import go_on_from
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into, turned

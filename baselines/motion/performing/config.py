@@ -1,9 +1,9 @@
-"""The configuration of `MotionStep`; numbers have the units of `stepping/config.py`."""
+"""The configuration of `MotionStep`; numbers have the units of `stepping/planning/config.py`."""
 
 from dataclasses import dataclass, field
 from typing import Literal
 
-from poise.baselines.balance.stepping.config import CaptureStepConfig, SwingTask
+from poise.baselines.balance.stepping.planning.config import CaptureStepConfig, SwingTask
 from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
 
 POSITIVE, NOT_NEGATIVE = {"above": 0.0}, {"min": 0.0}

@@ -5,8 +5,11 @@ import numpy as np
 from poise.baselines.balance.references.footing import COM, PLACE, SPIN, TURN
 from poise.baselines.balance.references.splines import evaluate
 from poise.baselines.balance.references.tempo import CHANGE, RATE, TIME
-from poise.baselines.balance.stepping.cop_region import double_support_region, single_support_region
-from poise.baselines.balance.stepping.recentring import set_level_frame
+from poise.baselines.balance.stepping.planning.cop_region import (
+    double_support_region,
+    single_support_region,
+)
+from poise.baselines.balance.stepping.planning.recentring import set_level_frame
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import along, turned

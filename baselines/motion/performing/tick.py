@@ -11,8 +11,8 @@ import numpy as np
 
 from poise.baselines.balance.references.footing import COM, PLACE, ROOT, SPIN, TURN
 from poise.baselines.balance.references.targets import root_reference
-from poise.baselines.balance.stepping.guidance import limit_posture
-from poise.baselines.balance.stepping.swing import start_swing
+from poise.baselines.balance.stepping.planning.guidance import limit_posture
+from poise.baselines.balance.stepping.planning.swing import start_swing
 from poise.baselines.balance.stepping.tick import (
     FIRST_LOAD,
     capture_tick,

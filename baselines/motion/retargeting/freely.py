@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from poise.baselines.balance.references.feet import foot_signs
 from poise.baselines.balance.references.footing import stances_of
+from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.balance.references.robot_clip import RATE, About, RobotClip
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import FLOOR, measure_contacts, over_ground

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from poise.baselines.balance.references.feet import foot_signs, nominal_feet
 from poise.baselines.balance.references.foot_steps import STANDING
 from poise.baselines.balance.references.footing import root_turns
 from poise.baselines.balance.references.footwork import FootPlan
+from poise.baselines.balance.references.legs import foot_signs, nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts

@@ -7,7 +7,7 @@ import time
 import mink
 import numpy as np
 
-from poise.baselines.balance.references.feet import foot_signs
+from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.motion.clips.rotations import about_z, multiply, rotate
 from poise.baselines.motion.clips.skeleton import SIDES
 from poise.configs.errors import PoiseError

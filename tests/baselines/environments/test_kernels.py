@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep
-from poise.baselines.balance.stepping.config import CaptureStepConfig
+from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
 from poise.baselines.environments import kernels
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.warmup import PARTS, prepare

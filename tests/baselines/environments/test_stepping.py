@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.guidance import copy_reference, guide_com
+from poise.baselines.balance.stepping.planning.guidance import copy_reference, guide_com
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv

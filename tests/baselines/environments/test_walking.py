@@ -6,7 +6,7 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import CommandSampler
 from poise.configs.errors import ConfigError
 from tests.support.shared import robot

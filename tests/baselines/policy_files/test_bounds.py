@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from poise.baselines.policy_files import bounds
-from poise.baselines.policy_files.bounds import Clocked, try_network
-from poise.baselines.policy_files.files import digest
 from poise.baselines.policy_files.networks import OnnxNetwork
-from poise.baselines.policy_files.onnx_tensors import DEPTH, external_files
+from poise.baselines.policy_files.onnx import bounds
+from poise.baselines.policy_files.onnx.bounds import Clocked, try_network
+from poise.baselines.policy_files.onnx.files import digest
+from poise.baselines.policy_files.onnx.tensors import DEPTH, external_files
 from poise.configs.errors import ConfigError, PoiseError
 from tests.support.policies import helper, linear, onnx, write_onnx, write_recurrent
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from poise.baselines.walking.dcm import (
+from poise.baselines.walking.planner.dcm import (
     constant_cop,
     gait_offset,
     step_to_offset,

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.config import SwingTask
-from poise.baselines.balance.stepping.swing import Swing, advance_high, aim_swing
-from poise.baselines.balance.stepping.swing_speed import swing_time
+from poise.baselines.balance.stepping.planning.config import SwingTask
+from poise.baselines.balance.stepping.planning.swing import Swing, advance_high, aim_swing
+from poise.baselines.balance.stepping.planning.swing_speed import swing_time
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.registry import load_controller
-from poise.baselines.walking.command import GaitCommand
 from poise.baselines.walking.config import GaitConfig
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.tick import stands_higher
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import on_terrain

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import (
     MOST_COMMANDS,
     CommandSampler,

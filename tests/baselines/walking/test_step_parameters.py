@@ -9,9 +9,9 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import load_controller
-from poise.baselines.walking.arms import arm_scales, largest_swing
-from poise.baselines.walking.command import GaitCommand, command_of
-from poise.baselines.walking.reach import TOLD, least_width, shared_reach
+from poise.baselines.walking.planner.arms import arm_scales, largest_swing
+from poise.baselines.walking.planner.command import GaitCommand, command_of
+from poise.baselines.walking.planner.reach import TOLD, least_width, shared_reach
 from poise.configs.errors import ConfigError
 from tests.support.shared import robot
 

@@ -5,9 +5,9 @@ import pytest
 
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.registry import load_controller
-from poise.baselines.walking.command import GaitCommand
 from poise.baselines.walking.config import TreadConfig
 from poise.baselines.walking.given import given_footholds
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.errors import ConfigError
 from poise.envs.balance.episode import EDGE_CONTACTS
 from poise.envs.physics.simulation import Simulation

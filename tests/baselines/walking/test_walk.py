@@ -5,10 +5,10 @@ import copy
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.swing_speed import possible_limits
+from poise.baselines.balance.stepping.planning.swing_speed import possible_limits
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.registry import load_controller
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 from tests.support.shared import robot

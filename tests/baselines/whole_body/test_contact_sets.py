@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.swing import SwingTask
+from poise.baselines.balance.stepping.planning.swing import SwingTask
 from poise.baselines.controller import Targets
 from poise.baselines.solvers import make_solver, residuals
 from poise.baselines.whole_body.contact_sets import ContactSets

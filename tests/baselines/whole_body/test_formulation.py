@@ -8,6 +8,7 @@ import pytest
 from poise.baselines.solvers import make_solver
 from poise.baselines.whole_body.constraint_rows import (
     Bounds,
+    Rows,
     joint_limits,
     root_dynamics,
     sole_cones,
@@ -16,7 +17,6 @@ from poise.baselines.whole_body.constraint_rows import (
     torque_matrix,
 )
 from poise.baselines.whole_body.formulation import build, torques_of, unknowns
-from poise.baselines.whole_body.task_rows import Rows
 from tests.support.physics import recovery, robot_named
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from poise.baselines.controller import Targets
 from poise.baselines.solvers import make_solver, residuals
+from poise.baselines.whole_body.constraint_rows import posture_rows
 from poise.baselines.whole_body.constraints import braking_bounds
-from poise.baselines.whole_body.task_rows import posture_rows
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import controller, random_state, recovery, robot_named
 

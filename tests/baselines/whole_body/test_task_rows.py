@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.controller import Targets
-from poise.baselines.whole_body.task_rows import (
+from poise.baselines.whole_body.constraint_rows import (
     angular_momentum_rows,
     carrying_velocity,
     desired_angular_rate,

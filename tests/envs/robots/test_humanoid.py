@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.envs.robots.humanoid import humanoid_path, humanoid_spec
+from poise.envs.robots.models.humanoid import humanoid_path, humanoid_spec
 from poise.envs.robots.robot import load_robot
 
 

@@ -71,6 +71,13 @@ def test_the_known_robot_is_believed(source):
     np.testing.assert_allclose(believed.contact_wrench, true.contact_wrench, atol=1e-9)
 
 
+def test_sources_of_one_robot_share_its_model():
+    """A hundred environments would else hold a hundred models, of 75 MB each on the G1."""
+    one, other = estimated(PLAIN), estimated(PLAIN)
+    assert one.known.model is other.known.model is not one.simulation.model
+    assert one.simulation.model is not other.simulation.model  # each draws a robot of its own
+
+
 def test_auto_is_exact_where_no_sensor_errs():
     """And the time that is led on is what the estimator takes for the delay."""
     level = {

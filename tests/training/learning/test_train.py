@@ -24,14 +24,14 @@ from poise.configs.schema import build, read_yaml
 from poise.envs.balance.mdp.reward import REWARD_TERMS
 from poise.envs.balance.vector.batch import EnvBatch
 from poise.envs.physics.pushes.sampler import PushSampler
+from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.learning import callbacks, curriculum
-from poise.training.learning.checkpoints import FILES, POLICY, STATE
+from poise.training.learning.checkpoints import FILES, KEPT, POLICY, STATE
 from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, train_config
 from poise.training.learning.policy import load_policy
-from poise.training.learning.seeds import KEPT
+from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import _env_seed, train
-from poise.training.learning.train_seeds import train_seeds
 from tests.support.shared import finished_run, robot, tiny_config
 
 ROOT = Path(__file__).parents[3]
@@ -340,6 +340,25 @@ def test_the_curriculum_grows_the_pushes(tmp_path, monkeypatch):
     train(config, tmp_path, progress=False)
     expected = [(0.06, 0.06), (0.1, 0.33), (0.1, 0.6), (0.1, 0.6)]
     np.testing.assert_allclose(largest[:4], expected)
+
+
+def test_the_curriculum_grows_the_errors_of_the_robot(tmp_path, monkeypatch):
+    """The level of realism is a part of the final one, and that one after its share of the run."""
+    noises = []
+    start = curriculum.CurriculumCallback._on_rollout_start
+
+    def spy(self):
+        start(self)
+        levels = self.training_env.get_attr("realism")
+        noises.append([level.sensors.gyro_noise for level in levels])
+
+    monkeypatch.setattr(curriculum.CurriculumCallback, "_on_rollout_start", spy)
+    config = tiny_config(steps=256, curriculum=Curriculum(realism=0.2, share=0.5))
+    config = replace(config, env=replace(config.env, realism=load_realism("field")))
+    config = replace(config, evaluation=replace(config.evaluation, trials=1))
+    train(config, tmp_path, progress=False)
+    expected = np.outer([0.2, 0.6, 1.0, 1.0], np.full(4, 0.05))
+    np.testing.assert_allclose(noises[:4], expected)
 
 
 def test_the_progress_bar_shows_steps_and_success(tmp_path, capsys):

@@ -1,4 +1,4 @@
-"""training/learning/train_seeds.py, training/learning/seed_progress.py and the flags of `poise
+"""training/learning/seeds/train.py, training/learning/seeds/progress.py and the flags of `poise
 train`.
 """
 
@@ -23,11 +23,11 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.schema import read_yaml, to_yaml
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.cli.train import run as train_command
-from poise.training.learning import train_seeds as module
 from poise.training.learning.checkpoints import find_checkpoint
 from poise.training.learning.config import PPOConfig
+from poise.training.learning.seeds import train as module
+from poise.training.learning.seeds.train import SeedRun, train_seeds
 from poise.training.learning.train import train
-from poise.training.learning.train_seeds import SeedRun, train_seeds
 from tests.support.benchmarks_small import InProcessExecutor
 from tests.support.evaluations import random_suite, write_suite
 from tests.support.shared import finished_run, tiny_config

@@ -29,7 +29,7 @@ from poise.training.benchmarking.trials.step_limits import (
     groups,
     line_name,
 )
-from poise.training.learning.seeds import KEPT
+from poise.training.learning.checkpoints import KEPT
 from poise.training.pictures.figures.envelope import Band, Curve, fall_probability, polar_envelope
 from poise.training.pictures.figures.learning_curve import Point, learning_curve
 from poise.training.running.files import CURVE, PLOTS

@@ -40,7 +40,7 @@ from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.step_limits import NStepLimit, curves, stepping_limits
 from poise.training.benchmarking.trials.table import trial_row
 from poise.training.benchmarking.trials.trial import Trial
-from poise.training.learning.seeds import expand_seeds
+from poise.training.learning.seeds.records import expand_seeds
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.files import LOG, SETTINGS, SUMMARY, TRIALS, plain
 from poise.training.running.provenance import circumstances, versions

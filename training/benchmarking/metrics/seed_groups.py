@@ -13,7 +13,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.reading import is_file, is_folder
 from poise.configs.schema import to_yaml
 from poise.training.benchmarking.statistics.seeds import FIGURES, SeedFigures, seed_figures
-from poise.training.learning.seeds import SEEDS
+from poise.training.learning.seeds.records import SEEDS
 from poise.training.running.summary import Entry, SeedGroup
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.envs.terrain.stairs import Stairs
 from poise.envs.terrain.terrain import Terrain, seeded
 from poise.training.benchmarking.trials.trial import Trial

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.configs.errors import ConfigError
 from poise.envs.physics.pushes.push import Kick

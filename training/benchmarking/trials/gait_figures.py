@@ -8,11 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import TimedCommand
 
-from .gait_record import WalkArrays
-from .step_figures import step_error, steps_of
+from .gait_record import WalkArrays, step_error, steps_of
 
 AIR_TIME = 0.08  # [s] off the ground, below which a foot has only rocked or bounced
 SETTLING = 4.0  # [s] after a change of the command, from which strides are compared with it

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from poise.baselines.balance.references.feet import foot_signs
+from poise.baselines.balance.references.legs import foot_signs
 from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.balance import episode

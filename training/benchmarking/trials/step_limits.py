@@ -8,9 +8,9 @@ from typing import cast
 
 import numpy as np
 
-from poise.baselines.balance.stepping.config import StepLimits
 from poise.baselines.balance.stepping.controller import SteppingController
-from poise.baselines.balance.stepping.cop_region import CopRegion
+from poise.baselines.balance.stepping.planning.config import StepLimits
+from poise.baselines.balance.stepping.planning.cop_region import CopRegion
 from poise.baselines.controller import as_base_controller
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.envs.compiled.maths.pendulum import capture_distance, duration_factor

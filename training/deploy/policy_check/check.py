@@ -12,10 +12,10 @@ from poise.baselines.allowance import is_script
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
-from poise.baselines.policy_files.files import BYTES, digest, is_network
 from poise.baselines.policy_files.known import known_policies
-from poise.baselines.policy_files.metadata import metadata_fields
 from poise.baselines.policy_files.networks import onnx_session
+from poise.baselines.policy_files.onnx.files import BYTES, digest, is_network
+from poise.baselines.policy_files.onnx.metadata import metadata_fields
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError
 from poise.configs.reading import is_file, read_bytes

@@ -15,12 +15,12 @@ from poise.training.running.files import plain
 
 from .dynamics import Dynamics, dynamics
 from .faults import Fault, find_faults
-from .holding import Holding, holding
-from .one_leg import one_leg_qpos
 from .physics_faults import unlike_the_file, unrest
-from .posture import PostureFigures, posture_figures
-from .rest import Rest, stand_at_rest
-from .stability import DirectionFigures, by_direction
+from .standing.holding import Holding, holding
+from .standing.one_leg import one_leg_qpos
+from .standing.posture import PostureFigures, posture_figures
+from .standing.rest import Rest, stand_at_rest
+from .standing.stability import DirectionFigures, by_direction
 from .touching import SelfContact, self_contacts, sole_contacts
 from .uses import STEPPING, Uses, controllers_for
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from poise.envs.physics.legs import Leg
 
-from .holding import Holding
-from .stability import DirectionFigures
+from .standing.holding import Holding
+from .standing.stability import DirectionFigures
 from .touching import SelfContact
 
 STRAIGHT = 10.0  # [deg] a knee that is bent less

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from .dynamics import LIGHT, Dynamics, JointDynamics
 from .faults import Fault
-from .rest import CONTROLLER, DURATION, Rest
+from .standing.rest import CONTROLLER, DURATION, Rest
 
 SHOWN = 4  # joints that a fault names
 ALIKE = 0.05  # between coefficients of friction that are the same

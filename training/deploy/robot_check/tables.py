@@ -11,9 +11,9 @@ from rich.table import Table
 from poise.envs.physics.legs import Leg
 
 from .check import RobotCheck
-from .holding import Holding
-from .posture import Difference
-from .rest import CONTROLLER, Rest
+from .standing.holding import Holding
+from .standing.posture import Difference
+from .standing.rest import CONTROLLER, Rest
 
 EVERY = 2  # of the directions, in the table
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep
-from poise.baselines.balance.stepping.config import CaptureStepConfig
+from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.registry import ControllerConfig, controller_config, load_controller
 from poise.baselines.walking.simbicon import SimbiconConfig

@@ -10,8 +10,8 @@ from typing import Protocol
 
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.robot_clip import RobotClip
-from poise.baselines.walking.command import GaitCommand
-from poise.baselines.walking.reach import Reach
+from poise.baselines.walking.planner.command import GaitCommand
+from poise.baselines.walking.planner.reach import Reach
 from poise.baselines.walking.schedule import TimedCommand
 from poise.configs.errors import PoiseError
 from poise.envs.physics.pushes.push import Push

@@ -10,8 +10,8 @@ import numpy as np
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.environments.commanded import CommandedEnv
 from poise.baselines.registry import walking_controllers
-from poise.baselines.walking.command import GaitCommand, command_of
-from poise.baselines.walking.reach import Reach, shared_reach
+from poise.baselines.walking.planner.command import GaitCommand, command_of
+from poise.baselines.walking.planner.reach import Reach, shared_reach
 from poise.baselines.walking.schedule import MOST_COMMANDS, TimedCommand, parse_commands
 from poise.configs.errors import ConfigError, PoiseError
 from poise.envs.physics.pushes.options import parse_pushes

@@ -10,7 +10,7 @@ import numpy as np
 
 from poise.baselines.allowance import allows
 from poise.baselines.walking.config import WalkConfig
-from poise.baselines.walking.reach import check_command
+from poise.baselines.walking.planner.reach import check_command
 from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.baselines.walking.walk import allocate_gait, limits_of_legs
 from poise.configs.errors import ConfigError, shown

@@ -10,7 +10,7 @@ from typing import Any
 
 import viser
 
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.configs.texts import code, plain
 from poise.envs.physics.pushes.options import body_names
 from poise.envs.viewing.quantities import Quantity

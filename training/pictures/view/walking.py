@@ -9,8 +9,8 @@ from typing import Any
 
 import viser
 
-from poise.baselines.walking.command import GaitCommand
-from poise.baselines.walking.reach import Reach
+from poise.baselines.walking.planner.command import GaitCommand
+from poise.baselines.walking.planner.reach import Reach
 
 #: field of a command → label, least, most and step of its slider, and how much 1 of it is; a
 #: robot's reach may be narrower

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.baselines.balance.references.feet import nominal_feet
 from poise.baselines.balance.references.foot_steps import FootStep, Waypoint, plan_steps
 from poise.baselines.balance.references.footwork import com_over, perform_plan, plan_zmp, real_zmp
+from poise.baselines.balance.references.legs import nominal_feet
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.feasibility.check import check_motion

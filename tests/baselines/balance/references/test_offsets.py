@@ -1,6 +1,6 @@
 """One order of what may be added to a controller's choices."""
 
-from poise.baselines.balance.references import offsets
+from poise.baselines.balance.references import targets as offsets
 from poise.baselines.balance.stepping.controller import StepOffsets
 from poise.baselines.environments.scales import ResidualScales, StepScales
 

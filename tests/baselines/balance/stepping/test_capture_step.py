@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from poise.baselines.balance.references.offsets import (
+from poise.baselines.balance.references.targets import (
     COM_X,
     COM_Y,
     COM_Z,
@@ -17,9 +17,9 @@ from poise.baselines.balance.references.offsets import (
     LEAN_Y,
 )
 from poise.baselines.balance.stepping.capture_step import CaptureStep
-from poise.baselines.balance.stepping.config import CaptureStepConfig
-from poise.baselines.balance.stepping.feedback import PHASE
-from poise.baselines.balance.stepping.recentring import SHIFTING
+from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
+from poise.baselines.balance.stepping.planning.feedback import PHASE
+from poise.baselines.balance.stepping.planning.recentring import SHIFTING
 from poise.baselines.controller import WrappedController
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config, load_controller

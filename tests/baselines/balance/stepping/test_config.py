@@ -2,7 +2,7 @@
 
 import pytest
 
-from poise.baselines.balance.stepping import config
+from poise.baselines.balance.stepping.planning import config
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError
 

@@ -5,8 +5,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial import ConvexHull
 
-from poise.baselines.balance.references.feet import ankle_limits, nominal_feet
-from poise.baselines.balance.stepping.cop_region import LOAD_FRACTIONS, CopRegion, rest_ahead
+from poise.baselines.balance.references.legs import ankle_limits, nominal_feet
+from poise.baselines.balance.stepping.planning.cop_region import (
+    LOAD_FRACTIONS,
+    CopRegion,
+    rest_ahead,
+)
 from poise.envs.compiled.maths.pendulum import capture_distance, drifted
 from poise.envs.compiled.maths.polygons import clipped
 from poise.envs.compiled.maths.vectors import turn

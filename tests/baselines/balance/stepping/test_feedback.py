@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping import feedback
-from poise.baselines.balance.stepping.config import (
+from poise.baselines.balance.stepping.planning import feedback
+from poise.baselines.balance.stepping.planning.config import (
     SIGNALS,
     FallFeedback,
     PivotConfig,
@@ -13,7 +13,7 @@ from poise.baselines.balance.stepping.config import (
     SignalGains,
     StepFeedback,
 )
-from poise.baselines.balance.stepping.feedback import (
+from poise.baselines.balance.stepping.planning.feedback import (
     LATER_STEP,
     PHASE,
     STANCE,

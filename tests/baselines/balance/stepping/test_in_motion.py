@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from poise.baselines.balance.stepping.blocks import CaptureTick
 from poise.baselines.balance.stepping.capture_step import CaptureStep
-from poise.baselines.balance.stepping.guidance import crouch, moves
+from poise.baselines.balance.stepping.planning.blocks import CaptureTick
+from poise.baselines.balance.stepping.planning.guidance import crouch, moves
 from poise.baselines.balance.stepping.tick import must_step
 from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv

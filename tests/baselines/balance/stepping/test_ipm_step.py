@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from poise.baselines.balance.stepping.config import (
+from poise.baselines.balance.stepping.ipm_step import EnergyPlanner, IPMStep, rest_distance
+from poise.baselines.balance.stepping.planning.config import (
     FootholdChoice,
     IPMStepConfig,
     SignalGains,
     StepFeedback,
     StepLimits,
 )
-from poise.baselines.balance.stepping.cop_region import CopRegion
-from poise.baselines.balance.stepping.ipm_step import EnergyPlanner, IPMStep, rest_distance
+from poise.baselines.balance.stepping.planning.cop_region import CopRegion
 from poise.baselines.registry import controller_config, load_controller
 from poise.envs.compiled.maths.pendulum import drifted, pendulum
 from poise.envs.compiled.maths.polygons import nearest_inside

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.config import (
+from poise.baselines.balance.stepping.planner import StepPlanner
+from poise.baselines.balance.stepping.planning.config import (
     FallFeedback,
     FootholdChoice,
     SignalGains,
@@ -11,10 +12,9 @@ from poise.baselines.balance.stepping.config import (
     StepLimits,
     SwingTask,
 )
-from poise.baselines.balance.stepping.cop_region import CopRegion
-from poise.baselines.balance.stepping.feedback import LATER_STEP
-from poise.baselines.balance.stepping.planner import StepPlanner
-from poise.baselines.balance.stepping.swing import Swing
+from poise.baselines.balance.stepping.planning.cop_region import CopRegion
+from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
+from poise.baselines.balance.stepping.planning.swing import Swing
 from tests.support.shared import generic_state, robot
 from tests.support.stepping_reference import ReadablePlanner
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.blocks import BEST_COST, BEST_TIME, BEST_X, BEST_Y
 from poise.baselines.balance.stepping.capture_step import CaptureStep
-from poise.baselines.balance.stepping.feedback import LATER_STEP
-from poise.baselines.balance.stepping.recentring import (
+from poise.baselines.balance.stepping.planning.blocks import BEST_COST, BEST_TIME, BEST_X, BEST_Y
+from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
+from poise.baselines.balance.stepping.planning.recentring import (
     BOUNCE_TIME,
     INACTIVE,
     LOADING,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.config import SwingTask
-from poise.baselines.balance.stepping.swing import Swing, quintic
+from poise.baselines.balance.stepping.planning.config import SwingTask
+from poise.baselines.balance.stepping.planning.swing import Swing, quintic
 from poise.envs.compiled.maths.pendulum import Units
 from poise.envs.compiled.maths.vectors import rotation_error
 from poise.envs.physics.simulation import Simulation

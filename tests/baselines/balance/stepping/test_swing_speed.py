@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep
-from poise.baselines.balance.stepping.config import CaptureStepConfig, StepLimits
-from poise.baselines.balance.stepping.swing_speed import possible_limits, swing_speed
+from poise.baselines.balance.stepping.planning.config import CaptureStepConfig, StepLimits
+from poise.baselines.balance.stepping.planning.swing_speed import possible_limits, swing_speed
 from poise.baselines.controller import Targets
 from poise.baselines.registry import controller_config, load_controller
 from poise.baselines.whole_body.momentum_qp import MomentumQP

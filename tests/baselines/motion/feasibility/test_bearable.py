@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from poise.baselines.motion.feasibility.bearable import bearable_region
-from poise.baselines.motion.feasibility.split import motor_torques
+from poise.baselines.motion.feasibility.split import bearable_region, motor_torques
 from poise.baselines.motion.feasibility.trajectory import PlantedRobot, sample_trajectory
 from poise.envs.compiled.maths.polygons import half_planes
 from tests.support.physics import robot_named

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.environments.stepping import ResidualStepEnv
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.planner.command import GaitCommand
 
 
 def walked(controller, seconds=6.0, compiled=True):

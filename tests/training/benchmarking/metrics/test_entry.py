@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.config import StepLimits
+from poise.baselines.balance.stepping.planning.config import StepLimits
 from poise.envs.physics.pushes.push import Push
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.metrics.entry import controller_entry

@@ -14,7 +14,7 @@ from poise.configs.errors import ConfigError
 from poise.training.benchmarking.metrics import seed_groups as module
 from poise.training.benchmarking.metrics.seed_groups import seed_groups, seed_lines
 from poise.training.benchmarking.statistics.seeds import seed_figures
-from poise.training.learning.seeds import expand_seeds
+from poise.training.learning.seeds.records import expand_seeds
 
 
 def write_seeds(out: Path, **runs: bool) -> Path:

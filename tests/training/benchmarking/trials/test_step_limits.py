@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from poise.baselines.balance.stepping.config import StepLimits
+from poise.baselines.balance.stepping.planning.config import StepLimits
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config, load_controller
 from poise.envs.compiled.maths.pendulum import drifted, duration_factor

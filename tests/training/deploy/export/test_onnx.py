@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from poise.baselines.environments.step_terms import STEP_TERMS
 from poise.baselines.environments.stepping import ResidualStepEnv
+from poise.baselines.environments.terms import STEP_TERMS
 from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import load_controller
 from poise.configs.errors import ConfigError, PoiseError

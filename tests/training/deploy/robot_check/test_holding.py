@@ -1,4 +1,4 @@
-"""training/deploy/robot_check/holding.py and touching.py."""
+"""training/deploy/robot_check/standing/holding.py and touching.py."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from poise.envs.robots.robot import load_robot
-from poise.training.deploy.robot_check.holding import Holding, holding
+from poise.training.deploy.robot_check.standing.holding import Holding, holding
 from poise.training.deploy.robot_check.touching import self_contacts
 from tests.support.small_biped import write_biped
 from tests.support.small_urdf import write_urdf

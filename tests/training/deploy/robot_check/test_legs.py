@@ -1,4 +1,4 @@
-"""envs/physics/legs.py and training/deploy/robot_check/one_leg.py."""
+"""envs/physics/legs.py and training/deploy/robot_check/standing/one_leg.py."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from poise.baselines.balance.stepping.config import SwingTask
+from poise.baselines.balance.stepping.planning.config import SwingTask
 from poise.envs.physics.legs import find_legs
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.deploy.robot_check.one_leg import one_leg_qpos
+from poise.training.deploy.robot_check.standing.one_leg import one_leg_qpos
 from tests.support.small_biped import JOINTS, LEG, write_biped
 from tests.support.small_urdf import write_urdf
 

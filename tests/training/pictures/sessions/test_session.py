@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.walking.command import GaitCommand
+from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv

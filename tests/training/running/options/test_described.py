@@ -11,7 +11,7 @@ import tyro
 
 from poise.training.cli.commands import COMMANDS
 from poise.training.cli.entry import main
-from poise.training.cli.motion import MOTION
+from poise.training.cli.motion.commands import MOTION
 from poise.training.cli.train import BASIC, Command, options
 from poise.training.learning.config import train_config
 from poise.training.running.options.described import entries

@@ -1,0 +1,1 @@
+"""Where and when to step, and the swing that does it."""

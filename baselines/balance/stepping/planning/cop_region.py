@@ -1,0 +1,168 @@
+"""The region of centres of pressure that soles reach with their ankles' torques [Koolen12]."""
+
+import numpy as np
+
+from poise.baselines.balance.references.legs import bearing_polygon, nominal_feet
+from poise.envs.compiled.copies import Copyable
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.polygons import convex_hull, stacked
+from poise.envs.compiled.maths.vectors import placed, turn, turned
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.robots.robot import Robot
+
+from .blocks import RegionArrays
+
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
+# fractions of the load on the first sole, for which the region of two soles is computed
+LOAD_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+LINE = 1e-12  # [m] a corner that is nearer to the line of its neighbours is none
+
+
+@compiled
+def distance_beyond(
+    r: RegionArrays,
+    fx: float,
+    fy: float,
+    sx: float,
+    sy: float,
+    cos: float,
+    sin: float,
+    x: float,
+    y: float,
+) -> float:
+    """Return how far (x, y) lies outside the region of two soles [m]; < 0 inside.
+
+    The soles are at (fx, fy) and (sx, sy), their heading is (cos, sin). The distance is
+    measured along 48 DIRECTIONS only, which lets corners reach some millimetres further.
+    """
+    worst = -np.inf
+    for d in range(r.directions.shape[0]):
+        # the direction, turned
+        dx, dy = turned(cos, sin, r.directions[d, 0], r.directions[d, 1])
+        a, b = fx * dx + fy * dy, sx * dx + sy * dy
+        edge = -np.inf
+        for k in range(r.load_fractions.shape[0]):
+            edge = max(
+                edge,
+                r.support[k, d] + r.load_fractions[k] * a + (1.0 - r.load_fractions[k]) * b,
+            )
+        worst = max(worst, x * dx + y * dy - edge)
+    return worst
+
+
+@compiled
+def distances_beyond(
+    r: RegionArrays,
+    first: np.ndarray,
+    second: np.ndarray,
+    yaw: float,
+    xi: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """`distance_beyond` for rows of `first`, `second` and `xi` (≥ 1, 2) into `out`; an array of one
+    row stands for as many as there are."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    for i in range(out.shape[0]):
+        f, s, x = first[i % first.shape[0]], second[i % second.shape[0]], xi[i % xi.shape[0]]
+        out[i] = distance_beyond(r, f[0], f[1], s[0], s[1], cos, sin, x[0], x[1])
+
+
+@compiled
+def single_support_region(
+    r: RegionArrays, sole: int, point: np.ndarray, cos: float, sin: float, out: np.ndarray
+) -> int:
+    """The corners of what a sole at `point` (≥ 2,) reaches alone into rows of `out` (≥ k, 2) [m];
+    how many they are."""
+    for i in range(r.corners[sole]):
+        u, v = r.alone[sole, i, 0], r.alone[sole, i, 1]
+        out[i, 0], out[i, 1] = placed(point[0], point[1], cos, sin, u, v)
+    return r.corners[sole]
+
+
+@compiled
+def double_support_region(
+    r: RegionArrays, points: np.ndarray, cos: float, sin: float, cloud: np.ndarray, out: np.ndarray
+) -> int:
+    """The hull of what two soles at `points` (2, ≥ 2) reach under all fractions of the load, into
+    rows of `out` (10 n + 1, 2) [m]; how many corners it has.
+
+    `cloud` (5 n, 2) is scratch.
+    """
+    n = 0
+    for k in range(r.load_fractions.shape[0]):
+        a, b = r.load_fractions[k], 1.0 - r.load_fractions[k]
+        x, y = a * points[0, 0] + b * points[1, 0], a * points[0, 1] + b * points[1, 1]
+        for i in range(r.sums.shape[1]):
+            u, v = r.sums[k, i, 0], r.sums[k, i, 1]
+            cloud[n, 0], cloud[n, 1] = placed(x, y, cos, sin, u, v)
+            n += 1
+    return convex_hull(cloud, n, LINE, out)
+
+
+class CopRegion(Copyable):
+    """The region in which soles can put the centre of pressure p with their ankles' torques.
+
+    A sole under a load of λ m g reaches the p of its polygon with |N p − o| ≤ b/λ, see `feet.py`.
+    Two soles reach p = λ p_0 + (1 − λ) p_1, with p_i what sole i reaches under its load: the less a
+    foot carries, the further its ankle can move the pressure. Only `fraction` of each polygon and
+    of each torque limit counts.
+    """
+
+    def __init__(self, robot: Robot, fraction: float = 0.95):
+        self.robot, self._fraction = robot, fraction
+        self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
+        self.middle = [polygon.mean(axis=0) for polygon in self.alone]
+        if len(robot.soles) == 2:
+            sums = [self._sum(load) for load in LOAD_FRACTIONS]
+            self.arrays = RegionArrays(
+                alone=stacked(self.alone),
+                corners=np.array([len(corners) for corners in self.alone]),
+                middle=np.array(self.middle),
+                sums=stacked(sums),
+                support=np.array([(corners @ DIRECTIONS.T).max(axis=0) for corners in sums]),
+                directions=DIRECTIONS,
+                load_fractions=np.array(LOAD_FRACTIONS),
+            )
+
+    def _under(self, sole: int, load: float) -> np.ndarray:
+        return bearing_polygon(self.robot, sole, load, self._fraction)
+
+    def _sum(self, load: float) -> np.ndarray:
+        first, second = load * self._under(0, load), (1.0 - load) * self._under(1, 1.0 - load)
+        return (first[:, None] + second[None]).reshape(-1, 2)
+
+    def one(self, sole: int, point: np.ndarray, yaw: float) -> np.ndarray:
+        """(k, 2) The region of the sole alone at `point` (≥ 2,), turned by `yaw` [m]."""
+        return point[:2] + self.alone[sole] @ turn(yaw).T
+
+    def both(self, points: np.ndarray, yaw: float) -> np.ndarray:
+        """(k, 2) The region of two soles at `points` (2, ≥ 2), turned by `yaw` [m]."""
+        r = self.arrays
+        cloud = guarded_zeros((r.sums.shape[0] * r.sums.shape[1], 2))
+        out = guarded_zeros((2 * len(cloud) + 1, 2))
+        n = double_support_region(r, np.array(points), np.cos(yaw), np.sin(yaw), cloud, out)
+        return out[:n]
+
+    def beyond(
+        self, first: np.ndarray, second: np.ndarray, yaw: float, xi: np.ndarray
+    ) -> np.ndarray:
+        """(n,) How far points `xi` (n, 2) lie outside the region of both soles [m]; < 0 inside.
+
+        The soles are at `first` and `second`, (n, 2) or (2,); see `distance_beyond`.
+        """
+        rows = [np.array(v, dtype=float, ndmin=2) for v in (first, second, xi)]
+        out = np.empty(max(len(points) for points in rows))
+        distances_beyond(self.arrays, rows[0], rows[1], yaw, rows[2], out)
+        return out if max(np.ndim(v) for v in (first, second, xi)) > 1 else out[0]
+
+
+def rest_ahead(region: CopRegion) -> float:
+    """How far the CoM of the standing posture is ahead of the middle of both soles' region [m].
+
+    Zero for a robot that does not stand as described, see `PostureDescription`.
+    """
+    robot = region.robot
+    if robot.description.posture.com == "controller":
+        return 0.0
+    return float(robot.com_ahead - region.both(nominal_feet(robot), 0.0).mean(axis=0)[0])

@@ -1,0 +1,208 @@
+"""The compiled part of `StepPlanner`: steps of either foot in several times, and the cheapest."""
+
+import numpy as np
+
+from poise.baselines.balance.references.targets import FOOTHOLD_X, FOOTHOLD_Y
+from poise.baselines.balance.references.targets import TIME as TIME_OFFSET
+from poise.envs.compiled.calls import call
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.pendulum import drifted_point
+from poise.envs.compiled.maths.polygons import find_nearest
+from poise.envs.compiled.maths.vectors import along, placed
+
+from .blocks import BEST_COST, BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, Search, SwingArrays
+from .cop_region import distance_beyond, single_support_region
+from .feedback import (
+    AHEAD,
+    OUTWARD,
+    PHASE,
+    PLAN,
+    TIME,
+    evaluate_feedback,
+    pivot_offset,
+    schedule_gains,
+)
+from .swing import FROZEN, time_left
+
+TIMES = 8  # step times that are weighed against each other
+CHANGE_PRICE = 0.02  # [m/s] of another step time while the foot swings
+
+
+@compiled
+def set_capture_point(q: Search) -> None:
+    """Set the capture point that steps and CoP follow: ξ + r, see `PivotConfig`."""
+    x, y = pivot_offset(q.feedback, q.state, PLAN, q.heading[0], q.heading[1])
+    q.capture_point[0] = q.state.capture_point[0] + x
+    q.capture_point[1] = q.state.capture_point[1] + y
+
+
+@compiled
+def set_foot(q: Search, foot: int) -> None:
+    """Search for steps of this foot: set the CoP where the other sole brakes ξ most, and Δ."""
+    q.foot[0] = foot
+    stance, cos, sin = q.state.sole_point[1 - foot], q.heading[0], q.heading[1]
+    evaluate_feedback(q.feedback, q.state, stance, cos, sin, q.foot_sign[foot])
+    n = single_support_region(q.region, 1 - foot, stance, cos, sin, q.corners)
+    set_capture_point(q)
+    find_nearest(q.corners[:n], q.capture_point, q.cop)
+
+
+@compiled
+def set_start(q: Search, x: float, y: float) -> None:
+    """Set where the foot is, in the world [m]."""
+    q.start[0], q.start[1] = x, y
+
+
+@compiled
+def to_step_frame(q: Search, x: float, y: float) -> tuple[float, float]:
+    """The point (x, y) of the world in the frame of the step [m]."""
+    stance = q.state.sole_point[1 - q.foot[0]]
+    return along(q.heading[0], q.heading[1], x - stance[0], y - stance[1])
+
+
+@compiled
+def to_world(q: Search, x: float, y: float) -> tuple[float, float]:
+    """The point (x, y) of the frame of the step, in the world [m]."""
+    stance = q.state.sole_point[1 - q.foot[0]]
+    return placed(stance[0], stance[1], q.heading[0], q.heading[1], x, y)
+
+
+@compiled
+def to_heading(q: Search, x: float, y: float) -> tuple[float, float]:
+    """The vector (x, y) along the heading of the step, in the world."""
+    cos, sin = q.heading[0], q.heading[1]
+    return cos * x - sin * y, sin * x + cos * y
+
+
+@compiled
+def with_offsets(q: Search, x: float, y: float) -> tuple[float, float]:
+    """A foothold (x, y) in the frame of the step, moved by feedback and by a policy [m]."""
+    added, side = q.feedback.added, q.foot_sign[q.foot[0]]
+    x += added[AHEAD] + q.offsets[FOOTHOLD_X]
+    return x, y + side * added[OUTWARD] + q.offsets[FOOTHOLD_Y]
+
+
+@compiled
+def clip_to_limits(q: Search, x: float, y: float) -> tuple[float, float]:
+    """Return the foothold (x, y) [m], in the frame of the step, within limits of place and speed.
+
+    The place is limited to a box. The mean velocities vx and vy of the swing are limited to the
+    ellipse (vx/`speed`)² + (vy/`side_speed`)² ≤ 1: the way from the start is shortened to it.
+    """
+    return clip_to_width(q, x, y, q.width_min)
+
+
+@compiled
+def clip_to_width(q: Search, x: float, y: float, least: float) -> tuple[float, float]:
+    """The same with another `least` distance of the feet across the heading [m]."""
+    side, start = q.foot_sign[q.foot[0]], to_step_frame(q, q.start[0], q.start[1])
+    x = min(max(x, -q.behind), q.ahead)
+    y = side * min(max(side * y, least), q.width_max)
+    way_x, way_y = x - start[0], y - start[1]
+    pace_x, pace_y = way_x / (q.speed * q.time[0]), way_y / (q.side_speed * q.time[0])
+    cut = 1.0 - 1.0 / max(np.sqrt(pace_x * pace_x + pace_y * pace_y), 1.0)
+    return x - way_x * cut, y - way_y * cut
+
+
+@compiled
+def end_capture_point(q: Search) -> tuple[float, float]:
+    """ξ(T) = p + (ξ − p) e^(ωT): the capture point at touchdown [m]."""
+    return drifted_point(q.capture_point, q.cop, q.state.omega[0], q.time[0])
+
+
+@compiled
+def distance_outside(q: Search, x: float, y: float) -> float:
+    """Return how far (x, y) lies outside the CoP region of both soles, one at its foothold [m]."""
+    foot, heading = q.foot[0], q.heading
+    first, second = q.foothold, q.state.sole_point[1 - foot]
+    if foot == 1:
+        first, second = second, first
+    return distance_beyond(
+        q.region, first[0], first[1], second[0], second[1], heading[0], heading[1], x, y
+    )
+
+
+@compiled
+def capture_foothold(q: Search) -> None:
+    """The foothold under ξ(T) and its cost, see `StepPlanner.footholds`."""
+    foot = q.foot[0]
+    end_x, end_y = end_capture_point(q)
+    x, y = to_step_frame(q, end_x, end_y)
+    x, y = x - q.region.middle[foot, 0], y - q.region.middle[foot, 1]
+    x += q.sagittal_offset * np.tanh(x / (0.1 * q.height))
+    y += q.foot_sign[foot] * q.lateral_offset
+    x, y = with_offsets(q, x, y)
+    x, y = clip_to_limits(q, x, y)
+    q.foothold[0], q.foothold[1] = to_world(q, x, y)
+    q.cost[0] = max(distance_outside(q, end_x, end_y), -q.margin)
+
+
+@compiled
+def _weigh(q: Search, time: float, extra: float) -> None:
+    """Keep a step of this time if it is cheaper than the best one, or the first."""
+    q.time[0] = time
+    call(q.foothold_rule, q)
+    cost = q.cost[0] + q.time_price * time + extra
+    if q.best_foot[0] < 0 or cost < q.best[BEST_COST]:
+        q.best[BEST_X], q.best[BEST_Y], q.best[BEST_TIME] = q.foothold[0], q.foothold[1], time
+        q.best[BEST_COST], q.best_foot[0] = cost, q.foot[0]
+
+
+@compiled
+def _offset_time(q: Search) -> None:
+    """Let the best step land earlier or later, as feedback and a policy want."""
+    q.best[BEST_OFFSET] = 0.0
+    offset = q.feedback.added[TIME] + q.offsets[TIME_OFFSET]
+    if offset == 0.0:
+        return
+    q.time[0] = max(q.best[BEST_TIME] + offset, FROZEN)
+    call(q.foothold_rule, q)
+    q.best[BEST_X], q.best[BEST_Y] = q.foothold[0], q.foothold[1]
+    q.best[BEST_TIME], q.best[BEST_OFFSET] = q.time[0], q.time[0] - q.best[BEST_TIME]
+
+
+@compiled
+def schedule_feedback(q: Search) -> None:
+    """Set the gains of feedback to those of where the body falls now."""
+    v = q.state.com_vel
+    ahead, left = along(q.heading[0], q.heading[1], v[0], v[1])
+    schedule_gains(q.feedback, ahead, left)
+
+
+@compiled
+def plan_step(q: Search) -> None:
+    """The cheapest step of either foot from where they stand: the best of the search."""
+    schedule_feedback(q)
+    q.best_foot[0] = -1
+    q.feedback.signals[PHASE] = 0.0
+    for foot in range(2):
+        set_foot(q, foot)
+        set_start(q, q.state.sole_point[foot, 0], q.state.sole_point[foot, 1])
+        for k in range(TIMES):
+            _weigh(q, q.time_min + (q.time_max - q.time_min) * k / (TIMES - 1), 0.0)
+    foot = q.best_foot[0]
+    set_foot(q, foot)
+    set_start(q, q.state.sole_point[foot, 0], q.state.sole_point[foot, 1])
+    _offset_time(q)
+
+
+@compiled
+def replan_step(q: Search, foot: int, w: SwingArrays) -> None:
+    """Foothold and time left of the running step `w` of `foot`: the best of the search."""
+    low = max(q.time_min - w.time[0], FROZEN)
+    high = max(q.time_max - w.time[0], low)
+    planned = max(time_left(w) - w.time_offset[0], FROZEN)
+    coasting = 0.5 * min(planned, 0.1)  # [s] in which its speed carries the foot anyway
+    q.best_foot[0] = -1
+    q.feedback.signals[PHASE] = w.time[0] / w.duration[0]
+    set_foot(q, foot)
+    set_start(
+        q,
+        w.reference[0, 0] + coasting * w.reference[1, 0],
+        w.reference[0, 1] + coasting * w.reference[1, 1],
+    )
+    for k in range(TIMES):
+        time = low + (high - low) * k / (TIMES - 1)
+        _weigh(q, time, CHANGE_PRICE * abs(time - planned))
+    _weigh(q, planned, 0.0)
+    _offset_time(q)

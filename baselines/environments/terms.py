@@ -1,0 +1,144 @@
+"""Terms that tell of a controller's motion and steps, besides those of `envs.balance.mdp.terms`."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.baselines.balance.references.targets import Motion
+from poise.baselines.balance.references.tempo import TIME
+from poise.baselines.balance.stepping.planning.blocks import StepMemory, SwingArrays
+from poise.baselines.balance.stepping.planning.swing import time_left as remaining_time
+from poise.envs.balance.mdp.observation import GROUND, SPACE, Terms, View
+from poise.envs.balance.mdp.terms import TERMS, put_local
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+
+
+@dataclass(frozen=True, eq=False)
+class MotionView(Block):
+    """The block of a term about the motion: what it reads, and the place that it fills."""
+
+    seen: View
+    motion: Motion
+
+
+MOTION_TERMS = Terms(TERMS, MotionView)  #: by name; those of every environment come first
+
+
+@MOTION_TERMS.add(
+    ("sin", "cos", "left"),
+    "1",
+    "phase of the motion, a turn from begin to end, and the fraction of it that is left",
+    "number",
+    default=False,
+)
+def motion_phase(t: MotionView):
+    motion, v = t.motion, t.seen
+    begin, end = motion.knots[0], motion.knots[-1]
+    now = v.clock[0] * v.robot.timestep
+    if motion.pace.waits:
+        now = motion.pace.memory[TIME]
+    over = (now - begin) / (end - begin)
+    over = over % 1.0 if motion.loop else min(max(over, 0.0), 1.0)
+    v.out[0], v.out[1] = np.sin(2.0 * np.pi * over), np.cos(2.0 * np.pi * over)
+    v.out[2] = 1.0 - over
+
+
+# entries of what a controller tells of its steps, see `Stepping.entries`
+STEPS, FOOT, FOOTHOLD, PHASE, REMAINING, SINCE = 0, 1, 2, 4, 5, 6
+REPORTED = 7
+
+
+@dataclass(frozen=True, eq=False)
+class StepView(Block):
+    """The block of a term about steps: what it reads, and the place that it fills."""
+
+    seen: View
+    report: np.ndarray  # (7,) see `Stepping.entries`
+
+
+@dataclass(frozen=True, eq=False)
+class StepReporter(Block):
+    """The memory of a compiled controller's steps, and the report that is made of it."""
+
+    memory: StepMemory
+    swing: SwingArrays
+    report: np.ndarray  # (7,)
+
+
+@compiled
+def report_steps(t: StepReporter):
+    """Fill `report` as `Stepping.entries` does."""
+    m, w, report = t.memory, t.swing, t.report
+    report[STEPS], report[FOOT], report[SINCE] = m.steps[0], -1.0, m.clock[0]
+    report[PHASE], report[REMAINING] = 0.0, 0.0
+    if m.swinging[0]:
+        report[FOOT], report[SINCE] = m.foot[0], 0.0
+        report[FOOTHOLD], report[FOOTHOLD + 1] = w.foothold[0], w.foothold[1]
+        report[PHASE], report[REMAINING] = w.time[0] / w.duration[0], remaining_time(w)
+
+
+STEP_TERMS = Terms(MOTION_TERMS, StepView)  #: by name; those of every environment come first
+
+
+@compiled
+def put_from_stance(t: StepView, x: float, y: float):
+    """The point (x, y) of the ground from the stance sole, heading frame [0.5 h]; 0 without one."""
+    v, foot = t.seen, int(t.report[FOOT])
+    v.out[:] = 0.0
+    if foot >= 0:
+        stance, half = v.state.sole_point[1 - foot], 0.5 * v.scales.height
+        put_local(v.state, x - stance[0], y - stance[1], half, v.out)
+
+
+@STEP_TERMS.add("feet", "1", "1 where the foot swings, else 0", "feet")
+def swing(t: StepView):
+    for i in range(t.seen.out.shape[0]):
+        t.seen.out[i] = 1.0 if int(t.report[FOOT]) == i else 0.0
+
+
+@STEP_TERMS.add(("fraction",), "1", "fraction of the swing that is over", "number")
+def phase(t: StepView):
+    t.seen.out[0] = t.report[PHASE]
+
+
+@STEP_TERMS.add(("t",), "1/ω", "until touchdown is planned", "number")
+def time_left(t: StepView):
+    t.seen.out[0] = t.seen.scales.omega * t.report[REMAINING]
+
+
+@STEP_TERMS.add(("t",), "1/ω", "since the last touchdown", "number")
+def since(t: StepView):
+    t.seen.out[0] = t.seen.scales.omega * t.report[SINCE]
+
+
+@STEP_TERMS.add(("count",), "1", "steps begun", "number")
+def steps(t: StepView):
+    t.seen.out[0] = t.report[STEPS]
+
+
+@STEP_TERMS.add(GROUND, "0.5 h", "first sole from the second", "between feet")
+def feet(t: StepView):
+    s, half = t.seen.state, 0.5 * t.seen.scales.height
+    first, second = s.sole_point[0], s.sole_point[1]
+    put_local(s, first[0] - second[0], first[1] - second[1], half, t.seen.out)
+
+
+@STEP_TERMS.add(SPACE, "0.5 h", "swinging sole from the stance sole, 0 if both are down", "vector")
+def swing_foot(t: StepView):
+    v, foot = t.seen, int(t.report[FOOT])
+    moving = v.state.sole_point[max(foot, 0)]
+    put_from_stance(t, moving[0], moving[1])
+    if foot >= 0:
+        v.out[2] = (moving[2] - v.state.sole_point[1 - foot, 2]) / (0.5 * v.scales.height)
+
+
+@STEP_TERMS.add(GROUND, "0.5 h", "foothold from the stance sole, 0 if both are down", "vector")
+def foothold(t: StepView):
+    put_from_stance(t, t.report[FOOTHOLD], t.report[FOOTHOLD + 1])
+
+
+@STEP_TERMS.add(GROUND, "0.5 h", "ξ from the stance sole, 0 if both are down", "vector")
+def stance_capture_point(t: StepView):
+    xi = t.seen.state.capture_point
+    put_from_stance(t, xi[0], xi[1])

@@ -1,0 +1,1 @@
+"""Steps of a walk: where, when, and whether legs reach."""

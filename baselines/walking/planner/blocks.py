@@ -1,0 +1,102 @@
+"""The blocks that the kernels of walking work on; SI units, arrays of one entry are numbers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.baselines.balance.stepping.planning.blocks import CaptureTick, StepMemory, SwingArrays
+from poise.baselines.walking.models.reference import Reference
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.calls import Program
+
+
+@dataclass(frozen=True, eq=False)
+class Treads(Block):
+    """The surfaces on which footholds are given, and how the foot swings between them."""
+
+    surfaces: np.ndarray  # (n, 6) see `Surface`; none: footholds are free
+    margin: float  # [m]
+    least_step: float  # [m]
+    approach: float  # [m]
+    highest: float  # [m]
+    clearance: float  # [m]
+    hold: np.ndarray  # (2,) up, down [of the swing]
+    rise: np.ndarray  # (2,)
+    lower: np.ndarray  # (2,)
+    arrive: float
+    lean: float  # [rad/m]
+    lean_from: float  # [m]
+    leaning: np.ndarray  # (1,) of the trunk ahead, now [rad]
+    left: np.ndarray  # (3,) where the swinging foot lifted off [m]
+    aim: np.ndarray  # (1,) int: the surface that the step goes to
+    target: np.ndarray  # (1,) height of the foothold that is being weighed [m]
+    room: np.ndarray  # (2,) scratch: from a sole's point back to its heel, on to its toes [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Gait(Block):
+    """A `GaitConfig` in SI units, the command, and how far the walk is."""
+
+    step_time: float  # T, from lift-off to touchdown, unless the command says it [s]
+    transfer_time: float  # T_d, on both feet [s]
+    width: float  # W, unless the command says it [m]
+    height: float  # of the CoM [m]
+    acceleration: float  # [m/s²]
+    turn_acceleration: float  # [rad/s²]
+    correction: float
+    correction_limit: float  # [m/s]
+    time_price: float  # [m/s]
+    transfer_gain: float
+    start_radius: float  # [m]
+    start_time: float  # [s]
+    speed_margin: float  # [m/s]
+    time_min: float  # of a step, whatever the command says [s]
+    lower: float  # from when a swinging foot comes down [of the swing]; 0: once it is up
+    command: np.ndarray  # (8,) see `GaitCommand.array`
+    velocity: np.ndarray  # (3,) ahead, left, turn, which follow the command
+    error: np.ndarray  # (2,) what the sum of the velocity's errors adds to it [m/s]
+    planned: np.ndarray  # (2,) the velocity with it [m/s]
+    yaw: np.ndarray  # (1,) of the heading [rad]
+    walking: np.ndarray  # (1,) int: 1 from the first shift of weight until the walk has stopped
+    starting: np.ndarray  # (1,) int: 1 until the first foot lifts off
+    clock: np.ndarray  # (1,) since both feet are down [s]
+    cop: np.ndarray  # (2,) that was asked for last on one foot [m]
+    middle: np.ndarray  # (2,) between the soles at the last touchdown [m]
+    step_clock: np.ndarray  # (1,) since then [s]; < 0: there was none
+    treads: Treads
+
+
+@dataclass(frozen=True, eq=False)
+class Arms(Block):
+    """The joints that swing the arms; as many arms as feet, none where `scales` are zero."""
+
+    scales: np.ndarray  # (2, nj) of the arm on the side of each foot: about the robot's left axis
+    weight: np.ndarray  # (nv,) of the posture in the QP while the arms swing as commanded
+    free_weight: np.ndarray  # (nv,) else
+    least_step: float  # [m] for the whole swing; less where steps are shorter
+    swinging: np.ndarray  # (1,) int: 1 while they swing as commanded
+
+
+@dataclass(frozen=True, eq=False)
+class WalkTick(Block):
+    """All that a tick of `Walk` works on."""
+
+    capture: CaptureTick  # while it stands, and catches falls from there
+    walk: CaptureTick  # the same memory, with the QPs, the swing and the limits of the gait
+    gait: Gait
+    reference: Reference  # what the model of the gait is told, and what it answers
+    model: Program  # its kernel
+    arms: Arms
+    constant_height: int  # 1: the gait's own height holds, and no model is asked
+    stance: np.ndarray  # (2,) scratch: the middle of what the stance sole reaches [m]
+    swinging: np.ndarray  # (2,) scratch: the same of the other one
+
+    @property
+    def memory(self) -> StepMemory:
+        """The memory of its steps."""
+        return self.capture.memory
+
+    @property
+    def swing(self) -> SwingArrays:
+        """The way of the swinging foot."""
+        return self.capture.swing

@@ -1,0 +1,167 @@
+"""`poise motion check` and `follow`: what a robot can do of a motion, and what it then does."""
+
+import json
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from poise.baselines.allowance import named
+from poise.configs.errors import ConfigError
+from poise.configs.files import write_atomic
+from poise.configs.outputs import check_out_file
+from poise.envs.robots.robot import load_robot
+from poise.training.running.options.arguments import Allow, Switch
+from poise.training.running.terminal import terminal
+
+
+def check(
+    motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")],
+    /,
+    *,
+    robot: str = "humanoid",
+    qp: Switch = False,
+    controller: str = "momentum-qp",
+    fit: Switch = False,
+    out: Path | None = None,
+) -> int:
+    """Say whether a robot can do a motion: ground, motors and joints, 100 times a second.
+
+    Args:
+        motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        qp: also ask the momentum QP what it makes of the motion, at every sample.
+        controller: a momentum QP, whose gains the QP has.
+        fit: change a .npz until the robot can do it: slower, or with its centre of mass moved.
+        out: the .npz file to write what was fitted to.
+
+    Returns:
+        0 if the robot can do it, 1 if it cannot.
+    """
+    from poise.baselines.balance.references.motion import load_motion
+    from poise.baselines.balance.references.robot_clip import (
+        read_robot_clip,
+        reference_from,
+        write_robot_clip,
+    )
+    from poise.baselines.motion.feasibility.check import check_motion
+    from poise.baselines.motion.feasibility.fit import fit_motion
+    from poise.baselines.motion.feasibility.gap import with_gap
+    from poise.baselines.registry import momentum_qp_config
+    from poise.training.motion.following.tables import print_feasibility
+
+    if (out is None) == fit:
+        raise ConfigError("--fit and --out go together", field="out")
+    body, console = load_robot(robot), terminal()
+    reference = load_motion(motion, body)
+    judged = check_motion(reference, body)
+    config = momentum_qp_config(controller) if qp else None
+    if fit:
+        if Path(motion).suffix != ".npz":
+            raise ConfigError("only a .npz of poise motion import can be fitted", source=motion,
+                              field="fit")  # fmt: skip
+        fitted = fit_motion(read_robot_clip(motion), body)
+        reference = reference_from(fitted.clip, body, motion)
+        judged = fitted.feasibility
+        print(f"tempo {fitted.tempo:g}, centre of mass moved by {100 * fitted.moved:.1f} cm")
+    if config is not None:
+        judged = with_gap(judged, reference, body, config)
+    print_feasibility(judged, f"{Path(motion).stem} on {body.name}", console)
+    if out is not None:
+        write_robot_clip(fitted.clip, out)
+        print(out)
+    return 0 if judged.feasible else 1
+
+
+def follow(
+    motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")],
+    /,
+    *,
+    controller: str = "momentum-qp",
+    robot: str = "humanoid",
+    starts: int | None = None,
+    push: float = 0.0,
+    share: float = 0.0,
+    directions: int = 8,
+    tempo: float = 1.0,
+    realism: str | None = None,
+    waits: Switch = False,
+    fastest: Switch = False,
+    seed: int = 0,
+    out: Path | None = None,
+    report: Path | None = None,
+    video: Path | None = None,
+    size: tuple[int, int] = (640, 480),
+    allow: Allow = (),
+) -> None:
+    """Perform a motion, pushed or not, and say how near the robot stayed to it.
+
+    Args:
+        motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
+        controller: as in poise evaluate.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
+            at each tempo of --fastest.
+        push: impulse of a push at a random time of the motion [N s]; 0 for none.
+        share: the same as a share of the J50 of the push's direction, standing (configs/limits).
+        directions: of the pushes, spread evenly, one after the other.
+        tempo: how many times as fast the motion is played.
+        realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
+        waits: let the motion wait while the robot catches itself.
+        fastest: find the largest tempo at which none of the trials falls.
+        seed: of starts and pushes.
+        out: a JSON file to write the trials to.
+        report: a .html file for pictures of the trial with the largest error: ZMP and centre of
+            pressure, errors, tempo, and the timeline of a script's motion.
+        video: a .mp4 or .webp file for the first trial, with the motion as a yellow ghost.
+        size: of the video, width and height [pixels], even.
+    """
+    from poise.baselines.allowance import allowing
+    from poise.training.benchmarking.trials.names import check_names
+
+    check_names([controller], robot=robot, motion=motion)
+    from poise.baselines.balance.references.tempo import Tempo
+    from poise.training.motion.following.fastest import STARTS, find_fastest
+    from poise.training.motion.following.follow import follow as perform
+    from poise.training.motion.following.tables import print_followed
+    from poise.training.pictures.figures.playback import check_size, check_video
+    from poise.training.pictures.motion_report.film import Film
+    from poise.training.pictures.motion_report.page import check_page
+    from poise.training.pictures.motion_report.performance import Watched, write_performance
+
+    if fastest and (push or share or tempo != 1.0 or waits or out or report or video):
+        raise ConfigError("goes with --controller, --robot, --starts and --seed alone",
+                          field="fastest")  # fmt: skip
+    if out is not None:
+        check_out_file(out)
+    if report is not None:
+        check_page(report)
+    if video is not None:
+        check_video(video)
+        check_out_file(video)
+        check_size(size)
+    with allowing([*named(controller), *allow]), ExitStack() as stack:
+        if fastest:
+            find_fastest(motion, controller, robot, STARTS if starts is None else starts, seed)
+            return
+        watched = Watched() if report is not None else None
+        film = None if video is None else stack.enter_context(Film(video, size, watched))
+        waits_so = Tempo(waits=True) if waits else None
+        trials = perform(motion, controller, robot=robot, starts=20 if starts is None else starts,
+                         impulse=push, share=share, directions=directions, seed=seed, speed=tempo,
+                         tempo=waits_so, watch=film or watched, realism=realism)  # fmt: skip
+    pushed = f"pushed by {push:g} N s" if push else "not pushed"
+    pushed = f"pushed by {share:g} of J50" if share else pushed
+    faster = f", {tempo:g} times as fast" if tempo != 1.0 else ""
+    title = f"{Path(motion).stem} by {controller} on {robot}{faster}, {pushed}"
+    print_followed(trials, title, terminal())
+    if out is not None:
+        write_atomic(out, json.dumps([asdict(trial) for trial in trials], indent=1) + "\n")
+        print(out)
+    if video is not None:
+        print(video)
+    if report is not None and watched is not None:
+        write_performance(report, title, motion, robot, tempo, trials, watched)
+        print(report)

@@ -1,0 +1,311 @@
+"""`poise motion …`: files of motion capture, on a robot, and performed."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.clips.names import ROLES
+from poise.baselines.motion.space_time.retarget_clip import RetargetedClip
+from poise.configs.errors import ConfigError, meant, shown
+from poise.configs.outputs import check_out_file
+from poise.envs.robots.robot import Robot, load_robot
+from poise.training.running.options.arguments import Switch
+from poise.training.running.options.pages import print_commands
+from poise.training.running.options.parsing import parsed
+from poise.training.running.terminal import terminal
+
+from .check import check, follow
+from .join import join, match
+from .script import graph, plan, synth
+
+USAGE = """usage: poise motion COMMAND [OPTIONS]
+
+Motion capture: what files hold, a robot's motion of them, and performing it.
+"""
+Solver = Literal["frame", "spacetime", "grid"]
+Joints = tuple[str, ...]
+File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+
+
+def info(
+    file: File,
+    /,
+    *,
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    joints: Joints = (),
+) -> None:
+    """What a BVH file holds: joints, unit, axes, rate, planted feet, skating.
+
+    Args:
+        file: a .bvh file, or the name of a packaged clip.
+        unit: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
+        up: the file's axis that is up, such as y or -z, or auto.
+        forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
+    """
+    from poise.training.motion.following.tables import print_clip
+
+    clip, axes = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints))
+    print_clip(clip, axes, terminal())
+
+
+def convert(
+    file: File,
+    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")],
+    /,
+    *,
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    joints: Joints = (),
+    cut: tuple[float, float] | None = None,
+    speed: float = 1.0,
+    mirror: Switch = False,
+    reverse: Switch = False,
+    turn: float = 0.0,
+    close: float = 0.0,
+    loop: int = 1,
+    rate: float | None = None,
+    robot: str = "humanoid",
+) -> None:
+    """Change a BVH file, in this order: cut, speed, mirror, reverse, close, loop, turn, rate.
+
+    What is written has y up, z forward, and metres. A .npz of poise motion import becomes a BVH
+    file of the robot.
+
+    Args:
+        file: a .bvh file, the name of a packaged clip, or a robot's .npz.
+        out: the .bvh file to write.
+        unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
+        up: the file's axis that is up, such as y or -z, or auto.
+        forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
+        cut: two times [s]; what lies between is kept.
+        speed: how many times as fast.
+        mirror: exchange left and right.
+        reverse: play it backwards.
+        turn: about the vertical axis [degrees].
+        close: seconds over which the end is led to the first frame.
+        loop: how many times, one after the other.
+        rate: frames a second.
+        robot: whose .npz it is.
+    """
+    clip = _clip(file, unit, up, forward, robot, joints)
+    if cut is not None:
+        clip = clip.cut(*cut)
+    clip = clip.at_speed(speed) if speed != 1.0 else clip
+    clip = clip.mirrored() if mirror else clip
+    clip = clip.reversed() if reverse else clip
+    clip = clip.closed(close) if close else clip
+    clip = clip.repeated(loop)
+    clip = clip.turned(turn * 3.141592653589793 / 180.0) if turn else clip
+    if rate is not None:
+        if not 1.0 <= rate <= 1000.0:
+            raise ConfigError(f"must be from 1 to 1000, not {rate:g}", field="rate")
+        clip = clip.resampled(1.0 / rate)
+    write_bvh(clip, out)
+    print(out)
+
+
+def bring(
+    file: File,
+    /,
+    *,
+    out: Path,
+    robot: str = "humanoid",
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    joints: Joints = (),
+    cut: tuple[float, float] | None = None,
+    speed: float = 1.0,
+    mirror: Switch = False,
+    smooth: float = 3.0,
+    lead: float = 1.0,
+    planted: Switch = False,
+    solver: Solver | None = None,
+    constraints: str | None = None,
+    steps: Switch = False,
+    kinematic: Switch = False,
+    video: Path | None = None,
+) -> None:
+    """Retarget a BVH file to a robot, its soles planted where the clip's are; see docs/motions.md.
+
+    The .npz file is taken wherever a motion is named. A clip whose feet move by 12 cm becomes a
+    motion with steps, which motion-step performs. What cannot be performed becomes a motion that
+    can be seen, by poise motion play and poise view, and the reason is said. Needs pip install -e
+    '.[motion]' in a checkout.
+
+    Args:
+        file: a .bvh file, or the name of a packaged clip.
+        out: the .npz file to write.
+        robot: a packaged robot (see poise list) or a .yaml description.
+        unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
+        up: the file's axis that is up, such as y or -z, or auto.
+        forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
+        cut: two times [s]; what lies between is kept.
+        speed: how many times as fast.
+        mirror: exchange left and right.
+        smooth: low-pass on what is asked of the robot [Hz].
+        lead: from standing into the clip, and back [s].
+        planted: take the feet as planted though they move in the clip.
+        solver: frame by frame, spacetime for the optimum of the whole clip, grid for constraints
+            by trial in steps; without one spacetime if there are constraints, else frame.
+        constraints: a packaged name (see poise list) or a .yaml file of what else is wanted.
+        steps: keep the clip's own steps, for motion-step, though legs make them short.
+        kinematic: do what the clip does, whether or not it can be performed.
+        video: a .mp4 or .webp file of the robot, and beside it the skeleton of the file.
+    """
+    from poise.baselines.balance.references.robot_clip import write_robot_clip
+    from poise.baselines.motion.space_time.retarget_clip import retarget_clip
+    from poise.training.motion.following.tables import print_retargeted
+    from poise.training.pictures.figures.playback import check_video
+
+    check_out_file(out)
+    if video is not None:
+        check_video(video)
+        check_out_file(video)
+    clip = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
+    clip = clip.cut(*cut) if cut is not None else clip
+    clip = clip.at_speed(speed) if speed != 1.0 else clip
+    clip = clip.mirrored() if mirror else clip
+    body = load_robot(robot)
+    made = retarget_clip(
+        clip,
+        body,
+        solver=solver,
+        constraints=constraints or (),
+        smooth=smooth,
+        lead=lead,
+        planted=planted,
+        kinematic=True if kinematic else False if steps else None,
+        progress=partial(print, flush=True),
+    )
+    write_robot_clip(made.clip, out)
+    print_retargeted(made, terminal())
+    if video is not None:
+        _film(video, body, clip, made)
+    print(out)
+
+
+def play(
+    file: File,
+    /,
+    *,
+    video: Path,
+    robot: str = "humanoid",
+    unit: str = "auto",
+    up: str = "auto",
+    forward: str = "auto",
+    joints: Joints = (),
+    size: tuple[int, int] = (640, 480),
+    planted: Switch = False,
+) -> None:
+    """Show a motion without physics: the robot, and beside it the skeleton of the BVH file.
+
+    Args:
+        file: a .bvh file, the name of a packaged clip, or a robot's .npz, which has no skeleton.
+        video: the .mp4 or .webp file to write.
+        robot: who does it.
+        unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
+        up: the file's axis that is up, such as y or -z, or auto.
+        forward: the axis along which the rest pose faces, or auto.
+        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
+        size: width and height [pixels], even.
+        planted: take the feet as planted though they move in the clip.
+    """
+    from poise.baselines.balance.references.robot_clip import check_robot, read_robot_clip
+    from poise.baselines.motion.space_time.retarget_clip import retarget_clip
+    from poise.training.pictures.figures.playback import check_size, check_video, write_playback
+
+    check_video(video)
+    check_out_file(video)
+    check_size(size)
+    body = load_robot(robot)
+    if file.suffix == ".npz":
+        clip = read_robot_clip(file)
+        check_robot(clip, body, str(file))
+        print(f"{write_playback(video, body, clip.qpos, clip.dt, None, size)} frames")
+        print(video)
+        return
+    source = read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
+    _film(video, body, source, retarget_clip(source, body, solver="frame" if planted else None,
+                                             planted=planted), size)  # fmt: skip
+
+
+def _film(
+    video: Path, body: Robot, source: Clip, made: RetargetedClip, size: tuple[int, int] = (640, 480)
+) -> None:
+    """Film a motion, with the skeleton of its clip beside it."""
+    from poise.baselines.motion.clips.contacts import over_ground
+    from poise.baselines.motion.retargeting.paces import clip_heading
+    from poise.training.pictures.figures.playback import beside_of, write_playback
+
+    clip, heading = made.clip, None
+    if clip.planted is not None and not clip.free:
+        heading = clip_heading(source)
+    beside = beside_of(body, over_ground(source), made.scale, made.begins, heading, made.stride)
+    print(f"{write_playback(video, body, clip.qpos, clip.dt, beside, size)} frames")
+    print(video)
+
+
+MOTION: dict[str, Callable[..., object]] = {
+    "info": info,
+    "convert": convert,
+    "import": bring,
+    "follow": follow,
+    "join": join,
+    "check": check,
+    "graph": graph,
+    "plan": plan,
+    "synth": synth,
+    "match": match,
+    "play": play,
+}
+
+
+def run(args: Sequence[str]) -> int:
+    """Run a sub-command of `poise motion`; returns 0, or 1 (see `check`)."""
+    if not args or args[0] in ("-h", "--help", "--help-all"):
+        print_commands(USAGE, MOTION, terminal())
+        return 0
+    name = args[0]
+    if name not in MOTION:
+        raise ConfigError(f"no such command: motion {shown(name)}{meant(name, MOTION)}",
+                          choices=MOTION)  # fmt: skip
+    given = ["--help" if arg == "--help-all" else arg for arg in args[1:]]
+    code = parsed(MOTION[name], given, f"poise motion {name}")()
+    return code if isinstance(code, int) else 0
+
+
+def named_joints(joints: Sequence[str]) -> dict[str, str]:
+    """Role → name of the joint; raises ConfigError for what is not ``role=JOINT``."""
+    pairs = dict(each.partition("=")[::2] for each in joints)
+    for role, name in pairs.items():
+        if not name:
+            raise ConfigError(f"must be role=JOINT, not {shown(role)}", field="joints",
+                              choices=ROLES)  # fmt: skip
+    return pairs
+
+
+def _clip(file: Path, unit: str, up: str, forward: str, robot: str, joints: Sequence[str]) -> Clip:
+    """The clip of a BVH file, or of a robot's .npz."""
+    if file.suffix != ".npz":
+        return read_bvh(find_bvh(file), unit, up, forward, named_joints(joints)).clip
+    from poise.baselines.balance.references.robot_clip import read_robot_clip
+    from poise.baselines.motion.retargeting.robot_bvh import clip_of_robot
+
+    stored, body = read_robot_clip(file), load_robot(robot)
+    if stored.about.fingerprint != body.fingerprint:
+        raise ConfigError(f"is a motion of the robot {stored.about.robot!r}, not of {body.name!r}",
+                          source=file, field="robot")  # fmt: skip
+    return clip_of_robot(body, stored.qpos, stored.dt, file.stem)

@@ -1,0 +1,1 @@
+"""How a robot stands: posture, rest, holding torques, one leg, stability."""

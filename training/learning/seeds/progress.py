@@ -1,0 +1,101 @@
+"""The terminal shows several training runs, while they run and at their end."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from poise.configs.errors import ConfigError
+from poise.training.learning.checkpoints import STATE, find_checkpoint
+from poise.training.learning.policy_files import read_state
+from poise.training.running.terminal import ProgressLines
+
+from .records import SeedSummary, evaluations
+
+if TYPE_CHECKING:
+    from .train import SeedRun
+
+PERIOD = 1.0  # [s] between looks
+
+
+class SeedProgress:
+    """A bar per run, of what the runs write to their folders; use as a context.
+
+    So it is the same for processes of this machine and of others.
+    """
+
+    def __init__(self, runs: Sequence[SeedRun], console: Console):
+        self.runs = runs
+        self._bar = ProgressLines(
+            TextColumn("seed {task.fields[seed]}"),
+            BarColumn(),
+            TextColumn("{task.completed:,.0f}/{task.total:,.0f} steps"),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(),
+            console=console,
+            disable=console.quiet,
+        )
+        self._tasks = [
+            self._bar.add_task("", total=run.config.steps, seed=run.config.seed, rate="")
+            for run in runs
+        ]
+        self._end = threading.Event()
+        self._watcher = threading.Thread(target=self._watch, daemon=True)
+
+    def __enter__(self) -> SeedProgress:
+        self._bar.start()
+        self._watcher.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end.set()
+        self._watcher.join()
+        self._show()
+        self._bar.stop()
+
+    def _watch(self) -> None:
+        while True:
+            self._show()
+            if self._end.wait(PERIOD):
+                return
+
+    def _show(self) -> None:
+        for run, task in zip(self.runs, self._tasks, strict=True):
+            checkpoint = find_checkpoint(run.folder / "last")
+            if checkpoint is None:
+                continue
+            try:
+                state = read_state(checkpoint / STATE)
+            except ConfigError:  # just being replaced
+                continue
+            rates = [row["recovered"] for row in state.get("evaluations", [])]
+            text = f"held out, recovered {rates[0]:.1%}" if rates else ""
+            text += f", best {max(rates[1:]):.1%}" if rates[1:] else ""
+            steps = min(state["timesteps"], run.config.steps)
+            self._bar.update(task, completed=steps, rate=text)
+
+
+def print_seeds(summary: SeedSummary, console: Console) -> None:
+    """A row per seed, and the interquartile mean over them."""
+    table = Table(title="held-out pushes during training, recovered", title_justify="left")
+    for name in ("seed", "at the start", "best", "at step", "fell", "mean |action|"):
+        table.add_column(name, justify="right")
+    for entry in summary["runs"]:
+        start, best = evaluations(entry)
+        table.add_row(
+            str(entry["seed"]), f"{start['recovered']:.1%}", f"{best['recovered']:.1%}",
+            f"{best['timesteps']:,.0f}", f"{best['fallen']:.1%}", f"{best['mean_abs_action']:.3f}",
+        )  # fmt: skip
+    console.print(table)
+    found = summary["recovered"]
+    low, high = found["iqm_ci95"]
+    console.print(
+        f"IQM over {len(summary['runs'])} seeds {found['iqm']:.1%} [{low:.1%}, {high:.1%}], "
+        f"worst {found['worst']:.1%} (seed {found['worst_seed']})",
+        highlight=False, markup=False,
+    )  # fmt: skip

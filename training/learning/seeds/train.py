@@ -1,0 +1,208 @@
+"""One training run for each seed, spread over processes, and what they reached taken together."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from poise.baselines.allowance import allows
+from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.files import write_atomic
+from poise.configs.outputs import check_out_folder
+from poise.configs.reading import whole_path
+from poise.configs.schema import to_yaml
+from poise.training.benchmarking.statistics.seeds import seed_figures
+from poise.training.learning.checkpoints import CONFIG, STATE, find_checkpoint
+from poise.training.learning.config import TrainConfig
+from poise.training.learning.policy_files import read_state
+from poise.training.learning.train import LAST, check_folder, check_pushes, train
+from poise.training.running.executor import Executor, check_backend
+from poise.training.running.folder_lock import FolderLock
+from poise.training.running.provenance import circumstances
+from poise.training.running.stopping import keeps
+
+from .progress import SeedProgress, print_seeds
+from .records import (
+    SEEDS,
+    SeedEntry,
+    SeedSummary,
+    evaluations,
+    read_seeds,
+    seed_folder,
+    start_and_best,
+)
+
+
+@dataclass(frozen=True)
+class SeedRun:
+    """The run of one seed: what a process is given to do."""
+
+    config: TrainConfig
+    folder: Path
+    resume: bool
+
+
+@allows()
+def train_seeds(
+    config: TrainConfig,
+    seeds: Sequence[int],
+    out: str | Path,
+    *,
+    resume: bool = False,
+    workers: int | None = None,
+    backend: str = "local",
+    console: Console | None = None,
+    allow: str | Iterable[str] = (),
+) -> SeedSummary:
+    """Train one run per seed into `out`/seed-SEED; returns what seeds.json holds.
+
+    Every run has the bits of `train` with its seed alone, whatever `workers` and `backend`. What a
+    run raises ends that run alone. Finished runs are not trained again.
+
+    Args:
+        config: of all runs, but for the seed; each has one thread.
+        seeds: all different; with `resume` those that `out` has besides are trained too.
+        out: folder of the runs, of their configuration and of seeds.json. All processes write
+            there: on a cluster it is one that every machine sees.
+        resume: go on with the runs that `out` holds.
+        workers: number of runs at a time; None for all cores.
+        backend: local, joblib or ray, as of `poise benchmark`.
+        console: where progress and the table are printed; None: nowhere.
+        allow: as of `train`.
+
+    Raises:
+        ConfigError: as `train`, before any run starts and anything is written.
+        PoiseError: a run has failed, after the others are done; or a process has died.
+    """
+    console, started = console or Console(quiet=True), time.perf_counter()
+    out = whole_path(out, field="out")
+    check_out_folder(out)
+    check_backend(backend)
+    if workers is not None and workers < 1:
+        raise ConfigError(f"must be at least 1, not {workers}", field="workers")
+    given, seeds = seeds, _all_seeds(seeds, out, resume)
+    runs = [_run(replace(config, seed=seed, threads=1), seed_folder(out, seed)) for seed in seeds]
+    missing = [run for run in runs if not _finished(run)]
+    env = config.make_env()  # compiles all that the runs need, once
+    check_pushes(config, env)
+    env.close()
+    keeps(out / SEEDS, f"what is trained is kept in {out}; go on with --resume")
+    with FolderLock(out):
+        _all_seeds(given, out, resume)  # another process may have begun since
+        return _train(config, runs, missing, out, Executor(backend, workers), console, started)
+
+
+def _train(
+    config: TrainConfig,
+    runs: Sequence[SeedRun],
+    missing: Sequence[SeedRun],
+    out: Path,
+    executor: Executor,
+    console: Console,
+    started: float,
+) -> SeedSummary:
+    """Train what is missing; writes seeds.json at the start, and whole at the end."""
+    seeds = [run.config.seed for run in runs]
+    write_atomic(out / CONFIG, to_yaml(replace(config, seed=seeds[0], threads=1)))
+    write_atomic(out / SEEDS, json.dumps({"runs": [_entry(run) for run in runs]}, indent=1) + "\n")
+    failed: list[str] = []
+    with SeedProgress(runs, console), executor:
+        for run, error in executor.each(train_run, missing):
+            if error is None and not _finished(run):
+                error = f"{run.folder} is not finished here: do all machines see it?"
+            if error is None:
+                console.print(_line(_entry(run)), markup=False, highlight=False)
+            else:
+                failed.append(f"seed {run.config.seed}: {error}")
+    if failed:
+        raise PoiseError(f"{'; '.join(failed)}; what is finished is kept, and --resume goes on")
+    entries = [_entry(run) for run in runs]
+    rates = [[evaluations(entry)[1]["recovered"]] for entry in entries]
+    recovered = seed_figures(np.array(rates), seeds)
+    summary: SeedSummary = {
+        "runs": entries,
+        "recovered": recovered,
+        **circumstances(started, executor.workers, executor.backend),
+    }
+    write_atomic(out / SEEDS, json.dumps(summary, indent=1) + "\n")
+    print_seeds(summary, console)
+    return summary
+
+
+def train_run(run: SeedRun) -> str | None:
+    """Train one run; returns what went wrong, on one line, if anything did.
+
+    A run whose process has died goes on from its last rollout.
+    """
+    try:
+        resume = find_checkpoint(run.folder / LAST) is not None
+        train(run.config, run.folder, resume, progress=False)
+    except MemoryError:  # of this process: another one may have enough
+        raise
+    except Exception as error:  # the other seeds go on
+        text = str(error) if isinstance(error, PoiseError) else f"{type(error).__name__}: {error}"
+        return " ".join(text.split())
+    return None
+
+
+def _all_seeds(seeds: Sequence[int], out: Path, resume: bool) -> list[int]:
+    """Return the seeds of the folder and the given ones; refuses what is no list of seeds."""
+    for seed in seeds:
+        if seed < 0:
+            raise ConfigError(f"must be at least 0, not {seed}", field="seeds")
+        if list(seeds).count(seed) > 1:
+            raise ConfigError(f"{seed} is given twice", field="seeds")
+    if find_checkpoint(out / LAST) is not None:
+        raise ConfigError("holds the run of a single seed; choose another folder",
+                          source=out, field="out")  # fmt: skip
+    there = [int(entry["seed"]) for entry in read_seeds(out)] if (out / SEEDS).exists() else []
+    if there and not resume:
+        raise ConfigError("already holds training runs; go on with --resume or choose another "
+                          "folder", source=out, field="out")  # fmt: skip
+    if resume and not there:
+        raise ConfigError("holds no runs to resume", source=out, field="resume")
+    if not (there or seeds):
+        raise ConfigError("give at least one", field="seeds")
+    return there + [seed for seed in seeds if seed not in there]
+
+
+def _run(config: TrainConfig, folder: Path) -> SeedRun:
+    """Refuses a folder that holds a run of another configuration."""
+    resume = find_checkpoint(folder / LAST) is not None
+    if resume:
+        check_folder(config, folder, resume)
+    return SeedRun(config, folder, resume)
+
+
+def _finished(run: SeedRun) -> bool:
+    return _entry(run)["timesteps"] >= run.config.steps
+
+
+def _entry(run: SeedRun) -> SeedEntry:
+    """The evaluations of a run at its start and at its best, for seeds.json."""
+    checkpoint = find_checkpoint(run.folder / LAST)
+    state: dict[str, Any] = read_state(checkpoint / STATE) if checkpoint else {"timesteps": 0}
+    start, best = start_and_best(state.get("evaluations", []))
+    return {
+        "seed": run.config.seed,
+        "folder": run.folder.name,
+        "timesteps": state["timesteps"],
+        "finished": state["timesteps"] >= run.config.steps,
+        "start": start,
+        "best": best,
+    }
+
+
+def _line(entry: SeedEntry) -> str:
+    start, best = evaluations(entry)
+    return (
+        f"seed {entry['seed']}: recovered {best['recovered']:.1%} at its best, "
+        f"{start['recovered']:.1%} at the start"
+    )
