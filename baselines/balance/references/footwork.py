@@ -26,7 +26,8 @@ MARGIN = 0.02  # [rad] that joints of legs keep from their limits
 LEAD = 0.5  # [s] in which the CoM is led to rest at both ends
 SOFT = 0.1  # [s] over which turns of the root are smoothed
 ROLLED, MOST_ROLL = 0.4, 0.1  # least rate of a joint that the root's roll helps; the roll [rad]
-AWAY = 0.04  # [m] that the ZMP may be from where it is planned
+AWAY, AWAY_BOTH = 0.04, 0.1  # [m] that the ZMP may be from where it is planned; and on both soles,
+# which bear it anywhere between them
 UNREACHED = 2e-3  # [m, rad] that a sole or the CoM may be off
 
 
@@ -138,6 +139,7 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
             if k < ROLLING:
                 plan = plan._replace(root=plan.root + _smoothed(turns, SOFT / plan.dt))
     away = np.linalg.norm(real_zmp(robot, qpos, whole - [0.0, 0.0, ground], plan.dt) - zmp, axis=1)
+    away *= np.where(plan.planted.all(axis=1), AWAY / AWAY_BOTH, 1.0)
     if away.max() > AWAY:
         raise ConfigError(
             f"the limbs swing too fast: the ZMP is {100 * away.max():.1f} cm from where the soles "

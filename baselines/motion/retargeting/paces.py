@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.foot_steps import STANDING
 from poise.baselines.balance.references.footing import root_turns
@@ -13,86 +14,81 @@ from poise.baselines.balance.references.legs import foot_signs, nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts
-from poise.baselines.motion.clips.rotations import heading_angle
 from poise.baselines.motion.clips.skeleton import SIDES
 from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
+from .targets import low_pass
+from .tracks import Tracks
+
 BOTH = 0.1  # [s] on both feet between two steps, at least
+EARLY = 0.2  # [s] by which a sole lifts off before the toes of the clip do, whose heel is up then
 SWING = 0.4  # [s] of a step whose begin or end the clip does not show
-FLIGHT = 0.25  # [s] with both feet off the ground: longer is a jump
-LONGEST = 0.45  # [h] of a step
+FLIGHT = 0.07  # [s] with both feet off the ground: longer is a run or a jump
 LOWEST, HIGHEST = 0.05, 0.15  # [h] of the way of a foot over the ground at its highest
 DIP, MOST_DIP = 0.5, 0.35  # of its height that a foot's toes dip in the air; the turn [rad]
-WALKING = 0.98  # [h] height of the CoM between first and last step
+LEANING = 1.0  # [Hz] of the low-pass on what the trunk leans: faster, the ZMP cannot be borne
 BEFORE, AFTER = STANDING, 1.6  # [s] of standing before the first and after the last step, at least
-FAR = 0.3  # [m] a clip whose hips move further faces that way
-TURN = 45.0  # [°] that a clip may turn
+TURN = 300.0  # [°] that a motion may turn: rotation vectors of a whole turn have no axis
 
 
 class Pace(NamedTuple):
-    """A step: foot (0 left, 1 right), lift-off and touchdown [s], place (2,) [m], yaw [rad], and
-    how high the foot gets [m], in the clip's sizes; without a place it steps beside the other."""
+    """A step: foot (0 left, 1 right), lift-off and touchdown [s], the end of the stance after it
+    [s], and how high the foot gets [m], in the clip's sizes; with no end it steps beside the
+    other."""
 
     foot: int
     lift: float
     land: float
-    place: np.ndarray | None
-    yaw: float
+    end: float | None
     apex: float
 
-
-def clip_heading(clip: Clip) -> float:
-    """Where a clip goes, or else faces [rad]; raises ConfigError if it turns by more than 45°."""
-    way = clip.root[-1] - clip.root[0]
-    facing = clip.facing()
-    turned = np.degrees(np.ptp(np.unwrap(facing)))
-    if turned > TURN:
-        raise ConfigError(f"turns by {turned:.0f}°: at most {TURN:.0f}° can be performed yet",
-                          source=clip.name, field="heading")  # fmt: skip
-    if np.linalg.norm(way[:2]) > FAR:
-        return float(heading_angle(way))
-    return float(np.median(np.unwrap(facing)))
+    def at_speed(self, factor: float) -> Pace:
+        """The step `factor` > 0 times as fast."""
+        end = None if self.end is None else self.end / factor
+        return self._replace(lift=self.lift / factor, land=self.land / factor, end=end)
 
 
-def find_paces(clip: Clip) -> tuple[list[Pace], np.ndarray]:
-    """The steps of a clip along x, in order, and (2,) where the foot that lifts off last at first
-    stands in its first frame.
+def find_paces(clip: Clip) -> list[Pace]:
+    """The steps of a clip, in order.
 
-    A foot lands when its toe begins to rest, and lifts off when it begins to move, but no sooner
-    than 0.1 s after the other one has landed: a robot's soles are flat, a person's toes are not.
+    A foot lands when its heel or toe begins to rest, and lifts off when both have begun to move,
+    but no sooner than 0.1 s after the other one has landed: a robot's soles are flat, a person's
+    are not.
 
     Raises:
-        ConfigError: no foot is planted in the first frame, or none is for 0.25 s.
+        ConfigError: no foot is planted in the first frame, or none is for 0.07 s; no step.
     """
     planted = measure_contacts(clip).planted
     free = np.flatnonzero(~planted.any(axis=1))
-    longest = max((len(run) for run in np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)),
-                  default=0) * clip.dt  # fmt: skip
-    if longest > FLIGHT or not planted[0].any():
-        raise ConfigError("both feet are off the ground" + (f" for {longest:.2f} s" if longest else
-                          " at its begin"), source=clip.name, field="feet")  # fmt: skip
-    places, headings, heights = _feet(clip)
-    found: list[Pace] = []
-    for foot in range(2):
+    runs = [run for run in np.split(free, np.flatnonzero(np.diff(free) > 1) + 1) if len(run)]
+    longest = max(runs, key=len, default=free)
+    if len(longest) * clip.dt > FLIGHT or not planted[0].any():
+        raise ConfigError(
+            f"both feet are off the ground for {len(longest) * clip.dt:.2f} s at "
+            f"{longest[0] * clip.dt:.2f} s: no controller flies", source=clip.name, field="feet",
+        )  # fmt: skip
+    turned = np.degrees(np.ptp(np.unwrap(clip.facing())))
+    if turned > TURN:
+        raise ConfigError(f"turns by {turned:.0f}°: at most {TURN:.0f}° can be performed",
+                          source=clip.name, field="heading")  # fmt: skip
+    places, found = clip.places(), []
+    for foot, side in enumerate(SIDES):
+        heights = places[:, clip.skeleton.joint(f"ankle_{side}", clip.name), 2]
         edges = np.diff(np.concatenate([[0], planted[:, foot].astype(int), [0]]))
         begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-        low = float(heights[planted[:, foot], foot].mean())
+        low = float(heights[planted[:, foot]].mean())
         for k, (a, b) in enumerate(zip(begins, ends, strict=True)):
             if a == 0 or (len(planted) - a) * clip.dt < BOTH:  # the clip shows no step's end
                 continue
             left = int(ends[k - 1]) if k else max(int(a) - round(SWING / clip.dt), 0)
-            apex = float(heights[left : a + 1, foot].max()) - low
-            at, yaw = np.median(places[a : b + 1, foot], axis=0), headings[a : b + 1, foot].mean()
-            found.append(Pace(foot, left * clip.dt, a * clip.dt, at, float(yaw), apex))
+            apex = float(heights[left : a + 1].max()) - low
+            found.append(Pace(foot, left * clip.dt, a * clip.dt, b * clip.dt, apex))
     found.sort(key=lambda pace: pace.land)
     if not found:
         raise ConfigError("its feet move, but take no step", source=clip.name, field="feet")
-    stance = 1 - found[0].foot if planted[0, 1 - found[0].foot] else found[0].foot
-    first = np.flatnonzero(~planted[:, stance])
-    begin = places[: first[0] if len(first) else None, stance]
-    return _in_turn(found), np.median(begin, axis=0)
+    return _in_turn(found)
 
 
 def _in_turn(found: list[Pace]) -> list[Pace]:
@@ -100,10 +96,10 @@ def _in_turn(found: list[Pace]) -> list[Pace]:
     period = float(np.median(np.diff([pace.land for pace in found]))) if len(found) > 2 else 0.6
     last = found[-1]
     end = last.land + max(period, SWING + BOTH)
-    paces = [*found, Pace(1 - last.foot, last.land, end, None, 0.0, last.apex)]
+    paces = [*found, Pace(1 - last.foot, last.land, end, None, last.apex)]
     made, before = [], -np.inf
     for pace in paces:
-        lift = max(pace.lift, before + BOTH)
+        lift = max(pace.lift - EARLY, before + BOTH)
         if before == -np.inf:
             lift = min(lift, pace.land - SWING)
         before = max(pace.land, lift + 0.5 * SWING)
@@ -111,82 +107,95 @@ def _in_turn(found: list[Pace]) -> list[Pace]:
     return made
 
 
-def _feet(clip: Clip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middles (F, 2, 2) of the feet [m], headings (F, 2) [rad], heights (F, 2) of ankles [m]."""
-    roles, all_places = clip.skeleton.roles, clip.places()
-    middles, headings, heights = [], [], []
-    for side in SIDES:
-        ankle = all_places[:, clip.skeleton.joint(f"ankle_{side}", clip.name)]
-        toe = all_places[:, roles[f"toe_{side}"]] if f"toe_{side}" in roles else None
-        middles.append(ankle[:, :2] if toe is None else 0.5 * (ankle + toe)[:, :2])
-        way = np.tile([1.0, 0.0, 0.0], (len(ankle), 1)) if toe is None else toe - ankle
-        headings.append(np.unwrap(np.arctan2(way[:, 1], way[:, 0])))
-        heights.append(ankle[:, 2])
-    return np.stack(middles, axis=1), np.stack(headings, axis=1), np.stack(heights, axis=1)
-
-
 def plan_paces(
-    clip: Clip, robot: Robot, qpos: np.ndarray, lead: int, scale: float, stride: float
-) -> FootPlan:
+    paces: list[Pace], tracks: Tracks, qpos: np.ndarray, robot: Robot, lead: int, scale: float,
+    low: float,
+) -> FootPlan:  # fmt: skip
     """The plan of a clip's steps for a robot.
 
     Args:
-        clip: along x, at `RATE`.
+        paces: of the clip.
+        tracks: where it leads the soles; of its rests in the stances only.
+        qpos: (F, nq) in its frames: trunk, arms and the root's turn, and the legs as a guess.
         robot: with two feet.
-        qpos: (F, nq) of trunk and arms, from standing to standing; `lead` frames before the clip.
+        lead: frames from standing into the clip, and back.
         scale: of the robot's legs over the clip's.
-        stride: by which lengths of steps are less than that.
+        low: height of the CoM from first to last step, over that of standing.
     """
-    paces, origin = find_paces(clip)
-    before = _longer(paces, lead)
-    last = lead + before + round((paces[-1].land + AFTER) / RATE)
-    frames = max(before + len(qpos), last)
-    whole = np.pad(qpos, ((before, frames - before - len(qpos)), (0, 0)), mode="edge")
-    times = [tuple(lead + before + round(t / RATE) for t in (p.lift, p.land)) for p in paces]
+    begin = frames_before(paces, lead)
+    frames = max(begin + len(qpos) + lead, begin + round((paces[-1].land + AFTER) / RATE))
+    times = [tuple(begin + round(t / RATE) for t in (p.lift, p.land)) for p in paces]
     left, h = int(np.argmax(foot_signs(robot))), robot.height_com
     nominal = nominal_feet(robot) * [1.0, 1.0, 0.0]
-    middle = np.mean([np.median([p.place[1] for p in paces if p.place is not None and p.foot == f])
-                      for f in {p.foot for p in paces if p.place is not None}])  # fmt: skip
+    goals = _goals(paces, tracks, nominal, left)
     places = np.repeat(nominal[None], frames, axis=0)
-    turns, planted = np.zeros((frames, 2, 3)), np.ones((frames, 2), dtype=bool)
-    ahead = 0.0
-    for pace, (a, b) in zip(paces, times, strict=True):
+    yaws, tips = np.zeros((frames, 2)), np.zeros((frames, 2))
+    planted = np.ones((frames, 2), dtype=bool)
+    for pace, (a, b), (place, yaw) in zip(paces, times, goals, strict=True):
         foot = left if pace.foot == 0 else 1 - left
-        goal, yaw = nominal[foot].copy(), 0.0
-        if pace.place is not None:
-            ahead = scale * stride * float(pace.place[0] - origin[0])
-            side = scale * float(pace.place[1] - middle)
-            goal[1] = np.sign(goal[1]) * max(abs(goal[1]), np.sign(goal[1]) * side)
-            yaw = float(pace.yaw)
-        goal[0] += ahead
         apex = float(np.clip(scale * pace.apex, LOWEST * h, HIGHEST * h))
         u = np.linspace(0.0, 1.0, b - a + 1)[:, None]
-        way = ease(u)
-        places[a : b + 1, foot] += way * (goal - places[a, foot])
-        places[a : b + 1, foot, 2] += apex * _hump(u[:, 0])
+        way, hump = ease(u), _hump(u[:, 0])
+        places[a : b + 1, foot] += way * (place - places[a, foot])
+        places[a : b + 1, foot, 2] += apex * hump
         tip = min(DIP * apex / (0.5 * float(np.ptp(robot.soles[foot].polygon[:, 0]))), MOST_DIP)
-        turns[a : b + 1, foot, 1] = tip * _hump(u[:, 0])
-        turns[a : b + 1, foot, 2] += way[:, 0] * (yaw - turns[a, foot, 2])
-        places[b:, foot], turns[b:, foot, 2] = goal, yaw
+        tips[a : b + 1, foot] = tip * hump
+        yaws[a : b + 1, foot] += way[:, 0] * (yaw - yaws[a, foot])
+        places[b:, foot], yaws[b:, foot] = place, yaw
         planted[a + 1 : b, foot] = False
-    return FootPlan(RATE, whole[:, 7:], root_turns(robot, whole), _heights(frames, times, h),
-                    places, turns, planted)  # fmt: skip
+    turns = Rotation.from_euler("ZY", np.stack([yaws, tips], axis=2).reshape(-1, 2)).as_rotvec()
+    lean = root_turns(robot, qpos)
+    lean[:, :2] = low_pass(lean[:, :2], LEANING)
+    root = _led(lean, np.zeros(3), np.array([0.0, 0.0, yaws[-1].mean()]),
+                lead, begin, frames)  # fmt: skip
+    standing = robot.standing_qpos[7:]
+    joints = _led(qpos[:, 7:], standing, standing, lead, begin, frames)
+    return FootPlan(RATE, joints, root, _heights(frames, times, h, low), places,
+                    turns.reshape(frames, 2, 3), planted)  # fmt: skip
 
 
-def frames_before(clip: Clip, lead: int) -> int:
-    """How many frames of standing a clip along x has before it, `lead` of them at least."""
-    return lead + _longer(find_paces(clip)[0], lead)
+def _goals(
+    paces: list[Pace], tracks: Tracks, nominal: np.ndarray, left: int
+) -> list[tuple[np.ndarray, float]]:
+    """Where each step lands: the sole's point (3,) on the ground [m], and its heading [rad].
+
+    The foot that stands in the first frame is where it stands as the robot does.
+    """
+    stands = int(np.argmax([np.flatnonzero(~np.append(each, False))[0]
+                            for each in tracks.planted.T]))  # fmt: skip
+    origin = tracks.soles[0, stands] - nominal[stands]
+    goals: list[tuple[np.ndarray, float]] = []
+    latest = {foot: (nominal[foot], 0.0) for foot in range(2)}
+    for pace in paces:
+        foot = left if pace.foot == 0 else 1 - left
+        if pace.end is None:
+            place, yaw = latest[1 - foot]
+            beside = Rotation.from_rotvec([0.0, 0.0, yaw]).apply(nominal[foot] - nominal[1 - foot])
+            goals.append((place + beside, yaw))
+            continue
+        own = slice(*(min(round(t / RATE), len(tracks.yaws) - 1) for t in (pace.land, pace.end)))
+        own = slice(own.start, max(own.stop, own.start + 1))
+        place = np.median(tracks.soles[own, foot], axis=0) - origin
+        goals.append((place * [1.0, 1.0, 0.0], float(np.median(tracks.yaws[own, foot]))))
+        latest[foot] = goals[-1]
+    return goals
 
 
-def _longer(paces: list[Pace], lead: int) -> int:
-    return max(round((BEFORE - paces[0].lift) / RATE) - lead, 0)
+def _led(
+    values: np.ndarray, first: np.ndarray, last: np.ndarray, lead: int, begin: int, frames: int
+) -> np.ndarray:
+    """Values (F, m) of a clip that begins in a frame, led from `first` and to `last` (m,) in `lead`
+    frames, which are held."""
+    way = ease(np.arange(lead)[:, None] / lead)
+    into, back = first + way * (values[0] - first), last + way[::-1] * (values[-1] - last)
+    before, after = begin - lead, frames - begin - len(values) - lead
+    return np.concatenate([np.repeat(first[None], before, axis=0), into, values, back,
+                           np.repeat(last[None], after, axis=0)])  # fmt: skip
 
 
-def longest_step(clip: Clip, scale: float) -> float:
-    """The longest step of a clip along x [m], from one foot to the other, for a robot."""
-    paces, origin = find_paces(clip)
-    marks = [origin[0], *(pace.place[0] for pace in paces if pace.place is not None)]
-    return scale * float(np.abs(np.diff(marks)).max())
+def frames_before(paces: list[Pace], lead: int) -> int:
+    """How many frames of standing a clip has before it, `lead` of them at least."""
+    return max(round((BEFORE - paces[0].lift) / RATE), lead)
 
 
 def _hump(u: np.ndarray) -> np.ndarray:
@@ -196,10 +205,10 @@ def _hump(u: np.ndarray) -> np.ndarray:
     return ease(v)
 
 
-def _heights(frames: int, times: list[tuple[int, ...]], h: float) -> np.ndarray:
+def _heights(frames: int, times: list[tuple[int, ...]], h: float, low: float) -> np.ndarray:
     """(F,) of the CoM: lower from half a second before the first step until after the last [m]."""
     k = np.arange(frames) * RATE
     down = np.clip((k - times[0][0] * RATE + 0.7) / 0.7, 0.0, 1.0)
     up = np.clip((times[-1][1] * RATE + 0.7 - k) / 0.7, 0.0, 1.0)
     v = np.minimum(down, up)
-    return np.asarray(h * (1.0 - (1.0 - WALKING) * ease(v)))
+    return np.asarray(h * (1.0 - (1.0 - low) * ease(v)))

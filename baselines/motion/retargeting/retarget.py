@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,12 +16,19 @@ from poise.configs.extras import how_to_install
 from poise.envs.robots.robot import Robot
 
 from .limbs import Limbs, find_limbs
-from .paces import LONGEST, clip_heading, frames_before, longest_step, plan_paces
+from .paces import find_paces, frames_before, plan_paces
 from .targets import BodyTargets, between_standing, clip_targets, standing_targets
+from .tracks import find_tracks, first_heading
 
 SMOOTH = 3.0  # [Hz] of the low-pass on what the clip asks for, and on the joints
 LEAD = 1.0  # [s] from standing into the clip, and back
-SHORTER, SHORTEST = 0.94, 0.3  # by which steps are shortened until legs reach, and the end of that
+SHORTER, SHORTEST = 0.94, 0.3  # by which ways are shortened until legs reach, and the end of that
+#: shares of the clip's lengths of steps and of its tempo, the fastest first
+TRIED = sorted(((stride, tempo) for stride in (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
+                for tempo in (1.0, 0.85, 0.7)), key=lambda each: -each[0] * each[1])  # fmt: skip
+LOWER = (0.98, 0.96, 0.94, 0.92, 0.9)  # heights of the CoM over standing that steps are tried at
+OFF = 0.003  # [m] by which a planted sole may be off
+SWIFTER = 2.0  # times `smooth` is what is kept of a motion that need not be performed
 
 
 class Retargeted(NamedTuple):
@@ -33,6 +41,7 @@ class Retargeted(NamedTuple):
         limit_excess: largest excess over a joint limit [rad]; 0 if there is none.
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
+        tempo: how many times as fast as the clip it is.
     """
 
     clip: RobotClip
@@ -44,6 +53,7 @@ class Retargeted(NamedTuple):
     limit_excess: float
     stride: float = 1.0
     begins: float = LEAD
+    tempo: float = 1.0
 
 
 def retarget(
@@ -64,7 +74,7 @@ def retarget(
         planted: take the feet as planted though they move in the clip.
 
     Raises:
-        ConfigError: feet that jump or turn, or steps that the legs cannot do (without `planted`);
+        ConfigError: feet that fly, or steps that the legs cannot do (without `planted`);
             unknown joints, fewer than 8 frames, a `smooth` or `lead` that is not above 0, mink is
             missing.
         PoiseError: no posture keeps the soles and the limits.
@@ -79,36 +89,39 @@ class AskedOf(NamedTuple):
     Attributes:
         limbs: the robot's.
         targets: from standing to standing.
-        heading: of a clip with steps [rad]; None for feet that stay.
+        steps: whether the feet step, else they stay.
     """
 
     limbs: Limbs
     targets: BodyTargets
-    heading: float | None
+    steps: bool
 
 
 def retarget_to(
     asked: AskedOf, clip: Clip, robot: Robot, *, smooth: float, lead: float
 ) -> Retargeted:
     """`retarget` for what `targets_on` has found with the same arguments; raises what it does."""
-    limbs, whole, heading = asked
-    solved = _solver()(robot, limbs, whole, smooth)
+    limbs, whole, steps = asked
+    if steps:
+        return _stepped(clip, robot, limbs, smooth, lead)
+    solved = _solver("solve", "solve_frames")(robot, limbs, whole, smooth)
+    return _retargeted(solved, clip, robot, limbs, begins=lead)
+
+
+def _retargeted(
+    solved: Any, clip: Clip, robot: Robot, limbs: Limbs, *, planted: np.ndarray | None = None,
+    stride: float = 1.0, begins: float = 0.0,
+) -> Retargeted:  # fmt: skip
+    joints, (low, high) = solved.qpos[:, 7:], robot.joint_range.T
     about = About(robot.name, robot.fingerprint, clip.name, clip.name, clip.licence)
-    qpos, stance, stride, begins = solved.qpos, None, 1.0, lead
-    if heading is not None:
-        walk = clip.resampled(RATE).turned(-heading)
-        qpos, stance, stride = _stepped(walk, robot, limbs, qpos, lead)
-        begins = RATE * frames_before(walk, max(round(lead / RATE), 1))
-    joints = qpos[:, 7:]
-    excess = np.maximum(robot.joint_range[:, 0] - joints, joints - robot.joint_range[:, 1])
     return Retargeted(
-        RobotClip(about, RATE, qpos, stance),
+        RobotClip(about, RATE, solved.qpos, planted),
         limbs.leg_length / clip.skeleton.leg_length,
         solved.sole_error,
         solved.direction_error,
         solved.penetration,
         solved.time_per_frame,
-        float(max(excess.max(), 0.0)),
+        float(max(np.maximum(low - joints, joints - high).max(), 0.0)),
         stride,
         begins,
     )
@@ -121,33 +134,71 @@ def targets_on(clip: Clip, robot: Robot, *, smooth: float, lead: float, planted:
             raise ConfigError(f"must be above 0 and at most 100, not {value:g}", field=name)
     steps = not planted and not measure_contacts(clip).in_place
     limbs = find_limbs(robot)
-    heading = clip_heading(clip) if steps else None
-    targets = clip_targets(clip, limbs.has_arms, smooth, heading)
+    targets = clip_targets(clip, limbs.has_arms, smooth, first_heading(clip) if steps else None)
     whole = between_standing(targets, standing_targets(robot, limbs), lead)
-    return AskedOf(limbs, whole, heading)
+    return AskedOf(limbs, whole, steps)
 
 
-def _stepped(
-    clip: Clip, robot: Robot, limbs: Limbs, qpos: np.ndarray, lead: float
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Postures with the steps of a clip along x, the planted soles, and what is left of their
-    lengths: less until the legs reach."""
-    scale, frames = limbs.leg_length / clip.skeleton.leg_length, max(round(lead / RATE), 1)
-    stride = min(LONGEST * robot.height_com / max(longest_step(clip, scale), 1e-6), 1.0)
+def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float) -> Retargeted:
+    """The fastest motion up to the clip's that the robot can do: steps and tempo as of `TRIED`, the
+    CoM as high as legs reach then."""
+    paces, scale = find_paces(clip), limbs.leg_length / clip.skeleton.leg_length
+    frames, solve = max(round(lead / RATE), 1), _solver("solve_tracks", "solve_tracks")
+    solved: dict[float, Any] = {}
+    reason = None
+    for stride, tempo in TRIED:
+        slower = clip if tempo == 1.0 else clip.at_speed(tempo)
+        tracks = find_tracks(slower, robot, limbs, smooth, stride)
+        if tempo not in solved:
+            solved[tempo] = solve(robot, limbs, tracks, smooth)
+        timed = [pace.at_speed(tempo) for pace in paces]
+        for low in LOWER:
+            plan = plan_paces(timed, tracks, solved[tempo].qpos, robot, frames, scale, low)
+            try:
+                qpos = perform_plan(robot, plan, clip.name)
+            except ConfigError as error:
+                reason = error
+                continue
+            made = _retargeted(solved[tempo]._replace(qpos=qpos), clip, robot, limbs,
+                               planted=plan.planted, stride=stride,
+                               begins=RATE * frames_before(timed, frames))  # fmt: skip
+            return made._replace(tempo=tempo)
+    assert reason is not None
+    raise reason
+
+
+def retarget_freely(clip: Clip, robot: Robot, *, smooth: float = SMOOTH) -> Retargeted:
+    """The postures in which a robot does what a clip shows, by kinematics, at `RATE`.
+
+    The heading of the clip's begin becomes x. Hips and feet go where the clip's do, times the
+    ratio of the legs; directions of the segments are the clip's. Soles are level. Planted ones rest
+    at the median of the clip's places in the stance; between stances a foot goes the clip's way,
+    and what it was off grows into what it will be off. Where the legs cannot reach, the hips get
+    lower. Ways get shorter until every planted sole is within 3 mm of its place. Whether a
+    controller can perform that is another question.
+
+    Args:
+        clip: of any skeleton whose hips, knees and ankles are known.
+        robot: with two feet.
+        smooth: half the low-pass on what is asked for [Hz].
+
+    Raises:
+        ConfigError: unknown joints, fewer than 8 frames, mink is missing.
+        PoiseError: no posture keeps the soles and the limits.
+    """
+    limbs, stride = find_limbs(robot), 1.0
     while True:
-        plan = plan_paces(clip, robot, qpos, frames, scale, stride)
-        try:
-            return perform_plan(robot, plan, clip.name), plan.planted, stride
-        except ConfigError:
-            stride *= SHORTER
-            if stride < SHORTEST:
-                raise
+        tracks = find_tracks(clip, robot, limbs, SWIFTER * smooth, stride)
+        solved = _solver("solve_tracks", "solve_tracks")(robot, limbs, tracks, SWIFTER * smooth)
+        if solved.sole_error < OFF or stride * SHORTER < SHORTEST:
+            break
+        stride *= SHORTER
+    return _retargeted(solved, clip, robot, limbs, planted=tracks.planted, stride=stride)
 
 
-def _solver() -> Any:  # the function `solve_frames`
+def _solver(module: str, name: str) -> Any:  # a function of a module that imports mink
     try:
-        from .solve import solve_frames
+        return getattr(import_module(f".{module}", __package__), name)
     except ImportError as error:
         raise ConfigError(f"needs the package {error.name}: {how_to_install('motion')}",
                           source="motion") from None  # fmt: skip
-    return solve_frames

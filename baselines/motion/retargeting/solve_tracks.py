@@ -13,11 +13,11 @@ from poise.baselines.motion.clips.skeleton import SIDES
 from poise.configs.errors import PoiseError
 from poise.envs.robots.robot import Robot
 
-from .freely import Tracks
 from .limbs import Limbs
 from .solve import FrameIk, Solved
 from .targets import low_pass
 from .tasks import PlaceTask
+from .tracks import Tracks
 
 PELVIS = 5.0  # cost of its place [1/m]
 SWING, LEVEL = 30.0, 1.0  # costs of a sole in the air: place [1/m] and turn [1/rad]

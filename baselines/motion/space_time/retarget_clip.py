@@ -14,12 +14,12 @@ from poise.baselines.balance.references.robot_clip import RATE, RobotClip, refer
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
-from poise.baselines.motion.retargeting.freely import retarget_freely
 from poise.baselines.motion.retargeting.limbs import find_limbs
 from poise.baselines.motion.retargeting.retarget import (
     LEAD,
     SMOOTH,
     Retargeted,
+    retarget_freely,
     retarget_to,
     targets_on,
 )
@@ -38,7 +38,7 @@ from .trajectory import jerk
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
-ENOUGH = 0.7  # of the length of steps: where they are shorter, the planner of walks does better
+ENOUGH = 0.7  # of the speed: where steps are slower, the planner of walks does better
 CROSSOVER = 2.0  # [Hz] what is asked faster than this is smoothed
 
 
@@ -98,7 +98,7 @@ def retarget_clip(
                 planted=planted, crossover=crossover, progress=progress,
             )  # fmt: skip
             reference_from(made.clip, robot, clip.name)
-            if kinematic is not None or made.stride >= ENOUGH:
+            if kinematic is not None or made.stride * made.tempo >= ENOUGH:
                 return made
             short = made
         except ConfigError as error:
@@ -172,8 +172,8 @@ def performable(
         source, wanted = None, tuple(constraints)
     chosen: Solver = solver or ("spacetime" if wanted else "frame")
     given = targets_on(clip, robot, smooth=smooth, lead=lead, planted=planted)
-    limbs, targets, heading = given
-    if heading is not None and (chosen != "frame" or wanted):
+    limbs, targets, steps = given
+    if steps and (chosen != "frame" or wanted):
         raise ConfigError("its feet step: only the solver 'frame', without constraints, is for "
                           "such clips (--planted takes the feet as planted)", source=clip.name,
                           field="solver" if chosen != "frame" else "constraints")  # fmt: skip
@@ -187,7 +187,7 @@ def performable(
     from .solve import optimise
 
     scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted)
-    if heading is not None:
+    if steps:
         return _stepped(made, scene)
     stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
     spent, begun = made.time_per_frame, time.thread_time()
@@ -215,7 +215,7 @@ def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
         made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
     )  # fmt: skip
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
-                          made.begins)  # fmt: skip
+                          made.begins, made.tempo)  # fmt: skip
 
 
 def _scene(

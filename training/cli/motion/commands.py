@@ -247,13 +247,14 @@ def _film(
 ) -> None:
     """Film a motion, with the skeleton of its clip beside it."""
     from poise.baselines.motion.clips.contacts import over_ground
-    from poise.baselines.motion.retargeting.paces import clip_heading
+    from poise.baselines.motion.retargeting.tracks import first_heading
     from poise.training.pictures.figures.playback import beside_of, write_playback
 
     clip, heading = made.clip, None
     if clip.planted is not None and not clip.free:
-        heading = clip_heading(source)
-    beside = beside_of(body, over_ground(source), made.scale, made.begins, heading, made.stride)
+        heading = first_heading(source)
+    source = over_ground(source) if made.tempo == 1.0 else source.at_speed(made.tempo)
+    beside = beside_of(body, source, made.scale, made.begins, heading, made.stride)
     print(f"{write_playback(video, body, clip.qpos, clip.dt, beside, size)} frames")
     print(video)
 

@@ -135,7 +135,8 @@ def _steps(made: RetargetedClip) -> str:
     if planted is None:
         return "none"
     steps = int(np.sum(np.diff(planted.astype(int), axis=0) > 0))
-    return f"{steps}, {made.stride:.0%} of the length that the legs' scale gives"
+    tempo = "" if made.tempo == 1.0 else f", {made.tempo:.0%} as fast as the clip"
+    return f"{steps}, {made.stride:.0%} of the length that the legs' scale gives{tempo}"
 
 
 def _walks(made: RetargetedClip) -> list[tuple[str, str]]:

@@ -20,7 +20,7 @@ from poise.baselines.motion.clips.axes import axes_of
 from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts, over_ground
-from poise.baselines.motion.retargeting.freely import retarget_freely
+from poise.baselines.motion.retargeting.retarget import retarget_freely
 from poise.baselines.motion.space_time.retarget_clip import retarget_clip
 from poise.configs.errors import ConfigError
 from tests.support.captures import CAPTURES, make

@@ -14,6 +14,7 @@ from poise.configs.errors import ConfigError
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.motion.following.fastest import fastest
 from poise.training.motion.following.follow import follow
+from tests.support.captures import make
 from tests.support.physics import robot_named
 
 
@@ -91,3 +92,12 @@ def test_a_faster_motion_has_its_rates_and_the_impatient_stop_at_a_fall() -> Non
     assert len(trials) == 1 and trials[0].fallen
     with pytest.raises(ConfigError, match=r"tempo: must be from 0.1 to 10, not 0"):
         follow(motion, robot=robot, speed=0.0)
+
+
+def test_a_turn_is_performed() -> None:
+    """Half a turn on the spot, from three starts, without a fall and without the planner."""
+    robot = robot_named("humanoid")
+    motion = reference_from(retarget(make("turn-in-place")[0], robot).clip, robot, "turn")
+    trials = follow(motion, "motion-step", robot=robot, starts=3)
+    assert not any(trial.fallen or trial.interruptions for trial in trials)
+    assert max(trial.placement_error for trial in trials) < 0.03

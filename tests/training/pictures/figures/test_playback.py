@@ -9,7 +9,7 @@ import pytest
 
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh
-from poise.baselines.motion.retargeting.paces import clip_heading
+from poise.baselines.motion.retargeting.tracks import first_heading
 from poise.training.cli.entry import main
 from poise.training.pictures.figures.playback import beside_of, looked_at
 from tests.support.physics import robot_named
@@ -34,7 +34,7 @@ def test_the_skeleton_stands_beside_and_moves_with_the_clip() -> None:
 def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_is_looked_at() -> None:
     robot = robot_named("humanoid")
     clip = read_bvh(find_bvh("cmu02_walk")).clip
-    whole, half = (beside_of(robot, clip, 0.9, 1.0, clip_heading(clip), stride)
+    whole, half = (beside_of(robot, clip, 0.9, 1.0, first_heading(clip), stride)
                    for stride in (1.0, 0.5))  # fmt: skip
     end = 1.0 + clip.duration
     ways = [skeleton.root(end) - skeleton.root(0.0) for skeleton in (whole, half)]

@@ -1,31 +1,30 @@
-"""Any clip of a biped on a robot by kinematics alone: wherever it goes, turns, sits or leaps."""
+"""Where a clip of a biped leads a robot's pelvis and soles, wherever it goes, turns or leaps."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.footing import stances_of
-from poise.baselines.balance.references.legs import foot_signs
-from poise.baselines.balance.references.robot_clip import RATE, About, RobotClip
+from poise.baselines.balance.references.legs import foot_signs, nominal_feet
+from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import FLOOR, measure_contacts, over_ground
+from poise.baselines.motion.clips.rotations import heading_angle
 from poise.baselines.motion.clips.skeleton import SIDES
-from poise.configs.errors import ConfigError
-from poise.configs.extras import how_to_install
 from poise.envs.robots.robot import Robot
 
-from .limbs import Limbs, find_limbs
-from .retarget import SMOOTH, Retargeted
+from .limbs import Limbs
 from .targets import UPRIGHT, BodyTargets, clip_targets, low_pass
 
 FLAT = 0.6  # of a foot's length that is seen from above: less, and its heading says nothing
 TURNED, SPLAY = 0.35, 1.2  # [rad] by which a foot turns as it stands, at most; and from the hips
 NARROW = 0.8  # of the feet's distance from the middle as the robot stands: they get no nearer
-SHORTER, SHORTEST, OFF = 0.92, 0.4, 0.003  # of steps, until no planted sole is so far off [m]
-SWIFTER = 2.0  # times `smooth` is what is kept of a motion that need not be performed
+FAR, ALONG = 0.3, 0.35  # [m] way of a clip that goes somewhere; [rad] from where it faces
+FACING = 1.2  # [s] from whose headings that of the begin is found
 
 
 class Tracks(NamedTuple):
@@ -35,6 +34,7 @@ class Tracks(NamedTuple):
         body: directions of the segments.
         pelvis: (F, 3) the middle of the hips [m].
         ankles: (F, 2, 3) where ankles are if soles are level, by the robot's soles [m].
+        soles: (F, 2, 3) where the soles' points are then.
         yaws: (F, 2) headings of the soles [rad].
         planted: (F, 2) bool.
     """
@@ -42,50 +42,9 @@ class Tracks(NamedTuple):
     body: BodyTargets
     pelvis: np.ndarray
     ankles: np.ndarray
+    soles: np.ndarray
     yaws: np.ndarray
     planted: np.ndarray
-
-
-def retarget_freely(clip: Clip, robot: Robot, *, smooth: float = SMOOTH) -> Retargeted:
-    """The postures in which a robot does what a clip shows, by kinematics, at `RATE`.
-
-    The clip's first heading becomes x. Hips and feet go where the clip's do, times the ratio of the
-    legs; directions of the segments are the clip's. Soles are level. Planted ones rest at the
-    median of the clip's places in the stance; between stances a foot goes the clip's way, and what
-    it was off grows into what it will be off. Where the legs cannot reach, the hips get lower. Ways
-    get shorter until every planted sole is within 3 mm of its place. Whether a controller can
-    perform that is another question.
-
-    Args:
-        clip: of any skeleton whose hips, knees and ankles are known.
-        robot: with two feet.
-        smooth: half the low-pass on what is asked for [Hz].
-
-    Raises:
-        ConfigError: unknown joints, fewer than 8 frames, mink is missing.
-        PoiseError: no posture keeps the soles and the limits.
-    """
-    limbs, stride = find_limbs(robot), 1.0
-    while True:
-        tracks = find_tracks(clip, robot, limbs, SWIFTER * smooth, stride)
-        solved = _solver()(robot, limbs, tracks, SWIFTER * smooth)
-        if solved.sole_error < OFF or stride * SHORTER < SHORTEST:
-            break
-        stride *= SHORTER
-    joints = solved.qpos[:, 7:]
-    low, high = robot.joint_range.T
-    about = About(robot.name, robot.fingerprint, clip.name, clip.name, clip.licence)
-    return Retargeted(
-        RobotClip(about, RATE, solved.qpos, tracks.planted),
-        limbs.leg_length / clip.skeleton.leg_length,
-        solved.sole_error,
-        solved.direction_error,
-        solved.penetration,
-        solved.time_per_frame,
-        float(max(np.maximum(low - joints, joints - high).max(), 0.0)),
-        stride,
-        0.0,
-    )
 
 
 def find_tracks(
@@ -93,11 +52,14 @@ def find_tracks(
 ) -> Tracks:
     """Where a clip leads a robot, low-passed at `cutoff` [Hz].
 
-    Ways over the ground are `stride` times as long as the legs' ratio has them. Errors as of
-    `retarget_freely`.
+    Ways over the ground are `stride` times as long as the legs' ratio has them.
+
+    Raises ConfigError for joints that are not known by name, or fewer than 8 frames.
     """
     stood = measure_contacts(clip).planted
-    clip = over_ground(clip).faced()
+    clip = over_ground(clip)
+    clip = clip.turned(-first_heading(clip))
+    clip = clip.moved(-clip.root[0] * [1.0, 1.0, 0.0])
     clip, times = clip.resampled(RATE), clip.times
     nearest = np.abs(clip.times[:, None] - times).argmin(axis=1)
     stood, facing = stood[nearest], np.unwrap(clip.facing())
@@ -143,7 +105,24 @@ def find_tracks(
         own, planted[:, foot] = _resting(own, stood[:, i])
         ankles[:, foot] = own[:, :3] + [0.0, 0.0, mine[f"ankle_{side}"][2]]
         yaws[:, foot] = own[:, 3]
-    return Tracks(body, root, ankles, yaws, planted)
+    away = nominal_feet(robot)[[first, 1 - first]]
+    away = away - [mine[f"ankle_{side}"] for side in SIDES]  # of the soles' points, left first
+    turns = Rotation.from_euler("z", yaws.reshape(-1, 1))
+    away = turns.apply(np.tile(away[[first, 1 - first]], (len(clip), 1))).reshape(-1, 2, 3)
+    return Tracks(body, root, ankles, ankles + away, yaws, planted)
+
+
+def first_heading(clip: Clip) -> float:
+    """Where a clip faces at its begin [rad]: on the line through 1.2 s, since hips swing.
+
+    Or where it goes, if that is within 20° and it does not turn by 45°.
+    """
+    facing, count = np.unwrap(clip.facing()), int(np.searchsorted(clip.times, FACING))
+    first = float(np.polyfit(clip.times[:count], facing[:count], 1)[1])
+    way = clip.root[-1] - clip.root[0]
+    beside = float(heading_angle(way) - first + np.pi) % (2.0 * np.pi) - np.pi
+    straight = np.linalg.norm(way[:2]) > FAR and np.ptp(facing) < np.pi / 4.0
+    return first + beside if straight and abs(beside) < ALONG else first
 
 
 def _heading(ways: np.ndarray, facing: np.ndarray) -> np.ndarray:
@@ -171,12 +150,3 @@ def _resting(own: np.ndarray, stood: np.ndarray) -> tuple[np.ndarray, np.ndarray
         off[~planted, 2] = 0.0
         rests = own + off
     return rests, planted
-
-
-def _solver() -> Any:  # the function `solve_tracks`
-    try:
-        from .solve_tracks import solve_tracks
-    except ImportError as error:
-        raise ConfigError(f"needs the package {error.name}: {how_to_install('motion')}",
-                          source="motion") from None  # fmt: skip
-    return solve_tracks
