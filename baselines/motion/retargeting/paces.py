@@ -29,6 +29,8 @@ FLIGHT = 0.07  # [s] with both feet off the ground: longer is a run or a jump
 LOWEST, HIGHEST = 0.05, 0.15  # [h] of the way of a foot over the ground at its highest
 DIP, MOST_DIP = 0.5, 0.35  # of its height that a foot's toes dip in the air; the turn [rad]
 LEANING = 1.0  # [Hz] of the low-pass on what the trunk leans: faster, the ZMP cannot be borne
+SWINGING = 1.5  # [Hz] of that on trunk and arms
+MARGIN = 0.005  # [rad] that these keep from their limits
 BEFORE, AFTER = STANDING, 1.6  # [s] of standing before the first and after the last step, at least
 TURN = 300.0  # [°] that a motion may turn: rotation vectors of a whole turn have no axis
 
@@ -149,7 +151,9 @@ def plan_paces(
     root = _led(lean, np.zeros(3), np.array([0.0, 0.0, yaws[-1].mean()]),
                 lead, begin, frames)  # fmt: skip
     standing = robot.standing_qpos[7:]
-    joints = _led(qpos[:, 7:], standing, standing, lead, begin, frames)
+    least, most = (robot.joint_range + [MARGIN, -MARGIN]).T
+    calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
+    joints = _led(calm, standing, standing, lead, begin, frames)
     return FootPlan(RATE, joints, root, _heights(frames, times, h, low), places,
                     turns.reshape(frames, 2, 3), planted)  # fmt: skip
 

@@ -24,9 +24,12 @@ SMOOTH = 3.0  # [Hz] of the low-pass on what the clip asks for, and on the joint
 LEAD = 1.0  # [s] from standing into the clip, and back
 SHORTER, SHORTEST = 0.94, 0.3  # by which ways are shortened until legs reach, and the end of that
 #: shares of the clip's lengths of steps and of its tempo, the fastest first
-TRIED = sorted(((stride, tempo) for stride in (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
-                for tempo in (1.0, 0.85, 0.7)), key=lambda each: -each[0] * each[1])  # fmt: skip
-LOWER = (0.98, 0.96, 0.94, 0.92, 0.9)  # heights of the CoM over standing that steps are tried at
+TRIED = sorted(
+    [(stride, 1.0) for stride in (1.0, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.5, 0.4)]
+    + [(stride, tempo) for stride in (1.0, 0.9, 0.8) for tempo in (0.85, 0.7)],
+    key=lambda each: -each[0] * each[1],
+)
+LOWER = (0.98, 0.965, 0.95, 0.935)  # heights of the CoM over standing that steps are tried at
 OFF = 0.003  # [m] by which a planted sole may be off
 SWIFTER = 2.0  # times `smooth` is what is kept of a motion that need not be performed
 
