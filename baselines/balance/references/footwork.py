@@ -24,6 +24,7 @@ SHIFT = 0.8  # [s] that the ZMP takes from one foot to the other at most
 ROUNDS, ROLLING = 6, 4
 MARGIN = 0.02  # [rad] that joints of legs keep from their limits
 LEAD = 0.5  # [s] in which the CoM is led to rest at both ends
+FLOATS = 0.02  # [m g] of the force on the ground, at least: in the air the CoM goes straight
 SOFT = 0.1  # [s] over which turns of the root are smoothed
 ROLLED, MOST_ROLL = 0.4, 0.1  # least rate of a joint that the root's roll helps; the roll [rad]
 AWAY, AWAY_BOTH = 0.04, 0.1  # [m] that the ZMP may be from where it is planned; and on both soles,
@@ -83,7 +84,7 @@ def plan_zmp(robot: Robot, plan: FootPlan, rest: np.ndarray) -> np.ndarray:
         return np.asarray(plan.places[k, foot, :2] + turn @ middles[foot])
 
     both = plan.planted.all(axis=1)
-    flies = ~plan.planted.any(axis=1)
+    flies = np.asarray(~plan.planted.any(axis=1))
     out[flies] = plan.places[flies, :, :2].mean(axis=1) + rest
     for k in np.flatnonzero(~both & ~flies):
         out[k] = over(int(np.argmax(plan.planted[k])), int(k))
@@ -133,7 +134,7 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     zmp = plan_zmp(robot, plan, rest)
     vertical = rest_spline(times, plan.height[:, None])(times, 2)[:, 0]
     gravity = robot.units.gravity
-    share = plan.height / np.maximum(gravity + vertical, LIGHT * gravity) / plan.dt**2
+    share = plan.height / np.maximum(gravity + vertical, FLOATS * gravity) / plan.dt**2
     wanted, whole, qpos = zmp.copy(), np.empty((0, 3)), np.empty((0, robot.model.nq))
     for k in range(ROUNDS):
         com = _led(com_over(wanted, share, zmp[0], zmp[-1]), int(LEAD / plan.dt))

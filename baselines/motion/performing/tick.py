@@ -42,7 +42,7 @@ from .schedule import (
 )
 
 UNLOADED, LEAST_LOAD = 1.15, 0.03  # [m g] that a foot may bear when it begins to, and as it, leaves
-AIR, WEIGHTLESS = 40.0, 0.01  # [1/s] of soles in the air when both are; [m g] that they bear then
+AIR, WEIGHTLESS = 30.0, 0.01  # [1/s] of soles in the air when both are; [m g] that they bear then
 SETTLING = 0.3  # [s] before the first lift-off until which the motion's frame is that of the soles
 
 
@@ -143,8 +143,7 @@ def in_flight(t: PerformTick, phase: int, time: float) -> bool:
 
 @compiled
 def fly(t: PerformTick, time: float) -> None:
-    """A tick with both feet in the air: soles go where the motion has them under the CoM, and bear
-    nothing."""
+    """A tick with both feet in the air: soles go where the motion has them, and bear nothing."""
     c, p, s = t.own, t.performance, t.own.state
     contacts = c.on_both
     problem, limits = contacts.problem, contacts.load_limits
@@ -155,9 +154,7 @@ def fly(t: PerformTick, time: float) -> None:
         for a in range(3):
             j, r = PLACE[foot] + a, 6 * foot + a
             gap = p.samples[0, j] - s.sole_point[foot, a]
-            if a < 2:  # where the CoM goes cannot be changed any more
-                gap += s.com[a] - p.samples[0, COM + a]
-            else:
+            if a == 2:
                 gap -= p.landing_speed * late
             rate = p.samples[1, j] - s.J_v[r]
             accel[r] = p.samples[2, j] + AIR**2 * gap + 2.0 * AIR * rate + damping * s.J_v[r]

@@ -55,6 +55,7 @@ class RetargetedClip(NamedTuple):
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
         tempo: how many times as fast as the clip it is.
+        flight: share of the time that the clip is in the air.
     """
 
     clip: RobotClip
@@ -65,6 +66,7 @@ class RetargetedClip(NamedTuple):
     stride: float = 1.0
     begins: float = LEAD
     tempo: float = 1.0
+    flight: float = 1.0
 
 
 def retarget_clip(
@@ -186,7 +188,7 @@ def performable(
     from .quality import measure
     from .solve import optimise
 
-    scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted)
+    scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted, made.clip.dt)
     if steps:
         return _stepped(made, scene)
     stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
@@ -215,15 +217,16 @@ def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
         made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
     )  # fmt: skip
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
-                          made.begins, made.tempo)  # fmt: skip
+                          made.begins, made.tempo, made.flight)  # fmt: skip
 
 
 def _scene(
-    robot: Robot, limbs: Any, qpos: np.ndarray, lead: float, planted: np.ndarray | None = None
-) -> Scene:
-    """Postures at `RATE`; soles that step are to stay where they land."""
+    robot: Robot, limbs: Any, qpos: np.ndarray, lead: float, planted: np.ndarray | None = None,
+    dt: float = RATE,
+) -> Scene:  # fmt: skip
+    """Postures `dt` [s] apart; soles that step are to stay where they land."""
     both = np.ones((len(qpos), 2), dtype=bool)
-    scene = Scene(robot, limbs, qpos, RATE, lead, both if planted is None else planted)
+    scene = Scene(robot, limbs, qpos, dt, lead, both if planted is None else planted)
     if planted is None:
         return scene
     for frame in range(len(scene)):

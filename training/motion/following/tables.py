@@ -156,8 +156,11 @@ def _walks(made: RetargetedClip) -> list[tuple[str, str]]:
 def _flight(made: RetargetedClip) -> str:
     planted = made.clip.planted
     flying = np.zeros(0, int) if planted is None else np.flatnonzero(~planted.any(axis=1))
-    first = f", first at {flying[0] * made.clip.dt:.2f} s" if len(flying) else ""
-    return f"{len(flying) * made.clip.dt:.2f} s{first}"
+    if not len(flying):
+        return "never"
+    share = "" if made.flight == 1.0 else f", {made.flight:.0%} as long as the clip at a time"
+    first = flying[0] * made.clip.dt
+    return f"{len(flying) * made.clip.dt:.2f} s, first at {first:.2f} s{share}"
 
 
 def print_feasibility(judged: Feasibility, title: str, console: Console) -> None:
