@@ -23,7 +23,6 @@ from poise.baselines.motion.retargeting.retarget import (
     retarget_to,
     targets_on,
 )
-from poise.baselines.motion.retargeting.walked import find_commands
 from poise.baselines.motion.space_time.constraints.constraint import Constraint
 from poise.baselines.motion.space_time.constraints.reading import (
     check_constraints,
@@ -35,6 +34,7 @@ from poise.envs.robots.robot import Robot
 
 from .stance import standing_stance
 from .trajectory import jerk
+from .walked import find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so

@@ -15,8 +15,8 @@ from poise.baselines.balance.references.robot_clip import (
     write_robot_clip,
 )
 from poise.baselines.motion.retargeting.retarget import retarget_freely
-from poise.baselines.motion.retargeting.walked import find_commands
 from poise.baselines.motion.space_time.retarget_clip import retarget_clip
+from poise.baselines.motion.space_time.walked import find_commands
 from poise.configs.errors import ConfigError
 from poise.training.motion.following.follow import follow
 from tests.support.captures import CAPTURES, make
