@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import allowing, named
+from poise.baselines.balance.references.commanded import told
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.targets import motion_arrays
@@ -197,6 +198,8 @@ class ResidualBalanceEnv(ControlledEnv):
             self._hand_over_motion()
             self._unbind()
         self.controller.reset(self.state_source.state)
+        if "command" not in options and self.motion.commands is not None:
+            options = {**options, "command": told(self.motion.commands)}
         self._begin_walk(options)
         self._motion.pace.clear()
         self._offsets[:] = 0.0

@@ -82,9 +82,10 @@ def _update_contacts(s: StateArrays, c: ContactArrays):
 
 @compiled
 def _eliminate_contacts(s: StateArrays, c: ContactArrays, p: QPParameters, ws: Workspace):
-    """Solve J v̇ = −k_v J v − J̇ v of the soles, and of the points likewise, for v̇₀ and V."""
+    """Solve J v̇ = a − k_v J v − J̇ v of the soles, and of the points likewise, for v̇₀ and V; a is
+    zero but where a sole is in the air."""
     for r in range(s.J.shape[0]):
-        ws.contact_accel[r] = -p.sole_damping * s.J_v[r] - s.Jdot_v[r]
+        ws.contact_accel[r] = ws.sole_accel[r] - p.sole_damping * s.J_v[r] - s.Jdot_v[r]
     solve_resting(c.J, ws.contact_accel, ws.space, ws.vdot0, ws.V)
 
 

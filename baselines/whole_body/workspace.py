@@ -107,6 +107,7 @@ class Workspace(Block):
     force_weights: np.ndarray  # (k,) a view
     torque_weights: np.ndarray  # (nj,) a view
     space: NullSpace
+    sole_accel: np.ndarray  # (6 nc,) a of the soles in the air; zero on the ground
     contact_accel: np.ndarray  # (k,) that the contacts are to have: J v̇ + J̇ v less J̇ v
     y: np.ndarray  # (6,)
     cop_prev: np.ndarray  # (2,) last measured p
@@ -171,6 +172,7 @@ def allocate_workspace(
         accel_des=desired[V], wrench_des=desired[B], force_des=desired[E],
         accel_weights=weights[V], momentum_weights=weights[B], force_weights=weights[E],
         torque_weights=weights[T], space=space,
+        sole_accel=z(6 * len(robot.sole_body)),
         contact_accel=z(k), y=z(6), cop_prev=z(2), cop_vel=z(2), momentum_rate=z(6),
         BBt=z((6, 6)), JtE=z((lay.nv, n)), local=z((6, n)), local0=z(6),
         H=z((n, n)), g=z(n), C=z((m, n)), l=z(m), u=z(m), x=z(n), lam=z(m),

@@ -22,6 +22,8 @@ from .splines import evaluate, piecewise, rest_spline
 COM, ROOT, PLACE, TURN, SPIN, COLUMNS = 0, 3, (6, 12), (9, 15), 18, 20
 CREEP = 0.01  # [m] by which a planted sole may be elsewhere than in the middle of its stance
 FLAT = 0.05  # [rad] by which it may be turned from there
+LIGHT = 0.7  # [m g] of the force on the ground: where it is less, the ZMP says nothing
+FREELY = 0.2  # of g by which the CoM of a robot in the air may accelerate otherwise
 BRIEF = 3  # frames that a sole is in the air at least, and on the ground
 
 
@@ -88,12 +90,9 @@ class Footing(Copyable):
 def check_planted(planted: np.ndarray, source: str) -> None:
     """Raise ConfigError unless `planted` (F, 2) says of every frame which soles are planted.
 
-    One at least always, both at the begin and at the end, and none for less than 3 frames.
+    Both are at the begin and at the end, none is for less than 3 frames, and one does not land as
+    the other one lifts off.
     """
-    if not planted.any(axis=1).all():
-        frame = int(np.argmin(planted.any(axis=1)))
-        raise ConfigError(f"no sole is planted in frame {frame}: jumps cannot be performed",
-                          source=source, field="contacts")  # fmt: skip
     if not (planted[0].all() and planted[-1].all()):
         raise ConfigError("both soles must be planted at the begin and at the end",
                           source=source, field="contacts")  # fmt: skip
@@ -146,13 +145,14 @@ def make_footing(
 
     Raises:
         ConfigError: see `check_planted`; a planted sole that moves by 1 cm or turns by 3°, or is
-            not flat on the ground.
+            not flat on the ground; a CoM that does not fall freely where no sole is planted.
     """
     check_planted(planted, source)
     times = np.arange(len(qpos)) * dt
     com, places, turns = sole_poses(robot, qpos)
     root = root_turns(robot, qpos)
     curves = [rest_spline(times, com), rest_spline(times, root)]
+    _check_falls(robot, times, com[:, 2], planted, source)
     for foot in range(2):
         down = planted[:, foot]
         _check_rest(times, places[:, foot], turns[:, foot], down, source)
@@ -184,6 +184,8 @@ def momentum_offset(robot: Robot, qpos: np.ndarray, dt: float) -> np.ndarray:
         spin[k] = data.subtree_angmom[robot.root_body_id]
     lift = rest_spline(times, com[:, 2:])(times, 2)[:, 0] + robot.units.gravity
     moment = rest_spline(times, spin)(times, 1) / robot.mass
+    borne = lift > LIGHT * robot.units.gravity  # else no ZMP
+    lift = np.where(borne, lift, np.inf)
     return np.asarray(np.column_stack([moment[:, 1], -moment[:, 0]]) / lift[:, None])
 
 
@@ -210,6 +212,20 @@ def stances_of(down: np.ndarray) -> list[tuple[int, int]]:
     """First and last frame of every time that a sole is planted."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], down.astype(int), [0]])))
     return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
+
+
+def _check_falls(
+    robot: Robot, times: np.ndarray, height: np.ndarray, planted: np.ndarray, source: str
+) -> None:
+    """Raise ConfigError unless the CoM falls freely while no sole is planted."""
+    flies = np.asarray(~planted.any(axis=1))
+    inside = np.flatnonzero(flies[:-2] & flies[1:-1] & flies[2:]) + 1
+    bends = (height[inside + 1] - 2.0 * height[inside] + height[inside - 1]) / times[1] ** 2
+    wrong = inside[np.abs(bends + robot.units.gravity) > FREELY * robot.units.gravity]
+    if len(wrong) or (flies.any() and not len(inside)):
+        time = times[wrong[0] if len(wrong) else int(np.argmax(flies))]
+        raise ConfigError(f"no sole is planted at {time:.2f} s, but the centre of mass does not "
+                          "fall freely", source=source, field="contacts")  # fmt: skip
 
 
 def _check_rest(

@@ -14,7 +14,7 @@ from poise.configs.errors import ConfigError
 from poise.envs.compiled.maths.easing import ease
 from poise.envs.robots.robot import Robot
 
-from .footing import momentum_offset
+from .footing import LIGHT, momentum_offset
 from .legs import PlantedLegs, bearing_polygon, nominal_feet
 from .splines import rest_spline
 
@@ -24,6 +24,7 @@ SHIFT = 0.8  # [s] that the ZMP takes from one foot to the other at most
 ROUNDS, ROLLING = 6, 4
 MARGIN = 0.02  # [rad] that joints of legs keep from their limits
 LEAD = 0.5  # [s] in which the CoM is led to rest at both ends
+FLOATS = 0.02  # [m g] of the force on the ground, at least: in the air the CoM goes straight
 SOFT = 0.1  # [s] over which turns of the root are smoothed
 ROLLED, MOST_ROLL = 0.4, 0.1  # least rate of a joint that the root's roll helps; the roll [rad]
 AWAY, AWAY_BOTH = 0.04, 0.1  # [m] that the ZMP may be from where it is planned; and on both soles,
@@ -83,13 +84,17 @@ def plan_zmp(robot: Robot, plan: FootPlan, rest: np.ndarray) -> np.ndarray:
         return np.asarray(plan.places[k, foot, :2] + turn @ middles[foot])
 
     both = plan.planted.all(axis=1)
-    for k in np.flatnonzero(~both):
+    flies = np.asarray(~plan.planted.any(axis=1))
+    out[flies] = plan.places[flies, :, :2].mean(axis=1) + rest
+    for k in np.flatnonzero(~both & ~flies):
         out[k] = over(int(np.argmax(plan.planted[k])), int(k))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], both.astype(int), [0]])))
     for a, b in edges.reshape(-1, 2):
         middle = plan.places[a, :, :2].mean(axis=0) + rest
         before = middle if a == 0 else out[a - 1]
-        after = middle if b == frames else over(int(np.argmax(plan.planted[b])), b)
+        after = middle
+        if b < frames:
+            after = out[b] if flies[b] else over(int(np.argmax(plan.planted[b])), b)
         length = round(SHIFT / plan.dt)
         if b - a <= 2 * length and a > 0 and b < frames:
             out[a:b] = before + _eased(b - a) * (after - before)
@@ -128,7 +133,8 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
     rest = _com(robot, standing)[:2] - middle[:2]
     zmp = plan_zmp(robot, plan, rest)
     vertical = rest_spline(times, plan.height[:, None])(times, 2)[:, 0]
-    share = plan.height / (robot.units.gravity + vertical) / plan.dt**2
+    gravity = robot.units.gravity
+    share = plan.height / np.maximum(gravity + vertical, FLOATS * gravity) / plan.dt**2
     wanted, whole, qpos = zmp.copy(), np.empty((0, 3)), np.empty((0, robot.model.nq))
     for k in range(ROUNDS):
         com = _led(com_over(wanted, share, zmp[0], zmp[-1]), int(LEAD / plan.dt))
@@ -139,7 +145,7 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
             if k < ROLLING:
                 plan = plan._replace(root=plan.root + _smoothed(turns, SOFT / plan.dt))
     away = np.linalg.norm(real_zmp(robot, qpos, whole - [0.0, 0.0, ground], plan.dt) - zmp, axis=1)
-    away *= np.where(plan.planted.all(axis=1), AWAY / AWAY_BOTH, 1.0)
+    away = np.nan_to_num(away) * np.where(plan.planted.sum(axis=1) == 1, 1.0, AWAY / AWAY_BOTH)
     if away.max() > AWAY:
         raise ConfigError(
             f"the limbs swing too fast: the ZMP is {100 * away.max():.1f} cm from where the soles "
@@ -157,10 +163,12 @@ def perform_plan(robot: Robot, plan: FootPlan, source: str) -> np.ndarray:
 
 
 def real_zmp(robot: Robot, qpos: np.ndarray, com: np.ndarray, dt: float) -> np.ndarray:
-    """(F, 2) the ZMP of postures with this CoM (F, 3) over the ground, by m c̈ and L̇ [m]."""
+    """(F, 2) the ZMP of postures with this CoM (F, 3) over the ground, by m c̈ and L̇ [m]; NaN where
+    there is next to no force."""
     times = np.arange(len(qpos)) * dt
     force = rest_spline(times, com)(times, 2) + [0.0, 0.0, robot.units.gravity]
     cmp = com[:, :2] - com[:, 2:] * force[:, :2] / force[:, 2:]
+    cmp[force[:, 2] < LIGHT * robot.units.gravity] = np.nan
     return np.asarray(cmp - momentum_offset(robot, qpos, dt))
 
 

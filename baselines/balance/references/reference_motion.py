@@ -7,6 +7,7 @@ import numpy as np
 
 from poise.envs.compiled.copies import Copyable
 
+from .commanded import faster
 from .footing import Footing
 from .splines import evaluate
 
@@ -37,7 +38,9 @@ class ReferenceMotion(Copyable):
     """A motion of one robot, C² in time, as a table of cubic polynomials.
 
     Columns of `coeffs` (k, 4, nj+6): joint positions, CoM offset (3), root rotation φ (3); see
-    `splines.piecewise` for the layout and `splines.evaluate` for the compiled evaluation.
+    `splines.piecewise` for the layout and `splines.evaluate` for the compiled evaluation. With
+    `commands` (n, 5), of the columns START to STEP_TIME, it is what trunk and arms do while the
+    robot walks as it is told.
     """
 
     name: str
@@ -45,6 +48,7 @@ class ReferenceMotion(Copyable):
     coeffs: np.ndarray  # (k, 4, nj+6)
     loop: bool
     footing: Footing | None = None  # None: both soles stay planted
+    commands: np.ndarray | None = None  # None: it does not walk
 
     @property
     def duration(self) -> float:
@@ -61,7 +65,8 @@ class ReferenceMotion(Copyable):
         powers = float(factor) ** np.arange(self.coeffs.shape[1])
         coeffs = self.coeffs * powers[:, None]
         footing = None if self.footing is None else self.footing.at_speed(factor)
-        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop, footing)
+        told = None if self.commands is None else faster(self.commands, factor)
+        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop, footing, told)
 
     def sample(self, t: float) -> MotionSample:
         """The reference at time t [s]."""

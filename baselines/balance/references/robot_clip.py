@@ -18,6 +18,7 @@ from poise.configs.reading import parse_json, parsing
 from poise.configs.schema import build
 from poise.envs.robots.robot import Robot
 
+from .commanded import check_commands, whole_walk
 from .footing import check_planted, make_footing, sole_poses
 from .postures import LevelKinematics
 from .reference_motion import ReferenceMotion
@@ -27,7 +28,7 @@ RATE = 1.0 / 30.0  # [s] between the postures of the clips that are made here
 FEWEST = 4  # frames that a spline at rest at both ends takes
 MOST = 20_000
 LEVEL = 0.02  # [m] by which a sole may leave the plane of both
-ABOUT, PLANTED = "about.json", "planted"
+ABOUT, PLANTED, COMMANDS = "about.json", "planted", "commands"
 
 
 @dataclass(frozen=True)
@@ -57,13 +58,21 @@ class RobotClip:
         dt: time between frames [s].
         qpos: (F, nq) as MuJoCo has them.
         planted: (F, 2) bool, which soles are on the ground; None: both, always.
-            One that can only be seen may have both in the air.
+            One that is `free` may have both in the air.
+        commands: (n, 5) by which a planner walks as the postures do, from their first frame on, see
+            `commanded.py`; None: soles go where the postures have them.
     """
 
     about: About
     dt: float
     qpos: np.ndarray
     planted: np.ndarray | None = None
+    commands: np.ndarray | None = None
+
+    @property
+    def free(self) -> bool:
+        """Whether no controller follows the postures themselves."""
+        return bool(self.about.unperformed) or self.commands is not None
 
     @property
     def duration(self) -> float:
@@ -85,6 +94,8 @@ def write_robot_clip(clip: RobotClip, path: str | Path) -> None:
         arrays = {"qpos": clip.qpos, "dt": np.array([clip.dt])}
         if clip.planted is not None:
             arrays[PLANTED] = clip.planted.astype(float)
+        if clip.commands is not None:
+            arrays[COMMANDS] = clip.commands
         for name, array in arrays.items():
             member = io.BytesIO()
             np.lib.format.write_array(member, np.ascontiguousarray(array), version=(1, 0))
@@ -116,11 +127,15 @@ def read_robot_clip(path: str | Path) -> RobotClip:
         raise ConfigError("must be one time from 0.001 to 1 s", source=path, field="dt")
     if not np.isfinite(clip.qpos).all():
         raise ConfigError("must be finite", source=path, field="qpos")
+    if f"{COMMANDS}.npy" in archive.names:
+        commands = read_arrays(path, (COMMANDS,))[COMMANDS]
+        check_commands(commands, str(path))
+        clip = replace(clip, commands=commands)
     if f"{PLANTED}.npy" in archive.names:
         planted = _read_planted(path, len(clip.qpos))
-        if not clip.about.unperformed:
+        if not clip.free:
             check_planted(planted, str(path))
-        return replace(clip, planted=planted)
+        clip = replace(clip, planted=planted)
     return clip
 
 
@@ -138,7 +153,8 @@ def reference_from(
 ) -> ReferenceMotion:
     """The reference motion of the postures: C², and at rest at both ends.
 
-    Joints, CoM and root are cubic splines through the frames. The places of the soles are where
+    Joints, CoM and root are cubic splines through the frames. With commands these are of trunk and
+    arms, from standing to standing. The places of the soles are where
     they are: CoM and root are taken over the plane and the middle of both, see `LevelKinematics`.
     Without `rest` it is a piece of a motion: at its ends it moves on as its frames do.
 
@@ -150,12 +166,14 @@ def reference_from(
     if clip.about.unperformed:
         raise ConfigError(f"can be seen, but not performed: {clip.about.unperformed}",
                           source=source, field="motion")  # fmt: skip
-    if clip.planted is not None:
+    joints, dt, commands = clip.qpos[:, 7:], clip.dt, clip.commands
+    if commands is not None:
+        joints, commands = whole_walk(robot, clip.qpos, dt, commands)
+    elif clip.planted is not None:
         return stepped_reference(
             clip.about.name, robot, clip.qpos, clip.dt, clip.planted, source
         )  # fmt: skip
-    kinematics, times = LevelKinematics(robot), np.arange(len(clip.qpos)) * clip.dt
-    joints = clip.qpos[:, 7:]
+    kinematics, times = LevelKinematics(robot), np.arange(len(joints)) * dt
     _check_range(joints, robot, source)
     com, root = np.empty((len(times), 3)), np.empty((len(times), 3))
     for i, q in enumerate(joints):
@@ -166,7 +184,7 @@ def reference_from(
     spline = rest_spline if rest else make_interp_spline  # the latter without a knot near ends
     splines = [spline(times, values) for values in (joints, com, root)]
     knots, coeffs = piecewise(splines)
-    return ReferenceMotion(clip.about.name, knots, coeffs, loop=False)
+    return ReferenceMotion(clip.about.name, knots, coeffs, loop=False, commands=commands)
 
 
 def check_robot(clip: RobotClip, robot: Robot, source: str) -> None:

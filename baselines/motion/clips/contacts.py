@@ -12,7 +12,7 @@ from .clip import Clip
 from .skeleton import SIDES
 
 LEG = 0.8  # [m] legs for which these hold; they grow with the legs, speeds with their root
-SLOW = 0.45  # [m/s] a planted toe, or heel, is slower
+SLOW = 0.65  # [m/s] a planted toe, or heel, is slower
 SHARE = 0.15  # or slower than so much of the speed that feet get to: low rates blur running
 LOW = 0.05  # [m] and nearer to where it is when it stands
 NOISE = 0.04  # [s] over which places are averaged before they are differentiated
@@ -50,7 +50,7 @@ class Contacts(NamedTuple):
 def measure_contacts(clip: Clip) -> Contacts:
     """Planted feet: those whose toe or heel is slow and within 5 cm of its floor.
 
-    Slow is below 0.45 m/s, or 0.15 of the 95th percentile of these speeds. The floor of a toe, or
+    Slow is below 0.65 m/s, or 0.15 of the 95th percentile of these speeds. The floor of a toe, or
     of an ankle, is the 2nd percentile of its heights. Bounds are for legs of 0.8 m. Times of less
     than 0.12 s count as what is around them. A clip on a treadmill is taken `over_ground`. A
     skeleton without toes has its ankles for them.

@@ -39,13 +39,14 @@ class Performance(Block):
     clock: np.ndarray  # (1,) since the reset [s]
     performing: np.ndarray  # (1,) int: 1 while it follows the schedule; 0: it catches itself
     begun: np.ndarray  # (1,) int: the phase whose foot lifted off last; 0: none did
+    flying: np.ndarray  # (1,) int: 1 while both feet are in the air
     rested: np.ndarray  # (1,) since both feet are down and the motion is left [s]
     left: np.ndarray  # (1,) int: how often the planner of steps took over
     frame: np.ndarray  # (5,) see X to SIN
 
     def clear(self) -> None:
         """Before the motion begins."""
-        for array in (self.clock, self.begun, self.rested, self.left):
+        for array in (self.clock, self.begun, self.flying, self.rested, self.left):
             array[0] = 0
         self.performing[0] = 1
 
@@ -69,6 +70,7 @@ def allocate_performance(
         clock=guarded_zeros(1),
         performing=guarded_zeros(1, whole),
         begun=guarded_zeros(1, whole),
+        flying=guarded_zeros(1, whole),
         rested=guarded_zeros(1),
         left=guarded_zeros(1, whole),
         frame=guarded_zeros(5),

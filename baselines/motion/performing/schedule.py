@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.footing import COM, PLACE, SPIN, TURN
+from poise.baselines.balance.references.footing import COM, LIGHT, PLACE, SPIN, TURN
 from poise.baselines.balance.references.splines import evaluate
 from poise.baselines.balance.references.tempo import CHANGE, RATE, TIME
 from poise.baselines.balance.stepping.planning.cop_region import (
@@ -46,6 +46,13 @@ def lifted_foot(t: PerformTick, phase: int) -> int:
         if planted[phase, foot] == 0:
             return foot
     return -1
+
+
+@compiled
+def flies(t: PerformTick, phase: int) -> bool:
+    """Return whether neither sole is planted in a phase."""
+    planted = t.performance.planted
+    return planted[phase, 0] == 0 and planted[phase, 1] == 0
 
 
 @compiled
@@ -127,10 +134,11 @@ def stance_differs(t: PerformTick) -> bool:
 
 @compiled
 def pendulum_rate(t: PerformTick) -> float:
-    """ω² = (g + c̈_z)/(c_z − ground) of the motion [1/s²]."""
+    """ω² = (g + c̈_z)/(c_z − ground) of the motion [1/s²]; of 0.7 g at least."""
     p = t.performance
     height = p.samples[0, COM + 2] - p.frame[GROUND]
-    return (t.own.robot.gravity + p.samples[2, COM + 2]) / max(height, 1e-3)
+    gravity = t.own.robot.gravity
+    return max(gravity + p.samples[2, COM + 2], LIGHT * gravity) / max(height, 1e-3)
 
 
 @compiled

@@ -12,7 +12,7 @@ import numpy as np
 from poise.baselines.balance.references.footing import COM, PLACE, ROOT, SPIN, TURN
 from poise.baselines.balance.references.targets import root_reference
 from poise.baselines.balance.stepping.planning.guidance import limit_posture
-from poise.baselines.balance.stepping.planning.swing import start_swing
+from poise.baselines.balance.stepping.planning.swing import LANDING, start_swing
 from poise.baselines.balance.stepping.tick import (
     FIRST_LOAD,
     capture_tick,
@@ -28,6 +28,7 @@ from .catching import ask_to_rest, go_on, leave, may_go_on
 from .schedule import (
     beyond_reach,
     face,
+    flies,
     lifted_foot,
     motion_time,
     next_switch,
@@ -41,6 +42,7 @@ from .schedule import (
 )
 
 UNLOADED, LEAST_LOAD = 1.15, 0.03  # [m g] that a foot may bear when it begins to, and as it, leaves
+AIR, WEIGHTLESS = 30.0, 0.01  # [1/s] of soles in the air when both are; [m g] that they bear then
 SETTLING = 0.3  # [s] before the first lift-off until which the motion's frame is that of the soles
 
 
@@ -77,8 +79,9 @@ def limit_loads(t: PerformTick, time: float) -> None:
     switch = next_switch(t, time)
     left = switch - time
     if left < p.unload_time:
-        foot = lifted_foot(t, phase_at(p.switches, switch + 1e-9))
-        if foot >= 0:
+        phase = phase_at(p.switches, switch + 1e-9)
+        foot = lifted_foot(t, phase)
+        if foot >= 0 and not flies(t, phase):
             most = max(UNLOADED * left / p.unload_time, LEAST_LOAD)
             limits[foot] = min(limits[foot], weight * most)
     c.on_both.limited[0] = 1
@@ -123,6 +126,50 @@ def follow_foot(t: PerformTick) -> None:
 
 
 @compiled
+def in_flight(t: PerformTick, phase: int, time: float) -> bool:
+    """Return whether both feet are in the air: from when the motion says so until a sole touches
+    the ground, late in the flight."""
+    s, p = t.own.state, t.performance
+    if flies(t, phase) and p.begun[0] != phase and not t.own.memory.swinging[0]:
+        p.begun[0], p.flying[0] = phase, 1
+    if p.flying[0]:
+        last, end = p.switches[p.begun[0] - 1], p.switches[p.begun[0]]
+        late = time > last + LANDING * (end - last)
+        if late and (s.contacts[0] > 0.5 or s.contacts[1] > 0.5):
+            p.flying[0] = 0
+            t.own.memory.clock[0] = 0.0
+    return p.flying[0] == 1
+
+
+@compiled
+def fly(t: PerformTick, time: float) -> None:
+    """A tick with both feet in the air: soles go where the motion has them, and bear nothing."""
+    c, p, s = t.own, t.performance, t.own.state
+    contacts = c.on_both
+    problem, limits = contacts.problem, contacts.load_limits
+    accel, damping = problem.workspace.sole_accel, problem.parameters.sole_damping
+    late = max(time - p.switches[p.begun[0]], 0.0)
+    for foot in range(2):
+        limits[foot] = WEIGHTLESS * c.robot.mass * c.robot.gravity
+        for a in range(3):
+            j, r = PLACE[foot] + a, 6 * foot + a
+            gap = p.samples[0, j] - s.sole_point[foot, a]
+            if a == 2:
+                gap -= p.landing_speed * late
+            rate = p.samples[1, j] - s.J_v[r]
+            accel[r] = p.samples[2, j] + AIR**2 * gap + 2.0 * AIR * rate + damping * s.J_v[r]
+        up = s.sole_axes[foot, :, 2]
+        accel[6 * foot + 3] = AIR**2 * up[1] - (2.0 * AIR - damping) * s.J_v[6 * foot + 3]
+        accel[6 * foot + 4] = -(AIR**2) * up[0] - (2.0 * AIR - damping) * s.J_v[6 * foot + 4]
+        accel[6 * foot + 5] = -(2.0 * AIR - damping) * s.J_v[6 * foot + 5]
+    contacts.limited[0] = 1
+    ask_for(t, reached_region(t))
+    solve_contacts(c, contacts)
+    for r in range(accel.shape[0]):
+        accel[r] = 0.0
+
+
+@compiled
 def perform(t: PerformTick, time: float) -> bool:
     """A tick of the performance; False instead of torques where the planner has to take over."""
     c, p, m = t.own, t.performance, t.own.memory
@@ -132,8 +179,11 @@ def perform(t: PerformTick, time: float) -> bool:
     to_world(t)
     if m.swinging[0] and has_landed(c):
         m.swinging[0], m.clock[0] = 0, 0.0
+    if in_flight(t, phase, time):
+        fly(t, time)
+        return True
     foot = lifted_foot(t, phase)
-    if not m.swinging[0] and foot >= 0 and p.begun[0] != phase:
+    if not m.swinging[0] and foot >= 0 and p.begun[0] != phase and not flies(t, phase):
         lift_off(t, foot, phase)
     face(t)
     corners = reached_region(t)

@@ -137,23 +137,23 @@ def plan_paces(
         foot = left if pace.foot == 0 else 1 - left
         apex = float(np.clip(scale * pace.apex, LOWEST * h, HIGHEST * h))
         u = np.linspace(0.0, 1.0, b - a + 1)[:, None]
-        way, hump = ease(u), _hump(u[:, 0])
+        way, up = ease(u), hump(u[:, 0])
         places[a : b + 1, foot] += way * (place - places[a, foot])
-        places[a : b + 1, foot, 2] += apex * hump
+        places[a : b + 1, foot, 2] += apex * up
         tip = min(DIP * apex / (0.5 * float(np.ptp(robot.soles[foot].polygon[:, 0]))), MOST_DIP)
-        tips[a : b + 1, foot] = tip * hump
+        tips[a : b + 1, foot] = tip * up
         yaws[a : b + 1, foot] += way[:, 0] * (yaw - yaws[a, foot])
         places[b:, foot], yaws[b:, foot] = place, yaw
         planted[a + 1 : b, foot] = False
     turns = Rotation.from_euler("ZY", np.stack([yaws, tips], axis=2).reshape(-1, 2)).as_rotvec()
     lean = root_turns(robot, qpos)
     lean[:, :2] = low_pass(lean[:, :2], LEANING)
-    root = _led(lean, np.zeros(3), np.array([0.0, 0.0, yaws[-1].mean()]),
+    root = led(lean, np.zeros(3), np.array([0.0, 0.0, yaws[-1].mean()]),
                 lead, begin, frames)  # fmt: skip
     standing = robot.standing_qpos[7:]
     least, most = (robot.joint_range + [MARGIN, -MARGIN]).T
     calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
-    joints = _led(calm, standing, standing, lead, begin, frames)
+    joints = led(calm, standing, standing, lead, begin, frames)
     return FootPlan(RATE, joints, root, _heights(frames, times, h, low), places,
                     turns.reshape(frames, 2, 3), planted)  # fmt: skip
 
@@ -185,7 +185,7 @@ def _goals(
     return goals
 
 
-def _led(
+def led(
     values: np.ndarray, first: np.ndarray, last: np.ndarray, lead: int, begin: int, frames: int
 ) -> np.ndarray:
     """Values (F, m) of a clip that begins in a frame, led from `first` and to `last` (m,) in `lead`
@@ -202,7 +202,7 @@ def frames_before(paces: list[Pace], lead: int) -> int:
     return max(round((BEFORE - paces[0].lift) / RATE), lead)
 
 
-def _hump(u: np.ndarray) -> np.ndarray:
+def hump(u: np.ndarray) -> np.ndarray:
     """From 0 to 1 at u = 0.45 and back, C² and at rest at both ends."""
     up, down = np.clip(u / 0.45, 0.0, 1.0), np.clip((1.0 - u) / 0.55, 0.0, 1.0)
     v = np.minimum(up, down)

@@ -124,6 +124,10 @@ def _stored(path: Path, robot: Robot) -> RobotClip:
     if stored.about.fingerprint != robot.fingerprint:
         raise ConfigError(f"is a motion of the robot {stored.about.robot!r}, not of "
                           f"{robot.name!r}", source=path, field="robot")  # fmt: skip
+    jumps = stored.planted is not None and not stored.planted.any(axis=1).all()
+    if stored.free or jumps:
+        raise ConfigError("jumps, or is walked by a planner: it cannot be joined", source=path,
+                          field="motion")  # fmt: skip
     return stored
 
 

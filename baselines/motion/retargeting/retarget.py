@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +17,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.extras import how_to_install
 from poise.envs.robots.robot import Robot
 
+from .leaps import FLIGHTS, WAYS, Leap, find_leaps, plan_leaps, tempo_of
 from .limbs import Limbs, find_limbs
 from .paces import find_paces, frames_before, plan_paces
 from .targets import BodyTargets, between_standing, clip_targets, standing_targets
@@ -45,6 +48,7 @@ class Retargeted(NamedTuple):
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
         tempo: how many times as fast as the clip it is.
+        flight: share of the time that the clip is in the air.
     """
 
     clip: RobotClip
@@ -57,6 +61,7 @@ class Retargeted(NamedTuple):
     stride: float = 1.0
     begins: float = LEAD
     tempo: float = 1.0
+    flight: float = 1.0
 
 
 def retarget(
@@ -105,6 +110,8 @@ def retarget_to(
 ) -> Retargeted:
     """`retarget` for what `targets_on` has found with the same arguments; raises what it does."""
     limbs, whole, steps = asked
+    if steps and (leaps := find_leaps(clip)):
+        return _leaping(leaps, clip, robot, limbs, smooth, lead)
     if steps:
         return _stepped(clip, robot, limbs, smooth, lead)
     solved = _solver("solve", "solve_frames")(robot, limbs, whole, smooth)
@@ -168,6 +175,34 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
             return made._replace(tempo=tempo)
     assert reason is not None
     raise reason
+
+
+def _leaping(
+    leaps: list[Leap], clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float
+) -> Retargeted:
+    """The highest and longest jumps up to the clip's that the robot can do, and slower ones where
+    it would not stand long enough between two."""
+    solve, solved = _solver("solve_tracks", "solve_tracks"), {}
+    longest, reason = min(leap.land - leap.lift for leap in leaps), None
+    for flight, way in product((each for each in FLIGHTS if each <= longest), WAYS):
+        tempo = tempo_of(leaps, flight)
+        if tempo not in solved:
+            tracks = find_tracks(clip.at_speed(tempo), robot, limbs, smooth)
+            solved[tempo] = tracks, solve(robot, limbs, tracks, smooth)
+        timed = [Leap(leap.lift / tempo, leap.land / tempo) for leap in leaps]
+        tracks, one = solved[tempo]
+        frames = max(round(lead / RATE), 1)
+        try:
+            plan, begin = plan_leaps(timed, tracks, one.qpos, robot, frames, flight, way)
+            qpos = perform_plan(robot, plan, clip.name)
+        except ConfigError as error:
+            reason = error
+            continue
+        made = _retargeted(one._replace(qpos=qpos), clip, robot, limbs, stride=way,
+                           planted=plan.planted, begins=begin * plan.dt)  # fmt: skip
+        fine = replace(made.clip, dt=plan.dt)
+        return made._replace(clip=fine, flight=flight / longest, tempo=tempo)
+    raise reason or ConfigError("its jumps are too short", source=clip.name, field="feet")
 
 
 def retarget_freely(clip: Clip, robot: Robot, *, smooth: float = SMOOTH) -> Retargeted:

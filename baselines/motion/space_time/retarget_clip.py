@@ -34,9 +34,11 @@ from poise.envs.robots.robot import Robot
 
 from .stance import standing_stance
 from .trajectory import jerk
+from .walked import find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
+ENOUGH = 0.7  # of the speed: where steps are slower, the planner of walks does better
 CROSSOVER = 2.0  # [Hz] what is asked faster than this is smoothed
 
 
@@ -53,6 +55,7 @@ class RetargetedClip(NamedTuple):
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
         tempo: how many times as fast as the clip it is.
+        flight: share of the time that the clip is in the air.
     """
 
     clip: RobotClip
@@ -63,6 +66,7 @@ class RetargetedClip(NamedTuple):
     stride: float = 1.0
     begins: float = LEAD
     tempo: float = 1.0
+    flight: float = 1.0
 
 
 def retarget_clip(
@@ -81,12 +85,14 @@ def retarget_clip(
     """A robot's motion of a clip: one that can be performed, else one that can be seen.
 
     With `kinematic` it is what `retarget_freely` makes, with False what `performable` makes; with
-    None the latter, or the former where no controller could perform that, and nothing was asked
-    with `solver`, `constraints` or `planted`. Then `about.unperformed` says why. A clip may be the
+    None the latter. Where no controller could perform that, or steps are shorter than 0.7 of what
+    the legs' ratio gives, and nothing was asked with `solver`, `constraints` or `planted`, it is
+    the former, with what `find_commands` has for a planner that walks. Of what does not walk either
+    `about.unperformed` says why. A clip may be the
     name of a packaged one, or a path. All else, and what is raised, is as of these two.
     """
     clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
-    reason = "it was retargeted by kinematics alone (--kinematic)"
+    reason, short = "it was retargeted by kinematics alone (--kinematic)", None
     if not kinematic:
         try:
             made = performable(
@@ -94,15 +100,28 @@ def retarget_clip(
                 planted=planted, crossover=crossover, progress=progress,
             )  # fmt: skip
             reference_from(made.clip, robot, clip.name)
-            return made
+            if kinematic is not None or made.stride * made.tempo >= ENOUGH:
+                return made
+            short = made
         except ConfigError as error:
             reason, asked = error.message, solver is not None or constraints or planted
             if kinematic is not None or asked or error.field not in UNPERFORMED:
                 raise
-    free = retarget_freely(clip, robot, smooth=smooth)
+    free, tempo = retarget_freely(clip, robot, smooth=smooth), 1.0
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
+    if not kinematic:
+        try:
+            commands, tempo = find_commands(clip, robot, free.scale)
+            walks = replace(free.clip, commands=commands, dt=free.clip.dt / tempo)
+            reference_from(walks, robot, clip.name)
+            seen = walks
+        except ConfigError as error:
+            if short is not None:
+                return short
+            if error.field == "contacts":
+                seen = replace(seen, about=replace(seen.about, unperformed=error.message))
     scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
-    return _stepped(free._replace(clip=seen), scene)
+    return _stepped(free._replace(clip=seen), scene)._replace(tempo=tempo)
 
 
 def performable(
@@ -169,7 +188,7 @@ def performable(
     from .quality import measure
     from .solve import optimise
 
-    scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted)
+    scene = _scene(robot, limbs, made.clip.qpos, lead, made.clip.planted, made.clip.dt)
     if steps:
         return _stepped(made, scene)
     stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
@@ -198,15 +217,16 @@ def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
         made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
     )  # fmt: skip
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
-                          made.begins, made.tempo)  # fmt: skip
+                          made.begins, made.tempo, made.flight)  # fmt: skip
 
 
 def _scene(
-    robot: Robot, limbs: Any, qpos: np.ndarray, lead: float, planted: np.ndarray | None = None
-) -> Scene:
-    """Postures at `RATE`; soles that step are to stay where they land."""
+    robot: Robot, limbs: Any, qpos: np.ndarray, lead: float, planted: np.ndarray | None = None,
+    dt: float = RATE,
+) -> Scene:  # fmt: skip
+    """Postures `dt` [s] apart; soles that step are to stay where they land."""
     both = np.ones((len(qpos), 2), dtype=bool)
-    scene = Scene(robot, limbs, qpos, RATE, lead, both if planted is None else planted)
+    scene = Scene(robot, limbs, qpos, dt, lead, both if planted is None else planted)
     if planted is None:
         return scene
     for frame in range(len(scene)):

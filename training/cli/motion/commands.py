@@ -133,6 +133,7 @@ def bring(
     planted: Switch = False,
     solver: Solver | None = None,
     constraints: str | None = None,
+    steps: Switch = False,
     kinematic: Switch = False,
     video: Path | None = None,
 ) -> None:
@@ -160,6 +161,7 @@ def bring(
         solver: frame by frame, spacetime for the optimum of the whole clip, grid for constraints
             by trial in steps; without one spacetime if there are constraints, else frame.
         constraints: a packaged name (see poise list) or a .yaml file of what else is wanted.
+        steps: keep the clip's own steps, for motion-step, though legs make them short.
         kinematic: do what the clip does, whether or not it can be performed.
         video: a .mp4 or .webp file of the robot, and beside it the skeleton of the file.
     """
@@ -185,7 +187,7 @@ def bring(
         smooth=smooth,
         lead=lead,
         planted=planted,
-        kinematic=kinematic or None,
+        kinematic=True if kinematic else False if steps else None,
         progress=partial(print, flush=True),
     )
     write_robot_clip(made.clip, out)
@@ -248,7 +250,9 @@ def _film(
     from poise.baselines.motion.retargeting.tracks import first_heading
     from poise.training.pictures.figures.playback import beside_of, write_playback
 
-    clip, heading = made.clip, None if made.clip.planted is None else first_heading(source)
+    clip, heading = made.clip, None
+    if clip.planted is not None and not clip.free:
+        heading = first_heading(source)
     source = over_ground(source) if made.tempo == 1.0 else source.at_speed(made.tempo)
     beside = beside_of(body, source, made.scale, made.begins, heading, made.stride)
     print(f"{write_playback(video, body, clip.qpos, clip.dt, beside, size)} frames")

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from poise.baselines.balance.references.commanded import AHEAD, START, TURN
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.tempo import Tempo
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import whole_number
+from poise.envs.balance.base import BalanceEnv
 from poise.envs.balance.mdp.termination import FallLimits
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
@@ -28,6 +30,7 @@ from poise.training.motion.tracking.record import ANYWHERE, TrackingFigures
 
 PUSH_TIME = 0.1  # [s]
 LONGEST = 600.0  # [s]
+LITTLE = 0.2  # [m, rad]
 LEAN = 30.0  # [deg] beyond the motion's own largest tilt
 FALLEN = 0.8  # of the motion's lowest CoM: lower is a fall where the motion itself goes low
 
@@ -40,11 +43,15 @@ class Followed(TrackingFigures):
         fallen: whether the robot fell.
         solver_failures: ticks without a solution of the QP.
         push: the push, as an environment takes it; None for none.
+        walked, turned: of a walk the way along its headings, and the turn, over those that are told
+            while the clip plays; NaN where these are less than 0.2 m or 0.2 rad.
     """
 
     fallen: bool
     solver_failures: int
     push: dict[str, Any] | None
+    walked: float = np.nan
+    turned: float = np.nan
 
 
 def follow(
@@ -106,11 +113,41 @@ def follow(
         push = Push(push_bodies(body)[0], start, PUSH_TIME, size, direction)
         pushes = (push,) if size else ()
         trial = Trial(k, seed + k, pushes, motion=reference.name)
-        watcher = None if watch is None else watch(trial)
-        trials.append(_followed(run_trial(agent, trial, watcher), trial))
+        course = Course(reference.commands, None if watch is None else watch(trial))
+        followed = _followed(run_trial(agent, trial, course), trial)
+        walked, turned = course.shares()
+        trials.append(replace(followed, walked=walked, turned=turned))
         if trials[-1].fallen and not patient:
             break
     return trials
+
+
+class Course:
+    """Where a robot walks while it is told to: to be called as a `Watch`, and to call another."""
+
+    def __init__(self, commands: np.ndarray | None, other: Watch | None = None):
+        self._told, self._other = commands, other
+        self._gone: list[tuple[float, float, float]] = []
+
+    def __call__(self, env: BalanceEnv) -> object:
+        told, state = self._told, env.simulation.state
+        if told is not None and told[1, START] <= env.simulation.time <= told[-1, START]:
+            heading = np.arctan2(state.heading[1], state.heading[0])
+            self._gone.append((*state.com[:2], heading))
+        return None if self._other is None else self._other(env)
+
+    def shares(self) -> tuple[float, float]:
+        """`walked` and `turned` of `Followed`."""
+        if self._told is None or len(self._gone) < 2:
+            return np.nan, np.nan
+        gone, told = np.array(self._gone), self._told[1:]
+        yaw = np.unwrap(gone[:, 2])
+        axes = np.column_stack([np.cos(yaw), np.sin(yaw)])[1:]
+        way = float((np.diff(gone[:, :2], axis=0) * axes).sum())
+        asked = np.diff(told[:, START]) @ told[:-1, [AHEAD, TURN]]
+        done = np.array([way, yaw[-1] - yaw[0]])
+        shares = np.where(np.abs(asked) > LITTLE, done / np.where(asked == 0.0, 1.0, asked), np.nan)
+        return float(shares[0]), float(shares[1])
 
 
 def _followed(outcome: Outcome, trial: Trial) -> Followed:

@@ -19,6 +19,10 @@ from poise.baselines.motion.space_time.retarget_clip import RetargetedClip
 from .follow import Followed
 
 #: what is shown of a motion with steps: name, field, factor, unit
+WALK = (
+    ("went, of the way told", "walked", 100.0, "%"),
+    ("turned, of what was told", "turned", 100.0, "%"),
+)
 STEPS = (
     ("a sole in the air, RMS", "swing_error", 1e3, "mm"),
     ("a sole as it lands, at most", "placement_error", 1e3, "mm"),
@@ -34,6 +38,7 @@ def print_followed(trials: Sequence[Followed], title: str, console: Console) -> 
     table.add_row("trials, falls", f"{len(trials)}, {falls}")
     table.add_row("solver failures", str(sum(trial.solver_failures for trial in trials)))
     stood = [trial for trial in trials if not trial.fallen]
+    walked = any(np.isfinite([(trial.walked, trial.turned) for trial in stood]).ravel())
     stepped = any(np.isfinite(trial.swing_error) for trial in trials)
     for name, field, factor, unit in (
         ("joints, RMS", "joint_rms", np.degrees(1.0), "°"),
@@ -41,6 +46,7 @@ def print_followed(trials: Sequence[Followed], title: str, console: Console) -> 
         ("the same, from the root", "body_error_root", 1e3, "mm"),
         ("bodies in the last second", "body_error_last", 1e3, "mm"),
         ("centre of mass", "com_error", 1e3, "mm"),
+        *(WALK if walked else ()),
         *(STEPS if stepped else (("a sole slid or stepped by", "sole_slide", 1e3, "mm"),)),
     ):
         values = [factor * getattr(trial, field) for trial in stood]
@@ -92,6 +98,7 @@ def print_retargeted(made: RetargetedClip, console: Console) -> None:
         ("legs over the clip's", f"{made.scale:.3f}"),
         ("steps", _steps(made)),
         ("off the ground", _flight(made)),
+        *_walks(made),
         ("soles off their places", f"{1000 * quality.sole_error:.2g} mm at most"),
         ("skating, mean and largest", f"{100 * quality.skating:.2g}, "
          f"{100 * quality.skating_largest:.2g} cm/s"),
@@ -132,11 +139,28 @@ def _steps(made: RetargetedClip) -> str:
     return f"{steps}, {made.stride:.0%} of the length that the legs' scale gives{tempo}"
 
 
+def _walks(made: RetargetedClip) -> list[tuple[str, str]]:
+    told = made.clip.commands
+    if told is None:
+        return []
+    ahead, left, turn = np.abs(told[:, 1:4]).max(axis=0)
+    return [
+        (
+            "performed by a planner that walks",
+            f"at {made.tempo:.2f} of the clip's speed: up to "
+            f"{np.hypot(ahead, left):.2f} m/s and {np.degrees(turn):.0f} °/s (--controller walk)",
+        )
+    ]
+
+
 def _flight(made: RetargetedClip) -> str:
     planted = made.clip.planted
     flying = np.zeros(0, int) if planted is None else np.flatnonzero(~planted.any(axis=1))
-    first = f", first at {flying[0] * made.clip.dt:.2f} s" if len(flying) else ""
-    return f"{len(flying) * made.clip.dt:.2f} s{first}"
+    if not len(flying):
+        return "never"
+    share = "" if made.flight == 1.0 else f", {made.flight:.0%} as long as the clip at a time"
+    first = flying[0] * made.clip.dt
+    return f"{len(flying) * made.clip.dt:.2f} s, first at {first:.2f} s{share}"
 
 
 def print_feasibility(judged: Feasibility, title: str, console: Console) -> None:

@@ -97,7 +97,7 @@ class ReferenceBodies:
     ) -> tuple[np.ndarray, np.ndarray]:
         """The same of a motion with steps, whose own frame is put on the soles that are planted."""
         data, sample, joints = self._data, footing.sample(time), self.motion.sample(time).q_ref
-        down = sample.planted
+        down = sample.planted if sample.planted.any() else ~sample.planted
         ahead = stance.axes[down][:, :2, 0].sum(axis=0)
         wanted = sample.turns[down][:, 0, 2].mean()
         yaw = float(np.arctan2(ahead[1], ahead[0]) - wanted)

@@ -81,6 +81,28 @@ def test_captures_of_others(name: str) -> None:
     assert flies == ("jump" in name)
 
 
+#: first frame of every stance and first after it, left and right, marked by hand: from the heights
+#: and speeds of toes and heels, before what is tested was asked
+MARKED = {
+    "cmu_12_01_walk": ([(0, 50), (103, 200), (256, 356), (411, 518)],
+                       [(20, 126), (177, 276), (330, 433), (488, 523)]),
+    "cmu02_jump": ([(0, 28), (45, 73)], [(0, 28), (45, 73)]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MARKED)
+def test_contacts_agree_with_those_marked_by_hand(name: str) -> None:
+    path = EXTRA / f"{name}.bvh"
+    if not path.is_file():
+        pytest.skip(f"{path} is not here")
+    found = measure_contacts(read_bvh(path).clip).planted
+    marked = np.zeros_like(found)
+    for foot, stances in enumerate(MARKED[name]):
+        for begin, end in stances:
+            marked[begin:end, foot] = True
+    assert np.mean(found == marked) > 0.95
+
+
 def test_the_heading_and_the_way_go_with_the_clip(tmp_path: Path) -> None:
     """A circle of 6.6 rad, its way the legs' ratio as long."""
     robot, (clip, _) = robot_named("humanoid"), written("circle", tmp_path)

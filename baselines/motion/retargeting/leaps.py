@@ -1,0 +1,164 @@
+"""Jumps with both feet on a robot: when it leaves the ground, for how long, and where it lands."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BPoly
+from scipy.spatial.transform import Rotation
+
+from poise.baselines.balance.references.footwork import FootPlan
+from poise.baselines.balance.references.legs import nominal_feet
+from poise.baselines.balance.references.robot_clip import RATE
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.contacts import measure_contacts
+from poise.configs.errors import ConfigError
+from poise.envs.compiled.maths.easing import ease
+from poise.envs.robots.robot import Robot
+
+from .paces import FLIGHT, MARGIN, SWINGING, hump, led
+from .targets import low_pass
+from .tracks import Tracks
+
+FINE = 4  # frames of a jump's motion for each of others: pushing off is quick
+TOGETHER = 0.15  # [s] between two feet that leave the ground, or land, in one jump
+#: seconds in the air, and shares of the clip's way and turn, that are tried
+FLIGHTS, WAYS = (0.26, 0.2, 0.15, 0.1), (1.0, 0.7, 0.5, 0.3, 0.15, 0.0)
+STANDS = 0.44  # [s] on the ground between two jumps, at least
+PUSH = 0.3  # [s] of pushing off, and of landing, at most
+OFF_AT, DEEPEST = 1.0, 0.84  # [h] of the CoM at lift-off; deeper, flat feet bend ankles too far
+DEPTH = 0.38  # of v · push by which it goes down first
+SWIFTEST = 1.2  # [g] of soles in the air, sideways: faster, legs and their motors fall behind
+PEAK = 5.77  # of α'', see `ease`
+CLEAR = 0.012  # [h] that soles rise more than the CoM does
+BEFORE, AFTER = 1.0, 1.2  # [s] of standing before the first and after the last push, at least
+
+
+class Leap(NamedTuple):
+    """When both feet are off the ground [s]."""
+
+    lift: float
+    land: float
+
+
+def find_leaps(clip: Clip) -> list[Leap]:
+    """The jumps with both feet of a clip, in order; none for one that walks or stands.
+
+    Raises ConfigError for one that runs: it has a foot in the air before it leaves the ground.
+    """
+    planted = measure_contacts(clip).planted
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], ~planted.any(axis=1), [0]])))
+    found = []
+    for a, b in edges.reshape(-1, 2):
+        if (b - a) * clip.dt <= FLIGHT:
+            continue
+        around = round(TOGETHER / clip.dt)
+        before, after = planted[max(a - around, 0) : a], planted[b : b + around]
+        if a == 0 or b == len(planted):
+            raise ConfigError("is in the air at its begin or end", source=clip.name,
+                              field="contacts")  # fmt: skip
+        if not (before.any(axis=0).all() and after.any(axis=0).all()):
+            raise ConfigError(
+                f"runs: it is off the ground for {(b - a) * clip.dt:.2f} s at {a * clip.dt:.2f} s "
+                "from one foot, and jumps are performed with both", source=clip.name,
+                field="contacts",
+            )  # fmt: skip
+        found.append(Leap(a * clip.dt, b * clip.dt))
+    return found
+
+
+def tempo_of(leaps: list[Leap], flight: float) -> float:
+    """How fast jumps of `flight` [s] can be that leave 0.44 s on the ground between two; 1 at
+    most."""
+    middles = [0.5 * (leap.lift + leap.land) for leap in leaps]
+    return min([1.0, *(np.diff(middles) / (flight + STANDS)).tolist()])
+
+
+def plan_leaps(
+    leaps: list[Leap], tracks: Tracks, qpos: np.ndarray, robot: Robot, lead: int, flight: float,
+    way: float,
+) -> tuple[FootPlan, int]:  # fmt: skip
+    """The plan of a clip's jumps for a robot, and how many frames it has before the clip.
+
+    The CoM goes down, and up until it leaves the ground at g·`flight`/2, for all flights are as
+    long. Soles rise with it, and land at `way` of the clip's.
+
+    Args:
+        leaps: of the clip.
+        tracks: where it leads the soles.
+        qpos: (F, nq) in its frames, at `RATE`.
+        robot: with two feet.
+        lead: frames at `RATE` from standing into the clip, and back.
+        flight: time in the air [s].
+        way: share of the clip's ways and turns.
+
+    Raises ConfigError where soles would have to move faster than legs can.
+    """
+    dt, h, g = RATE / FINE, robot.height_com, robot.units.gravity
+    lead = max(lead, round((BEFORE + PUSH - leaps[0].lift) / RATE))
+    last = max(len(qpos) - 1, round((leaps[-1].land + AFTER) / RATE) - lead)
+    qpos = np.pad(qpos, ((0, last + 1 - len(qpos)), (0, 0)), mode="edge")
+    frames = FINE * (2 * lead + last) + 1
+    middles = [0.5 * (leap.lift + leap.land) + lead * RATE for leap in leaps]
+    takes = [round((middle - 0.5 * flight) / dt) for middle in middles]
+    count = round(flight / dt)
+    height = _heights(np.array(takes) * dt, count * dt, frames, dt, h, g)
+    nominal = nominal_feet(robot) * [1.0, 1.0, 0.0]
+    places, yaws = np.repeat(nominal[None], frames, axis=0), np.zeros((frames, 2))
+    facing, planted = np.zeros(frames), np.ones((frames, 2), dtype=bool)
+    stances = [0.0, *(leap.land for leap in leaps)]
+    ends = [*(leap.lift for leap in leaps), tracks.pelvis.shape[0] * RATE]
+    rests = [_stance(tracks, a, b) for a, b in zip(stances, ends, strict=True)]
+    origin = rests[0][0].mean(axis=0)
+    u = np.linspace(0.0, 1.0, count + 1)
+    for a, (soles, turns) in zip(takes, rests[1:], strict=True):
+        b = a + count
+        goal = nominal + way * (soles - origin - nominal) * [1.0, 1.0, 0.0]
+        far = np.linalg.norm((goal - places[a])[:, :2], axis=1).max()
+        if PEAK * far / flight**2 > SWIFTEST * g:
+            raise ConfigError(f"a leap of {far:.2f} m in {flight:.2f} s is too fast for the legs",
+                              field="feet")  # fmt: skip
+        rise = float(height[a : b + 1].max()) - OFF_AT * h + CLEAR * h
+        places[a : b + 1] += ease(u)[:, None, None] * (goal - places[a])
+        places[a : b + 1, :, 2] += rise * hump(u)[:, None]
+        yaws[a : b + 1] += ease(u)[:, None] * (way * turns - yaws[a])
+        places[b:], yaws[b:] = goal, way * turns
+        planted[a + 1 : b] = False
+        early, late = max(a - round(0.5 * PUSH / dt), 0), min(b + round(0.5 * PUSH / dt), frames)
+        turn = np.linspace(0.0, 1.0, late - early)
+        facing[early:late] += ease(turn) * (yaws[b].mean() - facing[early])
+        facing[late:] = yaws[b].mean()
+    standing, (least, most) = robot.standing_qpos[7:], (robot.joint_range + [MARGIN, -MARGIN]).T
+    calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
+    coarse = led(calm, standing, standing, lead, lead, 2 * lead + len(calm))
+    times, at = np.arange(len(coarse)) * RATE, np.arange(frames) * dt
+    joints = np.stack([np.interp(at, times, column) for column in coarse.T], axis=1)
+    level = Rotation.from_euler("z", yaws.reshape(-1, 1)).as_rotvec().reshape(frames, 2, 3)
+    root = np.column_stack([np.zeros((frames, 2)), facing])
+    return FootPlan(dt, joints, root, height, places, level, planted), FINE * lead
+
+
+def _stance(tracks: Tracks, begin: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+    """Soles (2, 3) [m] and headings (2,) [rad] of a time on the ground."""
+    own = slice(round(begin / RATE), max(round(end / RATE), round(begin / RATE) + 1))
+    return np.median(tracks.soles[own], axis=0), np.median(tracks.yaws[own], axis=0)
+
+
+def _heights(
+    takes: np.ndarray, flight: float, frames: int, dt: float, h: float, g: float
+) -> np.ndarray:
+    """(F,) of the CoM [m]: C², with no force on the ground at lift-off and touchdown."""
+    speed, off = 0.5 * g * flight, OFF_AT * h
+    gaps = np.diff(takes) - flight
+    push = np.minimum(PUSH, 0.5 * np.concatenate([[np.inf], gaps, [np.inf]]))
+    low = np.maximum(off - DEPTH * speed * push, DEEPEST * h)
+    knots = [(0.0, h, 0.0, 0.0), (takes[0] - push[0] - 0.6, h, 0.0, 0.0)]
+    for k, take in enumerate(takes):
+        knots += [(take - push[k], low[k], 0.0, 0.0), (take, off, speed, -g),
+                  (take + flight, off, -speed, -g),
+                  (take + flight + push[k + 1], low[k + 1], 0.0, 0.0)]  # fmt: skip
+    knots += [(knots[-1][0] + 0.8, h, 0.0, 0.0), (frames * dt + 1.0, h, 0.0, 0.0)]
+    table = np.array(knots)
+    table = table[np.append(np.diff(table[:, 0]) > 1e-6, True)]
+    return np.asarray(BPoly.from_derivatives(table[:, 0], table[:, 1:])(np.arange(frames) * dt))

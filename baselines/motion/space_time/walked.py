@@ -1,0 +1,92 @@
+"""What a planner of steps is told so that a robot walks and turns as a clip does."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from poise.baselines.balance.references.commanded import COLUMNS, MOST, faster
+from poise.baselines.balance.references.robot_clip import RATE
+from poise.baselines.motion.clips.clip import Clip
+from poise.baselines.motion.clips.contacts import measure_contacts, over_ground
+from poise.configs.errors import ConfigError
+from poise.envs.robots.robot import Robot
+
+FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
+LONGEST, FASTEST = 0.72, 0.4  # [h] of a step, [hω] of a walk: further and faster, robots fall
+LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
+BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
+QUICKEST = 0.75  # [1/ω] of a swing; and what it lasts at most:
+SLOWEST = 2.0
+BOTH = 0.13  # [1/ω] that planners stand on both feet between two swings
+
+
+class Walked(NamedTuple):
+    """Commands (n, 5) in the clip's time, and how many times as fast as the clip that is."""
+
+    commands: np.ndarray
+    tempo: float
+
+
+def find_commands(clip: Clip, robot: Robot, scale: float) -> Walked:
+    """The velocity along the heading [m/s], the turning rate [rad/s] and the time of a swing [s] of
+    a clip, step by step.
+
+    Both are means over two steps, times `scale`, the ratio of the legs. Where the clip is too fast
+    for legs to follow, all is slower. Where it bends too sharply, steps are shorter and quicker.
+
+    Raises:
+        ConfigError: both feet are off the ground; it takes no two steps, or goes nowhere.
+    """
+    planted = measure_contacts(clip).planted
+    flying = np.flatnonzero(~planted.any(axis=1))
+    runs = np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
+    longest = max(runs, key=len)
+    if len(longest) * clip.dt > FLIGHT:
+        raise ConfigError(f"both feet are off the ground for {len(longest) * clip.dt:.2f} s at "
+                          f"{longest[0] * clip.dt:.2f} s", source=clip.name,
+                          field="contacts")  # fmt: skip
+    lands = np.sort(np.nonzero(np.diff(planted.astype(int), axis=0) > 0)[0]) * clip.dt
+    if len(lands) < 2:
+        raise ConfigError("its feet move, but take no two steps", source=clip.name, field="feet")
+    period = float(np.median(np.diff(lands))) if len(lands) > 2 else float(np.diff(lands)[0])
+    walk = over_ground(clip).faced().resampled(RATE)
+    size = 2 * max(round(period / RATE), 1) + 1
+    facing = _mean(np.unwrap(walk.facing()), size)
+    way = _mean(scale * walk.root[:, :2], size)
+    velocity, turn = np.gradient(way, RATE, axis=0), np.gradient(facing, RATE)
+    cos, sin = np.cos(facing), np.sin(facing)
+    ahead = cos * velocity[:, 0] + sin * velocity[:, 1]
+    left = cos * velocity[:, 1] - sin * velocity[:, 0]
+    h, omega = robot.height_com, robot.omega
+    speed = np.hypot(ahead, left)
+    if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
+        raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
+    tempo = min(FASTEST * h * omega / max(float(speed.max()), 1e-9), 1.0)
+    each = max(period, walk.duration / MOST)
+    rows = []
+    for start in np.arange(0.0, walk.duration, each):
+        own = slice(round(start / RATE), max(round((start + each) / RATE), round(start / RATE) + 1))
+        row = np.zeros(COLUMNS)
+        row[:] = start, ahead[own].mean(), left[own].mean(), turn[own].mean(), period
+        rows.append(row)
+    commands = faster(np.array(rows), tempo)
+    going = np.hypot(commands[:, 1], commands[:, 2])
+    turning = np.maximum(np.abs(commands[:, 3]), 1e-9)
+    limits = [LONGEST * h / np.maximum(going, 1e-9), MOST_TURN / turning,
+              BEND * h * omega / np.maximum(going * turning, 1e-9)]  # fmt: skip
+    swing = np.minimum(commands[:, 4], np.min(limits, axis=0)) - BOTH / omega
+    commands[:, 4] = np.clip(swing, QUICKEST / omega, SLOWEST / omega)
+    return Walked(commands, tempo)
+
+
+def _mean(values: np.ndarray, size: int) -> np.ndarray:
+    """The mean of so many frames around each, of a course that goes on beyond its ends."""
+    half = size // 2
+    slopes = [(values[min(half, len(values) - 1)] - values[0]) / half,
+              (values[-1] - values[max(-half - 1, -len(values))]) / half]  # fmt: skip
+    k = np.arange(1, half + 1).reshape(-1, *[1] * (values.ndim - 1))
+    longer = [values[0] - k[::-1] * slopes[0], values, values[-1] + k * slopes[1]]
+    return np.asarray(uniform_filter1d(np.concatenate(longer), size, axis=0)[half:-half])

@@ -1,0 +1,96 @@
+"""Clips that walk and turn, performed by the planner of steps: what it is told, what it does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from poise.baselines.balance.references.robot_clip import (
+    RobotClip,
+    read_robot_clip,
+    reference_from,
+    write_robot_clip,
+)
+from poise.baselines.motion.retargeting.retarget import retarget_freely
+from poise.baselines.motion.space_time.retarget_clip import retarget_clip
+from poise.baselines.motion.space_time.walked import find_commands
+from poise.configs.errors import ConfigError
+from poise.training.motion.following.follow import follow
+from tests.support.captures import CAPTURES, make
+from tests.support.physics import robot_named
+
+HUMANOID = "humanoid"
+#: metres a second ahead and left, and radians a second, of the made clips that walk
+SPEEDS = {"walk": (1.2, 0, 0), "walk-curve": (0.9, 0, 0.6), "circle": (0.7, 0, 0.95),
+          "turn-in-place": (0, 0, 0.8), "backwards": (-0.6, 0.1, 0)}  # fmt: skip
+
+
+def walking(name: str) -> RobotClip:
+    """A made clip as the planner is to walk it, though `motion-step` could step it."""
+    clip, robot = make(name)[0], robot_named(HUMANOID)
+    free = retarget_freely(clip, robot)
+    return replace(free.clip, commands=find_commands(clip, robot, free.scale).commands)
+
+
+@pytest.mark.parametrize("name", SPEEDS)
+def test_the_planner_is_told_the_clip_s_speed_turn_and_steps(name: str) -> None:
+    scale, robot = 0.9, robot_named(HUMANOID)
+    commands, tempo = find_commands(make(name)[0], robot, scale)
+    ahead, left, turn = SPEEDS[name]
+    told = np.median(commands[:, 1:4], axis=0)
+    assert told == pytest.approx([scale * ahead, scale * left, turn], abs=0.06)
+    assert tempo == 1.0
+    lands = np.sort(np.concatenate(CAPTURES[name].stances)[:, 0])
+    period = np.median(np.diff(lands))
+    assert (commands[:, 4] < period).all()
+    if name in ("walk", "turn-in-place", "backwards"):
+        assert commands[:, 4] + 0.037 == pytest.approx(period, abs=0.045)  # with both feet down
+
+
+def test_what_is_too_fast_is_slower_and_says_so() -> None:
+    commands, tempo = find_commands(make("walk")[0].at_speed(1.3), robot_named(HUMANOID), 0.9)
+    assert 0.7 < tempo < 0.9
+    assert commands[:, 1] == pytest.approx(tempo * 1.3 * 1.2 * 0.9, abs=0.06)
+    assert commands[-1, 0] + commands[1, 0] == pytest.approx(4.0 / 1.3 / tempo, rel=0.3)
+
+
+def test_runs_and_jumps_are_no_walks() -> None:
+    for name, seconds in (("run", r"0\.\d\d s at 0\.\d\d s"), ("jump", r"0\.\d\d s at 1\.0\d s")):
+        with pytest.raises(ConfigError, match=f"both feet are off the ground for {seconds}"):
+            find_commands(make(name)[0], robot_named(HUMANOID), 0.9)
+        clip = retarget_clip(make(name)[0], robot_named(HUMANOID)).clip
+        assert "off the ground" in clip.about.unperformed
+
+
+@pytest.mark.parametrize("name", ["circle", "turn-in-place", "backwards"])
+def test_walks_and_turns_are_performed(name: str, tmp_path: Path) -> None:
+    """As far as the clip goes, and as far round, from disturbed starts without a fall."""
+    clip = walking(name)
+    write_robot_clip(clip, tmp_path / "clip.npz")
+    again = read_robot_clip(tmp_path / "clip.npz")
+    assert again.commands == pytest.approx(clip.commands)
+    trials = follow(tmp_path / "clip.npz", "walk", starts=3)
+    assert not any(trial.fallen for trial in trials)
+    shares = np.array([(trial.walked, trial.turned) for trial in trials])
+    ahead, _, turn = SPEEDS[name]
+    assert np.isfinite(shares[0]).tolist() == [ahead != 0, turn != 0]
+    assert shares[np.isfinite(shares)] == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_clip_that_turns_too_far_for_its_own_steps_is_walked() -> None:
+    made = retarget_clip(make("circle")[0], robot_named(HUMANOID))
+    assert made.clip.commands is not None and made.tempo == 1.0
+    assert not made.clip.about.unperformed
+
+
+def test_only_what_walks_is_told_to() -> None:
+    reference = reference_from(walking("turn-in-place"), robot_named(HUMANOID), "turn")
+    assert reference.commands is not None
+    faster = reference.at_speed(2.0)
+    assert faster.commands[1, 3] == pytest.approx(2.0 * reference.commands[1, 3])
+    assert faster.commands[-1, 0] == pytest.approx(0.5 * reference.commands[-1, 0])
+    with pytest.raises(ConfigError, match="does not walk"):
+        follow(reference, "momentum-qp", starts=1)
