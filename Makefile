@@ -34,7 +34,7 @@ STAMP := .venv/.poise-setup
 FLEET := dm-control example-robot-data fourier-robot-descriptions gb-robot-models icub-models
 DOCS := .venv/.poise-docs
 
-.PHONY: setup test weekly test-processors demo check docs format build release bench fleet fuzz lock audit clean
+.PHONY: setup test clips weekly test-processors demo check docs format build release bench fleet fuzz lock audit clean
 
 setup: $(STAMP)
 
@@ -47,6 +47,10 @@ $(STAMP): pyproject.toml constraints.txt
 
 test: setup
 	$(PYTHON) -m pytest -q $(PYTEST_WORKERS) $(PYTEST_ARGS)
+
+# The packaged clips, made again from their keyframes.
+clips: setup
+	$(PYTHON) -m poise.training.motion.recording
 
 # Not in .venv: RLlib and the Zoo ask for other versions of Gymnasium than constraints.txt has. Of
 # that file torch alone is held, so that no other build of it is pulled.

@@ -182,7 +182,7 @@ def benchmark(
     if out is None:
         from poise.configs.errors import ConfigError
 
-        raise ConfigError("name a folder to write to", source="poise benchmark", field="--out")
+        raise ConfigError("needs --out PATH", source="benchmark")
     from poise.envs.viewing.gl import choose_gl_backend
 
     choose_gl_backend()

@@ -1,7 +1,7 @@
-"""The packaged clips: `python -m poise.training.motion.recording FOLDER` makes them again.
+"""The packaged clips: `python -m poise.training.motion.recording [FOLDER]` makes them again.
 
-They are keyframes of the default humanoid, configs/motions and configs/clips/*.yaml. So no file of
-anybody else is needed to try retargeting, motion graphs and scripts.
+They are keyframes of the default humanoid, in configs/motions and configs/clips/keyframes. So no
+file of anybody else is needed to try retargeting, motion graphs and scripts.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def record_clips() -> list[Clip]:
 def _files() -> list[Path]:
     motions = packaged_folder("motions")
     recorded = [motions / f"{name}.yaml" for name in motions_with_steps()]
-    return [*recorded, *packaged_folder("clips").glob("*.yaml")]
+    return [*recorded, *(packaged_folder("clips") / "keyframes").glob("*.yaml")]
 
 
 def _postures(robot: Robot, path: Path) -> np.ndarray:

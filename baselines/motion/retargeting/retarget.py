@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -114,7 +113,7 @@ def retarget_to(
         return _leaping(leaps, clip, robot, limbs, smooth, lead)
     if steps:
         return _stepped(clip, robot, limbs, smooth, lead)
-    solved = _solver("solve", "solve_frames")(robot, limbs, whole, smooth)
+    solved = _solver("solve_frames")(robot, limbs, whole, smooth)
     return _retargeted(solved, clip, robot, limbs, begins=lead)
 
 
@@ -153,7 +152,7 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
     """The fastest motion up to the clip's that the robot can do: steps and tempo as of `TRIED`, the
     CoM as high as legs reach then."""
     paces, scale = find_paces(clip), limbs.leg_length / clip.skeleton.leg_length
-    frames, solve = max(round(lead / RATE), 1), _solver("solve_tracks", "solve_tracks")
+    frames, solve = max(round(lead / RATE), 1), _solver("solve_tracks")
     solved: dict[float, Any] = {}
     reason = None
     for stride, tempo in TRIED:
@@ -182,7 +181,7 @@ def _leaping(
 ) -> Retargeted:
     """The highest and longest jumps up to the clip's that the robot can do, and slower ones where
     it would not stand long enough between two."""
-    solve, solved = _solver("solve_tracks", "solve_tracks"), {}
+    solve, solved = _solver("solve_tracks"), {}
     longest, reason = min(leap.land - leap.lift for leap in leaps), None
     for flight, way in product((each for each in FLIGHTS if each <= longest), WAYS):
         tempo = tempo_of(leaps, flight)
@@ -227,16 +226,22 @@ def retarget_freely(clip: Clip, robot: Robot, *, smooth: float = SMOOTH) -> Reta
     limbs, stride = find_limbs(robot), 1.0
     while True:
         tracks = find_tracks(clip, robot, limbs, SWIFTER * smooth, stride)
-        solved = _solver("solve_tracks", "solve_tracks")(robot, limbs, tracks, SWIFTER * smooth)
+        solved = _solver("solve_tracks")(robot, limbs, tracks, SWIFTER * smooth)
         if solved.sole_error < OFF or stride * SHORTER < SHORTEST:
             break
         stride *= SHORTER
     return _retargeted(solved, clip, robot, limbs, planted=tracks.planted, stride=stride)
 
 
-def _solver(module: str, name: str) -> Any:  # a function of a module that imports mink
+def _solver(name: str) -> Any:  # a function of a module that imports mink
     try:
-        return getattr(import_module(f".{module}", __package__), name)
+        if name == "solve_frames":
+            from .solve import solve_frames
+
+            return solve_frames
+        from .solve_tracks import solve_tracks
+
+        return solve_tracks
     except ImportError as error:
         raise ConfigError(f"needs the package {error.name}: {how_to_install('motion')}",
                           source="motion") from None  # fmt: skip

@@ -35,7 +35,7 @@ def test_captured_walking_feet_take_turns() -> None:
 def test_feet_of_the_own_walk_are_in_the_air_within_its_steps() -> None:
     """Its keyframes say when: a foot is never in the air outside of its steps, and is in each."""
     clip = read_bvh(find_bvh("humanoid_walk")).clip
-    steps = read_yaml(packaged_folder("clips") / "walk.yaml")["steps"]
+    steps = read_yaml(packaged_folder("clips") / "keyframes" / "walk.yaml")["steps"]
     contacts = measure_contacts(clip)
     assert not contacts.in_place and len(steps) == 5
     for foot, side in enumerate(("left", "right")):

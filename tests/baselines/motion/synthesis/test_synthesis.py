@@ -243,7 +243,7 @@ def test_settings_that_are_wrong() -> None:
 
 
 def test_packaged_scripts_are_read() -> None:
-    assert packaged_scripts() == ["greeting", "warm_up"]
+    assert packaged_scripts() == ["greeting", "semakin04", "warm_up"]
     for name in packaged_scripts():
         assert find_script(name).source.endswith(f"{name}.motion")
     assert find_script("squat -> punch") == parse("squat -> punch")

@@ -30,10 +30,11 @@ def test_sectors_of_few_trials_are_no_results_and_bounds_are_marked(
     played += [trial(180.0, 0.7 + 0.1 * k, k < 3) for k in range(6)]
     plan: Any = SimpleNamespace(limits=SimpleNamespace(scale="ankle limit"))
     plots.draw_plots(tmp_path, plan, {"a": played})
-    directions, j50, low, high = drawn["a"][1]["a"]
-    assert directions == [0.0, 90.0, 180.0]
-    assert [np.isnan(each).tolist() for each in (j50, low, high)] == 3 * [[True, False, False]]
-    assert j50[1] == pytest.approx(1.2) and drawn["bounds"] == {"a": [None, "lower", None]}
+    (found,) = drawn["a"][1]
+    assert found.name == "a" and found.x.tolist() == [0.0, 90.0, 180.0]
+    for each in (found.y, found.low, found.high):
+        assert np.isnan(each).tolist() == [True, False, False]
+    assert found.y[1] == pytest.approx(1.2) and found.side.tolist() == [0.0, 1.0, 0.0]
     assert drawn["note"] == "Not drawn: directions with fewer than 5 trials."
     plots.draw_plots(tmp_path, plan, {"a": played[4:]})
     assert drawn["note"] == ""

@@ -63,5 +63,5 @@ def test_what_no_leaderboard_takes_is_refused(
     assert main(["benchmark", "--submit", str(folder)]) == 2
     assert "no leaderboard is of this suite (choices: standard)" in capsys.readouterr().err
     assert main(["benchmark"]) == 2
-    assert "name a folder to write to" in capsys.readouterr().err
+    assert "benchmark: needs --out PATH" in capsys.readouterr().err
     assert not list(tmp_path.glob("*.zip"))

@@ -61,8 +61,8 @@ def test_runs_and_jumps_are_no_walks() -> None:
     for name, seconds in (("run", r"0\.\d\d s at 0\.\d\d s"), ("jump", r"0\.\d\d s at 1\.0\d s")):
         with pytest.raises(ConfigError, match=f"both feet are off the ground for {seconds}"):
             find_commands(make(name)[0], robot_named(HUMANOID), 0.9)
-        clip = retarget_clip(make(name)[0], robot_named(HUMANOID)).clip
-        assert "off the ground" in clip.about.unperformed
+    clip = retarget_clip(make("run")[0], robot_named(HUMANOID)).clip
+    assert "off the ground" in clip.about.unperformed
 
 
 @pytest.mark.parametrize("name", ["circle", "turn-in-place", "backwards"])

@@ -33,14 +33,13 @@ def test_the_skeleton_stands_beside_and_moves_with_the_clip() -> None:
 
 def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_is_looked_at() -> None:
     robot = robot_named("humanoid")
-    clip = read_bvh(find_bvh("humanoid_walk")).clip
+    clip = read_bvh(find_bvh("humanoid_walk")).clip.repeated(5)
     whole, half = (beside_of(robot, clip, 0.9, 1.0, first_heading(clip), stride)
                    for stride in (1.0, 0.5))  # fmt: skip
     end = 1.0 + clip.duration
     ways = [skeleton.root(end) - skeleton.root(0.0) for skeleton in (whole, half)]
     np.testing.assert_allclose(ways[1], 0.5 * ways[0])
-    assert ways[0][0] == pytest.approx(0.9 * (clip.root[-1, 0] - clip.root[0, 0]), rel=0.01)
-    assert ways[0][0] > 0.4 and abs(ways[0][1]) < 0.1  # along x
+    assert ways[0][0] > 2.0 and abs(ways[0][1]) < 0.1  # along x
     times = np.arange(0.0, end, 1.0 / 25.0)
     root = np.zeros((len(times), 2))
     seen = looked_at(root, 1.0 / 25.0, times, half)
