@@ -25,7 +25,7 @@ def policy(name: str) -> Policy:
     """A packaged policy, or that of a small training run."""
     if name == "run":
         return load_policy(finished_run(), robot())
-    return load_policy(name, robot("unitree_g1" if name.endswith("-g1") else "humanoid"))
+    return load_policy(name, robot("unitree_g1" if "-g1" in name else "humanoid"))
 
 
 @functools.cache

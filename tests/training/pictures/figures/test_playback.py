@@ -39,6 +39,7 @@ def test_a_skeleton_that_walks_goes_as_far_as_the_robot_and_is_looked_at() -> No
     end = 1.0 + clip.duration
     ways = [skeleton.root(end) - skeleton.root(0.0) for skeleton in (whole, half)]
     np.testing.assert_allclose(ways[1], 0.5 * ways[0])
+    assert ways[0][0] == pytest.approx(0.9 * (clip.root[-1, 0] - clip.root[0, 0]), rel=0.01)
     assert ways[0][0] > 2.0 and abs(ways[0][1]) < 0.1  # along x
     times = np.arange(0.0, end, 1.0 / 25.0)
     root = np.zeros((len(times), 2))
