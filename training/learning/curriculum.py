@@ -16,18 +16,20 @@ class CurriculumCallback(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         curriculum, env = self.config.curriculum, self.config.env
-        if curriculum.share == 0.0:
-            return
-        done = min(self.num_timesteps / (curriculum.share * self.config.steps), 1.0)
-        if env.pushes is not None:
+        growing = curriculum.share * self.config.steps
+        done = min(self.num_timesteps / growing, 1.0) if growing else 1.0
+        if env.pushes is not None and growing:
             factor = curriculum.start + (1.0 - curriculum.start) * done
             low, high = env.pushes.magnitude
             scaled = replace(env.pushes, magnitude=(min(low, factor * high), factor * high))
             self.training_env.set_attr("push_sampler", scaled)
             self.logger.record("curriculum/largest", scaled.magnitude[1])
-        if curriculum.realism < 1.0:
+        if curriculum.realism < 1.0 or curriculum.mixed:
             factor = curriculum.realism + (1.0 - curriculum.realism) * done
-            self.training_env.set_attr("realism", env.realism.scaled(factor))
+            n = self.training_env.num_envs
+            for i in range(n):
+                part = (i + 0.5) / n if curriculum.mixed else 1.0
+                self.training_env.set_attr("realism", env.realism.scaled(factor * part), indices=i)
             self.logger.record("curriculum/realism", factor)
 
     def _on_step(self) -> bool:

@@ -342,8 +342,12 @@ def test_the_curriculum_grows_the_pushes(tmp_path, monkeypatch):
     np.testing.assert_allclose(largest[:4], expected)
 
 
-def test_the_curriculum_grows_the_errors_of_the_robot(tmp_path, monkeypatch):
-    """The level of realism is a part of the final one, and that one after its share of the run."""
+@pytest.mark.parametrize("mixed", [False, True])
+def test_the_curriculum_grows_the_errors_of_the_robot(mixed, tmp_path, monkeypatch):
+    """The level of realism is a part of the final one, and that one after its share of the run.
+
+    Mixed, the environments of a run have levels from ideal to that one.
+    """
     noises = []
     start = curriculum.CurriculumCallback._on_rollout_start
 
@@ -353,11 +357,12 @@ def test_the_curriculum_grows_the_errors_of_the_robot(tmp_path, monkeypatch):
         noises.append([level.sensors.gyro_noise for level in levels])
 
     monkeypatch.setattr(curriculum.CurriculumCallback, "_on_rollout_start", spy)
-    config = tiny_config(steps=256, curriculum=Curriculum(realism=0.2, share=0.5))
+    config = tiny_config(steps=256, curriculum=Curriculum(realism=0.2, mixed=mixed, share=0.5))
     config = replace(config, env=replace(config.env, realism=load_realism("field")))
     config = replace(config, evaluation=replace(config.evaluation, trials=1))
     train(config, tmp_path, progress=False)
-    expected = np.outer([0.2, 0.6, 1.0, 1.0], np.full(4, 0.05))
+    parts = [0.125, 0.375, 0.625, 0.875] if mixed else [1.0, 1.0, 1.0, 1.0]
+    expected = 0.05 * np.outer([0.2, 0.6, 1.0, 1.0], parts)
     np.testing.assert_allclose(noises[:4], expected)
 
 
