@@ -1,4 +1,4 @@
-"""The layers of a policy's network, out of its ONNX file."""
+"""The layers of a policy's network, out of its ONNX file or TorchScript."""
 
 from __future__ import annotations
 
@@ -7,7 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from poise.baselines.allowance import is_script
 from poise.configs.errors import ConfigError
+from poise.configs.reading import read_bytes
+
+from .networks import script_module
+from .onnx.files import BYTES
 
 HOW = "needs the package onnx: pip install onnx"
 
@@ -21,12 +26,54 @@ class Layers:
     weights: list[np.ndarray]  # (out, in) each
     biases: list[np.ndarray]  # (out,) each
 
+    def outputs(self, observations: np.ndarray) -> np.ndarray:
+        """(n, out) of observations (n, in)."""
+        x = (observations - self.mean) / self.scale
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            x = x @ weight.T + bias
+            x = np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0)))
+        return x @ self.weights[-1].T + self.biases[-1]
+
 
 def read_layers(path: Path) -> Layers:
     """The layers of an ONNX file: Sub and Div, or neither; then Gemm and Elu in turn, as mjlab's.
 
+    Of TorchScript, which the user must have allowed, its matrices in turn, with ELU between them.
+
     Raises ConfigError naming the file: it holds another network, or the package onnx is missing.
     """
+    return _script_layers(path) if is_script(path) else _onnx_layers(path)
+
+
+def _script_layers(path: Path) -> Layers:
+    """What TorchScript calls weight and bias, in turn; and mean and std of what it is given.
+
+    Nothing tells what lies between them, so it is tried whether they do what it does.
+    """
+    import torch
+
+    module = script_module(read_bytes(path, BYTES), path)
+    found: dict[str, list[np.ndarray]] = {"weight": [], "bias": [], "mean": [], "std": []}
+    for name, each in module.state_dict().items():
+        found.get(name.rsplit(".")[-1].strip("_"), []).append(each.detach().double().numpy())
+    weights, biases = found["weight"], found["bias"]
+    shapes = [(w.ndim, w.shape[:1] == b.shape) for w, b in zip(weights, biases, strict=False)]
+    if not shapes or len(weights) != len(biases) or set(shapes) != {(2, True)}:
+        raise ConfigError("is no chain of layers: it has other weights than matrices with biases",
+                          source=path)  # fmt: skip
+    n = weights[0].shape[1]
+    mean, scale = (np.ravel(each[0]) if each else empty for each, empty in
+                   ((found["mean"], np.zeros(n)), (found["std"], np.ones(n))))  # fmt: skip
+    layers = Layers(mean, scale, weights, biases)
+    tried = mean + scale * np.random.default_rng(0).normal(size=(8, n))
+    with torch.inference_mode():
+        expected = module(torch.from_numpy(tried).float()).double().numpy()
+    if not np.allclose(layers.outputs(tried), expected, rtol=1e-3, atol=1e-3):
+        raise ConfigError("is no chain of layers with ELU between them", source=path)
+    return layers
+
+
+def _onnx_layers(path: Path) -> Layers:
     try:
         import onnx
     except ImportError:

@@ -229,7 +229,7 @@ class ScriptNetwork:
     def reset(self) -> None:
         import torch
 
-        self._module = _module(self.content, self.path)
+        self._module = script_module(self.content, self.path)
         kinds = (value.dtype for value in self._module.parameters())
         self._type = next((kind for kind in kinds if kind.is_floating_point), torch.float32)
         self._memory = [torch.zeros(each.shape, dtype=self._type) for each in self.config.memory]
@@ -254,7 +254,7 @@ def script_sizes(path: Path) -> tuple[int | None, int | None]:
 
     It runs: ask `check_allowed` before.
     """
-    matrices = [each for each in _module(read_bytes(path, BYTES), path).parameters()
+    matrices = [each for each in script_module(read_bytes(path, BYTES), path).parameters()
                 if each.dim() == 2]  # fmt: skip
     return (matrices[0].shape[1], matrices[-1].shape[0]) if matrices else (None, None)
 
@@ -266,7 +266,8 @@ def _place(output: str | int) -> int:
     return output
 
 
-def _module(content: bytes, path: Path) -> Any:
+def script_module(content: bytes, path: Path) -> Any:
+    """The module in TorchScript, which runs; raises ConfigError naming the file that holds none."""
     import torch
 
     try:
@@ -279,5 +280,5 @@ def _with_module(
     content: bytes, path: Path, config: PolicyFileConfig, module: bytes, memory: list[Any]
 ) -> ScriptNetwork:
     network = ScriptNetwork(content, path, config)
-    network._module, network._memory = _module(module, path), memory
+    network._module, network._memory = script_module(module, path), memory
     return network

@@ -39,7 +39,7 @@ from .episode import (
 )
 from .info import step_info
 from .mdp.docstrings import filled
-from .mdp.observation import Term, Terms, View, mirror_terms, observer, scales
+from .mdp.observation import Term, Terms, View, frames, mirror_terms, observer, scales
 from .mdp.reward import REWARD_TERMS
 from .mdp.termination import episode_limits
 from .mdp.terms import TERMS
@@ -92,7 +92,9 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             self.config.fall, self.robot.height_com, self.max_steps, self.quiet_steps
         )
         self.action_names = self._action_names()
-        self.terms = self._observation_terms()  #: of which the observation is made
+        self._newest = self._observation_terms()
+        #: of which the observation is made
+        self.terms = frames(self._newest, self.config.observation.history)
         size = sum(term.size for term in self.terms)
         sizes = len(REWARD_TERMS), len(self.robot.soles), self.robot.model.nu
         self.episode = allocate_episode(len(self.action_names), size, *sizes)
@@ -183,7 +185,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         """The block that ends a policy step; a new one when `simulation.world()` is."""
         world = self.simulation.world()
         if self._end is None or self._end_of is not world:
-            observe = observer(self.terms, self.episode.observation, self._view)
+            e = self.episode
+            observe = observer(self._newest, e.observation, e.steps, self._view)
             self._end = StepEnd(self._judge(), Program.of(()), observe)
             self._end_of = world
         return self._end

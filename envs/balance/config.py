@@ -32,10 +32,13 @@ class ObservationConfig:
     Attributes:
         terms: Terms of the observation by name, in this order; None: the environment's own.
         extra: Terms of the observation that come after those.
+        history: Policy steps that the observation shows, all terms of a step side by side, the
+            oldest first.
     """
 
     terms: tuple[str, ...] | None = None
     extra: tuple[str, ...] = ()
+    history: int = field(default=1, metadata={"min": 1, "max": 100, "omit": "default"})
 
 
 @dataclass(frozen=True)

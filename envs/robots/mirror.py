@@ -12,6 +12,8 @@ from .robot import Robot
 SIDES = np.array([1.0, -1.0, 1.0])  # of a vector's x, y, z when left and right are exchanged
 # of the CoM's height, by which a robot may differ from its mirror image: real ones by a millimetre
 TOLERANCE = 2e-3
+HEAVY = 0.1  # of the robot's mass: a lighter body may be farther off in proportion,
+FARTHER = 5.0  # up to so many times
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +55,10 @@ def mirror_robot(robot: Robot) -> dict[str, Mirror]:
 
 
 def _check_bodies(robot: Robot, data: mujoco.MjData) -> None:
-    model, near = robot.model, TOLERANCE * robot.height_com
+    model = robot.model
     for body in range(1, model.nbody):
+        light = HEAVY * robot.mass / max(model.body_mass[body], 1e-9)
+        near = TOLERANCE * robot.height_com * np.clip(light, 1.0, FARTHER)
         there = abs(data.xipos - SIDES * data.xipos[body]).max(axis=1) < near
         same = abs(model.body_mass - model.body_mass[body]) < TOLERANCE * robot.mass
         if not np.any(there & same):

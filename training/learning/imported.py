@@ -6,7 +6,7 @@ the actor's, number by number: nothing is fitted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -85,19 +85,25 @@ class Translation:
     def observation(self) -> Affine:
         """The policy's observation as a function of the environment's.
 
-        Raises ConfigError for a term that the environment's lacks, with a history, or with limits.
+        Raises ConfigError for a term that the environment's lacks, in an older step than its
+        observation has, with limits, or in part.
         """
         (terms, *more) = self.config.inputs.values()
         if more:
             raise self._wrong(0, "with several inputs it cannot be imported")
-        parts = [self._term(i, term) for i, term in enumerate(terms)]
+        if self.config.history == "frame":
+            order = [(i, term, age) for age in _ages(terms[0]) for i, term in enumerate(terms)]
+        else:
+            order = [(i, term, age) for i, term in enumerate(terms) for age in _ages(term)]
+        parts = [self._term(*each) for each in order]
         columns = [[p.index for p in parts], [p.gain for p in parts], [p.offset for p in parts]]
         return Affine(*(np.concatenate(column) for column in columns))
 
-    def _term(self, i: int, described: ObservationTerm) -> Affine:
+    def _term(self, i: int, described: ObservationTerm, age: int) -> Affine:
         name = meaning(described)
-        if described.frame or described != ObservationTerm(described.term, described.scale):
-            raise self._wrong(i, "with a history or limits it cannot be imported, nor in part")
+        plain = replace(described, history=1, lag=0, newest_first=False)
+        if described.frame or plain != ObservationTerm(described.term, described.scale):
+            raise self._wrong(i, "with limits it cannot be imported, nor in part")
         if isinstance(described.scale, dict):
             raise self._wrong(i, "with factors by name it cannot be imported")
         if name == "velocity_commands":
@@ -106,7 +112,11 @@ class Translation:
         own, factor, unit = SAME.get(name, (None, 1.0, None))
         if own not in self._places:
             raise self._wrong(i, f"the environment does not tell {name}")
-        index = self._places[own]
+        shown = f"{own}[-{age}]" if age else own
+        if shown not in self._places:
+            raise self._wrong(i, f"shows {own} of {age} steps ago: observation.history must be "
+                              f"{age + 1} or more")  # fmt: skip
+        index = self._places[shown]
         if own == "last_action":
             entries = Affine(index[self.entries], 1.0 / self.gain, -self.offset / self.gain)
             return entries.scaled(described.scale)
@@ -133,6 +143,12 @@ class Translation:
         if isinstance(self.env, ResidualWholeEnv):
             biases[-1] = AUTHORITY
         return weights, biases
+
+
+def _ages(term: ObservationTerm) -> list[int]:
+    """The policy steps ago that a term shows, in the order in which it shows them."""
+    ages = list(range(term.lag, term.lag + term.history))
+    return ages if term.newest_first else ages[::-1]
 
 
 def import_policy(

@@ -1,7 +1,7 @@
 """The observation: its terms, their scales, their table and their mirror image."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 import numpy as np
@@ -199,27 +199,56 @@ class Whole(Block):
     """A whole observation."""
 
     out: np.ndarray  # (no,)
+    first: np.ndarray  # (1,) int: where the newest frame begins
+    steps: np.ndarray  # (1,) int: policy steps since the reset
+
+
+@compiled
+def age(whole: Whole):
+    """Every frame becomes a step older, the oldest is forgotten."""
+    out, first = whole.out, whole.first[0]
+    size = out.shape[0] - first
+    for i in range(first):
+        out[i] = out[i + size]
 
 
 @compiled
 def clip(whole: Whole):
-    """Every entry into [−10, 10]."""
-    out = whole.out
-    for i in range(out.shape[0]):
+    """Every entry into [−10, 10]; an episode begins as if it had long been as it is."""
+    out, first = whole.out, whole.first[0]
+    for i in range(first, out.shape[0]):
         out[i] = min(max(out[i], -CLIP), CLIP)
+    if whole.steps[0] == 0:
+        size = out.shape[0] - first
+        for i in range(first - 1, -1, -1):
+            out[i] = out[i + size]
+
+
+def frames(terms: Sequence[Term], history: int) -> list[Term]:
+    """The terms of as many policy steps, oldest first: `joint_pos[-1]` is one step old."""
+    older = [replace(t, name=f"{t.name}[-{k}]") for k in range(history - 1, 0, -1) for t in terms]
+    return [*older, *terms]
 
 
 def observer(
-    terms: Iterable[Term], out: np.ndarray, view: Callable[[type[Block], np.ndarray], Block]
+    terms: Iterable[Term],
+    out: np.ndarray,
+    steps: np.ndarray,
+    view: Callable[[type[Block], np.ndarray], Block],
 ) -> Program:
-    """The program that fills `out` (no,) with `terms`; `view(kind, out)` makes their blocks."""
-    calls: list[tuple[Callable[..., None], Block]] = []
-    first = 0
+    """The program that fills the end of `out` (no,) with `terms`; before them lie older frames.
+
+    `steps` (1,) are the policy steps since the reset; `view(kind, out)` makes the terms' blocks.
+    """
+    terms = list(terms)
+    first = len(out) - sum(term.size for term in terms)
+    whole = Whole(out, np.array([first]), steps)
+    calls: list[tuple[Callable[..., None], Block]] = [(age, whole)] if first else []
     for term in terms:
         assert term.kernel is not None  # those of actions are not observed
         calls.append((term.kernel, view(term.view, out[first : first + term.size])))
         first += term.size
-    return Program.of([*calls, (clip, Whole(out))])
+    return Program.of([*calls, (clip, whole)])
 
 
 def mirror_terms(terms: Iterable[Term], parts: Mapping[str, Mirror]) -> Mirror:
