@@ -44,9 +44,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
-    """Links to README and the changelog lead to their pages; the log's days are not searched."""
-    if page.file.src_uri.startswith("log/2"):
-        page.meta["search"] = {"exclude": True}
+    """Links to README and the changelog lead to their pages."""
     return re.sub(
         r"\]\((?:\.\./)+(README|CHANGELOG)\.md",
         lambda found: f"]({'../' * page.file.src_uri.count('/')}{DIFFERENT[f'{found[1]}.md']}",

@@ -1,7 +1,5 @@
 """README and docs/: every Python block runs, every command parses, every named file exists.
 
-The days of docs/log tell of the code of their day and are left out.
-
 A Python block is run as a script in a folder that looks like the root of the repository. It is not
 run where `<!-- not run: reason -->` stands above it.
 """
@@ -24,6 +22,7 @@ from poise.training.cli.motion import commands as motion
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES += sorted((ROOT / "docs" / "log").glob("*.md"))
 LANGUAGES = {"python", "bash", "yaml", ""}  # "" is a figure: an equation, a tree, a listing
 SCRIPTS = ("git ", "tensorboard ", "pip install ", "docker ")  # commands of others
 INLINE = re.compile(r"`(poise\s[^`]+)`")
