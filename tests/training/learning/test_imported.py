@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from poise.baselines.policy_files.controller import PolicyFile
+from poise.baselines.policy_files.layers import read_layers
 from poise.baselines.policy_files.reading import policy_config
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build
@@ -107,6 +109,48 @@ def test_it_does_what_the_policy_does(action: str, tmp_path: Path) -> None:
         assert np.all(found[others] == 0.0) and (action != "whole" or found[-1] == 1.0)
 
 
+@pytest.mark.parametrize("history", ["term", "frame"])
+@pytest.mark.parametrize("order", [{}, {"newest_first": True}, {"lag": 1}])
+def test_a_policy_that_shows_several_steps(history: str, order: dict, tmp_path: Path) -> None:
+    """The same targets, step after step, while its own action is taken."""
+    known = {"base_ang_vel": 3, "projected_gravity": 3, "joint_pos_rel": 15, "joint_vel": 15}
+    names = [name for name in robot().joint_names if name != "abdomen_z"]
+    known.update(joint_pos_rel=len(names), joint_vel=len(names), last_action=len(names))
+    steps = 2 if order else 3
+    network = write_layers(
+        tmp_path / "policy.onnx", [steps * sum(known.values()), *HIDDEN, len(names)]
+    )
+    terms = [{"term": term, "history": steps, **order} for term in known]
+    fields: dict[str, Any] = {"joints": names, "default": 0.0, "action_joints": []}
+    standing = dict(zip(robot().joint_names, robot().standing_qpos[7:].tolist(), strict=True))
+    fields |= {"action_scale": 0.05, "action_offset": [standing[name] for name in names]}
+    fields["history"] = history
+    chosen = config(policy(tmp_path, network, observations=terms, **fields))
+    seen = replace(chosen.env.observation, history=3)
+    model, normalize = imported(replace(chosen, env=replace(chosen.env, observation=seen)))
+    env = normalize.venv.batch.envs[0]
+    player = PolicyFile(env.robot, policy_config(tmp_path / "policy.yaml"))
+    joints, servos = player.joints, env.servos
+    env.reset(seed=2, options={"push": []})
+    player.reset(env.simulation.state)
+    motors = [list(servos.dofs - 6).index(joint) for joint in joints.moved]
+    before, found, rng = np.zeros(env.action_space.shape), [], np.random.default_rng(1)
+    for _ in range(6):
+        targets = (servos.hold + servos.reach * before[: len(servos.hold)])[motors]
+        player.action[:] = (targets - joints.offset) / joints.scale
+        player._state = env.simulation.state
+        player._ask()
+        shown = normalize.normalize_obs(env.episode.observation)
+        action, _ = model.predict(shown, deterministic=True)
+        moved = (servos.hold + servos.reach * action[: len(servos.hold)])[motors]
+        np.testing.assert_allclose(moved, player._servos.target[joints.moved], atol=2e-5)
+        found.append(moved)
+        before = rng.uniform(-0.002, 0.002, env.action_space.shape)
+        before[-1] = 0.0
+        env.step_without_info(before)
+    assert np.ptp(found, axis=0).min() > 1e-3
+
+
 def test_a_run_starts_from_it(tmp_path: Path) -> None:
     """Statistics stay those of the policy; what is trained is loaded and acts as in training."""
     chosen, out = config(policy(tmp_path)), tmp_path / "run"
@@ -141,8 +185,11 @@ def test_a_slow_actor_moves_by_its_share() -> None:
     ("changes", "named"),
     [
         ({"observations": [{"term": "phase"}]}, r"observations\[0\].*does not tell phase"),
-        ({"observations": [{"term": "joint_vel", "history": 2}]}, "a history or limits"),
-        ({"observations": [{"term": "joint_vel", "clip": [-1.0, 1.0]}]}, "a history or limits"),
+        (
+            {"observations": [{"term": "joint_vel", "history": 2}]},
+            r"observations\[0\]: shows joint_vel of 1 steps ago: observation.history must be 2",
+        ),
+        ({"observations": [{"term": "joint_vel", "clip": [-1.0, 1.0]}]}, "with limits"),
     ],
 )
 def test_what_cannot_be_imported_is_said(changes: dict, named: str, tmp_path: Path) -> None:
@@ -160,6 +207,39 @@ def test_another_network_is_refused(tmp_path: Path) -> None:
     small = replace(chosen, ppo=replace(chosen.ppo, net_arch=(12, 8)))
     with pytest.raises(ConfigError, match=r"ppo.net_arch: must be \[12, 9\]"):
         imported(small)
+
+
+def write_script(path: Path, activation: torch.nn.Module) -> Path:
+    """TorchScript with layers and a normaliser, as Booster's."""
+
+    class Network(torch.nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.actor = torch.nn.Sequential(
+                torch.nn.Linear(6, 5), activation, torch.nn.Linear(5, 2)
+            )
+            self._mean = torch.nn.Parameter(torch.linspace(-1.0, 1.0, 6)[None])
+            self.register_buffer("_std", torch.linspace(0.5, 2.0, 6)[None])
+
+        def forward(self, x: torch.Tensor) -> torch.Tensor:
+            return self.actor((x - self._mean) / self._std)
+
+    torch.manual_seed(3)
+    torch.jit.script(Network()).save(str(path))
+    return path
+
+
+def test_layers_of_torchscript(tmp_path: Path) -> None:
+    """Their outputs are the network's; one with another activation is refused."""
+    path = write_script(tmp_path / "elu.pt", torch.nn.ELU())
+    given = np.random.default_rng(4).normal(size=(7, 6))
+    expected = torch.jit.load(str(path))(torch.from_numpy(given).float()).detach().numpy()
+    np.testing.assert_allclose(read_layers(path).outputs(given), expected, atol=1e-6)
+    with pytest.raises(ConfigError, match=r"tanh.pt: is no chain of layers with ELU"):
+        read_layers(write_script(tmp_path / "tanh.pt", torch.nn.Tanh()))
+    torch.jit.script(torch.nn.GRU(4, 3)).save(str(tmp_path / "gru.pt"))
+    with pytest.raises(ConfigError, match=r"gru.pt: is no chain of layers: it has other weights"):
+        read_layers(tmp_path / "gru.pt")
 
 
 def test_only_servos_can_start_from_it(tmp_path: Path) -> None:

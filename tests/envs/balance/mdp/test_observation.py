@@ -51,7 +51,7 @@ def observed(simulation, q_ref, v_ref, action, names=None):
             out=out,
         )
 
-    run(observer(terms, whole, view))
+    run(observer(terms, whole, np.zeros(1, dtype=np.int64), view))
     ends = np.cumsum([term.size for term in terms])
     return dict(zip([term.name for term in terms], np.split(whole, ends[:-1]), strict=True))
 
@@ -173,9 +173,33 @@ def test_the_configuration_chooses_the_terms():
     assert env.mirrors()[0].order.shape == env.observation_space.shape
 
 
+def test_an_observation_of_several_steps():
+    """Oldest first; the first one stands for the time before it, also of the next episode."""
+    chosen = {"terms": ["last_action", "com_vel", "joint_pos"], "history": 3}
+    env = TorqueBalanceEnv(robot(), pushes=None, observation=chosen)
+    single = TorqueBalanceEnv(robot(), pushes=None, observation={"terms": chosen["terms"]})
+    rng = np.random.default_rng(8)
+    for _ in range(2):
+        first = single.reset(seed=4)[0]
+        kept = [first, first, first]
+        np.testing.assert_array_equal(env.reset(seed=4)[0], np.concatenate(kept))
+        for _ in range(4):
+            action = rng.uniform(-0.3, 0.3, env.action_space.shape)
+            kept = [*kept[1:], single.step(action)[0]]
+            np.testing.assert_array_equal(env.step(action)[0], np.concatenate(kept))
+    names = [term.name for term in env.terms]
+    assert names[:2] == ["last_action[-2]", "com_vel[-2]"] and names[-1] == "joint_pos"
+    seen, _ = env.mirrors()
+    one, _ = single.mirrors()
+    whole = rng.normal(size=env.observation_space.shape)
+    expected = np.concatenate([one(frame) for frame in np.split(whole, 3)])
+    np.testing.assert_array_equal(seen(whole), expected)
+
+
 @pytest.mark.parametrize(
     ("chosen", "error"),
     [
+        ({"history": 0}, r"observation.history: must be at least 1"),
         ({"terms": ["com", "comm"]}, r"observation.terms: unknown term 'comm'.*com_height"),
         ({"extra": ["push me"]}, r"observation.extra: unknown term 'push me'"),
         ({"extra": ["com"]}, r"observation: 'com' comes twice"),
@@ -211,7 +235,7 @@ def test_a_term_is_one_function():
             world.views, world.clock, world.pushes, out,
         )  # fmt: skip
 
-    run(observer([term], out, view))
+    run(observer([term], out, np.zeros(1, dtype=np.int64), view))
     assert out.tolist() == [9.0, 10.0]  # clipped
     assert mirror_terms([term], {}).sign.tolist() == [1.0, 1.0]
 
