@@ -76,9 +76,13 @@ class Figure:
         text = f"{self.sign(entry)}{self.scale * value:{self.form}}"
         if not self.ends:
             return f"{text} of {entry[self.of]}" if self.of else text
+        return f"{text} {self.range(entry)}"
+
+    def range(self, entry: Entry) -> str:
+        """The interval as the terminal has it, with "–" for an end that is not known."""
         ends = self.interval(entry) or (None, None)
         low, high = (NONE if end is None else f"{self.scale * end:{self.form}}" for end in ends)
-        return f"{text} [{low}, {high}]"
+        return f"[{low}, {high}]"
 
 
 def known(figures: Sequence[Figure], entries: Sequence[Entry]) -> list[Figure]:

@@ -13,7 +13,6 @@ from rich.table import Table
 from poise.baselines.allowance import named
 from poise.training.benchmarking.diagnosis.words import told_losses
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
-from poise.training.motion.following.motion_tables import motion_tables
 from poise.training.running.columns import (
     AT_REST,
     ETA_MEAN,
@@ -35,7 +34,7 @@ from poise.training.running.columns import (
 from poise.training.running.summary import Entry, Summary
 from poise.training.running.terminal import BESIDE, in_parts
 
-from .walk_tables import walk_tables
+from .walk_tables import motion_tables, walk_tables
 
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
 P_VALUE = "McNemar p"
@@ -183,7 +182,7 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         return f"{pair['p_mcnemar']:.2g}" if pair and "p_mcnemar" in pair else NONE
 
     return [
-        (J50_MEAN.heading, lambda name: J50_MEAN.text(entries[name]) + _bounds(entries[name])),
+        (J50_MEAN.heading, lambda name: j50_mean_text(entries[name])),
         *map(column, (J50_WORST, ETA_MEAN, ETA_WORST)),
         column(HALF_AT, f"{HALF_AT.name}, of {summary['scale']}"),
         column(RECOVERED, f"{RECOVERED.name}{of_mix}"),
@@ -192,6 +191,12 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         (P_VALUE, p_value),
         *map(column, (*AT_REST, STEPS_TAKEN, *ROBUST)),
     ]
+
+
+def j50_mean_text(entry: Entry) -> str:
+    """With a mark where the pushes did not reach from recovery to fall in every direction."""
+    bounded = entry.get("j50_bounded")
+    return J50_MEAN.text(entry) + (f" ({bounded} bounds)" if bounded else "")
 
 
 def _pairs(summary: Summary, width: int) -> Table:
@@ -209,11 +214,6 @@ def _pairs(summary: Summary, width: int) -> Table:
         cells.append(f"{pair['p_mcnemar']:.2g}" if "p_mcnemar" in pair else NONE)
         table.add_row(escape(title), *cells, *(escape(each.text(pair)) for each in gain))
     return table
-
-
-def _bounds(entry: Entry) -> str:
-    """A mark where the pushes did not reach from recovery to fall in every direction."""
-    return f" ({entry['j50_bounded']} bounds)" if entry.get("j50_bounded") else ""
 
 
 def _room(names: Iterable[str], most: int) -> int:

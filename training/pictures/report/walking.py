@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
+from poise.training.benchmarking.evaluation.walk_tables import ALL, MEAN
 from poise.training.benchmarking.results.read import Results
-from poise.training.motion.following.motion_tables import ALL
 from poise.training.pictures.figures.rates import phase_curves
 from poise.training.pictures.figures.series import SIDES, series
 from poise.training.pictures.figures.style import Inline
@@ -71,7 +71,7 @@ def in_motion_table(results: Results, order: Sequence[str]) -> Table | None:
     caption = "J50 in motion over that of standing, over all directions."
     table = Table("in_motion", caption, [Column("motion", "motion")], [])
     return figure_table(results, order, "in_motion", table, IN_MOTION,
-                        lambda e: [_words(e["motion"] or "mean of the motions")])  # fmt: skip
+                        lambda e: [_words(e["motion"] or MEAN)])  # fmt: skip
 
 
 def phase_table(results: Results, order: Sequence[str]) -> Table | None:
