@@ -15,7 +15,7 @@ from poise.baselines.allowance import carried
 from poise.configs.errors import ConfigError, PoiseError, shown
 from poise.configs.extras import how_to_install
 
-from .processes import ADVICE, THREADS, WorkerPool, single_threaded, tell
+from .processes import ADVICE, THREADS, WorkerPool, end_if_imported, single_threaded, tell
 from .provenance import usable_cores
 from .stopping import uninterrupted
 
@@ -49,6 +49,7 @@ class Executor:
     """
 
     def __init__(self, backend: str, workers: int | None):
+        end_if_imported()
         check_backend(backend)
         self.backend, self.workers = backend, workers or usable_cores()
         self._given = workers is not None

@@ -30,10 +30,24 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXP
 # A new process would search the current folder before the libraries; instead it is sent `sys.path`.
 FOR_CHILDREN = (*THREADS, "PYTHONSAFEPATH")
 OUT_OF_MEMORY = errno.ENOMEM  # exit code of a worker
+UNGUARDED = 97  # of one that would start workers itself while it imports the user's script
 PATIENCE = 5.0  # [s] for a worker to end by itself
 ADVICE = "what is finished is kept: run the same command again to go on, with fewer --workers"
+GUARD = (
+    "processes import the script that starts them: put what it does under "
+    "`if __name__ == '__main__':`"
+)
 Job = TypeVar("Job")
 Result = TypeVar("Result")
+
+
+def end_if_imported() -> None:
+    """End this process if it is one that is only importing the script that has started it.
+
+    It would start processes of its own, which multiprocessing refuses in thirty lines.
+    """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        os._exit(UNGUARDED)
 
 
 class WorkerPool:
@@ -86,7 +100,10 @@ class WorkerPool:
                 answer = worker.connection.recv_bytes()
             except (EOFError, OSError):
                 self.workers.remove(worker)
-                task.survive(worker.death())
+                death = worker.death()
+                if worker.process.exitcode == UNGUARDED:
+                    raise PoiseError(GUARD) from None
+                task.survive(death)
                 waiting.appendleft(task)
                 continue
             return task, _result(answer)

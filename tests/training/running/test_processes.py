@@ -5,6 +5,8 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -117,3 +119,15 @@ def test_what_a_job_raises_is_raised_here() -> None:
         with pytest.raises(RuntimeError, match="Unportable: odd"):
             list(executor.each(work, [("unportable", 0)]))
         assert next(executor.each(work, [("plain", 0)]))[1][0] == "plain"
+
+
+@pytest.mark.parametrize("call", ["evaluate(['momentum-qp'], 'random', trials=2, out='out')"])
+def test_a_script_without_a_guard_is_told_of_it(call: str, tmp_path: Path) -> None:
+    """One error, and nothing of what multiprocessing says in every worker."""
+    script = tmp_path / "script.py"
+    script.write_text(f"import poise\npoise.{call}\n")
+    result = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 1 and result.stderr.count("Traceback") == 1
+    assert "put what it does under `if __name__ == '__main__':`" in result.stderr.splitlines()[-1]

@@ -131,7 +131,7 @@ def tune(
     search = _Search(config, gains)
     console = console or Console(quiet=True)
     keeps(out / HISTORY, f"the finished generations are kept in {out}; go on with --resume")
-    with FolderLock(out), Executor("local", workers) as executor:
+    with Executor("local", workers) as executor, FolderLock(out):
         rows = _known(config, out, resume)  # another search may have ended since
         for row in rows:
             search.again(row, out / HISTORY)
