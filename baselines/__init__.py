@@ -70,7 +70,8 @@ if TYPE_CHECKING:
     from poise.baselines.walking.controller import WalkingController
     from poise.baselines.walking.planner.command import GaitCommand
     from poise.baselines.walking.schedule import CommandSampler
-    from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+    from poise.baselines.whole_body.gains import MomentumQPConfig
+    from poise.baselines.whole_body.momentum_qp import MomentumQP
 else:
     __getattr__, __dir__ = lazy(
         __name__,
@@ -101,6 +102,7 @@ else:
             "walking.planner.command": ("GaitCommand",),
             "walking.controller": ("WalkingController",),
             "walking.schedule": ("CommandSampler",),
-            "whole_body.momentum_qp": ("MomentumQP", "MomentumQPConfig"),
+            "whole_body.gains": ("MomentumQPConfig",),
+            "whole_body.momentum_qp": ("MomentumQP",),
         },
     )

@@ -25,7 +25,8 @@ from poise.baselines.policy_files.reading import is_policy, policy_config, polic
 from poise.baselines.walking.config import WalkConfig
 from poise.baselines.walking.simbicon import Simbicon, SimbiconConfig
 from poise.baselines.walking.walk import Walk
-from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
+from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.schema import build, on_base, read_yaml

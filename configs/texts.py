@@ -8,6 +8,7 @@ by themselves, and a `Terminal` prints what cannot be printed as an escape.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from .errors import ConfigError, one_line, shown
@@ -26,6 +27,13 @@ def code(text: object) -> str:
     """The same as code; without, where code would end within the text, or a table's cell."""
     line = one_line(str(text))
     return plain(line) if not line or set(line) & set("`|") else f"`{line}`"
+
+
+def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown, of cells that are `plain`, `code` or our own."""
+    cells = ([cell.replace("|", "\\|") for cell in line] for line in (head, *rows))
+    first, *others = (f"| {' | '.join(line)} |\n" for line in cells)
+    return "".join([first, "|" + "---|" * len(head) + "\n", *others])
 
 
 def printable(text: str) -> str:

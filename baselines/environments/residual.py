@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import allowing, named
-from poise.baselines.balance.references.commanded import told
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.balance.references.reference_motion import ReferenceMotion
+from poise.baselines.balance.references.reference_motion import ReferenceMotion, told
 from poise.baselines.balance.references.targets import motion_arrays
 from poise.baselines.balance.references.tempo import TIME, Tempo
 from poise.baselines.controller import Controller, Targets

@@ -8,7 +8,7 @@ from poise.baselines.balance.stepping.planning.config import (
     StepLimits,
     SwingTask,
 )
-from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 
 from .models.lip import Lip
 from .models.reference import ReferenceModel

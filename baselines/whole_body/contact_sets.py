@@ -21,8 +21,9 @@ from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
 from .contacts.contact import BoundContact, bind_contacts, contact_arrays
+from .gains import MomentumQPConfig
 from .limits.limit import BoundLimit, bind_limits
-from .momentum_qp import MomentumQPConfig, prepare_rows
+from .momentum_qp import prepare_rows
 from .parameters import QPParameters, qp_parameters
 from .reduced_qp import Assembly, assemble
 from .stack import limit_program, make_stack, put_rows

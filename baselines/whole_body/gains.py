@@ -6,6 +6,13 @@ in m g, moments in m g h; a stiffness of 1 is ω² = g/h and a damping of 1 is �
 """
 
 from dataclasses import dataclass, field
+from typing import Literal
+
+from .contacts.contact import Contact
+from .limits.limit import Limit
+from .tasks.task import Task
+
+COMPILED_SOLVER = "active-set"
 
 
 def _at_least(minimum: float, default: float):
@@ -95,3 +102,31 @@ class JointLimit:
     brake: float = _above(0.0, 4.0)
     horizon: float = _above(0.0, 0.1)  # in 1/ω
     floor: float = _above(0.0, 20.0)
+
+
+@dataclass(frozen=True)
+class MomentumQPConfig:
+    """Tasks, contacts, limits and how they are solved [Macchietto09, Moskalev24 §2].
+
+    `root`: "hard" lets nothing but the ground push the root (physics); "soft" adds a penalised
+    wrench u_root on it (a game character that must not fail). `tasks`: what else v̇ is to do, each
+    under a name of its own, see `tasks/`; `contacts`: what touches the world besides the soles, see
+    `contacts/`; `limits`: what else bounds the solution, see `limits/`. Without `joint` (null)
+    nothing stops joints before their limits.
+    """
+
+    kind: Literal["momentum-qp"] = "momentum-qp"
+    period: float = field(default=0.004, metadata={"above": 0.0, "max": 0.05})  # [s]
+    solver: str = COMPILED_SOLVER
+    solver_options: dict[str, bool | float] = field(default_factory=dict)
+    root: Literal["hard", "soft"] = "hard"
+    root_weight: float = field(default=1e3, metadata={"above": 0.0})
+    posture: PostureTask = field(default_factory=PostureTask)
+    com: CoMTask = field(default_factory=CoMTask)
+    cop: CoPTask = field(default_factory=CoPTask)
+    contact: SoleContact = field(default_factory=SoleContact)
+    torque: TorqueLimit = field(default_factory=TorqueLimit)
+    joint: JointLimit | None = field(default_factory=JointLimit)
+    tasks: dict[str, Task] = field(default_factory=dict, metadata={"omit": "default"})
+    contacts: dict[str, Contact] = field(default_factory=dict, metadata={"omit": "default"})
+    limits: dict[str, Limit] = field(default_factory=dict, metadata={"omit": "default"})

@@ -1,7 +1,6 @@
 """The baseline: a momentum-based whole-body QP, solved anew at every control tick."""
 
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,45 +19,15 @@ from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 
-from .contacts.contact import BoundContact, Contact, bind_contacts, contact_arrays
-from .gains import CoMTask, CoPTask, JointLimit, PostureTask, SoleContact, TorqueLimit
-from .limits.limit import BoundLimit, Limit, bind_limits
+from .contacts.contact import BoundContact, bind_contacts, contact_arrays
+from .gains import COMPILED_SOLVER, CoMTask, MomentumQPConfig
+from .limits.limit import BoundLimit, bind_limits
 from .parameters import QPParameters, qp_parameters
 from .reduced_qp import Assembly, assemble
 from .stack import fill_from_python, limit_program, make_stack
-from .tasks.task import BoundTask, Task, bind_tasks
+from .tasks.task import BoundTask, bind_tasks
 from .tick import Tick, accept, allocate_memory, forget, momentum_tick, release_joints, solve
 from .workspace import allocate_workspace
-
-COMPILED_SOLVER = "active-set"
-
-
-@dataclass(frozen=True)
-class MomentumQPConfig:
-    """Tasks, contacts, limits and how they are solved [Macchietto09, Moskalev24 §2].
-
-    `root`: "hard" lets nothing but the ground push the root (physics); "soft" adds a penalised
-    wrench u_root on it (a game character that must not fail). `tasks`: what else v̇ is to do, each
-    under a name of its own, see `tasks/`; `contacts`: what touches the world besides the soles, see
-    `contacts/`; `limits`: what else bounds the solution, see `limits/`. Without `joint` (null)
-    nothing stops joints before their limits.
-    """
-
-    kind: Literal["momentum-qp"] = "momentum-qp"
-    period: float = field(default=0.004, metadata={"above": 0.0, "max": 0.05})  # [s]
-    solver: str = COMPILED_SOLVER
-    solver_options: dict[str, bool | float] = field(default_factory=dict)
-    root: Literal["hard", "soft"] = "hard"
-    root_weight: float = field(default=1e3, metadata={"above": 0.0})
-    posture: PostureTask = field(default_factory=PostureTask)
-    com: CoMTask = field(default_factory=CoMTask)
-    cop: CoPTask = field(default_factory=CoPTask)
-    contact: SoleContact = field(default_factory=SoleContact)
-    torque: TorqueLimit = field(default_factory=TorqueLimit)
-    joint: JointLimit | None = field(default_factory=JointLimit)
-    tasks: dict[str, Task] = field(default_factory=dict, metadata={"omit": "default"})
-    contacts: dict[str, Contact] = field(default_factory=dict, metadata={"omit": "default"})
-    limits: dict[str, Limit] = field(default_factory=dict, metadata={"omit": "default"})
 
 
 def prepare_rows(config: MomentumQPConfig) -> None:

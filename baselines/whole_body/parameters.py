@@ -1,7 +1,6 @@
 """From unit-free costs and gains to the numbers that compiled code uses for one robot."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +10,7 @@ from poise.envs.physics.arrays import RobotArrays, sole_chains
 from poise.envs.robots.robot import Robot
 
 from .contacts.wrench_cone import robot_cones
-from .gains import JointLimit
-
-if TYPE_CHECKING:
-    from .momentum_qp import MomentumQPConfig
+from .gains import JointLimit, MomentumQPConfig
 
 # A pelvis held by soles that are turned by 0.02 rad is as good as free; by 0.2 rad it is held.
 WEAKEST_WEIGHT = 3000.0  # per (acceleration / g)² or (angular acceleration / ω²)²
@@ -63,7 +59,7 @@ def joint_kinds(robot: RobotArrays) -> np.ndarray:
     return carried
 
 
-def qp_parameters(robot: Robot, arrays: RobotArrays, config: "MomentumQPConfig") -> QPParameters:
+def qp_parameters(robot: Robot, arrays: RobotArrays, config: MomentumQPConfig) -> QPParameters:
     """Scale `config` by the robot's mass m and CoM height h (see `gains.py`)."""
     units = arrays.units
     h, omega, force, moment = units.height, units.omega, units.force, units.moment

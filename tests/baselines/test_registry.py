@@ -3,7 +3,7 @@
 import pytest
 
 from poise.baselines.registry import controller_config, load_controller
-from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.configs.schema import to_dict

@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 
 from poise.baselines.controller import Targets
-from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
+from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.baselines.whole_body.parameters import QPParameters
 from poise.envs.physics.kinematics import update_state
 from poise.envs.physics.pushes.push import Push

@@ -6,7 +6,8 @@ from typing import Literal
 import numpy as np
 
 from poise.baselines.controller import Targets
-from poise.baselines.whole_body.momentum_qp import AroundQP, MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
+from poise.baselines.whole_body.momentum_qp import AroundQP
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 

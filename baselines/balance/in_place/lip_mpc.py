@@ -8,7 +8,7 @@ import osqp
 from scipy import sparse
 
 from poise.baselines.controller import Targets
-from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.configs.errors import PoiseError
 from poise.envs.compiled.maths.pendulum import lip_step
 from poise.envs.compiled.maths.polygons import half_planes, nearest_inside, shrunk

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_are
 
 from poise.baselines.controller import Targets
-from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot
 

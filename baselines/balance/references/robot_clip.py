@@ -18,10 +18,9 @@ from poise.configs.reading import parse_json, parsing
 from poise.configs.schema import build
 from poise.envs.robots.robot import Robot
 
-from .commanded import check_commands, whole_walk
 from .footing import check_planted, make_footing, sole_poses
 from .postures import LevelKinematics
-from .reference_motion import ReferenceMotion
+from .reference_motion import ReferenceMotion, check_commands, whole_walk
 from .splines import piecewise, rest_spline
 
 RATE = 1.0 / 30.0  # [s] between the postures of the clips that are made here

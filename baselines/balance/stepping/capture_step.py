@@ -8,12 +8,8 @@ from poise.baselines.controller import CompiledController, Outputs, Targets
 from poise.baselines.solvers.problem import Solver
 from poise.baselines.warmup import prepare
 from poise.baselines.whole_body.contact_sets import ContactSets
-from poise.baselines.whole_body.momentum_qp import (
-    COMPILED_SOLVER,
-    AroundQP,
-    MomentumQPConfig,
-    momentum_tick,
-)
+from poise.baselines.whole_body.gains import COMPILED_SOLVER, MomentumQPConfig
+from poise.baselines.whole_body.momentum_qp import AroundQP, momentum_tick
 from poise.baselines.whole_body.parameters import QPParameters
 from poise.baselines.whole_body.tick import contact_tick
 from poise.configs.errors import ConfigError

@@ -19,10 +19,9 @@ from .axes import FileAxes, axes_of, named_unit, nearest_axis, unit_from_legs
 from .bvh_pose import rigid, rooted_at_hips, unrooted
 from .bvh_text import read_bvh_text
 from .clip import Clip
-from .names import ROLES, SIDES, find_roles
+from .roles import ROLES, SIDES, find_roles, structural_roles
 from .rotations import to_scipy
 from .skeleton import Skeleton, leg_length
-from .structure import structural_roles
 
 ALONE = 4.0  # times the largest move between frames: that of a first frame that is the rest pose
 Y_UP = axes_of("y", "z")  # what most programs write

@@ -9,7 +9,7 @@ import numpy as np
 
 from poise.configs.errors import ConfigError
 
-from .names import ROLES, SIDES, find_roles, sided
+from .roles import ROLES, SIDES, find_roles, sided
 from .rotations import multiply, rotate
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from poise.baselines.balance.references.reference_motion import ReferenceMotion
 from poise.baselines.balance.references.targets import motion_arrays, update_targets
 from poise.baselines.controller import Targets
-from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
+from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 

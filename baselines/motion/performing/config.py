@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from poise.baselines.balance.stepping.planning.config import CaptureStepConfig, SwingTask
-from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 
 POSITIVE, NOT_NEGATIVE = {"above": 0.0}, {"min": 0.0}
 

@@ -14,10 +14,9 @@ from poise.configs.errors import PoiseError
 from poise.envs.robots.robot import Robot
 
 from .clearance import ClearanceLimit
-from .frame_tasks import FrameTasks
 from .limbs import Limbs
 from .targets import BodyTargets, low_pass
-from .tasks import SolesTask
+from .tasks import FrameTasks, SolesTask
 
 PLANTING = 3  # iterations from near postures to planted soles
 MARGIN = 0.005  # [rad] kept from the joint limits, for splines between the frames

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from poise.baselines.motion.retargeting.clearance import ClearanceLimit, Pair
-from poise.baselines.motion.retargeting.frame_tasks import FrameTasks
 from poise.baselines.motion.retargeting.targets import BodyTargets
+from poise.baselines.motion.retargeting.tasks import FrameTasks
 from poise.baselines.motion.space_time.constraints.constraint import Constraint
 from poise.baselines.motion.space_time.constraints.scene import Rows, Scene
 from poise.baselines.motion.space_time.constraints.touch import Touch

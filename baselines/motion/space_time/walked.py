@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from poise.baselines.balance.references.commanded import COLUMNS, MOST, faster
+from poise.baselines.balance.references.reference_motion import COLUMNS, MOST_COMMANDS, faster
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts, over_ground
@@ -65,7 +65,7 @@ def find_commands(clip: Clip, robot: Robot, scale: float) -> Walked:
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
     tempo = min(FASTEST * h * omega / max(float(speed.max()), 1e-9), 1.0)
-    each = max(period, walk.duration / MOST)
+    each = max(period, walk.duration / MOST_COMMANDS)
     rows = []
     for start in np.arange(0.0, walk.duration, each):
         own = slice(round(start / RATE), max(round((start + each) / RATE), round(start / RATE) + 1))

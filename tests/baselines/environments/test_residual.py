@@ -14,8 +14,8 @@ from poise.baselines.environments.policy_step import gate_opening
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales
 from poise.baselines.registry import controller_config, load_controller
-from poise.baselines.whole_body.gains import CoMTask
-from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.baselines.whole_body.gains import CoMTask, MomentumQPConfig
+from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import EnvConfig
 from poise.envs.balance.mdp.reward import RewardWeights

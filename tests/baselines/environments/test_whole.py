@@ -11,7 +11,7 @@ from poise.baselines.environments.hand_over import HandOverConfig
 from poise.baselines.environments.policy_step import set_targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
-from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.envs.balance.episode import FAILURES
 from poise.envs.balance.vector.batch import EnvBatch, replicate

@@ -8,7 +8,8 @@ from poise.baselines.controller import Targets
 from poise.baselines.solvers import make_solver, residuals
 from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.baselines.whole_body.formulation import build, unknowns
-from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
+from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 from tests.support.shared import generic_state, robot

@@ -18,7 +18,7 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.plugins import PluginController
-from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.configs.errors import PoiseError
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.balance.vector.scheduler import StepSchedule

@@ -13,20 +13,34 @@ from rich.table import Table
 from poise.baselines.allowance import named
 from poise.training.benchmarking.diagnosis.words import told_losses
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
-from poise.training.motion.following.motion_tables import motion_tables
-from poise.training.running.summary import Entry, Interval, Summary
+from poise.training.running.columns import (
+    AT_REST,
+    ETA_MEAN,
+    ETA_WORST,
+    FAILURES,
+    GAIN,
+    HALF_AT,
+    J50_MEAN,
+    J50_WORST,
+    NEVER_FELL,
+    NONE,
+    PAIRED,
+    RECOVERED,
+    ROBUST,
+    STEPS_TAKEN,
+    Figure,
+    known,
+)
+from poise.training.running.summary import Entry, Summary
 from poise.training.running.terminal import BESIDE, in_parts
 
-from .walk_tables import walk_tables
+from .walk_tables import motion_tables, walk_tables
 
-NONE = "–"
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
-HALF_AT, P_VALUE, STEPS = "half at", "McNemar p", "steps, mean"
-FAILURES = "solver failures"  # this and those above are headings that are explained
+P_VALUE = "McNemar p"
 SEPARATED = 0.05  # p below which the trials separate two controllers
 SHOWN = 5  # lost trials of a controller that are listed
 IN_PAIRS = ("lost, won", P_VALUE)  # headings whose figures the table of pairs has
-BOUNDS = {None: "", "lower": "≥ ", "upper": "≤ "}
 
 
 def ranked(entries: Mapping[str, Entry]) -> list[str]:
@@ -85,7 +99,7 @@ def print_summary(summary: Summary, console: Console) -> None:
         table.add_column("#", justify="right")
         table.add_column("controller", overflow="fold", width=named)
         for heading, width in part.items():
-            table.add_column(heading, justify="right", overflow="fold", width=width)
+            table.add_column(escape(heading), justify="right", overflow="fold", width=width)
         for name, row in zip(names, zip(*(cells[h] for h in part), strict=True), strict=True):
             table.add_row(str(rank[name] or NONE), escape(name), *row)
         console.print(table)
@@ -105,14 +119,14 @@ def print_summary(summary: Summary, console: Console) -> None:
 def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     """What the tables' words mean, of those that are there."""
     notes = []
-    if any(heading.startswith(HALF_AT) for heading in headings):
-        notes.append(f"{HALF_AT}: half of the pushes that are this fraction of the "
+    if any(heading.startswith(HALF_AT.name) for heading in headings):
+        notes.append(f"{HALF_AT.name}: half of the pushes that are this fraction of the "
                      f"{summary['scale']} are recovered; larger is better")  # fmt: skip
-    if STEPS in headings:
-        notes.append(f"{STEPS}: of all trials, those that were lost too")
+    if STEPS_TAKEN.heading in headings:
+        notes.append(f"{STEPS_TAKEN.heading}: of all trials, those that were lost too")
     of_won = [e.get("solver_failures_recovered") for e in summary["controllers"].values()]
-    if FAILURES in headings and None not in of_won:  # results of old have none
-        notes.append(f"{FAILURES}: ticks of all trials, also of robots that were falling; "
+    if FAILURES.heading in headings and None not in of_won:  # results of old have none
+        notes.append(f"{FAILURES.heading}: ticks of all trials, also of robots that were falling; "
                      f"{sum(filter(None, of_won))} in trials that were recovered")  # fmt: skip
     p_values = [pair["p_mcnemar"] for pair in summary["pairs"] if "p_mcnemar" in pair]
     if p_values:
@@ -156,16 +170,8 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
     pairs = {p["b"]: p for p in summary["pairs"] if p["a"] == summary["reference"]}
     of_mix = f" of the {summary['rated']}" if summary["rated"] else ""
 
-    def figure(form: Callable[[Entry], str]) -> Callable[[str], str]:
-        """A text of the entry, where it has the keys."""
-
-        def text(name: str) -> str:
-            try:
-                return form(entries[name])
-            except KeyError:
-                return NONE
-
-        return text
+    def column(figure: Figure, name: str = "") -> tuple[str, Callable[[str], str]]:
+        return name or figure.heading, lambda name: figure.text(entries[name])
 
     def lost(name: str) -> str:
         pair = pairs.get(name)
@@ -176,32 +182,21 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         return f"{pair['p_mcnemar']:.2g}" if pair and "p_mcnemar" in pair else NONE
 
     return [
-        ("mean J50 [N·s]", figure(
-            lambda e: with_range(e["j50_mean"], e["j50_mean_ci95"], ".1f") + _bounds(e))),
-        ("worst J50", figure(lambda e: f"{e['j50_min']:.1f}")),
-        ("η mean", figure(lambda e: with_range(e["eta_mean"], e["eta_mean_ci95"], ".2f"))),
-        ("η worst", figure(lambda e: f"{e['eta_min']:.2f}")),
-        (f"{HALF_AT}, of {summary['scale']}", figure(
-            lambda e: f"{BOUNDS[e['fraction50_bound']]}{e['fraction50']:.2f}")),
-        (f"recovered{of_mix}", figure(
-            lambda e: with_range(e["recovered_rate"], e["recovered_ci95"], ".0%"))),
-        ("never fell", figure(_never_fell)),
+        (J50_MEAN.heading, lambda name: j50_mean_text(entries[name])),
+        *map(column, (J50_WORST, ETA_MEAN, ETA_WORST)),
+        column(HALF_AT, f"{HALF_AT.name}, of {summary['scale']}"),
+        column(RECOVERED, f"{RECOVERED.name}{of_mix}"),
+        column(NEVER_FELL),
         ("lost, won", lost),
         (P_VALUE, p_value),
-        ("CoM drift [mm]", figure(lambda e: _number(e["com_drift_max"], ".1f", 1000.0))),
-        ("feet drift [mm]", figure(lambda e: _number(e["foot_drift_max"], ".1f", 1000.0))),
-        ("lean at the end [°]", figure(lambda e: _number(e["unpushed_lean_max"], ".2f"))),
-        ("power [W]", figure(lambda e: _at_rest(e, e["mean_power_median"], ".0f"))),
-        ("chatter [1/s]", figure(lambda e: _at_rest(e, e["torque_variation_median"], ".2f"))),
-        (STEPS, figure(lambda e: _number(e["steps_mean"] or None, ".1f"))),
-        ("of one-step limit", figure(lambda e: f"{e['step_share_1_mean']:.2f}")),
-        (FAILURES, figure(lambda e: f"{e['solver_failures'] or NONE}")),
-        ("of them in recoveries", figure(
-            lambda e: f"{e['solver_failures_recovered']}" if e["solver_failures"] else NONE)),
-        ("mean |action|", figure(lambda e: _number(e["mean_abs_action"] or None, ".3f"))),
-        ("root [N]", figure(lambda e: _number(e["root_force_max"], ".0f"))),
-        ("tick [µs]", figure(lambda e: _number(e["tick_us"], ".0f"))),
-    ]  # fmt: skip
+        *map(column, (*AT_REST, STEPS_TAKEN, *ROBUST)),
+    ]
+
+
+def j50_mean_text(entry: Entry) -> str:
+    """With a mark where the pushes did not reach from recovery to fall in every direction."""
+    bounded = entry.get("j50_bounded")
+    return J50_MEAN.text(entry) + (f" ({bounded} bounds)" if bounded else "")
 
 
 def _pairs(summary: Summary, width: int) -> Table:
@@ -211,44 +206,14 @@ def _pairs(summary: Summary, width: int) -> Table:
     table.add_column(
         "b against a", overflow="fold", width=_room(titles, min(max(width - 60, 16), 34))
     )
-    gain = any("j50_gain" in pair for pair in summary["pairs"])
-    names = ["both", "only a (lost)", "only b (won)", "neither", P_VALUE]
-    for name in names + (["J50 gain [95 %]"] if gain else []):
-        table.add_column(name, justify="right", overflow="fold")
+    gain = known([GAIN], summary["pairs"])
+    for heading in (*(each.heading for each in PAIRED), P_VALUE, *(each.heading for each in gain)):
+        table.add_column(escape(heading), justify="right", overflow="fold")
     for title, pair in zip(titles, summary["pairs"], strict=True):
-        cells = [str(pair.get(key, NONE)) for key in ("both", "only_a", "only_b", "neither")]
-        cells.append(_number(pair.get("p_mcnemar"), ".2g"))
-        if gain:
-            cells.append(with_range(pair.get("j50_gain"), pair.get("j50_gain_ci95"), "+.1%"))
-        table.add_row(escape(title), *cells)
+        cells = [each.text(pair) for each in PAIRED]
+        cells.append(f"{pair['p_mcnemar']:.2g}" if "p_mcnemar" in pair else NONE)
+        table.add_row(escape(title), *cells, *(escape(each.text(pair)) for each in gain))
     return table
-
-
-def with_range(value: float | None, interval: Interval | None, form: str) -> str:
-    """A value with its interval."""
-    low, high = (_number(end, form) for end in interval or (None, None))
-    return NONE if value is None else f"{value:{form}} [{low}, {high}]"
-
-
-def _never_fell(entry: Entry) -> str:
-    """Shown where falls are what is counted: neither J50 nor a fraction of a limit is fitted."""
-    if "j50_mean" in entry or "fraction50" in entry:
-        return NONE
-    return with_range(entry["never_fell_rate"], entry["never_fell_ci95"], ".1%")
-
-
-def _bounds(entry: Entry) -> str:
-    """A mark where the pushes did not reach from recovery to fall in every direction."""
-    return f" ({entry['j50_bounded']} bounds)" if entry["j50_bounded"] else ""
-
-
-def _number(value: float | None, form: str, scale: float = 1.0) -> str:
-    return NONE if value is None else format(scale * value, form)
-
-
-def _at_rest(entry: Entry, value: float | None, form: str) -> str:
-    """A figure of robots that stand: of pushed ones it says more of the pushes."""
-    return _number(value if entry["com_drift_max"] is not None else None, form)
 
 
 def _room(names: Iterable[str], most: int) -> int:

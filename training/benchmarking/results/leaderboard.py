@@ -9,9 +9,19 @@ from typing import Final
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.reading import is_folder
-from poise.configs.texts import code, plain
-from poise.training.benchmarking.evaluation.tables import places, ranked, table_columns
+from poise.configs.texts import code, markdown_table, plain
+from poise.training.benchmarking.evaluation.tables import IN_PAIRS, places, ranked, table_columns
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
+from poise.training.running.columns import (
+    ETA_MEAN,
+    ETA_WORST,
+    J50_MEAN,
+    J50_PER_MASS,
+    NONE,
+    RECOVERED,
+    ROOT,
+    TICK,
+)
 from poise.training.running.files import SUMMARY
 from poise.training.running.summary import Entry, Summary
 
@@ -33,8 +43,8 @@ Equal results share a rank. η is J50 over the robot's own ankle limit.
 
 
 HUMANOID: Final = "humanoid"  # whose page names no robot
-COLUMNS = ("mean J50 [N·s]", "η mean", "η worst", "recovered of the mix", "recovered", "lost, won",
-           "McNemar p", "root [N]", "tick [µs]")  # fmt: skip
+COLUMNS = {"recovered of the mix", *IN_PAIRS, *(each.heading for each in (
+    J50_MEAN, ETA_MEAN, ETA_WORST, RECOVERED, ROOT, TICK))}  # fmt: skip
 SAME: Final = (
     "suite",
     "seed",
@@ -141,14 +151,15 @@ def leaderboard(summaries: Mapping[str, Summary]) -> str:
         text += f"Played later, commit {code((other['commit'] or 'unknown')[:10])}, "
         text += f"{plain(other['machine']['processor'])}, {other['machine']['cores']} cores: "
         text += f"{names}.\n\n"
-    text += _table(*_ranked(summary))
+    text += markdown_table(*_ranked(summary))
     if lines := seed_lines(summary["seeds"]):
         text += "\n" + "\n".join(f"- {line}" for line in lines) + "\n"
-    directions = _directions(summary)
-    text += "\nη per direction (0° is forward, 90° left):\n\n" + _table(*directions)
+    text += "\nη per direction (0° is forward, 90° left):\n\n"
+    text += markdown_table(*_directions(summary))
     factors = _factors(summary)
     if factors is not None:
-        text += "\nRecovered rate per level of a factor, all else standard:\n\n" + _table(*factors)
+        text += "\nRecovered rate per level of a factor, all else standard:\n\n"
+        text += markdown_table(*factors)
     return text
 
 
@@ -160,11 +171,11 @@ def _ranked(summary: Summary) -> tuple[list[str], Cells]:
     columns = [
         (heading, text)
         for heading, text in table_columns(summary)
-        if heading in COLUMNS and (summary["rated"] or heading != "recovered")
+        if heading in COLUMNS and (summary["rated"] or heading != RECOVERED.heading)
     ]  # else each of its own pushes
-    columns.insert(1, ("N·s/kg", lambda name: f"{entries[name]['j50_mean_per_mass']:.2f}"))
+    columns.insert(1, (J50_PER_MASS.unit, lambda name: f"{entries[name]['j50_mean_per_mass']:.2f}"))
     rank = places(entries)
-    rows = [[str(rank[name] or "–"), code(name), *(text(name) for _, text in columns)]
+    rows = [[str(rank[name] or NONE), code(name), *(text(name) for _, text in columns)]
             for name in summary["ranking"]]  # fmt: skip
     return ["", "controller", *(heading for heading, _ in columns)], rows
 
@@ -192,12 +203,3 @@ def _factors(summary: Summary) -> tuple[list[str], Cells] | None:
             rates = (f"{cell['recovered_rate']:.0%}" for cell in here)
             rows.append([plain(factor["factor"]), f"{plain(level['level'])}{mark}", *rates])
     return (["factor", "level", *(code(name) for name in names)], rows) if rows else None
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [_line(head), "|" + "---|" * len(head), *(_line(row) for row in rows)]
-    return "\n".join(lines) + "\n"
-
-
-def _line(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

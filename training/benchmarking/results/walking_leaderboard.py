@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from poise.configs.errors import ConfigError
-from poise.configs.texts import code, plain
-from poise.training.benchmarking.evaluation.tables import assisted
+from poise.configs.texts import code, markdown_table, plain
+from poise.training.benchmarking.evaluation.tables import assisted, j50_mean_text
 from poise.training.benchmarking.statistics.rates import poisson_interval
-from poise.training.running.summary import Entry, Interval, Number, Summary, WalkLevel
+from poise.training.running.columns import (
+    COSTS,
+    FALLS,
+    FOLLOWED,
+    J50,
+    J50_MEAN,
+    J50_PER_MASS,
+    NONE,
+    STEPS,
+)
+from poise.training.running.summary import Entry, Summary, WalkLevel
 
 HEAD = """# Leaderboard of walks
 
@@ -21,7 +32,6 @@ A controller that took a force from nowhere has no rank.
 {j50}
 
 """
-NONE = "–"
 UNPUSHED, PUSHED = "walk", "walk_push"
 Cells = list[list[str]]
 
@@ -61,12 +71,13 @@ def walking_leaderboard(summaries: Mapping[str, Summary]) -> str:
         mujoco=plain(versions.get("mujoco")),
         j50=_pushed(entries),
     )
-    text += _table(*_ranking(entries, names))
+    text += markdown_table(*_ranking(entries, names))
     for command in commands:
-        text += f"\nCommand {command}:\n\n" + _table(*_walks(entries, names, command))
+        text += f"\nCommand {command}:\n\n" + markdown_table(*_walks(entries, names, command))
     directions = _directions(entries, names)
     if directions is not None:
-        text += "\nJ50 [N·s] per direction (0° is forward, 90° left):\n\n" + _table(*directions)
+        text += f"\n{J50.heading} per direction (0° is forward, 90° left):\n\n"
+        text += markdown_table(*directions)
     return text + "\n" + "".join(_played(each, summaries[each], origin) for each in summaries)
 
 
@@ -108,8 +119,8 @@ def _order(entry: Entry) -> tuple[bool, bool, float]:
 
 
 def _ranking(entries: Mapping[str, Entry], names: Sequence[str]) -> tuple[list[str], Cells]:
-    head = ["", "controller", "mean J50 [N·s]", "N·s/kg", "worst direction", "pushes recovered",
-            "fell unpushed", "falls a minute", "as told, unpushed"]  # fmt: skip
+    head = ["", "controller", J50_MEAN.heading, J50_PER_MASS.unit, "worst direction",
+            "pushes recovered", "fell unpushed", "falls a minute", "as told, unpushed"]  # fmt: skip
     shown = {name: format(entries[name]["j50_mean"], ".1f") for name in names
              if "j50_mean" in entries[name] and not assisted(entries[name])}  # fmt: skip
     rows = []
@@ -132,18 +143,11 @@ def _j50(entry: Entry) -> tuple[str, str, str]:
     if "j50_mean" not in entry:
         return NONE, NONE, NONE
     worst = min(entry["directions"], key=lambda each: each["j50"])
-    bounded = entry["j50_bounded"]
-    mean = f"{entry['j50_mean']:.1f} {_interval(entry['j50_mean_ci95'], '.1f')}"
     return (
-        mean + (f" ({bounded} bounds)" if bounded else ""),
+        j50_mean_text(entry),
         f"{entry['j50_mean_per_mass']:.2f}",
         f"{worst['j50']:.1f} ({worst['direction']:g}°)",
     )
-
-
-def _interval(ends: Interval, form: str) -> str:
-    low, high = (NONE if end is None else format(end, form) for end in ends)
-    return f"[{low}, {high}]"
 
 
 def _pushes(entry: Entry) -> str:
@@ -153,24 +157,10 @@ def _pushes(entry: Entry) -> str:
     return f"{sum(w['recovered'] for w in levels)} of {sum(w['trials'] for w in levels)}"
 
 
-def _figure(key: str, form: str) -> Callable[[WalkLevel], str]:
-    def text(level: WalkLevel) -> str:
-        value: Number = level.get(key)  # type: ignore[assignment]
-        return NONE if value is None else format(value, form)
-
-    return text
-
-
-WALKS: tuple[tuple[str, Callable[[WalkLevel], str]], ...] = (
-    ("fell", lambda level: f"{level['fallen']} of {level['trials']}"),
-    ("ahead [m/s]", _figure("speed_ahead", ".3f")),
-    ("RMS error [m/s]", _figure("speed_error_rms", ".3f")),
-    ("step [m]", _figure("step_length", ".2f")),
-    ("time [s]", _figure("step_time", ".2f")),
-    ("cost of transport", _figure("cost_of_transport", ".2f")),
-    ("of positive work", _figure("positive_cost_of_transport", ".2f")),
-    ("stance knee [N·m/kg]", _figure("knee_mean", ".2f")),
-)
+#: of a command; a page has room for two digits of steps
+WALKS = (FALLS[1], FOLLOWED[0], FOLLOWED[3], replace(STEPS[2], form=".2f"),
+         replace(STEPS[4], form=".2f"), *COSTS[:3])  # fmt: skip
+OF_DIRECTION = replace(J50, bound="")
 
 
 def _walks(
@@ -179,8 +169,8 @@ def _walks(
     rows = []
     for name in names:
         (level,) = (w for w in _levels(entries[name], UNPUSHED) if w["level"] == command)
-        rows.append([code(name), *(form(level) for _, form in WALKS)])
-    return ["controller", *(heading for heading, _ in WALKS)], rows
+        rows.append([code(name), *(each.text(level) for each in WALKS)])
+    return ["controller", *(each.heading for each in WALKS)], rows
 
 
 def _directions(
@@ -190,8 +180,7 @@ def _directions(
              for name in names}  # fmt: skip
     angles = sorted({angle for each in found.values() for angle in each})
     rows = [
-        [code(name), *(f"{each[a]['j50']:.1f} {_interval(each[a]['j50_ci95'], '.1f')}"
-                        if a in each else NONE for a in angles)]
+        [code(name), *(OF_DIRECTION.text(each[a]) if a in each else NONE for a in angles)]
         for name, each in found.items() if each
     ]  # fmt: skip
     return (["controller", *(f"{angle:g}°" for angle in angles)], rows) if rows else None
@@ -204,9 +193,3 @@ def _played(source: str, summary: Summary, origin: Mapping[str, str]) -> str:
     machine = summary["machine"]
     return (f"- {names}: commit {code((summary['commit'] or 'unknown')[:10])}, "
             f"{plain(machine['processor'])}, {machine['cores']} cores.\n")  # fmt: skip
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join("| " + " | ".join(c.replace("|", "\\|") for c in line) + " |\n"
-                   for line in lines)  # fmt: skip

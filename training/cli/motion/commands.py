@@ -10,7 +10,7 @@ import tyro
 from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
-from poise.baselines.motion.clips.names import ROLES
+from poise.baselines.motion.clips.roles import ROLES
 from poise.baselines.motion.space_time.retarget_clip import RetargetedClip
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file

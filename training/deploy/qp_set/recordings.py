@@ -13,7 +13,8 @@ from poise.baselines.controller import Targets
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import momentum_qp_config
 from poise.baselines.solvers import QP, make_solver
-from poise.baselines.whole_body.momentum_qp import MomentumQP, MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
+from poise.baselines.whole_body.momentum_qp import MomentumQP
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.state import RobotState

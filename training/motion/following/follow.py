@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from poise.baselines.balance.references.commanded import AHEAD, START, TURN
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.balance.references.reference_motion import ReferenceMotion
+from poise.baselines.balance.references.reference_motion import AHEAD, START, TURN, ReferenceMotion
 from poise.baselines.balance.references.tempo import Tempo
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import whole_number

@@ -6,13 +6,15 @@ import base64
 import csv
 import gzip
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 from markupsafe import Markup
 
-from poise.training.running.summary import Interval, both_ends
+from poise.training.benchmarking.results.read import Results
+from poise.training.running.columns import Entry, Figure, known
+from poise.training.running.summary import both_ends
 
 
 class Column(NamedTuple):
@@ -148,9 +150,50 @@ def name_cell(name: str, series: int) -> Cell:
     return Cell(name, name, series=series)
 
 
-def figure_cell(
-    entry: Mapping[str, object], key: str, form: str, ends_key: str = "", sign: str = ""
-) -> Cell:
-    """A figure of a summary's entry, with its interval; empty where the entry has none."""
-    value = cast("float | None", entry.get(key))
-    return cell(value, form, both_ends(cast("Interval | None", entry.get(ends_key))), sign)
+def figure_column(figure: Figure) -> Column:
+    """The column of a figure."""
+    return Column(figure.csv or figure.key, figure.heading, figure.words, bool(figure.ends))
+
+
+def figure_cell(figure: Figure, entry: Entry) -> Cell:
+    """A figure of an entry with its interval: in full, and as it is shown."""
+    value, ends, scale = figure.value(entry), both_ends(figure.interval(entry)), figure.scale
+    if value is None:
+        return cell(None)
+    around = (scale * ends[0], scale * ends[1]) if ends else None
+    shown = cell(scale * value, figure.form, around, figure.sign(entry))
+    return shown._replace(value=value, ends=ends)
+
+
+def figure_table(
+    results: Results,
+    order: Sequence[str],
+    key: str,
+    table: Table,
+    figures: Sequence[Figure],
+    first: Callable[[Any], list[Cell]],
+) -> Table | None:
+    """A table of the entries that the controllers have under `key`; None without any.
+
+    Args:
+        results, order: the controllers, in this order.
+        key: of a list of entries of a controller, such as "walks".
+        table: name, caption, and the columns between the controller and the figures.
+        figures: the columns after them; those that no entry has are left out.
+        first: the cells of the table's own columns, from an entry.
+    """
+    rows = [
+        (name, entry)
+        for name in order
+        for entry in cast(Sequence[Entry], results.summary["controllers"][name].get(key, ()))
+    ]
+    shown = known(figures, [entry for _, entry in rows])
+    if not shown:
+        return None
+    columns = [Column("controller", "controller"), *table.columns, *map(figure_column, shown)]
+    cells = [
+        [name_cell(name, results.controllers.index(name)), *first(entry),
+         *(figure_cell(each, entry) for each in shown)]
+        for name, entry in rows
+    ]  # fmt: skip
+    return Table(table.name, table.caption, columns, cells)

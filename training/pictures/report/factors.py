@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TypedDict, cast
 
 from markupsafe import Markup
@@ -13,9 +13,10 @@ from poise.training.pictures.figures.envelope import right_angle
 from poise.training.pictures.figures.rates import level_curves, level_text
 from poise.training.pictures.figures.series import rate_series
 from poise.training.pictures.figures.style import Inline
-from poise.training.running.summary import Level, MarginFigures, both_ends
+from poise.training.running.columns import MARGINS, RECOVERED, SWAY, TRIED, Entry, Figure
+from poise.training.running.summary import Level, MarginFigures
 
-from .cells import Cell, Column, Table, cell, figure_cell, name_cell, p_cell
+from .cells import Cell, Column, Table, cell, figure_cell, figure_column, name_cell, p_cell
 
 TITLES = {
     "duration": "duration of the push [s]",
@@ -80,14 +81,12 @@ def factor_plots(results: Results, order: Sequence[str]) -> list[FactorPlot]:
 def factor_table(results: Results) -> Table | None:
     """Every level of every factor; None without factors."""
     columns = [
-        Column("controller", "Controller"),
-        Column("factor", "Factor"),
-        Column("level", "Level"),
-        Column("trials", "Trials"),
-        Column("recovered", "Recovered"),
-        Column("recovered_rate", "Rate", interval=True),
-        Column("lost", "Lost", "against the standard case"),
-        Column("won", "Won", "against the standard case"),
+        Column("controller", "controller"),
+        Column("factor", "factor"),
+        Column("level", "level"),
+        *map(figure_column, (*TRIED, RECOVERED)),
+        Column("lost", "lost", "against the standard case"),
+        Column("won", "won", "against the standard case"),
         Column("p_mcnemar", "p", "McNemar's exact test"),
     ]
     rows = [
@@ -96,9 +95,7 @@ def factor_table(results: Results) -> Table | None:
             Cell(factor, factor),
             Cell(level["level"], level_text(level["level"])
                  + (" (standard)" if level["standard"] else "")),
-            cell(level["trials"], "d"),
-            cell(level["recovered"], "d"),
-            cell(level["recovered_rate"], ".0%", both_ends(level["recovered_ci95"])),
+            *(figure_cell(each, level) for each in (*TRIED, RECOVERED)),
             cell(level["lost"], "d"),
             cell(level["won"], "d"),
             p_cell(level["p_mcnemar"]),
@@ -113,7 +110,7 @@ def sensitivity(results: Results, order: Sequence[str]) -> Table | None:
     """The largest loss of each controller by each factor; None without factors."""
     found = factor_levels(results)
     factors = list(dict.fromkeys(factor for _, factor, _ in found))
-    columns = [Column("controller", "Controller"), Column("standard", "Standard case")]
+    columns = [Column("controller", "controller"), Column("standard", "standard case")]
     columns += [Column(f, f.replace("_", " "), TITLES.get(f, "")) for f in factors]
     rows = []
     for name in order:
@@ -146,33 +143,26 @@ def indicators(results: Results, order: Sequence[str]) -> Table | None:
     }
     angles = list(dict.fromkeys(angle for own in margins.values() for angle in own))
     columns = [
-        Column("controller", "Controller"),
-        Column("body_sway_mean", "Body sway [rad]", "mean over recovered standard pushes"),
-        Column("recovery_time_mean", "Recovery time [s]", "until the sway stays below 0.015 rad/s"),
-        Column("recovery_time_trials", "of trials", "that came to rest by this measure"),
+        Column("controller", "controller"),
+        *map(figure_column, SWAY),
     ]
     for angle in angles:
-        to, key = right_angle(angle), f"margin_{angle:g}"
         columns += [
-            Column(f"{key}_force", f"Margin {to} [N]", "largest with < 30 % falls in 10 runs"),
-            Column(f"{key}_force_normalised", "at human size [N]", f"margin {to}, normalised"),
-            Column(f"{key}_energy_normalised", "energy [J]", f"margin {to}, normalised"),
+            Column(
+                f"margin_{angle:g}_{each.key}", f"{each.heading}, {right_angle(angle)}", each.words
+            )
+            for each in MARGINS
         ]
     rows = []
     for name in order:
         found = entries[name]["eurobench"]
         row = [
             name_cell(name, results.controllers.index(name)),
-            figure_cell(found, "body_sway_mean", ".3f"),
-            figure_cell(found, "recovery_time_mean", ".2f"),
-            figure_cell(found, "recovery_time_trials", "d"),
+            *(figure_cell(each, found) for each in SWAY),
         ]
         for angle in angles:
             margin = margins[name].get(angle, MarginFigures(direction=angle))
-            sign = "≥ " if margin.get("largest_tried") else ""
-            for key in ("force", "force_normalised", "energy_normalised"):
-                form = ".1f" if "energy" in key else ".0f"
-                row.append(figure_cell(margin, key, form, sign=sign))
+            row += [figure_cell(each, margin) for each in MARGINS]
         rows.append(row)
     caption = "Indicators of simulated subjects, as EUROBENCH's protocols define them."
     return Table("indicators", caption, columns, rows).without_empty() if rows else None
@@ -180,18 +170,19 @@ def indicators(results: Results, order: Sequence[str]) -> Table | None:
 
 def seed_table(results: Results) -> Table | None:
     """Interquartile means over training seeds and the worst seed; None without groups of seeds."""
-    columns = [Column("name", "Runs"), Column("seeds", "Seeds")]
-    for key, title, _ in FIGURES:
-        columns += [
-            Column(f"{key}_iqm", f"{title}, IQM", "interquartile mean over seeds", interval=True),
-            Column(f"{key}_worst", "worst seed", "the smallest value of a seed"),
-        ]
+    columns = [Column("name", "runs"), Column("seeds", "seeds")]
+    figures = {key: (
+        Figure("iqm", f"{title}, IQM", form, words="interquartile mean over seeds",
+               ends="iqm_ci95", csv=f"{key}_iqm"),
+        Figure("worst", "worst seed", form, words="the smallest value of a seed",
+               csv=f"{key}_worst"),
+    ) for key, title, form in FIGURES}  # fmt: skip
+    columns += [figure_column(each) for pair in figures.values() for each in pair]
     rows = []
     for group in results.summary["seeds"]:
         row = [Cell(group["name"], group["name"]), cell(len(group["seeds"]), "d")]
-        for key, _, form in FIGURES:
-            found = cast(Mapping[str, object], group.get(key, {}))
-            row += [figure_cell(found, "iqm", form, "iqm_ci95"), figure_cell(found, "worst", form)]
+        for key, pair in figures.items():
+            row += [figure_cell(each, cast(Entry, group.get(key, {}))) for each in pair]
         rows.append(row)
     if not rows:
         return None
@@ -201,10 +192,10 @@ def seed_table(results: Results) -> Table | None:
 def error_table(results: Results) -> Table | None:
     """Trials in which a controller raised; None without any."""
     columns = [
-        Column("controller", "Controller"),
-        Column("trial", "Trial"),
-        Column("seed", "Seed"),
-        Column("error", "Error"),
+        Column("controller", "controller"),
+        Column("trial", "trial"),
+        Column("seed", "seed"),
+        Column("error", "error"),
     ]
     rows = [
         [

@@ -23,7 +23,7 @@ from poise.training.pictures.figures.time_series import signal_keys, trial_times
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
 from poise.training.running.terminal import print_paths
 
-from . import factors, motions, plots, walking, words
+from . import factors, plots, walking, words
 from . import tables as report_tables
 from .cells import Download, download
 from .worst_trials import (
@@ -100,8 +100,8 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         "walks": walking.walk_table(results, order),
         "walk_costs": walking.cost_table(results, order),
         "phases": walking.phase_table(results, order),
-        "motions": motions.motion_table(results, order),
-        "in_motion": motions.in_motion_table(results, order),
+        "motions": walking.motion_table(results, order),
+        "in_motion": walking.in_motion_table(results, order),
         "smallest": report_tables.smallest(results, order),
         "losses": report_tables.losses(results, order),
     }

@@ -4,18 +4,47 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast
 
-from poise.training.benchmarking.evaluation.tables import BOUNDS, places
+from poise.training.benchmarking.evaluation.tables import places
 from poise.training.benchmarking.results.read import Results
-from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.running.columns import (
+    AIMED,
+    ERRORS,
+    ETA_MEAN,
+    ETA_WORST,
+    FAILURES,
+    FAILURES_RECOVERED,
+    FALLS,
+    GAIN,
+    HALF_AT,
+    J50_BOUNDED,
+    J50_MEAN,
+    J50_PER_MASS,
+    J50_WORST,
+    PAIRED,
+    RECOVERED,
+    ROOT,
+    TICK,
+    TRIED,
+)
 from poise.training.running.summary import Bound, Direction, Sector
 
-from .cells import Cell, Column, Table, cell, figure_cell, name_cell, p_cell
+from .cells import (
+    Cell,
+    Column,
+    Table,
+    cell,
+    figure_cell,
+    figure_column,
+    figure_table,
+    name_cell,
+    p_cell,
+)
 from .worst_trials import smallest_lost
 
 SMALLEST = 3  # pushes listed for each controller
-STEP_LIMITS = {"1": "1-step limit", "2": "2-step limit", "inf": "∞-step limit"}
 
 
 def ranking(results: Results, baseline: str) -> Table:
@@ -24,57 +53,33 @@ def ranking(results: Results, baseline: str) -> Table:
     scale = results.summary["scale"]
     against, rated = _against(results, baseline), results.summary["rated"]
     mix = f" of the {rated}" if rated else ""
+    half = replace(HALF_AT, words=f"half of the trials survive, of the {scale}")
+    rate = replace(RECOVERED, words=f"fraction of all trials{mix}")
+    found = (J50_MEAN, J50_PER_MASS, J50_WORST, J50_BOUNDED, ETA_MEAN, ETA_WORST, half, rate,
+             replace(TRIED[0], words=f"that the rate is of{mix}"))  # fmt: skip
+    others = (FALLS[1], ERRORS, FAILURES, FAILURES_RECOVERED, TICK, ROOT)
     columns = [
         Column("rank", "#", "by mean J50, else by the fraction of the limit, else by rate"),
-        Column("controller", "Controller"),
-        Column("j50_mean", "J50 [N·s]", "impulse that half of the trials survive, mean over "
-               "directions", interval=True),
-        Column("j50_per_mass", "J50/m [N·s/kg]", "the same over the robot's mass"),
-        Column("j50_worst", "J50 worst [N·s]", "in the worst direction"),
-        Column("j50_bounds", "Bounds", "directions in which J50 is only a bound"),
-        Column("eta_mean", "η mean", "J50 over the ankle limit, mean of all", interval=True),
-        Column("eta_worst", "η worst", "in the worst direction"),
-        Column("fraction50", "Half at", f"half of the trials survive, of the {scale}"),
-        Column("recovered_rate", "Recovered", f"fraction of all trials{mix}", interval=True),
-        Column("trials", "Trials", f"that the rate is of{mix}"),
-        Column("lost", "Lost", f"trials that {baseline} recovers and this controller does not"),
-        Column("won", "Won", f"trials that this controller recovers and {baseline} does not"),
+        Column("controller", "controller"),
+        *map(figure_column, found),
+        Column("lost", "lost", f"trials that {baseline} recovers and this controller does not"),
+        Column("won", "won", f"trials that this controller recovers and {baseline} does not"),
         Column("p_mcnemar", "p", "McNemar's exact test of lost against won"),
-        Column("fallen", "Falls", "trials that ended on the ground"),
-        Column("errors", "Errors", "trials in which the controller raised an error"),
-        Column("solver_failures", "QP failures", "control ticks at which the QP was not solved"),
-        Column("solver_failures_recovered", "of them in recoveries", "in trials that recovered"),
-        Column("tick_us", "Tick [µs]", "time of one control tick"),
-        Column("root_force_max", "Root [N]", "largest force that a soft root took from nowhere"),
-    ]  # fmt: skip
+        *map(figure_column, others),
+    ]
     rows = []
     rank = places(results.summary["controllers"])
     for name in ranked:
         entry = results.summary["controllers"][name]
         lost, won, p = against.get(name, (None, None, None))
-        bound = BOUNDS.get(entry.get("fraction50_bound"), "")
         rows.append([
             cell(rank[name], "d"),
             name_cell(name, order.index(name)),
-            figure_cell(entry, "j50_mean", ".1f", "j50_mean_ci95"),
-            figure_cell(entry, "j50_mean_per_mass", ".3f"),
-            figure_cell(entry, "j50_min", ".1f"),
-            cell(entry.get("j50_bounded") or None, "d"),
-            figure_cell(entry, "eta_mean", ".2f", "eta_mean_ci95"),
-            figure_cell(entry, "eta_min", ".2f"),
-            figure_cell(entry, "fraction50", ".2f", sign=bound),
-            cell(entry["recovered_rate"], ".1%",
-                 wilson_interval(entry["recovered"], entry["trials"])),
-            cell(entry["trials"], "d"),
+            *(figure_cell(each, entry) for each in found),
             cell(lost, "d"),
             cell(won, "d"),
             p_cell(p),
-            figure_cell(entry, "fallen", "d"),
-            cell(entry["errors"] or None, "d"),
-            figure_cell(entry, "solver_failures", "d"),
-            figure_cell(entry, "solver_failures_recovered", "d"),
-            figure_cell(entry, "tick_us", ".0f"),
-            cell(entry.get("root_force_max") or None, ".0f"),
+            *(figure_cell(each, entry) for each in others),
         ])  # fmt: skip
     caption = f"Controllers, the best first. Lost and won are counted against {baseline}."
     if rated:
@@ -87,58 +92,29 @@ def pairs(results: Results) -> Table:
     columns = [
         Column("b", "b"),
         Column("a", "against a"),
-        Column("both", "Both", "recovered by both"),
-        Column("only_a", "Only a", "lost by b"),
-        Column("only_b", "Only b", "won by b"),
-        Column("neither", "Neither"),
+        *map(figure_column, PAIRED),
         Column("p_mcnemar", "p", "McNemar's exact test"),
-        Column("j50_gain", "J50 gain", "of b over a, relative", interval=True),
+        figure_column(GAIN),
     ]
     rows, order = [], results.controllers
     for pair in results.summary["pairs"]:
         rows.append([
             *(name_cell(name, order.index(name)) for name in (pair["b"], pair["a"])),
-            *(figure_cell(pair, key, "d") for key in ("both", "only_a", "only_b", "neither")),
+            *(figure_cell(each, pair) for each in PAIRED),
             p_cell(pair.get("p_mcnemar")),
-            figure_cell(pair, "j50_gain", "+.1%", "j50_gain_ci95"),
+            figure_cell(GAIN, pair),
         ])  # fmt: skip
     return Table("pairs", "All pairs on the same trials.", columns, rows).without_empty()
 
 
 def directions(results: Results) -> Table | None:
     """J50 or the fraction of the limit in every direction; None where no suite measured it."""
-    columns = [
-        Column("controller", "Controller"),
-        Column("direction", "Direction [°]", "counter-clockwise from forward"),
-        Column("trials", "Trials"),
-        Column("recovered", "Recovered"),
-        Column("j50", "J50 [N·s]", interval=True),
-        Column("j90", "J90 [N·s]", interval=True),
-        Column("fraction50", "Half at", "fraction of the limit", interval=True),
-        Column("ankle_limit", "Ankle limit [N·s]"),
-        Column("eta", "η"),
-    ]
-    for name, title in STEP_LIMITS.items():
-        columns.append(Column(f"step_limit_{name}", title, "of a pendulum that steps [N·s]"))
-        columns.append(Column(f"step_share_{name}", "of it", "fraction of that limit that J50 is"))
-    rows: list[list[Cell]] = []
-    for name, index, entry in per_direction(results):
-        bound = BOUNDS[bound_of(entry)]
-        rows.append([
-            name_cell(name, index),
-            *(figure_cell(entry, key, "g") for key in ("direction", "trials", "recovered")),
-            figure_cell(entry, "j50", ".1f", "j50_ci95", bound),
-            figure_cell(entry, "j90", ".1f", "j90_ci95"),
-            figure_cell(entry, "fraction50", ".2f", "fraction50_ci95", bound),
-            figure_cell(entry, "ankle_limit", ".1f"),
-            figure_cell(entry, "eta", ".2f"),
-        ])  # fmt: skip
-        for key in STEP_LIMITS:
-            fraction = figure_cell(entry, f"step_share_{key}", ".2f", sign=bound)
-            rows[-1] += [figure_cell(entry, f"step_limit_{key}", ".1f"), fraction]
-    if not rows:
-        return None
-    return Table("directions", "Every direction.", columns, rows).without_empty()
+    entries = results.summary["controllers"].values()
+    key = "directions" if any(entry.get("directions") for entry in entries) else "sectors"
+    columns = [Column("direction", "direction [°]", "counter-clockwise from forward")]
+    table = Table("directions", "Every direction.", columns, [])
+    return figure_table(results, results.controllers, key, table, (*TRIED, *AIMED),
+                        lambda entry: [cell(entry["direction"], "g")])  # fmt: skip
 
 
 def per_direction(results: Results) -> list[tuple[str, int, Direction | Sector]]:
@@ -172,9 +148,9 @@ def _against(results: Results, baseline: str) -> dict[str, tuple[int, int, float
 def losses(results: Results, order: Sequence[str]) -> Table | None:
     """How often what was the cause of a loss; None in older results, and where nothing was lost."""
     columns = [
-        Column("controller", "Controller"),
-        Column("trials", "Losses"),
-        Column("cause", "Cause"),
+        Column("controller", "controller"),
+        Column("trials", "losses"),
+        Column("cause", "cause"),
     ]
     rows = [
         [name_cell(name, results.controllers.index(name)), cell(loss["trials"], "d"),
@@ -189,15 +165,15 @@ def losses(results: Results, order: Sequence[str]) -> Table | None:
 def smallest(results: Results, order: Sequence[str]) -> Table:
     """The smallest pushes that each controller did not recover."""
     columns = [
-        Column("controller", "Controller"),
-        Column("trial", "Trial", "its number in trials.csv"),
-        Column("limit_fraction", "Push", "fraction of the limit"),
-        Column("impulse", "Impulse [N·s]"),
-        Column("direction", "Direction [°]", "counter-clockwise from forward"),
-        Column("duration", "Duration [s]"),
-        Column("body", "Body"),
-        Column("fall_time", "Fell at [s]", "after the reset; none: stood, but not quiet"),
-        Column("why", "Why"),
+        Column("controller", "controller"),
+        Column("trial", "trial", "its number in trials.csv"),
+        Column("limit_fraction", "push", "fraction of the limit"),
+        Column("impulse", "impulse [N·s]"),
+        Column("direction", "direction [°]", "counter-clockwise from forward"),
+        Column("duration", "duration [s]"),
+        Column("body", "body"),
+        Column("fall_time", "fell at [s]", "after the reset; none: stood, but not quiet"),
+        Column("why", "why"),
     ]
     rows = []
     for name in order:

@@ -18,10 +18,9 @@ from poise.training.pictures.sessions.mouse import Pull
 from poise.training.pictures.sessions.pace import Pace
 from poise.training.pictures.sessions.spec import SessionSpec, Spec, TrialSpec, read_link
 
-from .pages import Pages
+from .pages import Pages, send_films, send_picture
 from .panel import OPACITY, Panel, Wishes, status
 from .plots import Plots
-from .saving import send_films, send_picture
 from .stage import BACKGROUND, Stage, set_look
 from .walking import Throttle
 

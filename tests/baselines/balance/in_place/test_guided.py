@@ -8,7 +8,7 @@ from poise.baselines.balance.in_place.capture_point import CapturePoint, Capture
 from poise.baselines.balance.in_place.lip_mpc import LIPMPC, LIPMPCConfig
 from poise.baselines.balance.in_place.lqr_lip import LQRLIP, lqr_gain
 from poise.baselines.controller import Targets
-from poise.baselines.whole_body.momentum_qp import MomentumQPConfig
+from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.envs.compiled.maths.pendulum import lip_step
 from poise.envs.compiled.maths.polygons import half_planes
 from poise.envs.physics.simulation import Simulation

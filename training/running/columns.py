@@ -1,0 +1,260 @@
+"""What the figures of a result are called and how they are written, in every table of it.
+
+The terminal, the leaderboard (Markdown) and the report (HTML and CSV) take names, units, digits and
+words from here. `summary.json` and the CSV files have the figures in SI units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from .summary import Interval
+
+NONE = "–"
+#: what a figure is only a bound of, or whether it is one from below → before it
+SIGNS = {None: "", "lower": "≥ ", "upper": "≤ ", True: "≥ ", False: ""}
+Entry = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a result's entries.
+
+    Attributes:
+        key: in the entry.
+        name, unit: of it; people read both.
+        form: format in which it is written.
+        words: what it means.
+        scale: SI units times this are `unit`.
+        ends: key of its 95 % interval.
+        of: key of the count that it is a part of; the terminal then says "2 of 9".
+        bound: key of what it is only a bound of.
+        csv: its name in the report's CSV files, where it is not `key`.
+        where: whether an entry is one that the figure says something of; not given: all are.
+    """
+
+    key: str
+    name: str
+    form: str
+    unit: str = ""
+    words: str = ""
+    scale: float = 1.0
+    ends: str = ""
+    of: str = ""
+    bound: str = ""
+    csv: str = ""
+    where: Callable[[Entry], object] | None = None
+
+    @property
+    def heading(self) -> str:
+        """Name and unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    def value(self, entry: Entry) -> float | None:
+        """The figure in SI units; None where the entry has none."""
+        if self.where is not None and not self.where(entry):
+            return None
+        return cast("float | None", entry.get(self.key))
+
+    def interval(self, entry: Entry) -> Interval | None:
+        """Its 95 % interval in SI units."""
+        return cast("Interval | None", entry.get(self.ends)) if self.ends else None
+
+    def sign(self, entry: Entry) -> str:
+        """≥ or ≤ where it is only a bound."""
+        return SIGNS[entry.get(self.bound)] if self.bound else ""
+
+    def text(self, entry: Entry) -> str:
+        """With sign and interval, as the terminal has it; "–" where there is none."""
+        value = self.value(entry)
+        if value is None:
+            return NONE
+        text = f"{self.sign(entry)}{self.scale * value:{self.form}}"
+        if not self.ends:
+            return f"{text} of {entry[self.of]}" if self.of else text
+        return f"{text} {self.range(entry)}"
+
+    def range(self, entry: Entry) -> str:
+        """The interval as the terminal has it, with "–" for an end that is not known."""
+        ends = self.interval(entry) or (None, None)
+        low, high = (NONE if end is None else f"{self.scale * end:{self.form}}" for end in ends)
+        return f"[{low}, {high}]"
+
+
+def known(figures: Sequence[Figure], entries: Sequence[Entry]) -> list[Figure]:
+    """Those that any of the entries has."""
+    return [each for each in figures if any(each.text(entry) != NONE for entry in entries)]
+
+
+def _some(key: str, zero: bool = False) -> Callable[[Entry], bool]:
+    """Whether an entry has this figure; without `zero`, one that is not 0."""
+    return lambda entry: entry.get(key) is not None and (zero or entry[key] != 0)
+
+
+def _mm(key: str, name: str, words: str, form: str = ".1f") -> Figure:
+    return Figure(key, name, form, "mm", words, 1e3)
+
+
+TRIED = (Figure("trials", "trials", ".0f"), Figure("recovered", "recovered", ".0f"))
+J50 = Figure("j50", "J50", ".1f", "N·s", "impulse that half of the trials survive",
+             ends="j50_ci95", bound="j50_bound")  # fmt: skip
+
+# of a controller
+J50_MEAN = Figure("j50_mean", "mean J50", ".1f", "N·s",
+                  "impulse that half of the trials survive, mean over directions",
+                  ends="j50_mean_ci95")  # fmt: skip
+J50_PER_MASS = Figure("j50_mean_per_mass", "J50/m", ".3f", "N·s/kg",
+                      "the same over the robot's mass", csv="j50_per_mass")  # fmt: skip
+J50_WORST = Figure("j50_min", "worst J50", ".1f", "N·s", "in the worst direction",
+                   csv="j50_worst")  # fmt: skip
+J50_BOUNDED = Figure("j50_bounded", "bounds", ".0f", words="directions where J50 is only a bound",
+                     csv="j50_bounds", where=_some("j50_bounded"))  # fmt: skip
+ETA_MEAN = Figure("eta_mean", "η mean", ".2f", words="J50 over the ankle limit, mean of all",
+                  ends="eta_mean_ci95")  # fmt: skip
+ETA_WORST = Figure("eta_min", "η worst", ".2f", words="in the worst direction", csv="eta_worst")
+HALF_AT = Figure("fraction50", "half at", ".2f", words="half of the pushes of this fraction of the "
+                 "limit are recovered", bound="fraction50_bound")  # fmt: skip
+RECOVERED = Figure("recovered_rate", "recovered", ".0%", words="fraction of all trials",
+                   ends="recovered_ci95")  # fmt: skip
+ERRORS = Figure("errors", "errors", ".0f", words="trials in which a controller raised an error",
+                where=_some("errors"))  # fmt: skip
+FAILURES = Figure("solver_failures", "solver failures", ".0f", words="ticks at which no QP was "
+                  "solved", where=_some("solver_failures"))  # fmt: skip
+STEPS_TAKEN = Figure("steps_mean", "steps, mean", ".1f", where=_some("steps_mean"))
+NEVER_FELL = Figure("never_fell_rate", "never fell", ".1%", ends="never_fell_ci95",
+                    where=lambda e: "j50_mean" not in e and "fraction50" not in e)  # fmt: skip
+AT_REST = (
+    _mm("com_drift_max", "CoM drift", "largest"),
+    _mm("foot_drift_max", "feet drift", "largest"),
+    Figure("unpushed_lean_max", "lean at the end", ".2f", "°"),
+    # of pushed robots these two say more of the pushes
+    Figure("mean_power_median", "power", ".0f", "W", where=_some("com_drift_max", zero=True)),
+    Figure("torque_variation_median", "chatter", ".2f", "1/s",
+           where=_some("com_drift_max", zero=True)),
+)  # fmt: skip
+FAILURES_RECOVERED = Figure("solver_failures_recovered", "of them in recoveries", ".0f",
+                            words="in trials that recovered",
+                            where=_some("solver_failures"))  # fmt: skip
+ROOT = Figure("root_force_max", "root", ".0f", "N",
+              "largest force that a soft root took from nowhere")  # fmt: skip
+TICK = Figure("tick_us", "tick", ".0f", "µs", "time of one control tick")
+ROBUST = (
+    Figure("step_share_1_mean", "of one-step limit", ".2f"),
+    FAILURES,
+    FAILURES_RECOVERED,
+    Figure("mean_abs_action", "mean |action|", ".3f", where=_some("mean_abs_action")),
+    ROOT,
+    TICK,
+)
+
+# of two controllers on the same trials
+PAIRED = (
+    Figure("both", "both", ".0f", words="recovered by both"),
+    Figure("only_a", "only a (lost)", ".0f", words="lost by b"),
+    Figure("only_b", "only b (won)", ".0f", words="won by b"),
+    Figure("neither", "neither", ".0f"),
+)
+GAIN = Figure("j50_gain", "J50 gain", "+.1%", words="of b over a, relative", ends="j50_gain_ci95")
+
+# of a direction
+AIMED = (
+    J50,
+    Figure("j90", "J90", ".1f", "N·s", ends="j90_ci95"),
+    replace(HALF_AT, ends="fraction50_ci95"),
+    Figure("ankle_limit", "ankle limit", ".1f", "N·s"),
+    Figure("eta", "η", ".2f"),
+    *(
+        figure
+        for key, name in (("1", "1-step limit"), ("2", "2-step limit"), ("inf", "∞-step limit"))
+        for figure in (
+            Figure(f"step_limit_{key}", name, ".1f", "N·s", "of a pendulum that steps"),
+            Figure(f"step_share_{key}", "of it", ".2f", bound="j50_bound",
+                   words="fraction of that limit that J50 is"),
+        )
+    ),
+)  # fmt: skip
+
+# EUROBENCH's, of a controller and of a direction
+SWAY = (
+    Figure("body_sway_mean", "body sway", ".3f", "rad", "mean over recovered standard pushes"),
+    Figure("recovery_time_mean", "recovery time", ".2f", "s",
+           "until the sway stays below 0.015 rad/s"),
+    Figure("recovery_time_trials", "of trials", ".0f", words="that came to rest by this measure"),
+)  # fmt: skip
+MARGINS = (
+    Figure("force", "margin", ".0f", "N", "largest with < 30 % falls in 10 runs",
+           bound="largest_tried"),
+    Figure("force_normalised", "at human size", ".0f", "N", "normalised", bound="largest_tried"),
+    Figure("energy_normalised", "energy", ".1f", "J", "normalised", bound="largest_tried"),
+)  # fmt: skip
+
+# of walks and motions
+FALLS = (
+    TRIED[0],
+    Figure("fallen", "fell", ".0f", of="trials"),
+    Figure("falls_per_minute", "falls a minute", ".2f", words="Garwood's interval",
+           ends="falls_per_minute_ci95"),
+    Figure("recovered_rate", "as told", ".0%", words="fraction of trials that end as commanded",
+           ends="recovered_ci95"),
+)  # fmt: skip
+FOLLOWED = (
+    Figure("speed_ahead", "ahead", ".3f", "m/s", "mean over the strides"),
+    Figure("speed_left", "left", ".3f", "m/s", "mean over the strides"),
+    Figure("turn_rate", "turn", ".3f", "rad/s", "to the left, mean over the strides"),
+    Figure("speed_error_rms", "RMS error", ".3f", "m/s",
+           "of the strides' velocities from the command"),
+    Figure("turn_error_rms", "of the turn", ".3f", "rad/s", "root mean square over the strides"),
+    Figure("circle_error", "off the circle", ".3f", "m", "largest distance"),
+    Figure("surfaces_passed", "surfaces passed", ".1f", words="of the terrain, mean"),
+    Figure("edge_contacts", "edges touched", ".2f",
+           words="times that a foot came to touch one, mean",
+           where=lambda entry: entry.get("surfaces_passed") is not None),  # else there is none
+)  # fmt: skip
+STEPS = (
+    Figure("steps_as_told_rate", "steps as told", ".0%", words="no fall, all within 10 %"),
+    Figure("step_error", "off by", ".1%", words="largest of the step parameters told"),
+    Figure("step_length", "step", ".3f", "m", "length, along the heading"),
+    Figure("step_width", "width", ".3f", "m", "of a step, across the heading"),
+    Figure("step_time", "time", ".3f", "s", "between touchdowns"),
+    Figure("swing_time", "in the air", ".3f", "s", "from lift-off to touchdown"),
+    Figure("step_clearance", "clearance", ".3f", "m", "of the sole's middle at its highest"),
+    _mm("foot_slide", "slide", "largest way of a sole that bears the robot alone"),
+)
+COSTS = (
+    Figure("cost_of_transport", "cost of transport", ".2f", words="∫ Σ |τ q̇| dt / (m g d)"),
+    Figure("positive_cost_of_transport", "of positive work", ".2f",
+           words="∫ Σ max(τ q̇, 0) dt / (m g d)"),
+    Figure("knee_mean", "stance knee", ".2f", "N·m/kg", "mean of |τ|/m"),
+    Figure("knee_peak", "at most", ".2f", "N·m/kg", "largest |τ|/m"),
+    Figure("yaw_momentum", "yaw momentum", ".2f", "N·m·s", "root mean square about the vertical"),
+)  # fmt: skip
+FELL = Figure("fallen_rate", "fell", ".1%", words="share of the trials; Wilson's interval",
+              ends="fallen_ci95")  # fmt: skip
+PERFORMED = (
+    Figure("joint_rms", "joints", ".1f", "°", "root mean square of the joints' errors",
+           float(np.degrees(1.0))),
+    _mm("body_error", "bodies", "mean distance from where the motion has them"),
+    _mm("body_error_root", "from the root", "the same, relative to the root"),
+    _mm("body_error_last", "last second", "the same in the last second"),
+    _mm("com_error", "CoM", "mean distance from where the motion has it"),
+    _mm("sole_slide", "slide", "how far a sole moved since it landed"),
+    Figure("motion_delay", "late", ".2f", "s", "the motion at the end, where it waits"),
+    _mm("swing_error", "swing", "root mean square of a sole's way in the air, with steps"),
+    _mm("placement_error", "placed", "largest, of a sole that lands"),
+    _mm("support_slide", "support", "largest way of a planted sole"),
+    Figure("interruptions", "caught", ".2f", words="how often steps of the planner took over"),
+    Figure("steps_mean", "steps", ".1f", words="mean of the touchdowns"),
+    Figure("mean_power", "power", ".0f", "W", "∫ Σ |τ q̇| dt over the time"),
+)  # fmt: skip
+IN_MOTION = (
+    TRIED[0],
+    Figure("recovered", "stayed up", ".0f"),
+    Figure("share50", "half fall at", ".2f", words="share of the J50 that pushes were chosen by",
+           ends="share50_ci95", bound="share50_bound"),
+    Figure("over_standing", "over standing", ".2f", words="J50 in motion over J50 standing",
+           ends="over_standing_ci95", bound="share50_bound"),
+)  # fmt: skip
