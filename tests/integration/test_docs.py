@@ -11,6 +11,8 @@ import importlib.util
 import re
 import runpy
 import shlex
+import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +25,7 @@ from poise.training.cli.motion import commands as motion
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES += sorted((ROOT / "docs" / "log").glob("*.md"))
-LANGUAGES = {"python", "bash", "yaml", ""}  # "" is a figure: an equation, a tree, a listing
+LANGUAGES = {"python", "bash", "yaml", "diff", ""}  # "" is a figure: an equation, a tree, a listing
 SCRIPTS = ("git ", "tensorboard ", "pip install ", "docker ")  # commands of others
 INLINE = re.compile(r"`(poise\s[^`]+)`")
 FOLDERS = "envs|baselines|training|configs|tests|examples"
@@ -163,6 +165,15 @@ def parse(words: list[str], parsed: list[str]) -> None:
     parsed.clear()
     assert entry.main(words) == 0
     assert parsed == words[:1]
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="patches are read by git")
+@pytest.mark.parametrize("block", of("diff"), ids=ids(of("diff")))
+def test_patches_apply(block: Block) -> None:
+    """To this tree, as they are printed; nothing is changed."""
+    check = ["git", "apply", "--check", "-"]
+    found = subprocess.run(check, cwd=ROOT, input=block.text, text=True, capture_output=True)
+    assert found.returncode == 0, found.stderr
 
 
 def test_files_that_pages_name_exist() -> None:

@@ -230,3 +230,26 @@ def test_a_room_is_imported_without_those_above_it() -> None:
         command = [sys.executable, "-c", code.format(room, above)]
         result = subprocess.run(command, capture_output=True, text=True, check=True)
         assert result.stdout.split() == [], room
+
+
+def test_the_table_of_the_architecture_has_every_room_on_its_floor() -> None:
+    """As in `FLOORS`, but for single files and packages that only hold rooms."""
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    rows = re.findall(r"^\| (\d+) \| ([\w/.]+) \|", page, re.M)
+    told = {room.removesuffix(".py"): int(floor) for floor, room in rows}
+    assert {room: FLOOR.get(room) for room in told} == told
+    rooms = {path.rpartition("/")[0] for path in sources() if not path.endswith("__init__.py")}
+    assert rooms - set(told) <= set(FOLDERS)
+
+
+def test_the_walks_of_the_architecture_name_what_there_is() -> None:
+    """Each stop's file has the function, the class or the method that is named after it."""
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    stops = re.findall(r"^\d+\. `([\w/]+\.py)`: `([\w.]+)`", page, re.M)
+    assert len(stops) > 30
+    for path, name in stops:
+        inside = sources()[path].body
+        for part in name.split("."):
+            found = [node for node in inside if getattr(node, "name", None) == part]
+            assert found, (path, name)
+            inside = getattr(found[0], "body", [])
