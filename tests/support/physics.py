@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import functools
+from dataclasses import replace
 from typing import NamedTuple
 
 import mujoco
@@ -16,9 +18,16 @@ from poise.envs.physics.kinematics import update_state
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
-from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.robots.robot import Robot, fingerprint, load_robot
 
 robot_named = functools.cache(load_robot)
+
+
+def slippery(robot: Robot, friction: float) -> Robot:
+    """The robot on a ground of another sliding friction."""
+    model = copy.copy(robot.model)
+    model.geom_friction[:, 0] = friction
+    return replace(robot, model=model, fingerprint=fingerprint(model, robot.standing_qpos))
 
 
 def push(robot: Robot, specific: float, direction: float, start: float = 0.02) -> Push:

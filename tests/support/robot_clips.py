@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from poise.baselines.balance.references.foot_steps import FootStep, Waypoint, plan_steps
+from poise.baselines.balance.references.footing import Footing
 from poise.baselines.balance.references.footwork import perform_plan
 from poise.baselines.balance.references.legs import PlantedLegs
 from poise.baselines.balance.references.motion import load_motion
@@ -16,6 +17,18 @@ from poise.baselines.motion.feasibility.trajectory import PlantedRobot
 from poise.envs.robots.robot import Robot
 
 RATE = 1.0 / 30.0  # [s]
+
+
+def swings(footing: Footing) -> list[tuple[int, float, float]]:
+    """Foot, lift-off and touchdown [s] of every step, in order."""
+    found, times = [], footing.switches
+    for foot in range(2):
+        down = footing.planted[:, foot]
+        begins = np.flatnonzero((down[:-1] == 1) & (down[1:] == 0))
+        ends = np.flatnonzero((down[:-1] == 0) & (down[1:] == 1))
+        found += [(foot, float(times[a]), float(times[b]))
+                  for a, b in zip(begins, ends, strict=True)]  # fmt: skip
+    return sorted(found, key=lambda swing: swing[1])
 
 
 def packaged_clip(robot: Robot, name: str, dt: float = RATE) -> RobotClip:

@@ -10,11 +10,15 @@ from poise.baselines.balance.stepping.planning.cop_region import (
 )
 from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.recentring import LOADING, SHIFTING
-from poise.envs.compiled.maths.pendulum import drifted
 from poise.envs.compiled.maths.polygons import nearest_inside
 from poise.envs.compiled.maths.vectors import turn
 
 FROZEN = 0.03
+
+
+def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float | np.ndarray) -> np.ndarray:
+    """ξ(t) = p + (ξ − p) e^(ωt): where the capture point gets while the CoP stays at p."""
+    return p + (xi - p) * np.exp(omega * t)
 
 
 def quintic(start, end, duration, t):

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Literal
 
 from poise.training.running.options.arguments import (
     Allow,
+    Backend,
     Json,
     Names,
+    OnRobot,
+    Overwrite,
     RobotName,
     Switch,
     print_json,
@@ -31,7 +34,7 @@ def demo(
     full: Switch = False,
     workers: int | None = None,
     seed: int = 0,
-    overwrite: Switch = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Push four controllers and compare: a table, two plots and a video, in a minute or so.
 
@@ -44,7 +47,6 @@ def demo(
         full: more pushes, random ones too, and a policy with feet in place: some minutes.
         workers: number of processes; all cores if not given.
         seed: of the pushes.
-        overwrite: replace what the folder holds.
     """
     from poise.envs.viewing.gl import choose_gl_backend
 
@@ -66,16 +68,16 @@ def evaluate(
     suite: str = "strong",
     *,
     out: Path | None = None,
-    robot: str = "humanoid",
+    robot: OnRobot = "humanoid",
     seed: int = 0,
     workers: int | None = None,
-    backend: Literal["local", "joblib", "ray"] = "local",
+    backend: Backend = "local",
     trials: int | None = None,
     limits: str | None = None,
     write_limits: Path | None = None,
     motions: tuple[str, ...] = (),
     realism: str | None = None,
-    overwrite: Switch = False,
+    overwrite: Overwrite = False,
     json: Json = False,
     allow: Allow = (),
 ) -> int:
@@ -93,10 +95,8 @@ def evaluate(
         suite: strong (random pushes that tell good controllers apart), random, envelope, grid,
             quiet, repeated, in-step, follow, those of poise benchmark, or a .yaml file.
         out: folder to write to; out/SUITE if not given.
-        robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the trials.
         workers: number of processes; all cores if not given.
-        backend: local (processes of this machine), joblib (the same by joblib), ray (a cluster).
         trials: number of pushes (random), of starts (quiet), of trials per direction and controller
             in the second stage (envelope), of repeats (grid), of sequences (repeated, in-step); of
             a suite of several parts, at most as many in every cell.
@@ -107,7 +107,6 @@ def evaluate(
             .yaml files; its own if not given.
         realism: how real the robot is: ideal (its state is known exactly and at once), lab, field,
             or a .yaml file of a level; that of the suite if not given.
-        overwrite: replace what the folder holds.
     """
     from poise.configs.outputs import check_out_file
     from poise.training.benchmarking.trials.names import check_names
@@ -137,13 +136,13 @@ def benchmark(
     *,
     out: Path | None = None,
     suite: str = "standard",
-    robot: str = "humanoid",
+    robot: OnRobot = "humanoid",
     seed: int = 0,
     workers: int | None = None,
-    backend: Literal["local", "joblib", "ray"] = "local",
+    backend: Backend = "local",
     trials: int | None = None,
     realism: str | None = None,
-    overwrite: Switch = False,
+    overwrite: Overwrite = False,
     report: bool = True,
     submit: Path | None = None,
     json: Json = False,
@@ -162,14 +161,11 @@ def benchmark(
         out: folder to write to; needed, but with --submit.
         suite: quick (minutes), standard (an hour), full (many hours), those of poise evaluate, or a
             .yaml file.
-        robot: a packaged robot or a .yaml description.
         seed: of the cases.
         workers: number of processes; all cores if not given.
-        backend: local (processes of this machine), joblib (the same by joblib), ray (a cluster).
         trials: at most as many in every cell of the suite, to try things out; of a suite of one
             part, its number.
         realism: ideal, lab, field or a .yaml file of a level; that of the suite if not given.
-        overwrite: replace what the folder holds.
         report: write report.html at the end, as poise report does.
         submit: play nothing, but check this finished folder and pack it, without any code, into a
             .zip beside it: the issue form for results takes that.
@@ -269,7 +265,7 @@ def qp_set(
     count: int = 1000,
     seed: int = 0,
     form: Literal["reduced", "full"] = "reduced",
-    robot: str = "humanoid",
+    robot: OnRobot = "humanoid",
     controller: str = "momentum-qp",
 ) -> None:
     """Export whole-body QPs of real push recoveries, for qpsolvers and qpbenchmark.
@@ -279,7 +275,6 @@ def qp_set(
         count: number of problems; 25 of each trial.
         seed: of the pushes and starts.
         form: reduced (dense, inequalities only) or full (accelerations and wrenches, equalities).
-        robot: a packaged robot or a .yaml description.
         controller: a packaged controller or a .yaml file.
     """
     from poise.training.deploy.qp_set.export import write_qp_set

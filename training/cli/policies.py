@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from poise.configs.errors import ConfigError, shown
-from poise.training.running.options.arguments import Allow, PolicyName
+from poise.training.running.options.arguments import Allow, OnRobot, PolicyName
 from poise.training.running.options.parsing import parsed
 from poise.training.running.terminal import terminal
 
@@ -26,12 +26,13 @@ def show() -> None:
     print_policies(known_policies(), terminal())
 
 
-def check(file: Checked, /, *, robot: str, rollout: Path | None = None, allow: Allow = ()) -> int:
+def check(
+    file: Checked, /, *, robot: OnRobot, rollout: Path | None = None, allow: Allow = ()
+) -> int:
     """Say what a policy lacks, let it stand for 10 s, compare it with its maker's own steps.
 
     Args:
         file: a network (.onnx, .pt), a description (.yaml), a folder, or a known name.
-        robot: a packaged robot (see poise list) or a .yaml description.
         rollout: an .npz file of observations (T, n) and actions (T, na) of its maker's loop, and,
             if they are known, of the states qpos and qvel of this robot.
 
@@ -100,7 +101,7 @@ def dataset(
     name: str = "poise/pushes-v0",
     suite: str = "strong",
     trials: int | None = None,
-    robot: str = "humanoid",
+    robot: OnRobot = "humanoid",
     seed: int = 0,
     allow: Allow = (),
 ) -> None:
@@ -114,7 +115,6 @@ def dataset(
         name: of the data set, namespace/name-v0.
         suite: of pushes: packaged or a .yaml file.
         trials: number of episodes; the suite's if not given.
-        robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the trials.
     """
     from poise.training.benchmarking.trials.names import check_names

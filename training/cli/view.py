@@ -6,7 +6,7 @@ from typing import Annotated
 import tyro
 
 from poise.configs.errors import ConfigError
-from poise.training.running.options.arguments import Allow, Switch, check_folders
+from poise.training.running.options.arguments import Allow, OnRobot, Switch, check_folders
 
 Shown = Annotated[
     tuple[str, ...],
@@ -39,7 +39,7 @@ def view(
     shown: Shown = (),
     /,
     *,
-    robot: str = "humanoid",
+    robot: OnRobot = "humanoid",
     motion: str = "standing",
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -63,7 +63,6 @@ def view(
     Args:
         shown: controllers, feedback-step if not given; with --trial, a folder written by poise
             evaluate or poise benchmark.
-        robot: a packaged robot (see poise list) or a .yaml description.
         motion: that is performed: a name, a .yaml, or a .npz of poise motion import.
         host: address to serve at; the default can be reached from this machine alone.
         port: of the page; 0 is any that is free.

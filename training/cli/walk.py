@@ -9,7 +9,7 @@ import tyro
 import yaml
 
 from poise.configs.errors import ConfigError, shown
-from poise.training.running.options.arguments import Allow, Switch
+from poise.training.running.options.arguments import Allow, OnRobot, Switch
 from poise.training.running.terminal import terminal
 
 
@@ -27,7 +27,7 @@ def walk(
     push: str | None = None,
     push_at: float = 6.0,
     seed: int = 0,
-    robot: str = "humanoid",
+    robot: OnRobot = "humanoid",
     controller: str = "walk",
     terrain: str = "flat",
     realism: str | None = None,
@@ -49,7 +49,6 @@ def walk(
         push: an impulse [N·s] and a direction [deg, 0 ahead, 90 left] such as 20@90, for 0.1 s.
         push_at: when it is pushed [s].
         seed: of the start, which is a little disturbed.
-        robot: a packaged robot (see poise list) or a .yaml description.
         controller: one that walks: a name, a .yaml file, or a folder written by poise train.
         terrain: flat, stairs, slope or stones, or with fields: "{kind: stairs, rise: 0.15}".
         realism: how real the robot is: ideal, lab, field, or a .yaml file of a level.
@@ -96,7 +95,7 @@ def gait(
     speeds: tuple[float, ...] = (0.5, 0.8),
     starts: int = 4,
     duration: float = 20.0,
-    robot: str = "humanoid",
+    robot: OnRobot = "humanoid",
     seed: int = 21,
     human: str = "knee-moment",
     push: Switch = False,
@@ -112,7 +111,6 @@ def gait(
         speeds: ahead [m/s].
         starts: walks at each speed, a little disturbed.
         duration: of a walk [s].
-        robot: a packaged robot (see poise list) or a .yaml description.
         seed: of the starts.
         human: a packaged band of the human knee's moment or a .yaml file of one.
         push: find J50, too; by the suite walk-push at 0.5 m/s, an hour and more.
@@ -125,7 +123,7 @@ def gait(
     check_names(robot=robot, suite=push_suite)
     resolve("human", human)
     from poise.training.motion.gaits.compare import compare_gaits
-    from poise.training.motion.gaits.tables import print_gaits
+    from poise.training.motion.gaits.figures import print_gaits
 
     figures = compare_gaits(
         compare, out=out, speeds=speeds, starts=starts, duration=duration, robot=robot, seed=seed,

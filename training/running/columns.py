@@ -151,6 +151,13 @@ ROBUST = (
     TICK,
 )
 
+# of training seeds taken together
+OVER_SEEDS = (
+    replace(J50_MEAN, words="", ends=""),
+    Figure("eta", "η", ".2f"),
+    Figure("recovered", "recovered", ".1%"),
+)
+
 # of two controllers on the same trials
 PAIRED = (
     Figure("both", "both", ".0f", words="recovered by both"),

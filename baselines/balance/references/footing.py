@@ -74,18 +74,6 @@ class Footing(Copyable):
         coeffs[:, :, SPIN:] *= factor**2
         return Footing(self.knots / factor, coeffs, self.switches / factor, self.planted)
 
-    @property
-    def swings(self) -> list[tuple[int, float, float]]:
-        """Foot, lift-off and touchdown [s] of every step, in order."""
-        found, times = [], self.switches
-        for foot in range(2):
-            down = self.planted[:, foot]
-            begins = np.flatnonzero((down[:-1] == 1) & (down[1:] == 0))
-            ends = np.flatnonzero((down[:-1] == 0) & (down[1:] == 1))
-            found += [(foot, float(times[a]), float(times[b]))
-                      for a, b in zip(begins, ends, strict=True)]  # fmt: skip
-        return sorted(found, key=lambda swing: swing[1])
-
 
 def check_planted(planted: np.ndarray, source: str) -> None:
     """Raise ConfigError unless `planted` (F, 2) says of every frame which soles are planted.

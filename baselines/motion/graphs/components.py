@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from .moments import Moments
-from .motion_graph import MotionGraph, Transition
+from .motion_graph import MotionGraph
 from .paths import Place
 
 
-def strong_part(graph: MotionGraph) -> MotionGraph:
-    """The graph with those transitions alone from which one can go on for ever.
-
-    Both moments of a transition lie in the largest strongly connected component of all moments, in
-    which playing on leads from a moment of a clip to the next one.
-    """
-    inside = _inside(graph)
-    return replace(graph, transitions=tuple(t for t in graph.transitions if _ends(t) <= inside))
-
-
 def strong_clips(graph: MotionGraph) -> list[str]:
-    """The clips of which some part lies in that component."""
+    """The clips of which some part lies where one can go on for ever.
+
+    That is the largest strongly connected component of all moments, in which playing on leads from
+    a moment of a clip to the next one.
+    """
     names = {name for name, _ in _inside(graph)}
     return [name for name in graph.names if name in names]
-
-
-def _ends(transition: Transition) -> set[Place]:
-    return {(transition.before, transition.leave), (transition.after, transition.enter)}
 
 
 def _inside(graph: MotionGraph) -> set[Place]:

@@ -69,14 +69,9 @@ def ankle_limit(omega: float, margin: float, duration: float, profile: Profile =
     return omega * margin * duration_factor(omega, duration, profile)
 
 
-def drifted(xi: np.ndarray, p: np.ndarray, omega: float, t: float | np.ndarray) -> np.ndarray:
-    """ξ(t) = p + (ξ − p) e^(ωt): where the capture point gets while the CoP stays at p."""
-    return p + (xi - p) * np.exp(omega * t)
-
-
 @compiled
 def drifted_point(xi: np.ndarray, p: np.ndarray, omega: float, t: float) -> tuple[float, float]:
-    """`drifted` of points (≥ 2,), for kernels."""
+    """ξ(t) = p + (ξ − p) e^(ωt), points (≥ 2,): where ξ gets while the CoP stays at p."""
     growth = np.exp(omega * t)
     return p[0] + (xi[0] - p[0]) * growth, p[1] + (xi[1] - p[1]) * growth
 

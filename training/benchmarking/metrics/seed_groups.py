@@ -12,8 +12,9 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.configs.reading import is_file, is_folder
 from poise.configs.schema import to_yaml
-from poise.training.benchmarking.statistics.seeds import FIGURES, SeedFigures, seed_figures
+from poise.training.benchmarking.statistics.seeds import SeedFigures, seed_figures
 from poise.training.learning.seeds.records import SEEDS
+from poise.training.running.columns import NONE, OVER_SEEDS
 from poise.training.running.summary import Entry, SeedGroup
 
 
@@ -42,14 +43,14 @@ def seed_lines(groups: Sequence[SeedGroup]) -> list[str]:
     lines = []
     for group in groups:
         head = f"IQM over {len(group['members'])} training seeds, {group['name']}:"
-        for key, title, form in FIGURES:
-            if key in group:
-                found = cast(SeedFigures, group.get(key))
+        for each in OVER_SEEDS:
+            if each.key in group:
+                found = cast(SeedFigures, group.get(each.key))
                 value, low, high, worst = (
-                    format(x, form) if x is not None else "–"
+                    format(x, each.form) if x is not None else NONE
                     for x in (found["iqm"], *found["iqm_ci95"], found["worst"])
                 )
-                text = f"{title} {value} [{low}, {high}], worst {worst} (seed"
+                text = f"{each.heading} {value} [{low}, {high}], worst {worst} (seed"
                 lines.append(f"{head} {text} {found['worst_seed']})")
     return lines
 

@@ -13,6 +13,7 @@ from rich.table import Table
 from poise.training.benchmarking.evaluation.folder import Settings
 from poise.training.benchmarking.statistics.differences import difference, paired_rates
 from poise.training.benchmarking.statistics.rates import mcnemar
+from poise.training.running.columns import ETA_MEAN, J50_MEAN, RECOVERED
 from poise.training.running.summary import Entry, Interval, Level, Rate, both_ends
 
 from .read import Results, load_results
@@ -124,16 +125,13 @@ def _outcomes(results: Results, name: str) -> dict[Key, bool]:
 def _changes(name: str, a: Results, b: Results) -> Iterator[Change]:
     one, two = (results.summary["controllers"][name] for results in (a, b))
     if "j50_mean" in one and "j50_mean" in two:
-        for title, *estimates in (
-            ("mean J50 [N·s]", (one["j50_mean"], one["j50_mean_ci95"]),
-             (two["j50_mean"], two["j50_mean_ci95"])),
-            ("mean η", (one["eta_mean"], one["eta_mean_ci95"]),
-             (two["eta_mean"], two["eta_mean_ci95"])),
-        ):  # fmt: skip
-            yield from _by_intervals(name, title, *estimates)
+        yield from _by_intervals(name, J50_MEAN.heading, (one["j50_mean"], one["j50_mean_ci95"]),
+                                 (two["j50_mean"], two["j50_mean_ci95"]))  # fmt: skip
+        yield from _by_intervals(name, ETA_MEAN.heading, (one["eta_mean"], one["eta_mean_ci95"]),
+                                 (two["eta_mean"], two["eta_mean_ci95"]))  # fmt: skip
     if a.summary["rated"] == b.summary["rated"]:
         rated = a.summary["rated"]
-        title = f"recovered of the {rated}" if rated else "recovered"
+        title = f"{RECOVERED.name} of the {rated}" if rated else RECOVERED.name
         yield from _rates(name, title, one, two, a, b, part=rated)
     for (factor, level), before, after in _levels(one, two):
         yield from _rates(name, f"{factor} {level}", before, after, a, b, factor, level)

@@ -66,32 +66,6 @@ class EnvelopeGain:
     gains: tuple[Gain, ...]
 
 
-def direction_fit(
-    impulse: ArrayLike,
-    recovered: ArrayLike,
-    *,
-    resamples: int = 1000,
-    confidence: float = 0.95,
-    seed: int = 0,
-) -> DirectionFit:
-    """Logistic fit of the trials of one direction, with bootstrap intervals.
-
-    The percentile intervals are expanded for the number of trials (`percentile_interval`). In
-    simulations the 95 % interval of J50 holds the truth in 90–94 % of cases at 20 to 30 trials and
-    in 92–95 % at 60. That of J90 holds it in 78–92 % only: so few trials hardly show the scale.
-
-    Args:
-        impulse, recovered: (n,) trials, as for `fit_logistic`.
-
-    Raises:
-        ValueError: as `fit_logistic`, or confidence outside (0, 1).
-    """
-    check_confidence(confidence)
-    impulse, recovered = check_trials(impulse, recovered)
-    weights = _resample(impulse.size, resamples, np.random.SeedSequence(seed).spawn(1)[0])
-    return _direction_fit(impulse, recovered, weights, confidence)[0]
-
-
 def mean_over_directions(
     direction: ArrayLike,
     impulse: ArrayLike,
@@ -103,14 +77,17 @@ def mean_over_directions(
 ) -> EnvelopeFit:
     """Fit every direction, and the mean of their J50 with a stratified bootstrap interval.
 
-    Every direction has the same weight in the mean, however many trials it has.
+    Every direction has the same weight in the mean, however many trials it has. The percentile
+    intervals are expanded for the number of trials (`percentile_interval`). In simulations the 95 %
+    interval of J50 holds the truth in 90–94 % of cases at 20 to 30 trials and in 92–95 % at 60.
+    That of J90 holds it in 78–92 % only: so few trials hardly show the scale.
 
     Args:
         direction: (n,) direction of each trial [°]. Equal values make one direction.
         impulse, recovered: (n,) trials, as for `fit_logistic`.
 
     Raises:
-        ValueError: as `direction_fit`, or a direction that is not finite.
+        ValueError: as `fit_logistic`, confidence outside (0, 1), or a direction that is not finite.
     """
     check_confidence(confidence)
     impulse, recovered = check_trials(impulse, recovered)

@@ -1,7 +1,7 @@
 """Figures of training seeds taken together."""
 
 from collections.abc import Sequence
-from typing import Final, TypedDict
+from typing import TypedDict
 
 import numpy as np
 
@@ -31,11 +31,3 @@ def seed_figures(scores: np.ndarray, seeds: Sequence[int]) -> SeedFigures:
         "worst": float(values[worst]),
         "worst_seed": seeds[worst],
     }
-
-
-#: key in a group → what it is called, how it is written
-FIGURES: Final = (
-    ("j50_mean", "mean J50 [N·s]", ".1f"),
-    ("eta", "η", ".2f"),
-    ("recovered", "recovered", ".1%"),
-)

@@ -18,8 +18,7 @@ from .draw import Part, Standard
 from .factors import Factors, Mix
 from .motions import Motions
 from .random import Quiet, Random, Sequence
-from .terrains import Terrains
-from .walking import WALKING, Gait, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
+from .walking import WALKING, Gait, Terrains, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Parts for controllers that walk: how they follow commands, and what pushes them off a walk.
+"""Parts for controllers that walk: how they follow commands, on what, and what pushes them off.
 
 A trial depends on the seed and its number alone, as in all parts. Pushes and kicks begin at a time
 that goes through the phases of the gait evenly from trial to trial (the golden ratio's fractions),
@@ -17,6 +17,8 @@ from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import TimedCommand, parse_commands
 from poise.configs.errors import ConfigError
 from poise.envs.physics.pushes.push import Kick
+from poise.envs.terrain.stairs import Stairs
+from poise.envs.terrain.terrain import Terrain, seeded
 from poise.training.benchmarking.trials.trial import Trial
 
 from .directions import Envelope
@@ -175,3 +177,27 @@ class WalkRepeated(PushSequence):
 
 #: parts of a suite for controllers that walk
 WALKING = ("walk", "gait", "velocity", "walk_push", "walk_kick", "walk_repeated", "terrains")
+
+
+@dataclass(frozen=True)
+class Terrains(Part):
+    """Every terrain, `trials` times, from differently disturbed starts at one command.
+
+    Each trial has a terrain of its own where heights are drawn: their seed is the trial's number.
+    """
+
+    terrains: dict[str, Terrain] = field(default_factory=lambda: {"stairs up": Stairs()})
+    command: GaitCommand = field(default_factory=lambda: GaitCommand(0.5))
+    trials: int = field(default=20, metadata={"min": 1, "max": MOST_TRIALS})
+
+    def __post_init__(self) -> None:
+        if not self.terrains:
+            raise ValueError("terrains: must not be empty")
+
+    def first(self, draw: Draw, number: int) -> list[Trial]:
+        each = [pair for pair in self.terrains.items() for _ in range(self.trials)]
+        return [
+            draw.trial(number + k, (), part="terrains", level=name, terrain=seeded(terrain, k),
+                       commands=(from_start(self.command),))
+            for k, (name, terrain) in enumerate(each)
+        ]  # fmt: skip

@@ -15,7 +15,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import load_robot
-from poise.training.running.options.arguments import Allow, Switch
+from poise.training.running.options.arguments import Allow, OnRobot, Switch
 from poise.training.running.terminal import terminal
 
 
@@ -23,7 +23,7 @@ def check(
     motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")],
     /,
     *,
-    robot: str = "humanoid",
+    robot: OnRobot = "humanoid",
     qp: Switch = False,
     controller: str = "momentum-qp",
     fit: Switch = False,
@@ -33,7 +33,6 @@ def check(
 
     Args:
         motion: a .npz of poise motion import, a packaged motion, or a .yaml of one.
-        robot: a packaged robot (see poise list) or a .yaml description.
         qp: also ask the momentum QP what it makes of the motion, at every sample.
         controller: a momentum QP, whose gains the QP has.
         fit: change a .npz until the robot can do it: slower, or with its centre of mass moved.
@@ -82,7 +81,7 @@ def follow(
     /,
     *,
     controller: str = "momentum-qp",
-    robot: str = "humanoid",
+    robot: OnRobot = "humanoid",
     starts: int | None = None,
     push: float = 0.0,
     share: float = 0.0,
@@ -104,7 +103,6 @@ def follow(
         motion: a .npz of poise motion import, a packaged motion, a .yaml of one; or a script, whose
             motion is made first: a .motion file, the name of a packaged one, or its text.
         controller: as in poise evaluate.
-        robot: a packaged robot (see poise list) or a .yaml description.
         starts: number of trials, each from a start that is disturbed in another way. None: 20, or 5
             at each tempo of --fastest.
         push: impulse of a push at a random time of the motion [N s]; 0 for none.

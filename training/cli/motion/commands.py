@@ -15,7 +15,7 @@ from poise.baselines.motion.space_time.retarget_clip import RetargetedClip
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.outputs import check_out_file
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.running.options.arguments import Switch
+from poise.training.running.options.arguments import OnRobot, Switch
 from poise.training.running.options.pages import print_commands
 from poise.training.running.options.parsing import parsed
 from poise.training.running.terminal import terminal
@@ -29,7 +29,18 @@ USAGE = """usage: poise motion COMMAND [OPTIONS]
 Motion capture: what files hold, a robot's motion of them, and performing it.
 """
 Solver = Literal["frame", "spacetime", "grid"]
-Joints = tuple[str, ...]
+Unit = Annotated[
+    str,
+    tyro.conf.arg(
+        help="of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs)."
+    ),
+]
+Up = Annotated[str, tyro.conf.arg(help="the file's axis that is up, such as y or -z, or auto.")]
+Forward = Annotated[str, tyro.conf.arg(help="the axis along which the rest pose faces, or auto.")]
+Joints = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(help="role=JOINT, such as hip_left=Thigh_L, for each role that is not found."),
+]
 File = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
 
 
@@ -37,19 +48,15 @@ def info(
     file: File,
     /,
     *,
-    unit: str = "auto",
-    up: str = "auto",
-    forward: str = "auto",
+    unit: Unit = "auto",
+    up: Up = "auto",
+    forward: Forward = "auto",
     joints: Joints = (),
 ) -> None:
     """What a BVH file holds: joints, unit, axes, rate, planted feet, skating.
 
     Args:
         file: a .bvh file, or the name of a packaged clip.
-        unit: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
-        up: the file's axis that is up, such as y or -z, or auto.
-        forward: the axis along which the rest pose faces, or auto.
-        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
     """
     from poise.training.motion.following.tables import print_clip
 
@@ -62,9 +69,9 @@ def convert(
     out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")],
     /,
     *,
-    unit: str = "auto",
-    up: str = "auto",
-    forward: str = "auto",
+    unit: Unit = "auto",
+    up: Up = "auto",
+    forward: Forward = "auto",
     joints: Joints = (),
     cut: tuple[float, float] | None = None,
     speed: float = 1.0,
@@ -84,10 +91,6 @@ def convert(
     Args:
         file: a .bvh file, the name of a packaged clip, or a robot's .npz.
         out: the .bvh file to write.
-        unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
-        up: the file's axis that is up, such as y or -z, or auto.
-        forward: the axis along which the rest pose faces, or auto.
-        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
         cut: two times [s]; what lies between is kept.
         speed: how many times as fast.
         mirror: exchange left and right.
@@ -120,10 +123,10 @@ def bring(
     /,
     *,
     out: Path,
-    robot: str = "humanoid",
-    unit: str = "auto",
-    up: str = "auto",
-    forward: str = "auto",
+    robot: OnRobot = "humanoid",
+    unit: Unit = "auto",
+    up: Up = "auto",
+    forward: Forward = "auto",
     joints: Joints = (),
     cut: tuple[float, float] | None = None,
     speed: float = 1.0,
@@ -147,11 +150,6 @@ def bring(
     Args:
         file: a .bvh file, or the name of a packaged clip.
         out: the .npz file to write.
-        robot: a packaged robot (see poise list) or a .yaml description.
-        unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
-        up: the file's axis that is up, such as y or -z, or auto.
-        forward: the axis along which the rest pose faces, or auto.
-        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
         cut: two times [s]; what lies between is kept.
         speed: how many times as fast.
         mirror: exchange left and right.
@@ -203,9 +201,9 @@ def play(
     *,
     video: Path,
     robot: str = "humanoid",
-    unit: str = "auto",
-    up: str = "auto",
-    forward: str = "auto",
+    unit: Unit = "auto",
+    up: Up = "auto",
+    forward: Forward = "auto",
     joints: Joints = (),
     size: tuple[int, int] = (640, 480),
     planted: Switch = False,
@@ -216,10 +214,6 @@ def play(
         file: a .bvh file, the name of a packaged clip, or a robot's .npz, which has no skeleton.
         video: the .mp4 or .webp file to write.
         robot: who does it.
-        unit: of the file: m, cm, mm, dm, inch, a length in metres, or auto (from the legs).
-        up: the file's axis that is up, such as y or -z, or auto.
-        forward: the axis along which the rest pose faces, or auto.
-        joints: role=JOINT, such as hip_left=Thigh_L, for each role that is not found.
         size: width and height [pixels], even.
         planted: take the feet as planted though they move in the clip.
     """

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import os
 import zipfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from poise.baselines.allowance import allows
 from poise.configs.files import check_new_folder, new_folder, packaged
@@ -18,16 +20,15 @@ from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import load_robot
 from poise.training.learning.checkpoints import CONFIG, FILES
 from poise.training.learning.config import TrainConfig
-from poise.training.learning.policy import Policy, load_policy, locate_policy
+from poise.training.learning.policy import ACTOR, Policy, load_policy, locate_policy
 
 from .card import card
 from .check import check_onnx
 from .figures import Figure, figures
-from .libraries import check_libraries
+from .libraries import check_libraries, library
 from .metadata import IDS, metadata
-from .onnx_graph import onnx_bytes
+from .onnx_graph import narrowed, onnx_bytes
 from .stock import write_stock
-from .tensors import safetensors_bytes
 
 ONNX, TENSORS = "policy.onnx", "policy.safetensors"
 OWN = "poise"  # folder of what `load_policy` reads
@@ -130,3 +131,29 @@ def _results(found: Sequence[Figure]) -> str:
     """results.json; its words are huggingface_sb3's where it has one. Returns are not measured."""
     said = {"is_deterministic": True, "figures": [asdict(figure) for figure in found]}
     return json.dumps(said, indent=1, ensure_ascii=False) + "\n"
+
+
+def tensors(policy: Policy) -> dict[str, np.ndarray]:
+    """All numbers that decide the policy's actions, by name.
+
+    The actor's layers have the names and the shape (out, in) that they have in SB3's state_dict.
+    `observation.mean`, `.scale` (no,) and `.clip` () normalise; a symmetric policy has `.order` and
+    `.sign` of its mirror images, for `observation.` and `action.`. Weights have 32 bits where these
+    hold them exactly, as those of every policy that was trained here.
+    """
+    *hidden, (weight, bias) = policy.layers
+    found = {"action_net.weight": weight.T, "action_net.bias": bias}
+    for i, (weight, bias) in enumerate(hidden):  # the activations between them count, too
+        found |= {f"{ACTOR}{2 * i}.weight": weight.T, f"{ACTOR}{2 * i}.bias": bias}
+    found = {name: np.ascontiguousarray(narrowed(values)) for name, values in found.items()}
+    found["observation.mean"], found["observation.scale"] = policy.mean, policy.scale
+    found["observation.clip"] = np.array(policy.clip)
+    for side, mirror in zip(("observation", "action"), policy.mirrors or (), strict=False):
+        found[f"{side}.order"] = mirror.order.astype(np.int64)
+        found[f"{side}.sign"] = mirror.sign
+    return found
+
+
+def safetensors_bytes(policy: Policy, metadata: Mapping[str, str]) -> bytes:
+    """The file of `tensors` with these metadata; the same policy gives the same bytes."""
+    return bytes(library("safetensors.numpy").save(tensors(policy), metadata=dict(metadata)))

@@ -12,6 +12,7 @@ from poise.envs.robots.robot import Robot
 from poise.training.benchmarking.results.summary import read_summary
 from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.learning.policy import Policy
+from poise.training.running.columns import J50_MEAN
 from poise.training.running.files import SUMMARY
 from poise.training.running.summary import Entry, Summary
 
@@ -79,7 +80,7 @@ def _of_result(fingerprint: str, path: Path) -> list[Figure]:
     if "j50_mean" in entry and "j50_mean_ci95" in entry:
         low, high = entry["j50_mean_ci95"]
         text = f"{entry['j50_mean']:.1f} N·s, 95 % {_interval(low, high, '.1f')}"
-        name = f"mean J50 [N·s], {source}"
+        name = f"{J50_MEAN.heading}, {source}"
         found.append(Figure("j50_mean", name, entry["j50_mean"], text, source))
     return found
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,53 +25,13 @@ from poise.training.benchmarking.trials.play import run_trial
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.running.folder_lock import FolderLock
 
+from .figures import GaitFigures, stance_plot
 from .human import KneeMoment, load_knee_moment
 from .stance import StanceRecord, Stances
 
 SETTLED = 5.0  # [s] after which stances count
 TICKS_FROM = 3.0  # [s] after which ticks are timed, for so long
 Say = Callable[[str], object]
-
-
-@dataclass(frozen=True)
-class GaitFigures:
-    """A controller at one speed; means over its starts.
-
-    Attributes:
-        controller, speed: whose figures these are, and the command [m/s].
-        starts, falls: how many walks there were, and how many of them fell.
-        speed_ahead, speed_error_rms: reached, and the root mean square error of strides [m/s].
-        cost_of_transport, positive_cost_of_transport: see `Outcome`.
-        knee_mean, knee_peak: of the stance knee on one foot, |τ|/m [N·m/kg].
-        knee_stance: mean |τ|/m over whole stances, on both feet too [N·m/kg].
-        knee_rmse: root mean square difference of the mean curve over stance from the human one.
-        force_peak: mean of the stances' largest vertical force, in m g.
-        height_amplitude: of the CoM in a step, half of its way up and down [m].
-        step_length, step_time: [m], [s].
-        knee_curve: (51,) mean τ/m over stance, extension positive [N·m/kg]; empty without stances.
-        tick: median time of a control tick while it walks, from Python [µs].
-        j50: mean over directions and phases at 0.5 m/s [N·s]; None where it was not asked for.
-    """
-
-    controller: str
-    speed: float
-    starts: int
-    falls: int
-    speed_ahead: float | None
-    speed_error_rms: float | None
-    cost_of_transport: float | None
-    positive_cost_of_transport: float | None
-    knee_mean: float | None
-    knee_peak: float | None
-    knee_stance: float | None
-    knee_rmse: float | None
-    force_peak: float | None
-    height_amplitude: float | None
-    step_length: float | None
-    step_time: float | None
-    knee_curve: tuple[float, ...]
-    tick: float | None = None
-    j50: float | None = None
 
 
 def controller_of(model: str) -> str:
@@ -116,8 +76,6 @@ def compare_gaits(
             robot whose legs have no knees.
         PoiseError: a file cannot be written.
     """
-    from .plot import stance_plot
-
     _check(models, speeds, starts, duration, seed)
     check_out_folder(out)
     if pushed and load_suite(push_suite).walk_push is None:

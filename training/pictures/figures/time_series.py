@@ -1,22 +1,21 @@
-"""Pictures over time: a training run, one trial."""
+"""One trial over time."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, PercentFormatter
+from matplotlib.ticker import PercentFormatter
 from numpy.typing import ArrayLike
 
 from poise.envs.viewing.quantities import CAPTURE_POINT, COM, COP, PUSH, Quantity
 
 from .page_svg import tag
 from .palette import GREY, INK, PALE, PURPLE, SERIES
-from .style import Out, area_sample, headline, legend_below, look, sample, saved_figure
+from .style import Out, area_sample, headline, legend_below, sample, saved_figure
 
 FAR = 0.3  # beyond the support, not shown [m]
 LINES: dict[str, tuple[Quantity, Any, float]] = {  # signal → what it is, its dashes and width
@@ -30,63 +29,6 @@ PANELS = {"angular_momentum": 2.2, "torque": 1.6}  # further signals → height 
 AXES: dict[str, tuple[str, Any]] = {  # of the angular momentum → colour, dashes
     "forward": (SERIES[6], "-"), "left": (SERIES[7], (0, (5, 2))), "up": (PURPLE, (0, (2, 2))),
 }  # fmt: skip
-
-
-def training_curve(
-    path: str | Path,
-    rows: Sequence[Mapping[str, float]],
-    *,
-    x: str = "steps",
-    baseline: float | None = None,
-    title: str = "Training",
-) -> None:
-    """The course of a training run: recovery rates on top, a small panel for each other column.
-
-    Args:
-        path: PNG file to write.
-        rows: one mapping per log entry with the column `x` and any others. Columns that end in
-            "rate" are in [0, 1] and have the top panel in common; NAME_low and NAME_high are the
-            band around NAME. An entry may lack a column (or hold NaN): evaluations are rarer than
-            rollouts.
-        x: column of the horizontal axis [environment steps].
-        baseline: recovery rate of the baseline controller, drawn as a line.
-
-    Raises:
-        ValueError: no rows, or no column beside `x`.
-        PoiseError: the file cannot be written.
-    """
-    columns = {
-        name: np.array([row.get(name, np.nan) for row in rows], dtype=float)
-        for name in dict.fromkeys(key for row in rows for key in row)
-    }
-    bands = {f"{name}{end}" for name in columns for end in ("_low", "_high")}
-    names = [name for name in columns if name != x and name not in bands]
-    if not names or x not in columns:
-        raise ValueError(f"training_curve needs rows with the column '{x}' and at least one more")
-    rates = [name for name in names if name.endswith("rate")]
-    panels = ([rates] if rates else []) + [[name] for name in names if name not in rates]
-    heights = [3.0 if panel is rates else 1.3 for panel in panels]
-    with saved_figure(path, 7.2, 1.4 + sum(heights)) as figure:
-        axes = figure.subplots(
-            len(panels), sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
-        )[:, 0]
-        for ax, panel in zip(axes, panels, strict=True):
-            for k, name in enumerate(panel):
-                _series(ax, columns, x, name, k)
-            if panel is rates:
-                ax.set_ylim(-0.02, 1.02)
-                ax.yaxis.set_major_formatter(PercentFormatter(1.0))
-                ax.set_ylabel("recovered")
-                if baseline is not None:
-                    ax.axhline(baseline, color=INK, lw=1.3, ls=(0, (5, 3)), label="baseline")
-            else:
-                ax.set_ylabel(_words(panel[0]))
-        axes[-1].set_xlabel(f"environment {x}" if x == "steps" else _words(x))
-        axes[-1].xaxis.set_major_formatter(FuncFormatter(_thousands))
-        figure.align_ylabels()
-        axes[0].set_title(title)
-        if rates:
-            legend_below(figure, axes[0])
 
 
 def trial_timeseries(
@@ -189,27 +131,6 @@ def _torque(ax: Axes, t: np.ndarray, values: np.ndarray) -> None:
     ax.yaxis.set_major_formatter(PercentFormatter(1.0))
 
 
-def _series(ax: Axes, columns: Mapping[str, np.ndarray], x: str, name: str, index: int) -> None:
-    """One column as a line, with its band; few points, as those of evaluations, get markers."""
-    style = look(index)
-    known = np.isfinite(columns[name])
-    steps = columns[x][known]
-    few = len(steps) <= 60
-    ax.plot(
-        steps,
-        columns[name][known],
-        color=style.colour,
-        ls=style.line,
-        lw=2.0 if few else 1.0,
-        marker=style.marker if few else "",
-        ms=4,
-        label=_words(name),
-    )
-    if {f"{name}_low", f"{name}_high"} <= columns.keys():
-        low, high = columns[f"{name}_low"][known], columns[f"{name}_high"][known]
-        ax.fill_between(steps, low, high, color=style.colour, alpha=0.2, lw=0)
-
-
 def _limit_view(ax: Axes, axis: int, data: Mapping[str, np.ndarray]) -> None:
     """Keep a fall, metres away, from flattening what happened over the support."""
     values = {name: data[name][:, axis] for name in (*LINES, "support") if name in data}
@@ -224,13 +145,3 @@ def _limit_view(ax: Axes, axis: int, data: Mapping[str, np.ndarray]) -> None:
         top = min(top, first[1] + FAR)
     margin = 0.05 * max(top - bottom, 0.01)
     ax.set_ylim(bottom - margin, top + margin)
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _thousands(value: float, _: object) -> str:
-    if abs(value) >= 1e6:
-        return f"{value / 1e6:g} M"
-    return f"{value / 1e3:g} k" if abs(value) >= 1e3 else f"{value:g}"

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypedDict, cast
 
 from markupsafe import Markup
 
 from poise.training.benchmarking.results.read import Results
-from poise.training.benchmarking.statistics.seeds import FIGURES
 from poise.training.pictures.figures.envelope import right_angle
 from poise.training.pictures.figures.rates import level_curves, level_text
 from poise.training.pictures.figures.series import rate_series
 from poise.training.pictures.figures.style import Inline
-from poise.training.running.columns import MARGINS, RECOVERED, SWAY, TRIED, Entry, Figure
+from poise.training.running.columns import MARGINS, OVER_SEEDS, RECOVERED, SWAY, TRIED, Entry
 from poise.training.running.summary import Level, MarginFigures
 
 from .cells import Cell, Column, Table, cell, figure_cell, figure_column, name_cell, p_cell
@@ -171,12 +171,12 @@ def indicators(results: Results, order: Sequence[str]) -> Table | None:
 def seed_table(results: Results) -> Table | None:
     """Interquartile means over training seeds and the worst seed; None without groups of seeds."""
     columns = [Column("name", "runs"), Column("seeds", "seeds")]
-    figures = {key: (
-        Figure("iqm", f"{title}, IQM", form, words="interquartile mean over seeds",
-               ends="iqm_ci95", csv=f"{key}_iqm"),
-        Figure("worst", "worst seed", form, words="the smallest value of a seed",
-               csv=f"{key}_worst"),
-    ) for key, title, form in FIGURES}  # fmt: skip
+    figures = {each.key: (
+        replace(each, key="iqm", name=f"{each.heading}, IQM", unit="", ends="iqm_ci95",
+                words="interquartile mean over seeds", csv=f"{each.key}_iqm"),
+        replace(each, key="worst", name="worst seed", unit="", words="the smallest value of a seed",
+                csv=f"{each.key}_worst"),
+    ) for each in OVER_SEEDS}  # fmt: skip
     columns += [figure_column(each) for pair in figures.values() for each in pair]
     rows = []
     for group in results.summary["seeds"]:

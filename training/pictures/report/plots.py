@@ -18,6 +18,7 @@ from poise.training.pictures.figures.palette import GREY, INK
 from poise.training.pictures.figures.rates import BINS, fall_probability, forest
 from poise.training.pictures.figures.series import SIDES, Series, series
 from poise.training.pictures.figures.style import INLINE, Inline, look, sample
+from poise.training.running.columns import J50_MEAN
 from poise.training.running.summary import Interval, both_ends
 
 from .cells import Download, csv_text, download
@@ -49,7 +50,7 @@ def forests(results: Results) -> list[Markup]:
         ends = wilson_interval(count, of)
         rates.append(series(name, index, [100.0 * np.array([0.0, count / of, *ends])]))
     pictures = []
-    for found, title in ((j50, "mean J50 [N·s]"), (rates, "recovered trials [%]")):
+    for found, title in ((j50, J50_MEAN.heading), (rates, "recovered trials [%]")):
         if found:
             out = Inline(f"{title}: {'; '.join(s.told(0, '.1f') for s in found)}.")
             forest(out, found, title, ".1f")

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -21,6 +21,16 @@ PolicyName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY"
 RobotName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 Switch = Annotated[bool, tyro.conf.FlagCreatePairsOff]  # without a --no- form
+Overwrite = Annotated[Switch, tyro.conf.arg(help="replace what the folder holds.")]
+OnRobot = Annotated[
+    str, tyro.conf.arg(help="a packaged robot (see poise list) or a .yaml description.")
+]
+Backend = Annotated[
+    Literal["local", "joblib", "ray"],
+    tyro.conf.arg(
+        help="local (processes of this machine), joblib (the same by joblib), ray (a cluster)."
+    ),
+]
 Json = Annotated[
     bool,
     tyro.conf.FlagCreatePairsOff,

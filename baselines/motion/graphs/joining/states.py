@@ -54,20 +54,6 @@ def exp(vectors: np.ndarray) -> np.ndarray:
     return from_scipy(Rotation.from_rotvec(vectors.reshape(-1, 3)), vectors.shape[:-1])
 
 
-def body_rate(turn: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Angular velocities (…, 3) in body axes of Exp(h): J_r(h) ḣ, J_r the right Jacobian.
-
-    J_r = I − (1 − cos θ)/θ² [h]× + (θ − sin θ)/θ³ [h]×².
-    """
-    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
-    small = angle < 1e-4
-    safe = np.where(small, 1.0, angle)
-    first = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
-    second = np.where(small, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
-    once = np.cross(turn, rate)
-    return rate - first * once + second * np.cross(turn, once)
-
-
 def vector_rate(turn: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """ḣ (…, 3) for which Exp(h) has angular velocities (…, 3) in body axes: J_r(h)⁻¹ ω.
 

@@ -11,13 +11,14 @@ from poise.baselines.balance.stepping.planning.cop_region import (
     CopRegion,
     rest_ahead,
 )
-from poise.envs.compiled.maths.pendulum import capture_distance, drifted
+from poise.envs.compiled.maths.pendulum import capture_distance
 from poise.envs.compiled.maths.polygons import clipped
 from poise.envs.compiled.maths.vectors import turn
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
 from tests.support import stepping_reference as readable
 from tests.support.shared import robot
+from tests.support.stepping_reference import drifted
 
 OMEGA = 3.5
 

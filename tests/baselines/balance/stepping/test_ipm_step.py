@@ -14,10 +14,11 @@ from poise.baselines.balance.stepping.planning.config import (
 )
 from poise.baselines.balance.stepping.planning.cop_region import CopRegion
 from poise.baselines.registry import controller_config, load_controller
-from poise.envs.compiled.maths.pendulum import drifted, pendulum
+from poise.envs.compiled.maths.pendulum import pendulum
 from poise.envs.compiled.maths.polygons import nearest_inside
 from tests.baselines.balance.stepping.test_capture_step import trial
 from tests.support.shared import generic_state, robot
+from tests.support.stepping_reference import drifted
 
 HEIGHT, GRAVITY = 0.8, 9.81
 OMEGA = float(np.sqrt(GRAVITY / HEIGHT))

@@ -14,7 +14,7 @@ from poise.baselines.motion.feasibility.physical import PhysicalJoin, physical_j
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 from tests.support.physics import robot_named
-from tests.support.robot_clips import ahead_clip, packaged_clip, steps_clip
+from tests.support.robot_clips import ahead_clip, packaged_clip, steps_clip, swings
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +36,8 @@ def test_soles_are_planted_as_scheduled_and_rest_where_they_landed(
     clip = joined.clip
     motion = reference_from(clip, robot, "test")
     assert motion.footing is not None and clip.planted is not None
-    assert [foot for foot, *_ in motion.footing.swings] == [
-        foot for foot, *_ in reference_from(ahead_clip(robot), robot, "").footing.swings
+    assert [foot for foot, *_ in swings(motion.footing)] == [
+        foot for foot, *_ in swings(reference_from(ahead_clip(robot), robot, "").footing)
     ] * 2
     h = robot.height_com
     _, places, _ = sole_poses(robot, clip.qpos)

@@ -14,8 +14,7 @@ from poise.baselines.motion.feasibility.check import (
 )
 from poise.baselines.motion.feasibility.gap import with_gap
 from poise.baselines.registry import momentum_qp_config
-from poise.envs.robots.variants import perturbed_robot
-from tests.support.physics import robot_named
+from tests.support.physics import robot_named, slippery
 from tests.support.robot_clips import com_clip, packaged_clip
 
 
@@ -65,9 +64,9 @@ def test_each_limit_is_looked_at(change: dict[str, float], name: str) -> None:
 
 def test_less_friction_is_a_greater_share_of_it() -> None:
     robot = robot_named("humanoid")
-    slippery = perturbed_robot(robot, friction=0.2)
-    assert ground_friction(slippery) == pytest.approx(0.2)
-    shares = [check_motion(load_motion("squat", one), one).friction for one in (robot, slippery)]
+    smooth = slippery(robot, 0.2)
+    assert ground_friction(smooth) == pytest.approx(0.2)
+    shares = [check_motion(load_motion("squat", one), one).friction for one in (robot, smooth)]
     np.testing.assert_allclose(shares[1], shares[0] * ground_friction(robot) / 0.2, rtol=1e-6)
 
 

@@ -14,6 +14,7 @@ from poise.configs.errors import ConfigError
 from tests.support.captured import captured
 from tests.support.captures import make
 from tests.support.physics import robot_named
+from tests.support.robot_clips import swings
 
 
 @pytest.fixture(scope="module")
@@ -50,14 +51,14 @@ def test_made_clips_become_motions_with_their_steps(name: str, stride: float, tu
     footing = reference_from(made.clip, robot, name).footing
     assert footing is not None
     paces = find_paces(clip)
-    lands = np.array([land for _, _, land in footing.swings])
+    lands = np.array([land for _, _, land in swings(footing)])
     assert lands == pytest.approx([p.land + made.begins for p in paces], abs=0.04)
     end = footing.sample(made.clip.duration)
     assert end.root[0, 2] == pytest.approx(turn, abs=0.25)
     assert end.turns[:, 0, 2] == pytest.approx([end.root[0, 2]] * 2, abs=0.05)
     way = (clip.root[-1] - clip.root[0])[:2] * made.scale * made.stride
     assert end.com[0, :2] - footing.sample(0.0).com[0, :2] == pytest.approx(way, abs=0.25)
-    for foot, lift, land in footing.swings:
+    for foot, lift, land in swings(footing):
         assert footing.sample(0.5 * (lift + land)).places[foot, 0, 2] > 0.03
 
 

@@ -21,7 +21,7 @@ from poise.baselines.motion.synthesis.synthesis import Synthesis
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 from tests.support.physics import robot_named
-from tests.support.robot_clips import ahead_clip, packaged_clip
+from tests.support.robot_clips import ahead_clip, packaged_clip, swings
 
 pytest.importorskip("mink")
 
@@ -61,8 +61,8 @@ def test_a_script_goes_on_from_the_new_stance(robot: Robot, synthesis: Synthesis
     assert motion.footing is not None and made.planted is not None
     one = reference_from(ahead_clip(robot), robot, "").footing
     assert one is not None
-    first, second = (foot for foot, *_ in one.swings)
-    assert [foot for foot, *_ in motion.footing.swings] == [first, second, second, first]
+    first, second = (foot for foot, *_ in swings(one))
+    assert [foot for foot, *_ in swings(motion.footing)] == [first, second, second, first]
     _, places, _ = sole_poses(robot, made.qpos)
     moved = places[-1, :, 0] - places[0, :, 0]
     assert moved == pytest.approx(np.full(2, 0.2 * robot.height_com), abs=1e-3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from poise.envs.compiled.maths.pendulum import drifted, drifted_point
+from poise.envs.compiled.maths.pendulum import drifted_point
 from poise.envs.compiled.maths.vectors import along, placed, rotated, rotation_between, turn, turned
 
 
@@ -40,7 +40,9 @@ def test_the_rotation_between_frames_is_sine_times_axis():
         assert found == pytest.approx(np.array(vector) / angle * np.sin(angle))
 
 
-def test_points_drift_as_numbers_do():
-    """The form for kernels gives `drifted` of both coordinates."""
-    xi, p = np.array([0.3, -0.1]), np.array([0.05, 0.02])
-    assert drifted_point(xi, p, 3.5, 0.3) == pytest.approx(drifted(xi, p, 3.5, 0.3))
+def test_capture_points_drift_from_the_cop():
+    """ξ̇ = ω (ξ − p), and where it begins."""
+    xi, p, h = np.array([0.3, -0.1]), np.array([0.05, 0.02]), 1e-6
+    assert drifted_point(xi, p, 3.5, 0.0) == pytest.approx(xi)
+    before, now, after = (np.array(drifted_point(xi, p, 3.5, 0.3 + t)) for t in (-h, 0.0, h))
+    assert (after - before) / (2.0 * h) == pytest.approx(3.5 * (now - p), rel=1e-6)

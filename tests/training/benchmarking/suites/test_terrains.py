@@ -1,4 +1,4 @@
-"""training/benchmarking/suites/terrains.py: walks over terrain, and what becomes of them."""
+"""training/benchmarking/suites/walking.py: walks over terrain, and what becomes of them."""
 
 from __future__ import annotations
 

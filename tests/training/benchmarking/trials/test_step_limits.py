@@ -15,7 +15,7 @@ from rich.console import Console
 from poise.baselines.balance.stepping.planning.config import StepLimits
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config, load_controller
-from poise.envs.compiled.maths.pendulum import drifted, duration_factor
+from poise.envs.compiled.maths.pendulum import drifted_point, duration_factor
 from poise.training.benchmarking.evaluation import plots
 from poise.training.benchmarking.evaluation import run as evaluation
 from poise.training.benchmarking.evaluation.evaluate import evaluate
@@ -53,7 +53,7 @@ def test_a_push_at_the_limit_is_stopped_by_that_many_steps(limit: NStepLimit) ->
             J = limit(direction, 1e-9, count)  # a kick
             xi, foot = J / mass / omega, 0.0
             for _ in range(count):
-                xi = float(drifted(np.array([xi]), np.array([foot + r]), omega, time)[0])
+                xi = drifted_point(np.full(2, xi), np.full(2, foot + r), omega, time)[0]
                 foot += length
             assert xi - foot == pytest.approx(r, abs=1e-6)
         longer = duration_factor(omega, 0.1)

@@ -14,9 +14,9 @@ from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.registry import load_controller
 from poise.configs.errors import ConfigError, PoiseError
 from poise.training.deploy.export.check import COUNT, check_onnx, observations
+from poise.training.deploy.export.export import safetensors_bytes
 from poise.training.deploy.export.metadata import metadata, scale_of
 from poise.training.deploy.export.onnx_graph import onnx_bytes
-from poise.training.deploy.export.tensors import safetensors_bytes
 from poise.training.learning.policy import ACTIVATIONS, Policy
 from tests.support.exported import SHIPPED, SYMMETRIC, policy, spoiled
 from tests.support.policies import onnx, onnx_session

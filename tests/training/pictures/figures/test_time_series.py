@@ -1,11 +1,11 @@
-"""Pictures over time: a training run and one trial."""
+"""Pictures of one trial over time."""
 
 import numpy as np
 import pytest
 
 from poise.training.pictures.figures import style
 from poise.training.pictures.figures.style import Inline
-from poise.training.pictures.figures.time_series import FAR, training_curve, trial_timeseries
+from poise.training.pictures.figures.time_series import FAR, trial_timeseries
 from tests.support.drawings import drawing, points
 
 
@@ -23,22 +23,6 @@ def figures(monkeypatch):
     return drawn
 
 
-def rows():
-    """A log with rollouts at every entry and evaluations at every fifth."""
-    log = []
-    for k in range(20):
-        row = {"steps": 1000.0 * k, "rollout_rate": 0.02 * k, "reward": 1.0 + k}
-        if k % 5 == 0:
-            rate = 0.03 * k
-            row |= {
-                "evaluation_rate": rate,
-                "evaluation_rate_low": rate - 0.1,
-                "evaluation_rate_high": rate + 0.1,
-            }
-        log.append(row)
-    return log
-
-
 def trial(n=500):
     """Two seconds of a trial: time and all signals."""
     t = np.arange(n) * 0.004
@@ -54,38 +38,6 @@ def by_label(ax):
     """The artists of the axes by their label."""
     handles, labels = ax.get_legend_handles_labels()
     return dict(zip(labels, handles, strict=True))
-
-
-def test_rates_share_a_panel_and_others_have_their_own(tmp_path, figures):
-    """Rates are in the top panel, the reward below, and band columns are no lines."""
-    training_curve(tmp_path / "a.png", rows(), baseline=0.3)
-    top, below = figures[0].axes
-    assert set(by_label(top)) == {"rollout rate", "evaluation rate", "baseline"}
-    assert set(by_label(below)) == {"reward"}
-    assert len(top.collections) == 1
-
-
-def test_rare_evaluations_are_joined(tmp_path, figures):
-    """The evaluation line has just the entries that hold one."""
-    training_curve(tmp_path / "a.png", rows())
-    line = by_label(figures[0].axes[0])["evaluation rate"]
-    assert line.get_xdata().tolist() == [0.0, 5000.0, 10000.0, 15000.0]
-    np.testing.assert_allclose(line.get_ydata(), [0, 0.15, 0.3, 0.45])
-
-
-def test_a_run_without_rates_is_drawn(tmp_path, figures):
-    """Any numeric column can be drawn over any other."""
-    training_curve(tmp_path / "a.png", [{"epoch": 1, "loss": 2.0}, {"epoch": 2}], x="epoch")
-    assert len(figures[0].axes) == 1
-    assert figures[0].axes[0].get_xlabel() == "epoch"
-
-
-@pytest.mark.parametrize("bad", [[], [{"steps": 1.0}], [{"reward": 1.0}]])
-def test_a_log_without_columns_is_refused(tmp_path, bad):
-    """An empty log, or one with nothing to draw, is an error and writes nothing."""
-    with pytest.raises(ValueError, match="steps"):
-        training_curve(tmp_path / "a.png", bad)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_trial_shows_its_signals_against_the_support(tmp_path, figures):
@@ -144,7 +96,6 @@ def test_the_legend_is_not_cut_off(tmp_path, figures):
     """With every signal, the legend fits into the picture and covers no axes."""
     t, signals = trial()
     trial_timeseries(tmp_path / "a.png", t, signals, pushes=[(0.5, 0.1)])
-    training_curve(tmp_path / "b.png", rows(), baseline=0.3)
     for figure in figures:
         box = figure.legends[0].get_window_extent()
         assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0

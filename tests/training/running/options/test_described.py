@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable
+from typing import get_type_hints
 
 import pytest
 import tyro
@@ -16,7 +17,6 @@ from poise.training.cli.train import BASIC, Command, options
 from poise.training.learning.config import train_config
 from poise.training.running.options.described import entries
 
-TOLD_ONCE = ("allow", "json", "push", "command")  # by their types, for all commands
 COMMON = {**COMMANDS, **{f"motion {name}": each for name, each in MOTION.items()}}
 
 
@@ -44,10 +44,14 @@ def test_the_options_that_help_lists_are_those_that_are_read(
 
 @pytest.mark.parametrize("name", [name for name in COMMON if name not in ("train", "motion")])
 def test_every_parameter_of_a_command_is_described(name: str) -> None:
-    """In its docstring, by a text of its own."""
+    """In its docstring, by a text of its own; or by its type, which several commands share."""
     function: Callable[..., object] = COMMON[name]
     told = entries(inspect.getdoc(function))
-    assert {*inspect.signature(function).parameters} - {*TOLD_ONCE} == {*told} - {*TOLD_ONCE}
+    hints = get_type_hints(function, include_extras=True)
+    by_type = {key for key, hint in hints.items() for each in getattr(hint, "__metadata__", ())
+               if getattr(each, "help", None)}  # fmt: skip
+    assert {*inspect.signature(function).parameters} == {*told} | by_type
+    assert not {*told} & by_type
     assert len(set(told.values())) == len(told)
 
 

@@ -1,0 +1,115 @@
+"""What is found of a gait, the table of it, and the picture of [Zhao, fig. 12]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from poise.training.pictures.figures.palette import GREY
+from poise.training.pictures.figures.style import legend_below, look, saved_figure
+from poise.training.running.columns import Figure, known
+
+from .human import POINTS, KneeMoment
+
+
+@dataclass(frozen=True)
+class GaitFigures:
+    """A controller at one speed; means over its starts.
+
+    Attributes:
+        controller, speed: whose figures these are, and the command [m/s].
+        starts, falls: how many walks there were, and how many of them fell.
+        speed_ahead, speed_error_rms: reached, and the root mean square error of strides [m/s].
+        cost_of_transport, positive_cost_of_transport: see `Outcome`.
+        knee_mean, knee_peak: of the stance knee on one foot, |τ|/m [N·m/kg].
+        knee_stance: mean |τ|/m over whole stances, on both feet too [N·m/kg].
+        knee_rmse: root mean square difference of the mean curve over stance from the human one.
+        force_peak: mean of the stances' largest vertical force, in m g.
+        height_amplitude: of the CoM in a step, half of its way up and down [m].
+        step_length, step_time: [m], [s].
+        knee_curve: (51,) mean τ/m over stance, extension positive [N·m/kg]; empty without stances.
+        tick: median time of a control tick while it walks, from Python [µs].
+        j50: mean over directions and phases at 0.5 m/s [N·s]; None where it was not asked for.
+    """
+
+    controller: str
+    speed: float
+    starts: int
+    falls: int
+    speed_ahead: float | None
+    speed_error_rms: float | None
+    cost_of_transport: float | None
+    positive_cost_of_transport: float | None
+    knee_mean: float | None
+    knee_peak: float | None
+    knee_stance: float | None
+    knee_rmse: float | None
+    force_peak: float | None
+    height_amplitude: float | None
+    step_length: float | None
+    step_time: float | None
+    knee_curve: tuple[float, ...]
+    tick: float | None = None
+    j50: float | None = None
+
+
+#: of `GaitFigures`; a terminal has no room for longer names
+COLUMNS = (
+    Figure("falls", "fell", ".0f", of="starts"),
+    Figure("speed_ahead", "speed", ".3f", "m/s"),
+    Figure("speed_error_rms", "RMS error", ".3f"),
+    Figure("cost_of_transport", "CoT", ".2f"),
+    Figure("positive_cost_of_transport", "of positive work", ".2f"),
+    Figure("knee_mean", "knee", ".2f", "N·m/kg"),
+    Figure("knee_peak", "peak", ".2f"),
+    Figure("knee_rmse", "RMSE to humans", ".2f"),
+    Figure("force_peak", "force peak", ".2f", "m g"),
+    Figure("height_amplitude", "height ±", ".1f", "mm", scale=1e3),
+    Figure("j50", "J50", ".1f", "N·s"),
+    Figure("tick", "tick", ".0f", "µs"),
+)
+
+
+def print_gaits(figures: Sequence[GaitFigures], console: Console) -> None:
+    """A table for each speed."""
+    for speed in dict.fromkeys(each.speed for each in figures):
+        table = Table(title=f"{speed:g} m/s", title_justify="left")
+        table.add_column("controller", overflow="fold", min_width=11)
+        own = [vars(each) for each in figures if each.speed == speed]
+        shown = known(COLUMNS, own)
+        for column in shown:
+            table.add_column(escape(column.heading), justify="right", overflow="fold")
+        for each in own:
+            table.add_row(escape(each["controller"]), *(column.text(each) for column in shown))
+        console.print(table)
+
+
+def stance_plot(path: Path, figures: Sequence[GaitFigures], band: KneeMoment) -> None:
+    """The knee's torque over stance, models beside humans: a panel for each speed.
+
+    Raises PoiseError if the file cannot be written.
+    """
+    speeds = sorted({each.speed for each in figures})
+    names = list(dict.fromkeys(each.controller for each in figures))
+    with saved_figure(path, 5.4 * len(speeds), 4.6) as figure:
+        panels = figure.subplots(1, len(speeds), sharey=True, squeeze=False)[0]
+        for ax, speed in zip(panels, speeds, strict=True):
+            at = np.linspace(0.0, 100.0, POINTS)
+            mean, half = band.curves()
+            ax.fill_between(at, mean - half, mean + half, color=GREY, alpha=0.25, lw=0,
+                            label="humans, coarse")  # fmt: skip
+            for each in figures:
+                if each.speed == speed and each.knee_curve:
+                    style = look(names.index(each.controller))
+                    ax.plot(at, each.knee_curve, color=style.colour, linestyle=style.line,
+                            label=each.controller)  # fmt: skip
+            ax.set_title(f"{speed:g} m/s")
+            ax.set_xlabel("stance [%]")
+        panels[0].set_ylabel("knee torque, extension [N·m/kg]")
+        legend_below(figure, columns=3)
