@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -11,9 +11,8 @@ from poise.baselines.allowance import allowing, named
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import ReferenceMotion, told
 from poise.baselines.balance.references.targets import motion_arrays
-from poise.baselines.balance.references.tempo import TIME, Tempo
+from poise.baselines.balance.references.tempo import TIME, Pace, Tempo
 from poise.baselines.controller import Controller, Targets
-from poise.baselines.motion.performing.controller import Performer
 from poise.baselines.registry import (
     ControllerConfig,
     load_controller,
@@ -33,6 +32,14 @@ from .controlled import ControlledEnv
 from .policy_step import TargetInputs, set_targets
 from .scales import Lag, ResidualScales, action_term, make_residual
 from .terms import MOTION_TERMS, MotionView
+
+
+@runtime_checkable
+class Performer(Protocol):
+    """What a controller has that knows the motion whose targets it is given."""
+
+    def perform(self, motion: ReferenceMotion, pace: Pace) -> None:
+        """Take the motion, and the pace of its time."""
 
 
 class ResidualBalanceEnv(ControlledEnv):

@@ -1,7 +1,6 @@
 """Dense, small, strictly convex quadratic programs: one interface, three solvers."""
 
-from .problem import QP, Residuals, Solution, Solver, Status, residuals
-from .registry import SOLVERS, make_solver
+from .problem import QP, SOLVERS, Residuals, Solution, Solver, Status, make_solver, residuals
 
 __all__ = [
     "QP",

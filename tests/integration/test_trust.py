@@ -545,7 +545,7 @@ DANGEROUS = {
     # that a pickle of ours names, public names.
     "import_module": {
         "baselines/plugins.py",
-        "baselines/solvers/registry.py",
+        "baselines/solvers/problem.py",
         "configs/kinds.py",
         "envs/compiled/calls.py",
         "src/poise/lazy.py",

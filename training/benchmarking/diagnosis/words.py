@@ -89,10 +89,10 @@ def losses(lost: Iterable[tuple[Diagnosis, int]]) -> list[Loss]:
     return [{"cause": name, "trials": count} for name, count in counts.most_common()]
 
 
-def told_losses(found: list[Loss], most: int = 3) -> str:
-    """The most frequent causes in a line: of 57 losses 31: …; 9: …"""
+def told_losses(found: list[Loss]) -> str:
+    """The three most frequent causes in a line: of 57 losses 31: …; 9: …"""
     total = sum(loss["trials"] for loss in found)
-    some = "; ".join(f"{loss['trials']}: {loss['cause']}" for loss in found[:most])
+    some = "; ".join(f"{loss['trials']}: {loss['cause']}" for loss in found[:3])
     return f"of {total} losses {some}" if found else ""
 
 

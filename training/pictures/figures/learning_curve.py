@@ -7,6 +7,8 @@ from pathlib import Path
 
 from matplotlib.ticker import EngFormatter
 
+from poise.training.running.columns import J50_MEAN
+
 from .palette import GREY
 from .style import headline, legend_below, look, saved_figure
 
@@ -20,7 +22,6 @@ def learning_curve(
     others: Mapping[str, float] | None = None,
     *,
     note: str = "",
-    unit: str = "N·s",
 ) -> None:
     """Mean J50 over environment steps, a line for each run.
 
@@ -30,7 +31,6 @@ def learning_curve(
             a band.
         others: name → J50 of what does not learn, each a horizontal line.
         note: a sentence below the title.
-        unit: of J50.
 
     Raises:
         PoiseError: the file cannot be written.
@@ -49,7 +49,7 @@ def learning_curve(
         ax.set_ylim(bottom=0)
         ax.xaxis.set_major_formatter(EngFormatter(sep=""))
         ax.set_xlabel("environment steps")
-        ax.set_ylabel(f"mean J50 [{unit}]")
+        ax.set_ylabel(J50_MEAN.heading)
         said = "J50: half of the pushes are recovered. Band: 95 % interval."
         headline(figure, "Recovered impulse while it learns", said, note)
         legend_below(figure)

@@ -40,17 +40,13 @@ def variables(scheme: str) -> dict[str, str]:
     return {name: to_hex(readable(colour, card)) for name, colour in DRAWN.items()}
 
 
-def readable(colour: RGB, ground: RGB, least: float = CONTRAST) -> RGB:
-    """A colour, mixed with black on light ground or with white on dark as far as it must be.
-
-    Args:
-        colour, ground: parts of 0 to 1.
-        least: WCAG's contrast that the result has to `ground`, up to 21.
-    """
+def readable(colour: RGB, ground: RGB) -> RGB:
+    """A colour, mixed with black on light ground or with white on dark as far as it must be to have
+    WCAG's `CONTRAST` to it. Both are parts of 0 to 1."""
     end = 0.0 if luminance(ground) > 0.18 else 1.0
     for percent in range(101):
         r, g, b = (part + 0.01 * percent * (end - part) for part in colour)
-        if contrast((r, g, b), ground) >= least:
+        if contrast((r, g, b), ground) >= CONTRAST:
             break
     return r, g, b
 

@@ -37,7 +37,6 @@ def fall_probability(
     unit: Unit = "N·s",
     bins: int = BINS,
     xlabel: str | None = None,
-    title: str = "Pushes that are not recovered",
 ) -> None:
     """Fraction of trials that ended in a fall against the impulse, with the fitted curves.
 
@@ -52,7 +51,6 @@ def fall_probability(
         bins: largest number of dots per controller; with at most as many distinct impulses, each of
             them is a bin.
         xlabel: instead of the label that belongs to the unit, as for another kind of fraction.
-        title: above the plot.
 
     Raises:
         ValueError: trials that `fit_logistic` refuses too.
@@ -81,7 +79,7 @@ def fall_probability(
             draw_line(ax, s, x, y, label, 2.0)
             draw_marks(ax, s, ".0%", x=s.x + shift)
         ax.set_xlabel(xlabel or IMPULSE_LABEL[unit])
-        headline(figure, title, "Bars: 95 % intervals.")
+        headline(figure, "Pushes that are not recovered", "Bars: 95 % intervals.")
         legend_below(figure, columns=2)
 
 

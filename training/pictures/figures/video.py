@@ -74,7 +74,6 @@ def record_together(
     path: str | Path,
     *,
     fps: float = 25.0,
-    slow_motion: float = 1.0,
 ) -> int:
     """Film several episodes side by side, each under its name; returns the number of frames.
 
@@ -82,15 +81,15 @@ def record_together(
     it was then, until the last has ended.
 
     Raises:
-        ConfigError: the path, rate, slow motion or size is not valid, or periods or sizes differ.
+        ConfigError: the path, rate or size is not valid, or periods or sizes differ.
         PoiseError: the video cannot be encoded, or the file cannot be written.
     """
     own = list(episodes.values())
     if not own or len({(each.base.config.policy_period, each.size) for each in own}) != 1:
         raise ConfigError("give one or more, of one policy period and size", field="episodes")
     width, height = own[0].size
-    _check(path, fps, slow_motion, (width, height))
-    every, rate = _drawn(own[0].base, fps, slow_motion)
+    _check(path, fps, 1.0, (width, height))
+    every, rate = _drawn(own[0].base, fps, 1.0)
 
     def frame() -> np.ndarray:
         return np.hstack([_labelled(name, each) for name, each in episodes.items()])
