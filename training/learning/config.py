@@ -58,8 +58,6 @@ class PPOConfig:
             learned.
         noise_correlation: Correlation of the exploration's noise in successive steps; 0: white, see
             `exploration.py`.
-        calm_noise: Exploration's noise at rest, as a fraction of that of a moving robot; 1: alike
-            everywhere, see `calm_exploration`.
         use_sde: Explore by noise that is smooth in the state, as SB3's gSDE.
         sde_sample_freq: Policy steps after which that noise is drawn anew; -1: once a rollout.
         symmetric: Make the policy its own mirror image, see `symmetry.py`: each push teaches two.
@@ -87,7 +85,6 @@ class PPOConfig:
     noise_correlation: float = field(
         default=0.0, metadata={"min": 0.0, "max": 0.99, "omit": "default"}
     )
-    calm_noise: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0, "omit": "default"})
     use_sde: bool = False
     sde_sample_freq: int = field(default=16, metadata={"min": -1})
     symmetric: bool = False
@@ -97,8 +94,6 @@ class PPOConfig:
             raise ValueError("symmetric: not with use_sde")
         if self.noise_correlation > 0.0 and self.use_sde:
             raise ValueError("noise_correlation: not with use_sde, whose noise lasts already")
-        if self.calm_noise < 1.0 and self.use_sde:
-            raise ValueError("calm_noise: not with use_sde, whose noise depends on the state")
         if self.n_envs * self.n_steps < 2:
             raise ValueError("n_envs × n_steps must be at least 2")
         if self.n_envs * self.n_steps > MOST_STEPS:

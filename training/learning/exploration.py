@@ -1,20 +1,12 @@
 """Exploration: how much noise a policy's actions have, and how long it lasts."""
 
-from collections.abc import Sequence
-
-import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.distributions import DiagGaussianDistribution
 from stable_baselines3.common.policies import ActorCriticPolicy
 
-from poise.configs.errors import ConfigError
-from poise.envs.balance.mdp.observation import Term
-
 from .config import TrainConfig
-
-VELOCITIES = ("root_rate", "joint_vel")  # terms
 
 
 class ExplorationCallback(BaseCallback):
@@ -72,43 +64,3 @@ def correlate_exploration(policy: ActorCriticPolicy, correlation: float) -> None
     dimension = policy.action_space.shape
     assert dimension  # the space is a box
     policy.action_dist = CorrelatedGaussian(dimension[0], correlation)
-
-
-def velocities(terms: Sequence[Term]) -> np.ndarray:
-    """The entries of an observation that are the newest velocities of root and joints.
-
-    Raises ConfigError where it has none.
-    """
-    places = np.cumsum([0, *(term.size for term in terms)])
-    found = [np.arange(first, first + term.size)
-             for term, first in zip(terms, places, strict=False) if term.name in VELOCITIES]  # fmt: skip
-    if not found:
-        raise ConfigError("needs a velocity in the observation", field="ppo.calm_noise",
-                          choices=VELOCITIES)  # fmt: skip
-    return np.concatenate(found)
-
-
-def calm_exploration(policy: ActorCriticPolicy, moving: np.ndarray, share: float) -> None:
-    """Let the noise of `policy`, which has Gaussian actions, fade as the robot comes to rest.
-
-    σ(o) = σ (share + (1 − share) min(1, 2 rms(z))), where z are the normalised entries `moving` of
-    the observation, velocities; 1 is what they have in the mean. Noise that shakes the robot hides
-    from the policy what rest is like, and what it does there then drifts.
-    """
-    scale = torch.ones(1)
-    entries = torch.as_tensor(moving)
-
-    def look(module: torch.nn.Module, given: tuple[torch.Tensor, ...]) -> None:
-        nonlocal scale
-        rms = given[0][..., entries].square().mean(dim=-1, keepdim=True).sqrt()
-        scale = share + (1.0 - share) * torch.clamp(2.0 * rms, max=1.0)
-
-    distribution = policy.action_dist
-    assert isinstance(distribution, DiagGaussianDistribution)
-    plain = distribution.proba_distribution
-
-    def scaled(mean: torch.Tensor, log_std: torch.Tensor) -> DiagGaussianDistribution:
-        return plain(mean, log_std + scale.log())
-
-    policy.features_extractor.register_forward_pre_hook(look)
-    distribution.proba_distribution = scaled  # type: ignore[method-assign]

@@ -33,7 +33,7 @@ from .callbacks import Checkpoints, Progress, RewardTerms, Throughput
 from .checkpoints import CONFIG, KEPT, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
 from .curriculum import CurriculumCallback
-from .exploration import ExplorationCallback, calm_exploration, correlate_exploration, velocities
+from .exploration import ExplorationCallback, correlate_exploration
 from .imported import import_policy
 from .policy import locate_policy
 from .symmetry import MirroredMeanStd, MirroredPolicy
@@ -172,8 +172,6 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         slow_actor(model.policy, ppo.actor_rate)
     if ppo.noise_correlation > 0.0:
         correlate_exploration(model.policy, ppo.noise_correlation)
-    if ppo.calm_noise < 1.0:
-        calm_exploration(model.policy, velocities(env.get_attr("terms")[0]), ppo.calm_noise)
     head = model.policy.action_net
     assert isinstance(head, torch.nn.Linear)
     with torch.no_grad():
