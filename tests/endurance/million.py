@@ -23,8 +23,10 @@ IDS = (
     "poise/ResidualBalance-v0", "poise/ResidualStep-v0", "poise/ResidualWalk-v0",
     "poise/ResidualWhole-v0",
 )  # fmt: skip
-#: what else an environment is made with, by a name for the table; a level of realism is a line
-SETTINGS: dict[str, dict[str, Any]] = {"exact": {}}
+#: what else an environment is made with, by a name for the table
+SETTINGS: dict[str, dict[str, Any]] = {
+    level: {"realism": level} for level in ("ideal", "lab", "field", "late")
+}
 KINDS = ("random", "bang-bang", "drop", "spin")
 WARM, GROWTH = 0.1, 20.0  # fraction of the steps before memory counts; [MiB] that it may grow
 

@@ -139,6 +139,8 @@ AT_REST = (
 FAILURES_RECOVERED = Figure("solver_failures_recovered", "of them in recoveries", ".0f",
                             words="in trials that recovered",
                             where=_some("solver_failures"))  # fmt: skip
+CHATTER = Figure("torque_variation_median", "chatter", ".1f", "1/s",
+                 "change of torques over the motors' limits, of trials without a fall")  # fmt: skip
 ROOT = Figure("root_force_max", "root", ".0f", "N",
               "largest force that a soft root took from nowhere")  # fmt: skip
 TICK = Figure("tick_us", "tick", ".0f", "µs", "time of one control tick")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -13,6 +13,7 @@ from poise.configs.texts import code, markdown_table, plain
 from poise.training.benchmarking.evaluation.tables import IN_PAIRS, places, ranked, table_columns
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
 from poise.training.running.columns import (
+    CHATTER,
     ETA_MEAN,
     ETA_WORST,
     J50_MEAN,
@@ -37,7 +38,9 @@ Suite {suite}, robot {robot}, seed {seed}; Poise {poise}, MuJoCo {mujoco}, commi
 {processor}, {cores} cores. Intervals are 95 %; what the columns mean: [benchmark.md](benchmark.md).
 `lost, won` and McNemar's p are against {reference} on the {paired}. `root [N]` is the largest
 force that a controller took from nowhere: only those with 0 obey physics, the others have no rank.
-Equal results share a rank. η is J50 over the robot's own ankle limit.
+Equal results share a rank. η is J50 over the robot's own ankle limit. Chatter is how much torques
+change, over the motors' limits. Columns of levels of [realism](realism.md) have the recovered rate
+of the same pushes.
 
 """
 
@@ -173,11 +176,24 @@ def _ranked(summary: Summary) -> tuple[list[str], Cells]:
         for heading, text in table_columns(summary)
         if heading in COLUMNS and (summary["rated"] or heading != RECOVERED.heading)
     ]  # else each of its own pushes
+    columns += [(CHATTER.heading, lambda name: CHATTER.text(entries[name])), *_levels(summary)]
     columns.insert(1, (J50_PER_MASS.unit, lambda name: f"{entries[name]['j50_mean_per_mass']:.2f}"))
     rank = places(entries)
     rows = [[str(rank[name] or NONE), code(name), *(text(name) for _, text in columns)]
             for name in summary["ranking"]]  # fmt: skip
     return ["", "controller", *(heading for heading, _ in columns)], rows
+
+
+def _levels(summary: Summary) -> Iterator[tuple[str, Callable[[str], str]]]:
+    """A column for each level of realism: what was recovered of the same pushes."""
+    entries = summary["controllers"]
+    for k, factor in enumerate(entries[summary["ranking"][0]].get("factors", ())):
+        for i, level in enumerate(factor["levels"] if factor["factor"] == "realism" else ()):
+
+            def rate(name: str, k: int = k, i: int = i) -> str:
+                return f"{entries[name]['factors'][k]['levels'][i]['recovered_rate']:.0%}"
+
+            yield code(level["level"]), rate
 
 
 def _directions(summary: Summary) -> tuple[list[str], Cells]:
