@@ -1,0 +1,30 @@
+"""The leaderboard page: what it adds to the table of the terminal."""
+
+import json
+from pathlib import Path
+
+from poise.training.benchmarking.results.leaderboard import write_leaderboard
+
+RESULT = Path(__file__).parents[4] / "docs/results/booster_t1.json"
+
+
+def test_levels_of_realism_are_columns(tmp_path: Path) -> None:
+    """With what was recovered at each, of those that a suite plays; without them, none."""
+    summary = json.loads(RESULT.read_text())
+    for entry in summary["controllers"].values():
+        (delays,) = (f for f in entry["factors"] if f["factor"] == "delay")
+        levels = [{**cell, "level": name} for cell, name in
+                  zip(delays["levels"], ("ideal", "lab", "field"), strict=False)]  # fmt: skip
+        entry["factors"].append({**delays, "factor": "realism", "levels": levels})
+    result = tmp_path / "summary.json"
+    result.write_text(json.dumps(summary))
+    lines = write_leaderboard([result], tmp_path / "page.md").read_text().splitlines()
+    head = next(line for line in lines if line.startswith("|  | controller"))
+    assert head.endswith("| chatter [1/s] | `ideal` | `lab` | `field` |")
+    for name, entry in summary["controllers"].items():
+        row = next(line for line in lines if f"| `{name}` |" in line).split(" | ")
+        cells = entry["factors"][-1]["levels"]
+        found = [cell.strip(" |") for cell in row[-3:]]
+        assert found == [f"{cell['recovered_rate']:.0%}" for cell in cells], name
+    plain = write_leaderboard([RESULT], tmp_path / "plain.md").read_text()
+    assert "chatter [1/s] |\n" in plain and "`field`" not in plain
