@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.motion.space_time.constraints.reading import read_constraints
@@ -149,6 +150,16 @@ def test_every_kind_refuses_all_of_them(tmp_path: Path, kind: str) -> None:
         text = message(partial(LOADERS[kind], path))
         assert text.startswith(f"{path}: "), (what, text)
         assert problem in text or "|" in problem, (what, text)
+
+
+def test_packaged_files_are_what_both_parsers_of_yaml_read() -> None:
+    """PyYAML without its C library refuses some texts that it takes with it."""
+    paths = sorted((Path(__file__).parents[2] / "configs").rglob("*.yaml"))
+    assert len(paths) > 100
+    for path in paths:
+        text = path.read_text()
+        plain = yaml.load(text, Loader=yaml.SafeLoader)
+        assert plain == yaml.load(text, Loader=yaml.CSafeLoader), path
 
 
 NAMES = ["x" * 300, "x" * 300 + ".yaml", "a\0b.yaml", "a\nb.yaml", "x/" * 3000 + "a.yaml",
