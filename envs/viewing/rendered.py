@@ -41,11 +41,12 @@ class RenderedEnv(Copyable, gymnasium.Env):
         camera: Camera | Mapping[str, object] | str | int | None,
     ) -> None:
         """Raises ConfigError for an unknown mode or camera, and for sizes that are none."""
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+        modes = self.metadata["render_modes"]
+        if render_mode is not None and not (isinstance(render_mode, str) and render_mode in modes):
             raise ConfigError(
                 f"unknown render mode {shown(render_mode)}",
                 field="render_mode",
-                choices=tuple(self.metadata["render_modes"]),
+                choices=tuple(modes),
             )
         self.render_mode = render_mode
         self.width = whole_number(width, 1, "width", "environment")
