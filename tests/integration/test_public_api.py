@@ -111,7 +111,9 @@ def deep_names(text: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
 def test_pages_and_examples_import_nothing_deeper(path: Path) -> None:
-    assert list(deep_names(path.read_text())) == []
+    """But for patches to Poise itself."""
+    text = re.sub(r"```diff\n.*?```", "", path.read_text(), flags=re.DOTALL)
+    assert list(deep_names(text)) == []
 
 
 def test_a_deep_import_is_found() -> None:

@@ -48,6 +48,7 @@ def test_the_packaged_suites_of_benchmarks(name: str) -> None:
         assert envelope.first_trials + envelope.trials >= 20
         assert {trial.factor for trial in part(plan, "factors")} == {
             "standard", "duration", "body", "height", "friction", "delay", "mass_error", "pushes",
+            "realism",
         }  # fmt: skip
 
 
