@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -57,6 +58,7 @@ def allocate_odometry(
     )  # fmt: skip
 
 
+@lru_cache(maxsize=256)  # a Riccati equation at each reset would take most of it
 def filter_gains(dt: float, acceleration: float, noise_q: float, noise_v: float) -> np.ndarray:
     """(2, 2) gains of the stationary Kalman filter of a joint, whose state is (q, q̇).
 
@@ -68,7 +70,9 @@ def filter_gains(dt: float, acceleration: float, noise_q: float, noise_v: float)
     B = np.array([[0.5 * dt * dt], [dt]])
     R = np.diag([max(noise_q, LEAST[0]) ** 2, max(noise_v, LEAST[1]) ** 2])
     P = solve_discrete_are(A.T, np.eye(2), acceleration**2 * B @ B.T + 1e-18 * np.eye(2), R)
-    return P @ np.linalg.inv(P + R)
+    gains = P @ np.linalg.inv(P + R)
+    gains.setflags(write=False)  # they are shared
+    return gains
 
 
 def rate_gain(dt: float, acceleration: float, noise: float) -> float:
