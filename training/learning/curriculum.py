@@ -26,10 +26,11 @@ class CurriculumCallback(BaseCallback):
             self.logger.record("curriculum/largest", scaled.magnitude[1])
         if curriculum.realism < 1.0 or curriculum.mixed:
             factor = curriculum.realism + (1.0 - curriculum.realism) * done
-            n = self.training_env.num_envs
+            n = self.training_env.num_envs if curriculum.mixed else 1
             for i in range(n):
-                part = (i + 0.5) / n if curriculum.mixed else 1.0
-                self.training_env.set_attr("realism", env.realism.scaled(factor * part), indices=i)
+                level = env.realism.scaled(factor * (i + 0.5) / n if curriculum.mixed else factor)
+                envs = i if curriculum.mixed else None  # None: all
+                self.training_env.set_attr("realism", level, indices=envs)
             self.logger.record("curriculum/realism", factor)
 
     def _on_step(self) -> bool:

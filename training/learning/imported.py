@@ -103,7 +103,9 @@ class Translation:
         name = meaning(described)
         plain = replace(described, history=1, lag=0, newest_first=False)
         if described.frame or plain != ObservationTerm(described.term, described.scale):
-            raise self._wrong(i, "with limits it cannot be imported, nor in part")
+            raise self._wrong(
+                i, "with limits it cannot be imported, nor with zeros before the start, nor in part"
+            )
         if isinstance(described.scale, dict):
             raise self._wrong(i, "with factors by name it cannot be imported")
         if name == "velocity_commands":
