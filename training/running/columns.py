@@ -160,6 +160,18 @@ OVER_SEEDS = (
     Figure("recovered", "recovered", ".1%"),
 )
 
+# of a controller at a level of realism
+J50_KEPT = Figure("j50_kept", "J50 kept", ".2f", words="over that of the first level",
+                  ends="j50_kept_ci95")  # fmt: skip
+AT_LEVEL = (
+    replace(J50_MEAN, words=""),
+    J50_KEPT,
+    RECOVERED,
+    Figure("stood", "stood", ".0f", words="unpushed, without a fall", of="unpushed"),
+    CHATTER,
+    Figure("energy_median", "energy", ".0f", "J", "of trials without a fall"),
+)  # fmt: skip
+
 # of two controllers on the same trials
 PAIRED = (
     Figure("both", "both", ".0f", words="recovered by both"),

@@ -270,6 +270,24 @@ class PhaseJ50(TypedDict):
     j50_bound: Bound
 
 
+class RealismLevel(Rate, total=False):
+    """The parts of a suite at a level of realism.
+
+    Rates are of random pushes, else of all; `stood` are the unpushed trials without a fall;
+    `j50_kept` is the J50 over that of the suite's own level, which comes first.
+    """
+
+    level: str
+    stood: int
+    unpushed: int
+    j50_mean: float
+    j50_mean_ci95: Interval
+    j50_kept: Number
+    j50_kept_ci95: Interval | None
+    torque_variation_median: Number
+    energy_median: Number
+
+
 class Fractions(TypedDict, total=False):
     """The fraction of the limit at which half of the random pushes are recovered."""
 
@@ -307,6 +325,7 @@ class Entry(Played, Counts, EnvelopeFigures, Fractions, total=False):
     walks: list[WalkLevel]
     phases: list[PhaseJ50]
     motions: list[MotionLevel]
+    levels: list[RealismLevel]
     in_motion: list[InMotion]
 
 

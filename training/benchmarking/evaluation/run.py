@@ -63,7 +63,7 @@ class Run:
         motions: that are performed instead of the suite's; none: its own.
         reference: whom others are compared with, if it takes part; None: the first.
         measured: what pushes on the robot are measured by.
-        realism: name or file of a level, instead of the suite's.
+        realism: name or file of a level, instead of the suite's; it is then the only one.
     """
 
     def __init__(
@@ -83,8 +83,9 @@ class Run:
         if trials is not None:
             self.suite = self.suite.resized(trials)
         if realism is not None:
-            self.suite = replace(self.suite, realism=realism)
-        load_realism(self.suite.realism)
+            self.suite = replace(self.suite, realism=realism, levels=())
+        for level in (self.suite.realism, *self.suite.levels):
+            load_realism(level)
         self.out, self.overwrite, self.executor = Path(out), overwrite, Executor(backend, workers)
         check_out_folder(out)
         self.robot = load_robot(robot)

@@ -1,4 +1,4 @@
-"""Tables of walks and motions: by command, by the phase of a push, by motion."""
+"""Tables of walks, motions and levels: by command, by the phase of a push, by motion, by level."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from poise.training.running.columns import (
+    AT_LEVEL,
     COSTS,
     FALLS,
     FELL,
@@ -51,6 +52,20 @@ def motion_tables(summary: Summary) -> Iterator[Table]:
     found = {name: rows for name in summary["ranking"] if (rows := entries[name].get("in_motion"))}
     if found:
         yield _in_motion(found)
+
+
+def level_tables(summary: Summary) -> Iterator[Table]:
+    """One of all controllers at each level of realism, if the suite has any."""
+    entries = summary["controllers"]
+    rows = [
+        (name, level) for name in summary["ranking"] for level in entries[name].get("levels", ())
+    ]
+    if figures := known(AT_LEVEL, [level for _, level in rows]):
+        table = _table("at levels of realism", figures, "controller", "level")
+        for name, level in rows:
+            texts = (escape(each.text(level)) for each in figures)
+            table.add_row(escape(name), escape(level["level"]), *texts)
+        yield table
 
 
 def _table(title: str, figures: Sequence[Figure], *first: str) -> Table:

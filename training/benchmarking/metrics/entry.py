@@ -26,12 +26,14 @@ from poise.training.running.summary import (
 )
 
 from .factors import eurobench_figures, factor_figures
+from .levels import level_figures
 from .motions import in_motion, motion_levels
 from .played import (
     DIRECTIONAL,
     Played,
     ankle_limits,
     fractions,
+    once,
     part,
     pushes,
     rate,
@@ -44,11 +46,12 @@ from .walking import phase_figures, walk_levels
 
 def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None) -> Entry:
     """All figures of one controller; `steps` is the limit of one that steps."""
+    everything, played = played, once(played)
     entry: Entry = {
         **counts([outcome for _, outcome in rated(played)]),
         "root_force_max": max((outcome.root_force or 0.0) for _, outcome in played),
-        "played": len(played),
-        "errors": sum(outcome.error is not None for _, outcome in played),
+        "played": len(everything),
+        "errors": sum(outcome.error is not None for _, outcome in everything),
     }
     if found := losses((outcome.diagnosis, outcome.steps) for _, outcome in played):
         entry["losses"] = found
@@ -66,6 +69,8 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
         entry["factors"] = factors
     if part(played, "envelope", "margin"):
         entry["eurobench"] = eurobench_figures(played, plan.limits)
+    if plan.suite.levels:
+        entry["levels"] = level_figures(everything, plan.suite, counts)
     return entry
 
 

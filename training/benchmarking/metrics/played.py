@@ -8,6 +8,7 @@ import numpy as np
 
 from poise.training.benchmarking.statistics.bootstrap import EnvelopeFit, mean_over_directions
 from poise.training.benchmarking.statistics.rates import wilson_interval
+from poise.training.benchmarking.suites.plan import LEVEL
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 from poise.training.running.summary import Rate
@@ -23,9 +24,14 @@ def part(played: Played, *names: str) -> Played:
     return [(trial, outcome) for trial, outcome in played if trial.part in names]
 
 
+def once(played: Played) -> Played:
+    """The trials without those that are played again at a level of realism."""
+    return [(trial, outcome) for trial, outcome in played if LEVEL not in trial.part]
+
+
 def rated(played: Played) -> Played:
-    """The trials that a controller is rated by: those of the mix, else all."""
-    return part(played, *RATED) or played
+    """The trials that a controller is rated by: those of the mix, else all that is played once."""
+    return part(played, *RATED) or once(played)
 
 
 def pushes(played: Played) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

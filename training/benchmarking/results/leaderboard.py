@@ -16,12 +16,15 @@ from poise.training.running.columns import (
     CHATTER,
     ETA_MEAN,
     ETA_WORST,
+    J50_KEPT,
     J50_MEAN,
     J50_PER_MASS,
     NONE,
     RECOVERED,
     ROOT,
     TICK,
+    Figure,
+    known,
 )
 from poise.training.running.files import SUMMARY
 from poise.training.running.summary import Entry, Summary
@@ -185,7 +188,7 @@ def _ranked(summary: Summary) -> tuple[list[str], Cells]:
 
 
 def _levels(summary: Summary) -> Iterator[tuple[str, Callable[[str], str]]]:
-    """A column for each level of realism: what was recovered of the same pushes."""
+    """Columns for each level of realism: what was recovered of the same pushes, and J50 there."""
     entries = summary["controllers"]
     for k, factor in enumerate(entries[summary["ranking"][0]].get("factors", ())):
         for i, level in enumerate(factor["levels"] if factor["factor"] == "realism" else ()):
@@ -194,6 +197,14 @@ def _levels(summary: Summary) -> Iterator[tuple[str, Callable[[str], str]]]:
                 return f"{entries[name]['factors'][k]['levels'][i]['recovered_rate']:.0%}"
 
             yield code(level["level"]), rate
+    others = entries[summary["ranking"][0]].get("levels", [])[1:]
+    for i, other in enumerate(others, 1):
+        for figure in known([J50_MEAN, J50_KEPT], [other]):
+
+            def text(name: str, i: int = i, figure: Figure = figure) -> str:
+                return figure.text(entries[name]["levels"][i])
+
+            yield f"{figure.name}, {code(other['level'])}", text
 
 
 def _directions(summary: Summary) -> tuple[list[str], Cells]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.trials.push_limits import PushLimits
@@ -13,6 +14,7 @@ from .draw import Draw, Part
 from .factors import standard_levels
 from .suite import Suite
 
+LEVEL = "@"  # between the name of a part and the level that it is played at again
 Finished = Mapping[tuple[str, int], Outcome]  # controller, number of the trial → outcome
 
 
@@ -39,38 +41,50 @@ class Plan:
     ):
         self.suite, self.limits, self.names = suite, limits, tuple(names)
         self._draw = Draw(suite, limits, seed, motions)
-        self._parts: list[tuple[Part, list[Trial], int]] = []  # with the second stage's number
         self.standard = standard_levels(self._draw) if suite.factors else {}
+        # each part with its level, its first trials, the number that its second stage is drawn by,
+        # and how much larger the numbers of its trials are than those that they are drawn by
+        self._parts: list[tuple[Part, str | None, list[Trial], int, int]] = []
         number = 0
-        for part in suite.parts.values():
-            first = self._real(part.first(self._draw, number))
-            second = number + len(first)
-            self._parts.append((part, first, second))
-            number = second + part.second_count(len(self.names))
-        self.first = [trial for _, first, _ in self._parts for trial in first]
+        for level in (None, *suite.levels):
+            drawn = 0  # every level draws alike
+            for name, part in suite.parts.items():
+                first = part.first(self._draw, drawn)
+                second = drawn + len(first)
+                following = second + part.second_count(len(self.names))
+                if level is None or name != "factors":
+                    shift = number - drawn
+                    self._parts.append((part, level, self._at(level, shift, first), second, shift))
+                    number += following - drawn
+                drawn = following
+        self.first = [trial for _, _, first, _, _ in self._parts for trial in first]
         self.count = number * len(self.names)
 
-    def _real(self, trials: list[Trial]) -> list[Trial]:
-        """The trials at the suite's level of realism, where they have none of their own."""
-        level = self.suite.realism
-        if level == IDEAL:
-            return trials
+    def _at(self, level: str | None, shift: int, trials: list[Trial]) -> list[Trial]:
+        """The trials at a level; None: the suite's, where they have none of their own."""
+        real = self.suite.realism if level is None else level
         return [
-            replace(trial, conditions=replace(trial.conditions, realism=level))
-            if trial.conditions.realism is None else trial
+            replace(
+                trial,
+                number=trial.number + shift,
+                part=trial.part if level is None else at_level(trial.part, level),
+                conditions=trial.conditions
+                if real == IDEAL or (level is None and trial.conditions.realism is not None)
+                else replace(trial.conditions, realism=real),
+            )
             for trial in trials
-        ]  # fmt: skip
+        ]
 
     def second(self, finished: Finished) -> dict[str, list[Trial]]:
         """controller → its trials of the second stage; `finished` must hold all of the first."""
         chosen: dict[str, list[Trial]] = {name: [] for name in self.names}
-        for part, first, number in self._parts:
+        for part, level, first, number, shift in self._parts:
             recovered = {
                 name: [finished[name, trial.number].recovered for trial in first]
                 for name in self.names
             }
             for name, trials in part.second(self._draw, number, first, recovered).items():
-                chosen[name] += self._real(trials)
+                chosen[name] += self._at(level, shift, trials)
         return chosen
 
     def trials(self, finished: Finished) -> dict[str, list[Trial]]:
@@ -78,3 +92,8 @@ class Plan:
         second = self.second(finished)
         return {name: sorted([*self.first, *second[name]], key=lambda trial: trial.number)
                 for name in self.names}  # fmt: skip
+
+
+def at_level(part: str, level: str) -> str:
+    """The name of a part that is played again at a level, such as envelope@field."""
+    return f"{part}{LEVEL}{Path(level).stem}"

@@ -23,7 +23,11 @@ from .walking import WALKING, Gait, Terrains, Velocity, Walk, WalkKick, WalkPush
 
 @dataclass(frozen=True)
 class Suite(Standard):
-    """A part that is null is left out; the others are played in this order."""
+    """A part that is null is left out; the others are played in this order.
+
+    All but `factors` are played again at each of `levels` of realism, names or files: the same
+    starts, directions and pushes; an envelope's second stage is around the J50 there.
+    """
 
     envelope: Envelope | None = None
     grid: Grid | None = None
@@ -41,6 +45,7 @@ class Suite(Standard):
     walk_repeated: WalkRepeated | None = field(default=None, metadata={"omit": "default"})
     terrains: Terrains | None = field(default=None, metadata={"omit": "default"})
     motions: Motions | None = field(default=None, metadata={"omit": "default"})
+    levels: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
 
     def __post_init__(self) -> None:
         if not self.parts:
@@ -49,6 +54,10 @@ class Suite(Standard):
             raise ValueError("walk_push: J50 is that of a walk or of standing, not of both")
         if self.motions is not None and len(self.parts) > 1:
             raise ValueError("motions: must be the only part: what a fall is, depends on them")
+        stems = [Path(level).stem for level in (self.realism, *self.levels)]
+        for stem in stems:
+            if stems.count(stem) > 1:
+                raise ValueError(f"levels: {stem} comes twice, besides the suite's own realism")
 
     @property
     def parts(self) -> dict[str, Part]:
@@ -83,7 +92,8 @@ class Suite(Standard):
         return replace(self, **changed)
 
 
-PARTS = tuple(f.name for f in fields(Suite) if f.name not in Standard.__dataclass_fields__)
+PARTS = tuple(f.name for f in fields(Suite)
+              if f.name not in (*Standard.__dataclass_fields__, "levels"))  # fmt: skip
 
 
 def load_suite(name: str | Path) -> Suite:

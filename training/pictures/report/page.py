@@ -100,6 +100,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         "walks": walking.walk_table(results, order),
         "walk_costs": walking.cost_table(results, order),
         "phases": walking.phase_table(results, order),
+        "levels": walking.level_table(results, order),
         "motions": walking.motion_table(results, order),
         "in_motion": walking.in_motion_table(results, order),
         "smallest": report_tables.smallest(results, order),

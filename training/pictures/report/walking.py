@@ -1,4 +1,4 @@
-"""What the report shows of walks and motions: by command, by phase of a push, by motion."""
+"""What the report shows of walks, motions and levels: by command, by phase of a push, by motion."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from poise.training.pictures.figures.rates import phase_curves
 from poise.training.pictures.figures.series import SIDES, series
 from poise.training.pictures.figures.style import Inline
 from poise.training.running.columns import (
+    AT_LEVEL,
     COSTS,
     FALLS,
     FELL,
@@ -64,6 +65,13 @@ def motion_table(results: Results, order: Sequence[str]) -> Table | None:
     return figure_table(results, order, "motions", Table("motions", caption, columns, []),
                         (*FALLS[:2], FELL, *PERFORMED),
                         lambda e: [_words(e["motion"] or ALL), cell(e["share"], "g")])  # fmt: skip
+
+
+def level_table(results: Results, order: Sequence[str]) -> Table | None:
+    """Every level of realism of every controller; None where the suite has none."""
+    caption = "The same starts and pushes at each level of realism."
+    table = Table("levels", caption, [Column("level", "level", "of realism")], [])
+    return figure_table(results, order, "levels", table, AT_LEVEL, lambda e: [_words(e["level"])])
 
 
 def in_motion_table(results: Results, order: Sequence[str]) -> Table | None:

@@ -252,3 +252,36 @@ def test_a_dead_worker_costs_nothing_that_is_finished(
     evaluate(["zero"], suite, out=tmp_path / "whole")
     same = [(tmp_path / name / "trials.csv").read_bytes() for name in ("out", "whole")]
     assert same[0] == same[1]
+
+
+def test_a_suite_is_played_again_at_levels(tmp_path: Path, in_process: type[InProcess]) -> None:
+    """Figures of each level stand beside the first; all else is of the first alone, bit for bit."""
+    parts = {**ENVELOPE, "quiet": {"trials": 2}}
+    alone = evaluate(BOTH, write_suite(tmp_path, parts), out=tmp_path / "alone", seed=3)
+    told = io.StringIO()
+    suite = write_suite(tmp_path, {**parts, "levels": ["field"]})
+    summary = evaluate(
+        BOTH, suite, out=tmp_path / "again", seed=3, console=Console(file=told, width=120)
+    )
+    for name in BOTH:
+        entry: dict[str, Any] = dict(summary["controllers"][name])
+        ideal, field = entry.pop("levels")
+        assert (ideal["level"], field["level"]) == ("ideal", "field")
+        assert ideal["j50_mean"] == entry["j50_mean"]
+        if name == "momentum-qp":  # of the other, nothing stands
+            assert ideal["torque_variation_median"] < field["torque_variation_median"]
+        assert field["unpushed"] == 2
+        assert entry.pop("played") == 2 * alone["controllers"][name]["played"]
+        before: dict[str, Any] = dict(alone["controllers"][name])
+        before.pop("played")
+        for each in (entry, before):
+            each.pop("losses", None)
+        assert entry == before
+    kept = summary["controllers"]["momentum-qp"]["levels"][1]["j50_kept"]
+    one, two = (level["j50_mean"] for level in summary["controllers"]["momentum-qp"]["levels"])
+    assert kept == pytest.approx(two / one)
+    assert "at levels of realism" in told.getvalue()
+    marks = {line["part"]: line["realism"] for line in lines(tmp_path / "again")}
+    assert marks["quiet@field"] == marks["envelope@field"] == "field"
+    assert not marks["quiet"]
+    load_results(tmp_path / "again")

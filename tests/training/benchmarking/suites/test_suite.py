@@ -16,7 +16,8 @@ from poise.configs.schema import build, to_dict
 from poise.envs.physics.pushes.sampler import LimitTable
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.suites.directions import Envelope, Grid
-from poise.training.benchmarking.suites.plan import Plan
+from poise.training.benchmarking.suites.factors import Factors, Levels
+from poise.training.benchmarking.suites.plan import LEVEL, Plan
 from poise.training.benchmarking.suites.random import Quiet
 from poise.training.benchmarking.suites.suite import Suite, load_suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
@@ -51,9 +52,10 @@ def test_every_packaged_suite_gives_as_many_trials_as_it_says(
     assert sum(len(trials) for trials in found.values()) == plan.count
     for trials in found.values():
         assert [trial.number for trial in trials] == list(range(len(trials)))
-        assert {trial.part for trial in trials} - {"standing"} == set(suite.parts)
+        once = [trial for trial in trials if LEVEL not in trial.part]
+        assert {trial.part for trial in once} - {"standing"} == set(suite.parts)
         alike = ("factors", "motions")  # whose cells start alike
-        own = [trial.seed for trial in trials if trial.part not in alike]
+        own = [trial.seed for trial in once if trial.part not in alike]
         assert len(set(own)) == len(own)
     assert first(suite, limits, 7) == Plan(suite, limits, 7, ["a"]).first
     other = first(suite, limits, 8)
@@ -62,7 +64,7 @@ def test_every_packaged_suite_gives_as_many_trials_as_it_says(
         suite.walks and name != "walk-push"
     ):
         parts = ("margin",)  # whose pushes are the same for any seed
-        pushes = [{trial.push.impulse for trial in trials if trial.part not in parts}
+        pushes = [{trial.push.impulse for trial in trials if trial.push and trial.part not in parts}
                   for trials in (other, plan.first)]  # fmt: skip
         assert not pushes[0] & pushes[1]
     assert build(Suite, to_dict(suite), "again") == suite
@@ -190,3 +192,35 @@ def test_a_suite_of_the_old_form_says_the_new_one(tmp_path: Path, text: str, now
     with pytest.raises(ConfigError) as error:
         load_suite(path)
     assert str(error.value).startswith(f"{path}: kind: a suite names its parts now: {now} (choices")
+
+
+def test_levels_meet_the_same_starts_and_pushes(limits: PushLimits) -> None:
+    """Each level has the trials of the suite's own, numbered on; factors are played once."""
+    own = Suite(
+        envelope=Envelope(directions=2, first_trials=3, trials=2),
+        factors=Factors(trials=2, levels=Levels(delay=(0.01,))),
+        quiet=Quiet(2),
+    )
+    plan = Plan(replace(own, levels=("lab", "field")), limits, 7, ["a"])
+    alone = Plan(own, limits, 7, ["a"])
+    # at `lab` nothing is recovered, elsewhere all is
+    lost = {trial.number for trial in plan.first if trial.part.endswith("@lab")}
+    found = plan.trials(finished(plan, lambda name, trial: trial.number not in lost))["a"]
+    known = alone.trials(finished(alone, lambda name, trial: True))["a"]
+    assert found[: len(known)] == known
+    assert [trial.number for trial in found] == list(range(plan.count))
+    repeated = [trial for trial in known if trial.part != "factors"]
+    for level in ("lab", "field"):
+        there = [trial for trial in found if trial.conditions.realism == level]
+        assert [t.part for t in there] == [f"{t.part}@{level}" for t in repeated]
+        assert [t.seed for t in there] == [t.seed for t in repeated]
+        same = [a.pushes == b.pushes for a, b in zip(there, repeated, strict=True)]
+        second = [t.stage == 2 for t in repeated]
+        assert all(s or t for s, t in zip(same, second, strict=True))
+        assert all(same) == (level == "field")  # the second stage is around the J50 there
+
+
+@pytest.mark.parametrize("levels", [["field", "field"], ["ideal"], ["a/field.yaml", "field"]])
+def test_a_level_comes_once(tmp_path: Path, levels: list[str]) -> None:
+    with pytest.raises(ConfigError, match="comes twice"):
+        load_suite(write_suite(tmp_path, {"quiet": {"trials": 2}, "levels": levels}))
