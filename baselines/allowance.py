@@ -28,7 +28,8 @@ from poise.configs.errors import ConfigError
 from poise.configs.reading import whole_path
 from poise.configs.schema import read_yaml
 
-NAME = re.compile(r"(?P<place>[^:\s]+):(?P<name>[A-Za-z_]\w*)")
+#: a module has no spaces, the path of a file may
+NAME = re.compile(r"(?P<place>[^:\s]+|[^:]+\.py):(?P<name>[A-Za-z_]\w*)")
 SCRIPTS = (".pt", ".pth", ".jit", ".ts")  # of files of TorchScript, which is code
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -70,6 +71,11 @@ def check_allowed(name: str) -> None:
         )  # fmt: skip
 
 
+def listed(names: str | Iterable[str]) -> list[str]:
+    """What an argument `allow` holds, one name or several."""
+    return [names] if isinstance(names, str) else list(names)
+
+
 @contextmanager
 def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) -> Iterator[None]:
     """Inside, these classes may run, besides those that already may; a context.
@@ -82,7 +88,7 @@ def allowing(names: str | Iterable[str] = (), source: str | Path | None = None) 
     Raises:
         ConfigError: a name of another form, or that of a file that links lead to in a circle.
     """
-    names = [names] if isinstance(names, str) else list(names)
+    names = listed(names)
     for name in names:
         if not is_plugin(name) and not is_script(name):
             raise ConfigError(
@@ -132,6 +138,18 @@ def named(*controllers: object) -> list[str]:
         if is_plugin(controller):
             found.append(controller)
     return found
+
+
+def allow_words(controller: str) -> list[str]:
+    """What a printed command needs to play `controller` again: the words of its ``--allow``.
+
+    That is its own name where it is from outside. A policy's folder or a file may name anything
+    that is allowed here, so it has all of that.
+    """
+    names = named(controller)
+    if not names and os.path.exists(controller):
+        names = sorted(_current.get().names)
+    return [word for name in names for word in ("--allow", name)]
 
 
 @dataclass(frozen=True)

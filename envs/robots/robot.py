@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -172,7 +173,8 @@ def read_description(path: Path) -> RobotDescription:
     feet = " and ".join(repr(foot.body) for foot in description.feet)
     warnings.warn(
         f"{path}: without a description; guessed: root {description.root!r}, feet {feet}, "
-        f"{_posture_text(description)}; poise robot {path.name} writes the description",
+        f"{_posture_text(description)}; poise robot {shlex.quote(str(path))} writes the "
+        "description",
         PoiseWarning,
         stacklevel=4,
     )

@@ -167,5 +167,5 @@ def test_what_is_wrong_is_said(module: str, name: str, message: str) -> None:
 
 def test_names_from_outside_have_a_colon() -> None:
     """Paths and packaged names have none."""
-    assert is_plugin("a.b:C") and is_plugin("a/b.py:C")
-    assert not any(map(is_plugin, ("momentum-qp", "a/b.yaml", "a:b:c", "a:b.c", 3)))
+    assert all(map(is_plugin, ("a.b:C", "a/b.py:C", "my files/b.py:C")))
+    assert not any(map(is_plugin, ("momentum-qp", "a/b.yaml", "a:b:c", "a:b.c", "a b:C", 3)))

@@ -189,3 +189,27 @@ def test_files_that_pages_name_exist() -> None:
             if not (place.with_suffix(".py").exists() or (place / "__main__.py").exists()):
                 wrong.append(f"{page.name}: {module}")
     assert wrong == []
+
+
+READ = ("stepping", "walking", "performance", "policies-from-outside", "evaluation")  # by strangers
+LONGEST = 30  # words of a sentence
+
+
+def sentences(page: str) -> list[str]:
+    """Of the prose of a page, without tables and formulas; code in a sentence is one word."""
+    text = re.sub(r"^```.*?^```$|<!--.*?-->", "", page, flags=re.M | re.S)
+    text = re.sub(r"^(?:\||#|!\[| {4}).*$", "", text, flags=re.M)
+    text = re.sub(r"^\s*(?:[-*]|\d+\.) ", "\n", text, flags=re.M)
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    text = re.sub(r"`[^`]*`", "code", text)
+    ends = re.compile(r"(?<=[.!?])[)\"]?\s+(?=[A-ZΔξω*c(_\d])|(?<=:)\s+(?=[A-Z])")
+    return [each for part in text.split("\n\n") for each in ends.split(" ".join(part.split()))]
+
+
+@pytest.mark.parametrize("page", READ)
+def test_sentences_are_short(page: str) -> None:
+    """A reader understands each at the first reading."""
+    found = sentences((ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8"))
+    assert len(found) > 50
+    counts = {each: len(re.findall(r"\S*\w\S*", each)) for each in found}
+    assert {each: n for each, n in counts.items() if n > LONGEST} == {}

@@ -7,9 +7,11 @@ import importlib
 import importlib.metadata
 import importlib.util
 import json
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -200,3 +202,30 @@ def test_the_command_and_the_version() -> None:
     (script,) = importlib.metadata.entry_points(group="console_scripts", name="poise")
     assert callable(script.load())
     assert importlib.metadata.version("poise") == poise.__version__
+
+
+CONDA = {"mujoco": "mujoco-python", "torch": "pytorch-cpu", "matplotlib": "matplotlib-base"}
+
+
+def test_the_recipe_for_conda_asks_for_what_the_package_does() -> None:
+    """The same version, command and dependencies, by conda-forge's names."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    recipe = yaml.safe_load((ROOT / "conda/meta.yaml").read_text())
+    assert recipe["package"]["version"] == poise.__version__
+    assert recipe["build"]["entry_points"] == [
+        f"{name} = {place}" for name, place in project["scripts"].items()
+    ]
+    wanted = {f"python{project['requires-python']}"}
+    for dependency in project["dependencies"]:
+        name, bounds = re.fullmatch(r"([\w-]+)(.*)", dependency).groups()
+        wanted.add(CONDA.get(name, name) + bounds)
+    assert {line.replace(" ", "") for line in recipe["requirements"]["run"]} == wanted
+
+
+def test_the_image_installs_extras_that_exist() -> None:
+    """And copies in no environment of the machine that builds it."""
+    text = (ROOT / "Dockerfile").read_text()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = re.search(r'-e "\.\[([\w,]+)\]"', text)[1].split(",")
+    assert set(extras) <= set(project["optional-dependencies"])
+    assert {".git", ".venv", "build"} <= set((ROOT / ".dockerignore").read_text().split())

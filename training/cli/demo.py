@@ -1,5 +1,6 @@
 """The main job in a minute or, in full, in some: who recovers from which pushes."""
 
+import shlex
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -64,8 +65,9 @@ def _film(results: Results, console: Console) -> None:
         return
     ranking = results.summary["ranking"]
     names = list(dict.fromkeys([*ranking[:-FILMED:-1], ranking[0]]))  # the best to the right
-    command = f"poise replay {results.folder} --trial {trial} --controllers {' '.join(names)}"
     path = results.folder / VIDEO
+    command = ["poise", "replay", str(results.folder), "--trial", str(trial), "--controllers",
+               *names, "--video", str(path)]  # fmt: skip
     try:
         film(results, trial, names, path)
     except PoiseError as error:
@@ -73,7 +75,7 @@ def _film(results: Results, console: Console) -> None:
         return
     console.print("the hardest push that the best one recovers, filmed:")
     print_paths([path], console)
-    console.print(f"{command} --video {path}", markup=False, highlight=False, soft_wrap=True)
+    console.print(shlex.join(command), markup=False, highlight=False, soft_wrap=True)
 
 
 def hardest(results: Results) -> int | None:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from poise.baselines.allowance import named
+from poise.baselines.allowance import allow_words
 from poise.training.benchmarking.diagnosis.words import told_losses
 from poise.training.benchmarking.metrics.seed_groups import seed_lines
 from poise.training.running.columns import (
@@ -156,7 +156,7 @@ def print_lost(
         some = ", ".join(str(number) for number in numbers[:SHOWN])
         more = f", … ({len(numbers)})" if len(numbers) > SHOWN else ""
         command = ["poise", "view", str(folder), "--trial", str(numbers[0]), "--controllers", name]
-        command += [word for each in named(name) for word in ("--allow", each)]
+        command += allow_words(name)
         lines = [f"lost trials of {name}: {some}{more} ({shlex.join(command)})"]
         if told := told_losses(entries[name].get("losses", [])):
             lines.append(f"  {told}")

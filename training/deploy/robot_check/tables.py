@@ -114,7 +114,7 @@ def _directions(check: RobotCheck) -> Table:
     headings = ("direction", "CoM to edge [mm]", "CoP by ankles [mm]", "in place [N·s]",
                 "in place [N·s/kg]", "one step ≤ [N·s]", "one step ≤ [N·s/kg]")  # fmt: skip
     for heading in headings:
-        table.add_column(heading, justify="right", overflow="fold")
+        table.add_column(escape(heading), justify="right", overflow="fold")
     for each in check.directions[::EVERY]:
         table.add_row(
             f"{each.direction:g}°",

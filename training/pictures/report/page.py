@@ -11,7 +11,7 @@ from pathlib import Path
 import jinja2
 from rich.console import Console
 
-from poise.baselines.allowance import allowing, named
+from poise.baselines.allowance import allow_words, allowing
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
@@ -225,14 +225,12 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
         "end": _ending(record),
         "why": record.why,
         "films": parts,
-        "command": f"poise replay {shlex.quote(str(results.folder))} --trial {record.trial} "
-        f"--controllers {shlex.quote(record.controller)} --video trial.mp4{_allowed(record)}",
-    }
-
-
-def _allowed(record: Record) -> str:
-    """What a command needs besides that names the controller of a record in a folder."""
-    return "".join(f" --allow {shlex.quote(name)}" for name in named(record.controller))
+        "command": shlex.join([
+            *("poise", "replay", str(results.folder), "--trial", str(record.trial)),
+            *("--controllers", record.controller, "--video", "trial.mp4"),
+            *allow_words(record.controller),
+        ]),
+    }  # fmt: skip
 
 
 def _end(record: Record, start: float) -> float:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from poise.baselines.allowance import listed
 from poise.configs.errors import ConfigError
 from poise.envs.balance.base import BalanceEnv
 from poise.training.benchmarking.diagnosis.words import why
@@ -74,7 +75,7 @@ def recorded_trial(
         replay(results, trial, name, video=path, allow=allow)
 
     history = _side_by_side([recorder.frames for recorder in recorders], period)
-    spec = TrialSpec(str(folder), trial, tuple(names))
+    spec = TrialSpec(str(folder), trial, tuple(names), tuple(listed(allow)))
     return Recorded(spec, envs[0].robot, history, period, film, reasons), lines
 
 

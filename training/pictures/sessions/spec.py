@@ -24,6 +24,7 @@ class SessionSpec:
         seed: of the disturbed start.
         realism: a packaged level or a path to one.
         pushes, commands: YAML mappings, as `parse_pushes` and `parse_commands` take them.
+        allow: what may run though only a file names it.
     """
 
     controllers: tuple[str, ...]
@@ -33,6 +34,7 @@ class SessionSpec:
     pushes: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
     realism: str = IDEAL
+    allow: tuple[str, ...] = ()
 
     @property
     def command(self) -> str:
@@ -44,7 +46,8 @@ class SessionSpec:
             words += ["--realism", self.realism]
         words += ["--seed", str(self.seed)]
         words += [word for text in self.pushes for word in ("--push", text)]
-        return shlex.join(words + [word for text in self.commands for word in ("--command", text)])
+        words += [word for text in self.commands for word in ("--command", text)]
+        return shlex.join(words + [word for name in self.allow for word in ("--allow", name)])
 
     @property
     def link(self) -> str:
@@ -56,17 +59,24 @@ class SessionSpec:
 
 @dataclass(frozen=True)
 class TrialSpec:
-    """A trial of a result in a folder, by some of the controllers that took part."""
+    """A trial of a result in a folder, by some of the controllers that took part.
+
+    Attributes:
+        folder, trial, controllers: as a user writes them.
+        allow: what may run though only a file names it.
+    """
 
     folder: str
     trial: int
     controllers: tuple[str, ...]
+    allow: tuple[str, ...] = ()
 
     @property
     def command(self) -> str:
         """The command line that shows the same."""
         words = ["poise", "view", self.folder, "--trial", str(self.trial)]
-        allowed = [word for name in named(*self.controllers) for word in ("--allow", name)]
+        names = dict.fromkeys([*named(*self.controllers), *self.allow])
+        allowed = [word for name in names for word in ("--allow", name)]
         return shlex.join([*words, "--controllers", *self.controllers, *allowed])
 
     @property
@@ -117,7 +127,7 @@ def _trial(given: dict[str, list[str]], now: TrialSpec) -> TrialSpec | None:
     if "trial" not in given:
         return None
     controllers = tuple(given.get("controller", now.controllers))
-    return TrialSpec(now.folder, _number(given["trial"][-1], "trial"), controllers)
+    return replace(now, trial=_number(given["trial"][-1], "trial"), controllers=controllers)
 
 
 def _check_count(controllers: tuple[str, ...]) -> None:

@@ -137,8 +137,9 @@ class BrowserView:
 
     def load(self, robot: str, names: list[str], motion: str) -> None:
         """Play other controllers, another robot or another motion."""
-        seed = self.play.spec.seed if isinstance(self.play.spec, SessionSpec) else 0
-        self.open(SessionSpec(tuple(names), robot, motion, seed))
+        now = self.play.spec
+        seed = now.seed if isinstance(now, SessionSpec) else 0
+        self.open(SessionSpec(tuple(names), robot, motion, seed, allow=now.allow))
 
     def open_trial(self, trial: int) -> None:
         """Show another trial of the same result, by the same controllers."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from poise.baselines.allowance import allows
+from poise.baselines.allowance import allows, listed
 from poise.configs.errors import ConfigError
 from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.trials.names import check_names
@@ -61,7 +61,7 @@ def view(
         PoiseError: viser is not installed, or there is no display.
     """
     spec = SessionSpec(tuple(controllers) or (DEFAULT,), robot, motion, seed, tuple(pushes),
-                       tuple(commands), realism)  # fmt: skip
+                       tuple(commands), realism, tuple(listed(allow)))  # fmt: skip
     _check(spec, seconds, native)
     if not native:
         check_port(host, port)

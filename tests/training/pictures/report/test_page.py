@@ -203,6 +203,23 @@ def test_a_browser_shows_it(report: Path, browser: Browser, width: int, dark: bo
         assert contrast(ink, ground) > 4.5, part
 
 
+NAMED = """(name) => document.querySelectorAll("tbody th, figcaption").forEach((e) => {
+  e.textContent = name;
+})"""
+
+
+def test_a_long_name_breaks(report: Path, browser: Browser) -> None:
+    """Of a controller from outside: no page is wider for it, and the ranking is whole on a desk."""
+    for width in (320, 1400):
+        browser.open(report, width)
+        browser.run(f"({NAMED})('my_own_controller.py:WithStifferAnkles')")
+        assert browser.run("document.documentElement.scrollWidth") <= width
+    wider = (
+        "((box) => box.scrollWidth - box.clientWidth)(document.querySelector('#ranking .scroll'))"
+    )
+    assert browser.run(wider) <= 0
+
+
 def test_buttons_hide_sort_and_answer_keys(report: Path, browser: Browser) -> None:
     """A legend's button hides its series everywhere, a heading sorts; both by keyboard."""
     browser.errors.clear()

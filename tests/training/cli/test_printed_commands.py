@@ -1,0 +1,119 @@
+"""Every command that an output prints runs as it is printed, from the same folder."""
+
+from __future__ import annotations
+
+import html
+import io
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from poise.configs.errors import PoiseWarning
+from poise.envs.robots.robot import load_robot
+from poise.training.benchmarking.evaluation import run as evaluation
+from poise.training.cli import demo
+from poise.training.cli.entry import main
+from poise.training.cli.train import last_words
+from poise.training.pictures.sessions.spec import SessionSpec
+from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, write_suite
+from tests.support.shared import finished_run, tiny_config
+from tests.support.small_urdf import write_urdf
+
+ROOT = Path(__file__).parents[3]
+PRINTED = re.compile(
+    r"\b(poise (?:view|replay|evaluate|robot) [^\n]*?)(?:\)?$|</code>| writes the)", re.M
+)
+FIELD = "demi tour/проба"  # paths with a space, and letters beyond ASCII
+ENDS = {"view": ["--seconds", "0.2", "--port", "0"], "evaluate": ["--trials", "1"]}  # or hours
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, of an awkward name; trials are played in this process.
+
+    It holds a controller from outside, `mine.py:StifferAnkles`, and a file that names it.
+    """
+    pytest.importorskip("viser", reason="not installed: pip install 'poise[view]'")
+    folder = tmp_path / FIELD
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(evaluation, "Executor", InProcess)
+    InProcess.played, InProcess.stop_after = 0, None
+    shutil.copy(ROOT / "examples/own_controller.py", "mine.py")
+    Path("outside.yaml").write_text("kind: outside\nname: mine.py:StifferAnkles\n")
+    Path("my file.yaml").write_text("base: outside.yaml\n")
+    write_suite(folder, RANDOM)
+    return folder
+
+
+def commands(text: str) -> list[str]:
+    """What is printed to be typed."""
+    return PRINTED.findall(text)
+
+
+def played(command: str) -> int:
+    """The exit code of a command line; one that goes on for ever ends soon."""
+    words = shlex.split(command)[1:]
+    return main([*words, *ENDS.get(words[0], [])])
+
+
+def test_of_lost_trials(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A controller from outside; a file that names one, which needs what it was allowed before."""
+    names = ["zero", "mine.py:StifferAnkles", "my file.yaml"]
+    args = ["evaluate", *names, "--suite", "suite.yaml", "--trials", "2", "--out", "my out"]
+    assert main([*args, "--allow", "mine.py:StifferAnkles"]) == 0
+    shown = commands(capsys.readouterr().out)
+    assert [shlex.split(command)[2] for command in shown] == ["my out"] * 3
+    assert "--allow" not in next(line for line in shown if "zero" in line)
+    assert [played(command) for command in shown] == [0, 0, 0]
+
+
+def test_of_the_report(here: Path, can_render: None, capsys: pytest.CaptureFixture[str]) -> None:
+    """A film of each of the worst trials."""
+    args = ["my file.yaml", "--suite", "suite.yaml", "--trials", "1", "--out", "my out"]
+    assert main(["evaluate", *args, "--allow", "mine.py:StifferAnkles"]) == 0
+    assert main(["report", "my out", "--allow", "mine.py:StifferAnkles"]) == 0
+    capsys.readouterr()
+    page = html.unescape(Path("my out/report.html").read_text(encoding="utf-8"))
+    shown = sorted(set(commands(page)))
+    assert shown and all("--video trial.mp4" in command for command in shown)
+    assert played(shown[0]) == 0 and Path("trial.mp4").stat().st_size > 0
+
+
+def test_of_the_demo(here: Path, can_render: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The film again."""
+    monkeypatch.setattr(demo, "SUITE", write_suite(here, ENVELOPE, "envelope"))
+    text = io.StringIO()
+    demo.demo(here / "my demo", controllers=("zero", "momentum-qp"), console=Console(file=text))
+    (command,) = [line for line in commands(text.getvalue()) if line.startswith("poise replay")]
+    assert played(command) == 0
+
+
+def test_of_a_training(here: Path) -> None:
+    """What it is compared by, and what shows it."""
+    run = Path("my run")
+    shutil.copytree(finished_run(), run)
+    evaluate, view = commands("\n".join(last_words(tiny_config(), run)))
+    assert played(evaluate) == 0 and played(view) == 0
+
+
+def test_of_the_viewer(here: Path) -> None:
+    """What it says that plays the same again, of a policy's folder or a file that was allowed."""
+    spec = SessionSpec(("my file.yaml",), seed=3, pushes=("20@90@1.5",),
+                       allow=("mine.py:StifferAnkles",))  # fmt: skip
+    assert played(spec.command) == 0
+
+
+def test_of_a_guessed_robot(here: Path) -> None:
+    """The model lies in another folder; the description is written to the current one."""
+    folder = Path("a robot")
+    folder.mkdir()
+    model = write_urdf(folder).with_suffix(".urdf")
+    with pytest.warns(PoiseWarning) as told:
+        load_robot(model)
+    (command,) = [c for each in told for c in commands(str(each.message))]
+    assert played(command) == 0 and Path(f"{model.stem}.yaml").is_file()
