@@ -2,9 +2,9 @@
 
     python examples/unitree_lowcmd.py [CONTROLLER] [--targets]
 
-The G1 has an inertial unit and encoders, and no sensors of force: the ground's wrench is taken from
-the torques of its legs. The motors do what those of the robot do, τ = tau + kp (q − q_m) − kd dq_m at
-500 Hz on their own encoders. With `--targets` they are sent no torques, but positions. The robot is
+The G1 has an inertial unit and encoders, and no sensors of force: the ground's wrench comes from
+the torques of its legs. The motors do what those of the robot do at 500 Hz on their own encoders,
+tau + kp (q − q_m) − kd dq_m. With `--targets` they are sent no torques, but positions. The robot is
 pushed forward with 10 N·s.
 """
 
