@@ -19,6 +19,7 @@ ARGUMENTS = {
     "rllib_ppo.py": ["1"],
     "sb3_train.py": ["100"],
     "torchrl_ppo.py": ["600"],
+    "unitree_lowcmd.py": ["--targets"],
 }
 
 
@@ -51,6 +52,11 @@ def test_a_controller_outside_of_environments_stands(tmp_path):
 def test_a_controller_stands_by_sensors_alone(tmp_path):
     """Nobody tells it where it is; it is pushed, and stands."""
     assert run("measured_mujoco.py", tmp_path).startswith("momentum-qp stands\n")
+
+
+def test_a_controller_stands_on_messages(tmp_path):
+    """Positions with gains hold a pushed G1, which has no sensors of force."""
+    assert run("unitree_lowcmd.py", tmp_path) == "momentum-qp-g1 by targets stands\n"
 
 
 @pytest.mark.weekly

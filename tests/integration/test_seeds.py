@@ -66,9 +66,12 @@ def anchors(page: Path) -> set[str]:
 def test_every_document_has_its_rows_and_every_row_its_columns() -> None:
     assert {row.document for row in rows()} == set(DOCUMENTS)
     for row in rows():
-        assert row.described and row.there and row.state in ("works", "partial", "outside"), row
+        assert (
+            row.described and row.there and row.state in ("works", "tested", "partial", "outside")
+        ), row
         assert (row.state == "outside") == (not row.command), row
         assert COMMAND.sub("", row.command).strip(" ;") == "", row
+        assert (row.state == "tested") == row.command.startswith("`python -m pytest"), row
         if row.state == "partial":
             assert "(log/" in row.here, row  # where its bound is
         if row.state == "outside":
@@ -80,10 +83,11 @@ def test_every_document_has_its_rows_and_every_row_its_columns() -> None:
 def test_the_count_at_the_top_is_that_of_the_rows() -> None:
     states = [row.state for row in rows()]
     told = re.search(
-        r"(\d+) rows: (\d+) work, (\d+) are partial, (\d+) are outside", PAGE.read_text()
+        r"(\d+) rows: (\d+) work, (\d+) are tested, (\d+) are partial, (\d+) are outside",
+        PAGE.read_text(),
     )
     assert told is not None
-    counts = [len(states), *(states.count(s) for s in ("works", "partial", "outside"))]
+    counts = [len(states), *(states.count(s) for s in ("works", "tested", "partial", "outside"))]
     assert [int(number) for number in told.groups()] == counts
 
 

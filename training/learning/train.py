@@ -33,7 +33,7 @@ from .callbacks import Checkpoints, Progress, RewardTerms, Throughput
 from .checkpoints import CONFIG, KEPT, STATE, check_controller, find_checkpoint, restore
 from .config import TrainConfig
 from .curriculum import CurriculumCallback
-from .exploration import ExplorationCallback, correlate_exploration
+from .exploration import ExplorationCallback, shape_exploration
 from .imported import import_policy
 from .policy import locate_policy
 from .symmetry import MirroredMeanStd, MirroredPolicy
@@ -170,8 +170,8 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
     )
     if ppo.actor_rate < 1.0:
         slow_actor(model.policy, ppo.actor_rate)
-    if ppo.noise_correlation > 0.0:
-        correlate_exploration(model.policy, ppo.noise_correlation)
+    if ppo.noise_correlation > 0.0 or ppo.noise_until is not None:
+        shape_exploration(model.policy, ppo.noise_correlation)
     head = model.policy.action_net
     assert isinstance(head, torch.nn.Linear)
     with torch.no_grad():

@@ -1,4 +1,4 @@
-"""Exploration: noise that narrows on a schedule, and noise that lasts from step to step."""
+"""Exploration: noise that narrows on a schedule, lasts from step to step, and ends."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from poise.training.learning import exploration
-from poise.training.learning.exploration import CorrelatedGaussian
+from poise.training.learning.exploration import EpisodeGaussian
 from poise.training.learning.policy import load_policy
 from poise.training.learning.train import train
 from tests.support.shared import tiny_config
@@ -35,7 +35,7 @@ def test_noise_lasts_and_keeps_its_size(correlation):
     """ε has variance 1 at every step, ρ is between neighbours, ρ² between the next ones."""
     torch.manual_seed(0)
     envs, steps, std = 400, 60, 0.3
-    gaussian = CorrelatedGaussian(2, correlation)
+    gaussian = EpisodeGaussian(2, correlation)
     mean = torch.tensor([[1.0, -2.0]]).expand(envs, 2)
     gaussian.proba_distribution(mean, torch.full((2,), float(np.log(std))))
     actions = torch.stack([gaussian.sample() for _ in range(steps)])
@@ -51,7 +51,7 @@ def test_noise_lasts_and_keeps_its_size(correlation):
 
 def test_densities_stay_those_of_the_gaussian():
     """What PPO's ratio is made of does not know of the noise before."""
-    gaussian, plain = CorrelatedGaussian(2, 0.8), torch.distributions.Normal(0.5, 0.2)
+    gaussian, plain = EpisodeGaussian(2, 0.8), torch.distributions.Normal(0.5, 0.2)
     gaussian.proba_distribution(torch.full((3, 2), 0.5), torch.full((2,), float(np.log(0.2))))
     gaussian.sample()
     actions = gaussian.sample()
@@ -64,13 +64,13 @@ def test_densities_stay_those_of_the_gaussian():
 def test_a_run_explores_with_lasting_noise(tmp_path, monkeypatch, symmetric):
     """The run's policy draws from it, with the same bits for the same seed."""
     drawn = []
-    sample = CorrelatedGaussian.sample
+    sample = EpisodeGaussian.sample
 
     def spy(self):
         drawn.append(self.correlation)
         return sample(self)
 
-    monkeypatch.setattr(CorrelatedGaussian, "sample", spy)
+    monkeypatch.setattr(EpisodeGaussian, "sample", spy)
     ppo = replace(tiny_config().ppo, noise_correlation=0.7, symmetric=symmetric)
     config = tiny_config(steps=64, ppo=ppo)
     config = replace(config, evaluation=replace(config.evaluation, trials=1))
@@ -81,3 +81,36 @@ def test_a_run_explores_with_lasting_noise(tmp_path, monkeypatch, symmetric):
     for (w, b), (v, c) in zip(one, two, strict=True):
         np.testing.assert_array_equal(w, v)
         np.testing.assert_array_equal(b, c)
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_noise_ends_in_each_episode(tmp_path, monkeypatch, symmetric):
+    """Later actions are the mean, and do not move the actor; earlier ones have the noise."""
+    taken = []
+    end = exploration.ExplorationCallback._on_rollout_end
+
+    def spy(self):
+        end(self)
+        buffer, policy = self.model.rollout_buffer, self.model.policy
+        observations = torch.as_tensor(buffer.observations).flatten(0, 1)
+        with torch.no_grad():
+            mean = policy.get_distribution(observations).mode().numpy()
+        noise = buffer.actions - mean.reshape(buffer.actions.shape)
+        # an episode's steps are counted from where the buffer says that it begins
+        steps = np.zeros(buffer.episode_starts.shape, dtype=int)
+        for k in range(1, len(steps)):
+            steps[k] = np.where(buffer.episode_starts[k] > 0, 0, steps[k - 1] + 1)
+        taken.append((noise, steps, buffer.advantages.copy()))
+
+    monkeypatch.setattr(exploration.ExplorationCallback, "_on_rollout_end", spy)
+    config = tiny_config(steps=64)
+    until = 5 * config.env.policy_period
+    ppo = replace(config.ppo, noise_until=until, symmetric=symmetric)
+    config = replace(config, ppo=ppo, evaluation=replace(config.evaluation, trials=1))
+    train(config, tmp_path / "run", progress=False)
+    noise, steps, advantages = taken[0]  # the first rollout begins with the episodes
+    late = steps >= 5
+    assert late.any() and not late.all()
+    np.testing.assert_allclose(noise[late], 0.0, atol=1e-6)
+    assert (np.abs(noise[~late]) > 1e-4).all()
+    assert (advantages[late] == 0.0).all() and (advantages[~late] != 0.0).all()

@@ -382,6 +382,8 @@ def test_the_progress_bar_shows_steps_and_success(tmp_path, capsys):
         ({"ppo": {"lr": 1e-3}}, "ppo.lr.*learning_rate"),
         ({"ppo": {"noise_correlation": 1.0}}, "ppo.noise_correlation"),
         ({"ppo": {"noise_correlation": 0.5, "use_sde": True}}, "ppo: noise_correlation"),
+        ({"ppo": {"noise_until": 1.0, "use_sde": True}}, "ppo: noise_until"),
+        ({"ppo": {"noise_until": 0.0}}, "ppo.noise_until"),
         ({"steps": 0}, "steps"),
         ({"seed": 1.5}, "seed"),
         ({"evaluation": {"trials": 0}}, "evaluation.trials"),

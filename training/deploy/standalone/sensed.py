@@ -35,6 +35,32 @@ class MotorCommand(NamedTuple):
     stiffness: np.ndarray
     damping: np.ndarray
 
+    def targets(
+        self, q: np.ndarray, dq: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
+    ) -> MotorCommand:
+        """The same command for motors that take targets and no torques.
+
+        Gains K', D' take the place of none, and the target q' that of the torque:
+        K' (q' − q) − D' q̇ = τ at the readings q, q̇ of the motors; when these have moved on, the
+        servo's torque has too, by −K' Δq − D' Δq̇. A command that has gains keeps them.
+
+        Args:
+            q, dq: (nu,) positions [rad] and velocities [rad/s] of the motors, the latest ones.
+            stiffness, damping: (nu,) K' [N·m/rad] and D' [N·m·s/rad] of motors without gains.
+
+        Raises ConfigError for a stiffness of them that is not above 0.
+        """
+        free = (self.stiffness == 0.0) & (self.damping == 0.0)
+        if not np.all(np.asarray(stiffness)[free] > 0.0):
+            raise ConfigError("must be above 0", source="targets", field="stiffness")
+        gain = np.where(free, stiffness, self.stiffness)
+        brake = np.where(free, damping, self.damping)
+        if not np.all(gain > 0.0):
+            raise ConfigError("has motors with damping alone, which targets cannot express",
+                              source="targets", field="command")  # fmt: skip
+        torque = self.torque + self.stiffness * (self.target - q) - self.damping * dq
+        return MotorCommand(np.zeros_like(torque), q + (torque + brake * dq) / gain, gain, brake)
+
 
 class MeasuredState(EstimatedState):
     """The believed state of a robot whose measurements are handed over, instead of simulated.

@@ -18,7 +18,7 @@ from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 from poise.training.deploy.standalone.measurement import Measurement
 from poise.training.deploy.standalone.readings import Readings
-from poise.training.deploy.standalone.sensed import SensedController, typical
+from poise.training.deploy.standalone.sensed import MotorCommand, SensedController, typical
 from tests.support.shared import robot
 
 PUSH = {"impulse": 20.0, "direction": 40.0, "duration": 0.1, "start": 0.06, "body": "torso"}
@@ -169,3 +169,29 @@ def test_what_cannot_run_on_a_robot_is_refused() -> None:
     controller.command()
     with pytest.raises(ConfigError, match=f"must be {controller.measurements} measurements, not 1"):
         controller.command(standing())
+
+
+@pytest.mark.parametrize("servo", [False, True])
+def test_targets_give_the_same_torque(servo: bool) -> None:
+    """At the readings it is that of the command; away from them the servo's own is added."""
+    rng = np.random.default_rng(0)
+    torque, target, q, dq = rng.normal(size=(4, 5))
+    stiffness, damping = rng.uniform(1.0, 3.0, size=(2, 5)) if servo else np.zeros((2, 5))
+    command = MotorCommand(torque, target, stiffness, damping)
+    gain, brake = rng.uniform(10.0, 30.0, size=(2, 5))
+    sent = command.targets(q, dq, gain, brake)
+
+    def torques(c: MotorCommand, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+        return c.torque + c.stiffness * (c.target - q) - c.damping * dq
+
+    np.testing.assert_allclose(torques(sent, q, dq), torques(command, q, dq), atol=1e-12)
+    assert not sent.torque.any()
+    moved = torques(sent, q + 0.1, dq + 0.2) - torques(sent, q, dq)
+    own = (stiffness, damping) if servo else (gain, brake)
+    np.testing.assert_allclose(moved, -0.1 * own[0] - 0.2 * own[1], atol=1e-12)
+
+
+def test_targets_need_a_stiffness() -> None:
+    command = MotorCommand(*np.zeros((4, 2)))
+    with pytest.raises(ConfigError, match=r"stiffness: must be above 0"):
+        command.targets(np.zeros(2), np.zeros(2), np.zeros(2), np.ones(2))
