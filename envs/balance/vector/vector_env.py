@@ -13,12 +13,12 @@ from gymnasium.vector.utils import batch_space
 from poise.configs.errors import ConfigError, shown
 from poise.configs.numbers import option_mapping, seed_number, whole_number
 from poise.envs.balance.base import BalanceEnv
-from poise.envs.balance.info import InfoColumns
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.compiled.copies import Copyable
 
 from .batch import EnvBatch, replicate
+from .info_columns import InfoColumns
 
 try:
     from gymnasium.vector import AutoresetMode

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
@@ -15,10 +14,7 @@ from poise.training.learning.checkpoints import STATE, find_checkpoint
 from poise.training.learning.policy_files import read_state
 from poise.training.running.terminal import ProgressLines
 
-from .records import SeedSummary, evaluations
-
-if TYPE_CHECKING:
-    from .train import SeedRun
+from .records import SeedRun, SeedSummary, evaluations
 
 PERIOD = 1.0  # [s] between looks
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
@@ -10,10 +11,20 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.reading import is_file, read_json
 from poise.training.running.provenance import Circumstances
 
-if TYPE_CHECKING:  # it loads scipy
+if TYPE_CHECKING:  # they load SciPy and environments
     from poise.training.benchmarking.statistics.seeds import SeedFigures
+    from poise.training.learning.config import TrainConfig
 
 SEEDS = "seeds.json"  # in a folder of `poise train --seeds`
+
+
+@dataclass(frozen=True)
+class SeedRun:
+    """The run of one seed: what a process is given to do."""
+
+    config: TrainConfig
+    folder: Path
+    resume: bool
 
 
 class Evaluation(TypedDict):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,21 +32,13 @@ from .progress import SeedProgress, print_seeds
 from .records import (
     SEEDS,
     SeedEntry,
+    SeedRun,
     SeedSummary,
     evaluations,
     read_seeds,
     seed_folder,
     start_and_best,
 )
-
-
-@dataclass(frozen=True)
-class SeedRun:
-    """The run of one seed: what a process is given to do."""
-
-    config: TrainConfig
-    folder: Path
-    resume: bool
 
 
 @allows()

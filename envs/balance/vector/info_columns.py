@@ -1,45 +1,20 @@
-"""The `info` of environments, of one and of many at once."""
+"""The `info` of many environments at once: an array for each key."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TypedDict
 
 import numpy as np
 
+from poise.envs.balance.base import BalanceEnv
+from poise.envs.balance.episode import FAILURES, QUIET_STEPS, SATURATED, TICKS, EpisodeArrays
+from poise.envs.balance.mdp.reward import REWARD_TERMS
 from poise.envs.compiled.copies import Copyable
-
-from .episode import FAILURES, QUIET_STEPS, SATURATED, TICKS, EpisodeArrays
-from .mdp.reward import REWARD_TERMS
-
-if TYPE_CHECKING:
-    from .base import BalanceEnv
-
-
-def step_info(env: BalanceEnv) -> dict[str, Any]:
-    """Reward terms, push and record of the episode so far; see also `InfoColumns`."""
-    # Python's own numbers: arithmetic with NumPy's costs ten times as much
-    metrics, terms = env.episode.metrics.tolist(), env.episode.reward_terms.tolist()
-    return {
-        "reward_terms": dict(zip(REWARD_TERMS, terms, strict=True)),
-        "push": env.push_infos(),
-        "is_success": env.recovered,
-        "solver_failures": int(metrics[FAILURES]),
-        "torque_saturation": metrics[SATURATED] / max(metrics[TICKS], 1.0),
-        "root_wrench": env.episode.root_wrench.copy(),
-        **drawn_info(env),
-    }
-
-
-def drawn_info(env: BalanceEnv) -> dict[str, Any]:
-    """What is told of the episode's robot where that is drawn, see `DrawnRobot.summary`."""
-    if env.drawn is None:
-        return {}
-    return {"realism": {"level": env.realism.name, **env.drawn.summary(env.arrays.timestep)}}
 
 
 class InfoArrays(TypedDict):
-    """The entries of `step_info` of n environments, each (n,) but for the last one."""
+    """The entries of `BalanceEnv.info` of n environments, each (n,) but for the last one."""
 
     reward_terms: dict[str, np.ndarray]
     push: np.ndarray  # of lists
@@ -50,7 +25,7 @@ class InfoArrays(TypedDict):
 
 
 class InfoColumns(Copyable):
-    """The entries of `step_info` of many `envs`, one array for each key.
+    """The entries of `BalanceEnv.info` of many `envs`, one array for each key.
 
     `record` holds their rows. The lists of pushes are the same ones until the next episode.
     """
