@@ -253,8 +253,11 @@ class EstimatedState(StateSource, Copyable):
         begin_sensors(self.sensors, drawn, self.simulation.model)
         dt, c = self.arrays.timestep, self.config
         predicted = c.predictor != "none"
-        earlier = max(round((drawn.command * dt + drawn.lag + drawn.misjudged) / dt), 0)
-        horizon = drawn.sense + earlier if predicted else 0
+        acting = round((drawn.command * dt + drawn.lag + drawn.misjudged) / dt)
+        earlier = max(
+            acting, 0
+        )  # what is underrated beyond that, is taken from the sensing's delay
+        horizon = max(drawn.sense + acting, 0) if predicted else 0
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
         self.belief.steps[:] = (
             drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf"

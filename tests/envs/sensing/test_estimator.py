@@ -86,6 +86,8 @@ def test_auto_is_exact_where_no_sensor_errs():
     }
     source = estimated(level)
     assert source.belief.steps[:4].tolist() == [5, 7, 12, 1]
+    under = {"latency": {"sense": 0.01, "misjudged": -0.004}}
+    assert estimated(under).belief.steps[:4].tolist() == [5, 0, 3, 1]
     assert estimated("lab").belief.steps[3] == 0 and estimated("lab", kind="exact").belief.steps[3]
     assert estimated(level, predictor="none").belief.steps[:4].tolist() == [5, 7, 0, 1]
 
