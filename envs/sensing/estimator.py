@@ -254,9 +254,7 @@ class EstimatedState(StateSource, Copyable):
         dt, c = self.arrays.timestep, self.config
         predicted = c.predictor != "none"
         acting = round((drawn.command * dt + drawn.lag + drawn.misjudged) / dt)
-        earlier = max(
-            acting, 0
-        )  # what is underrated beyond that, is taken from the sensing's delay
+        earlier = max(acting, 0)  # below 0 the sensing's delay is underrated
         horizon = max(drawn.sense + acting, 0) if predicted else 0
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
         self.belief.steps[:] = (

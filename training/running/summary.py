@@ -126,10 +126,15 @@ class EnvelopeFigures(TypedDict, total=False):
     step_share_inf_mean: float
 
 
-class Level(Rate):
-    """A level of a factor; lost and won are against the standard case."""
+class LevelRate(Rate):
+    """The trials at a level."""
 
     level: str
+
+
+class Level(LevelRate):
+    """A level of a factor; lost and won are against the standard case."""
+
     standard: bool
     lost: int
     won: int
@@ -270,14 +275,13 @@ class PhaseJ50(TypedDict):
     j50_bound: Bound
 
 
-class RealismLevel(Rate, total=False):
+class RealismLevel(LevelRate, total=False):
     """The parts of a suite at a level of realism.
 
     Rates are of random pushes, else of all; `stood` are the unpushed trials without a fall;
     `j50_kept` is the J50 over that of the suite's own level, which comes first.
     """
 
-    level: str
     stood: int
     unpushed: int
     j50_mean: float

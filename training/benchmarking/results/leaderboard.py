@@ -202,7 +202,8 @@ def _levels(summary: Summary) -> Iterator[tuple[str, Callable[[str], str]]]:
         for figure in known([J50_MEAN, J50_KEPT], [other]):
 
             def text(name: str, i: int = i, figure: Figure = figure) -> str:
-                return figure.text(entries[name]["levels"][i])
+                levels = entries[name].get("levels", [])  # of another result there may be none
+                return figure.text(levels[i]) if i < len(levels) else NONE
 
             yield f"{figure.name}, {code(other['level'])}", text
 

@@ -18,6 +18,7 @@ ENTRY = (
      "eta_mean", "eta_mean_ci95", "eta_min"),
     ("sectors", "fraction_of", "fraction50"),
 )  # fmt: skip
+LEVEL = (("stood", "unpushed"), ("j50_mean", "j50_mean_ci95"))  # the same, of a level
 LARGEST = 2**53  # whole number, besides seeds: up to here a float holds each
 PAIR = (("both", "only_a", "only_b", "neither", "p_mcnemar"),)  # the same, of a pair
 
@@ -46,6 +47,13 @@ def read_summary(path: str | Path) -> Summary:
         for factor in entry.get("factors", ()):
             for level in factor["levels"]:
                 _check_rate(level, path, f"controllers.{name}.factors")
+        for at in entry.get("levels", ()):
+            _check_rate(at, path, f"controllers.{name}.levels")
+            _check_together(at, LEVEL, path, f"controllers.{name}.levels")
+    told = {tuple(at["level"] for at in entry.get("levels", ())) for entry in entries.values()}
+    if len(told) > 1:
+        raise ConfigError("must be the same of all controllers", source=path,
+                          field="controllers.levels")  # fmt: skip
     for k, pair in enumerate(summary["pairs"]):
         _check_together(pair, PAIR, path, f"pairs[{k}]")
     for k, steps in enumerate(summary["step_limits"]):

@@ -67,6 +67,10 @@ def test_wrong_entries_are_refused_in_one_line(tmp_path: Path) -> None:
         "body_sway_mean": 0.1, "recovery_time_mean": None, "recovery_time_trials": 0, "trials": 1,
         "margins": [margin],
     }  # fmt: skip
+    rate = {"trials": 2, "recovered": 1, "recovered_rate": 0.5, "recovered_ci95": [0.1, 0.9]}
+    more = {"stood": 1, "unpushed": 2, "j50_mean": 9.0, "j50_mean_ci95": [8.0, None]}
+    for entry in summary["controllers"].values():
+        entry["levels"] = [{"level": level, **rate, **more} for level in ("ideal", "field")]
     refused = accepted = 0
     for place in places(summary):
         if place[:2] == ("controllers", "abe07") and len(place) > 2:
