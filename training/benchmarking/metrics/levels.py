@@ -10,7 +10,7 @@ from poise.training.benchmarking.statistics.differences import relative_gain
 from poise.training.benchmarking.suites.plan import at_level
 from poise.training.benchmarking.suites.suite import Suite
 from poise.training.benchmarking.trials.trial import Outcome
-from poise.training.running.summary import Counts, Interval, RealismLevel
+from poise.training.running.summary import Counts, Interval, RealismLevel, both_ends
 
 from .played import DIRECTIONAL, Played, part, pushes, won
 
@@ -53,10 +53,10 @@ def level_figures(
 
 def _kept(first: RealismLevel, here: RealismLevel) -> tuple[float | None, Interval | None]:
     """J50 over that of the first level; None where an end of an interval is open or not > 0."""
-    ends = first["j50_mean_ci95"], here["j50_mean_ci95"]
-    if None in (*ends[0], *ends[1]):
+    one, two = both_ends(first["j50_mean_ci95"]), both_ends(here["j50_mean_ci95"])
+    if one is None or two is None:
         return None, None
-    gain, around = relative_gain(first["j50_mean"], ends[0], here["j50_mean"], ends[1])  # type: ignore[arg-type]
+    gain, around = relative_gain(first["j50_mean"], one, here["j50_mean"], two)
     if gain is None or around is None:
         return None, None
     return 1.0 + gain, (1.0 + around[0], 1.0 + around[1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.trials.push_limits import PushLimits
@@ -16,6 +17,16 @@ from .suite import Suite
 
 LEVEL = "@"  # between the name of a part and the level that it is played at again
 Finished = Mapping[tuple[str, int], Outcome]  # controller, number of the trial → outcome
+
+
+class _Planned(NamedTuple):
+    """A part at a level."""
+
+    part: Part
+    level: str | None  # None: the suite's own
+    first: list[Trial]  # of the first stage
+    second: int  # the number that the second stage is drawn by
+    shift: int  # from the numbers that its trials are drawn by to their own
 
 
 class Plan:
@@ -42,9 +53,7 @@ class Plan:
         self.suite, self.limits, self.names = suite, limits, tuple(names)
         self._draw = Draw(suite, limits, seed, motions)
         self.standard = standard_levels(self._draw) if suite.factors else {}
-        # each part with its level, its first trials, the number that its second stage is drawn by,
-        # and how much larger the numbers of its trials are than those that they are drawn by
-        self._parts: list[tuple[Part, str | None, list[Trial], int, int]] = []
+        self._parts: list[_Planned] = []
         number = 0
         for level in (None, *suite.levels):
             drawn = 0  # every level draws alike
@@ -54,10 +63,11 @@ class Plan:
                 following = second + part.second_count(len(self.names))
                 if level is None or name != "factors":
                     shift = number - drawn
-                    self._parts.append((part, level, self._at(level, shift, first), second, shift))
+                    trials = self._at(level, shift, first)
+                    self._parts.append(_Planned(part, level, trials, second, shift))
                     number += following - drawn
                 drawn = following
-        self.first = [trial for _, _, first, _, _ in self._parts for trial in first]
+        self.first = [trial for planned in self._parts for trial in planned.first]
         self.count = number * len(self.names)
 
     def _at(self, level: str | None, shift: int, trials: list[Trial]) -> list[Trial]:
