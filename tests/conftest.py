@@ -13,6 +13,9 @@ import pytest
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")  # small matrices lose time to threads
 os.environ.setdefault("MPLBACKEND", "Agg")
+# Tests start some hundred processes: none of them is to compile all modules again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 if sys.platform == "linux":
     off_screen = "osmesa" if ctypes.util.find_library("OSMesa") else "egl"
     os.environ.setdefault("MUJOCO_GL", off_screen)

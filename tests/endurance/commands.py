@@ -20,7 +20,8 @@ import numpy as np
 import yaml
 
 from poise.configs.schema import to_yaml
-from poise.training.learning.checkpoints import STATE, find_checkpoint, read_state
+from poise.training.learning.checkpoints import read_state
+from poise.training.learning.policy_files import STATE, find_checkpoint
 from tests.support.benchmarks_small import SMALL
 from tests.support.evaluations import random_suite
 from tests.support.shared import tiny_config

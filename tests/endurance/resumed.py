@@ -9,8 +9,9 @@ from typing import Any
 from unittest import mock
 
 from poise.training.learning import callbacks
-from poise.training.learning.checkpoints import STATE, find_checkpoint, read_state
+from poise.training.learning.checkpoints import read_state
 from poise.training.learning.config import train_config
+from poise.training.learning.policy_files import STATE, find_checkpoint
 from poise.training.learning.train import train
 
 from .commands import checkpoint_content, trained

@@ -11,8 +11,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from poise.configs.files import packaged, packaged_folder
-from poise.training.learning.checkpoints import CONFIG, FILES, STATE, STATISTICS
 from poise.training.learning.policy import load_policy
+from poise.training.learning.policy_files import CONFIG, FILES, STATE, STATISTICS
 from tests.support.shared import robot
 
 from .texts import Draw, byte_edits, changed, edit_bytes

@@ -41,9 +41,9 @@ from poise.training.cli.entry import main
 from poise.training.deploy.export.export import export_policy
 from poise.training.deploy.qp_set.export import write_qp_set
 from poise.training.deploy.standalone.controller import load_standalone
-from poise.training.learning.checkpoints import check_controller, controller_fingerprint
 from poise.training.learning.config import train_config
 from poise.training.learning.policy import load_policy
+from poise.training.learning.policy_files import check_controller, controller_fingerprint
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import train
 from poise.training.learning.tuning.candidates import Candidate

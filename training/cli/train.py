@@ -18,9 +18,8 @@ from poise.configs.schema import build, to_dict
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.statistics.differences import difference
 from poise.training.benchmarking.statistics.rates import wilson_interval
-from poise.training.learning.checkpoints import STATE, find_checkpoint
 from poise.training.learning.config import TrainConfig, train_config
-from poise.training.learning.policy_files import read_state
+from poise.training.learning.policy_files import STATE, find_checkpoint, read_state
 from poise.training.learning.seeds.records import SEEDS, Evaluation, evaluations, start_and_best
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import BEST, LAST, train

@@ -20,8 +20,9 @@ from poise.envs.balance.vector.batch import EnvBatch
 from poise.envs.robots.robot import Robot
 from poise.training.running.terminal import ProgressLines
 
-from .checkpoints import controller_fingerprint, save_checkpoint
+from .checkpoints import save_checkpoint
 from .config import TrainConfig
+from .policy_files import controller_fingerprint
 from .vec_env import ThreadedVecEnv
 
 

@@ -5,7 +5,6 @@ Nothing in it is unpickled on loading, see `policy_files.py`.
 """
 
 import copy
-import hashlib
 import json
 import os
 import shutil
@@ -20,17 +19,24 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import Tensor
 
-from poise.baselines.registry import controller_config
-from poise.configs.errors import ConfigError, PoiseError, shown
-from poise.configs.reading import is_file, parsing
+from poise.configs.errors import ConfigError, PoiseError
+from poise.configs.reading import parsing
 from poise.configs.schema import to_yaml
 
 from .config import TrainConfig
-from .policy_files import MOMENTS, read_parameters, read_state, read_statistics
+from .policy_files import (
+    CONFIG,
+    MOMENTS,
+    POLICY,
+    STATE,
+    STATISTICS,
+    beside,
+    check_robot,
+    read_parameters,
+    read_state,
+    read_statistics,
+)
 
-KEPT = "kept"  # folder of a run: its policies, by their steps
-POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.yaml", "state.json"
-FILES = (POLICY, STATISTICS, CONFIG, STATE)
 #: made anew by `PPO.load`, or of the running process alone
 LEFT_OUT = ("ep_info_buffer", "ep_success_buffer", "lr_schedule")
 
@@ -39,7 +45,7 @@ def save_checkpoint(
     folder: Path, model: PPO, normalize: VecNormalize, config: TrainConfig, state: dict[str, object]
 ) -> None:
     """Write the folder whole; raises PoiseError when the disk refuses."""
-    new, old = _beside(folder, "new"), _beside(folder, "old")
+    new, old = beside(folder, "new"), beside(folder, "old")
     try:
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir(parents=True)
@@ -70,14 +76,6 @@ def plain(model: PPO) -> PPO:
     stock.policy_class = ActorCriticPolicy
     stock.policy_kwargs = {k: v for k, v in model.policy_kwargs.items() if k != "mirrors"}
     return stock
-
-
-def find_checkpoint(folder: Path) -> Path | None:
-    """The folder, or what a kill in the middle of a replacement left of it."""
-    for candidate in (folder, _beside(folder, "old")):
-        if all(is_file(candidate / name) for name in FILES):
-            return candidate
-    return None
 
 
 def restore(
@@ -118,34 +116,6 @@ def _load_into_wider(stored: Mapping[str, Tensor], model: PPO) -> bool:
     return True
 
 
-def check_robot(state: dict[str, object], fingerprint: str, path: Path) -> None:
-    """Raise ConfigError unless the policy was trained for the robot with this fingerprint."""
-    if state.get("fingerprint") != fingerprint:
-        raise ConfigError(
-            f"the policy was trained on the robot {shown(state.get('robot'))} as it was then: name "
-            "that one, or train a policy on this one",
-            source=path,
-            field="robot",
-        )
-
-
-def check_controller(state: dict[str, object], config: TrainConfig, path: Path) -> None:
-    """Raise ConfigError unless the controller still has the gains that the policy learned on."""
-    if state.get("controller_fingerprint") != controller_fingerprint(config):
-        raise ConfigError(
-            f"the policy was trained on other gains of the controller {shown(config.controller)}",
-            source=path,
-            field="controller",
-        )
-
-
-def controller_fingerprint(config: TrainConfig) -> str:
-    """Hash of the configuration of the controller below the policy; empty if there is none."""
-    if config.action in ("torque", "position"):
-        return ""
-    return hashlib.sha256(to_yaml(controller_config(config.controller)).encode()).hexdigest()
-
-
 def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
     """The statistics that normalise observations and returns, as arrays."""
     arrays = {
@@ -156,11 +126,6 @@ def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
     arrays["clip_obs"] = np.asarray(normalize.clip_obs)
     arrays["epsilon"] = np.asarray(normalize.epsilon)
     return arrays
-
-
-def _beside(folder: Path, suffix: str) -> Path:
-    folder = Path(os.path.abspath(folder))  # "." has no name
-    return folder.parent / f".{folder.name}.{suffix}"
 
 
 def widened(

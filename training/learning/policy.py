@@ -17,7 +17,8 @@ from poise.envs.compiled.copies import Copyable
 from poise.envs.robots.mirror import Mirror
 from poise.envs.robots.robot import Robot, load_robot
 
-from .checkpoints import (
+from .config import TrainConfig, train_config
+from .policy_files import (
     CONFIG,
     FILES,
     POLICY,
@@ -26,9 +27,10 @@ from .checkpoints import (
     check_controller,
     check_robot,
     find_checkpoint,
+    read_state,
+    read_statistics,
+    read_weights,
 )
-from .config import TrainConfig, train_config
-from .policy_files import read_state, read_statistics, read_weights
 
 SHIPPED = "residual-torque"
 ACTOR = "mlp_extractor.policy_net."  # SB3's name of the actor's hidden layers

@@ -1,22 +1,34 @@
-"""The files of a policy folder, read and checked: statistics, weights, the optimizer.
+"""The files of a policy folder, found, read and checked: statistics, weights, the optimizer.
 
-Nothing is unpickled: weights come by torch's weights-only reader, statistics as plain arrays.
+Nothing is unpickled: weights come by torch's weights-only reader, statistics as plain arrays. torch
+itself is loaded with the first weights: what has none of its own does without it.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 
+from poise.baselines.registry import controller_config
 from poise.configs.archives import Archive, read_archive, read_arrays
-from poise.configs.errors import ConfigError
-from poise.configs.reading import parsing, read_json
+from poise.configs.errors import ConfigError, shown
+from poise.configs.reading import is_file, parsing, read_json
+from poise.configs.schema import to_yaml
 
+from .config import TrainConfig
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+KEPT = "kept"  # folder of a run: its policies, by their steps
+POLICY, STATISTICS, CONFIG, STATE = "policy.zip", "vecnormalize.npz", "config.yaml", "state.json"
+FILES = (POLICY, STATISTICS, CONFIG, STATE)
 MOMENTS = ("mean", "var", "count")
 #: The smallest and the largest of each number; what training gives lies far inside.
 RANGES = {
@@ -30,7 +42,48 @@ WEIGHT = 1e6  # the largest
 STEPS = 10**15  # of training
 _PARTS = ("policy", "policy.optimizer")  # members of policy.zip, without .pth
 _VALUES = 100_000  # in a member
-_FLOATS = (torch.float32, torch.float64)
+
+
+def find_checkpoint(folder: Path) -> Path | None:
+    """The folder, or what a kill in the middle of a replacement left of it."""
+    for candidate in (folder, beside(folder, "old")):
+        if all(is_file(candidate / name) for name in FILES):
+            return candidate
+    return None
+
+
+def beside(folder: Path, suffix: str) -> Path:
+    """Where a folder is built, or kept, while it is replaced."""
+    folder = Path(os.path.abspath(folder))  # "." has no name
+    return folder.parent / f".{folder.name}.{suffix}"
+
+
+def check_robot(state: dict[str, object], fingerprint: str, path: Path) -> None:
+    """Raise ConfigError unless the policy was trained for the robot with this fingerprint."""
+    if state.get("fingerprint") != fingerprint:
+        raise ConfigError(
+            f"the policy was trained on the robot {shown(state.get('robot'))} as it was then: name "
+            "that one, or train a policy on this one",
+            source=path,
+            field="robot",
+        )
+
+
+def check_controller(state: dict[str, object], config: TrainConfig, path: Path) -> None:
+    """Raise ConfigError unless the controller still has the gains that the policy learned on."""
+    if state.get("controller_fingerprint") != controller_fingerprint(config):
+        raise ConfigError(
+            f"the policy was trained on other gains of the controller {shown(config.controller)}",
+            source=path,
+            field="controller",
+        )
+
+
+def controller_fingerprint(config: TrainConfig) -> str:
+    """Hash of the configuration of the controller below the policy; empty if there is none."""
+    if config.action in ("torque", "position"):
+        return ""
+    return hashlib.sha256(to_yaml(controller_config(config.controller)).encode()).hexdigest()
 
 
 def read_state(path: Path) -> dict[str, Any]:
@@ -61,7 +114,7 @@ def read_statistics(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     return arrays
 
 
-def read_weights(path: Path) -> dict[str, torch.Tensor]:
+def read_weights(path: Path) -> dict[str, Tensor]:
     """The state_dict of the network in policy.zip.
 
     Raises ConfigError for anything but finite floats of at most `WEIGHT`.
@@ -79,7 +132,9 @@ def read_parameters(path: Path) -> dict[str, Any]:
     return {"policy": _weights(archive, path), optimizer: _member(archive, path, optimizer)}
 
 
-def _weights(archive: Archive, path: Path) -> dict[str, torch.Tensor]:
+def _weights(archive: Archive, path: Path) -> dict[str, Tensor]:
+    import torch
+
     weights = _member(archive, path, "policy")
     if not isinstance(weights, dict):
         raise ConfigError("policy.pth holds no weights", source=path)
@@ -94,12 +149,14 @@ def _weights(archive: Archive, path: Path) -> dict[str, torch.Tensor]:
 
 def _member(archive: Archive, path: Path, part: str) -> Any:
     """The content that torch saved in a member of policy.zip; its tensors are finite floats."""
+    import torch
+
     data = archive.read(f"{part}.pth")
     Archive(data, f"{path}: {part}.pth")  # torch's own format is a zip file too
     with parsing(path):
         value = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
     for tensor in _tensors(value, path):
-        if tensor.dtype not in _FLOATS or tensor.layout is not torch.strided:
+        if tensor.dtype not in (torch.float32, torch.float64) or tensor.layout is not torch.strided:
             raise ConfigError(f"holds weights of {tensor.dtype}: they must be 32- or 64-bit floats",
                               source=path)  # fmt: skip
         if tensor.numel() * tensor.element_size() > len(data):  # a few bytes that are repeated
@@ -109,8 +166,10 @@ def _member(archive: Archive, path: Path, part: str) -> Any:
     return value
 
 
-def _tensors(value: object, path: Path) -> Iterator[torch.Tensor]:
+def _tensors(value: object, path: Path) -> Iterator[Tensor]:
     """All tensors in mappings, lists and tuples of these."""
+    import torch
+
     waiting, seen = [value], 0
     while waiting:
         seen += 1

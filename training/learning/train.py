@@ -30,12 +30,13 @@ from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
 
 from .callbacks import Checkpoints, Progress, RewardTerms, Throughput
-from .checkpoints import CONFIG, KEPT, STATE, check_controller, find_checkpoint, restore
+from .checkpoints import restore
 from .config import TrainConfig
 from .curriculum import CurriculumCallback
 from .exploration import ExplorationCallback, shape_exploration
 from .imported import import_policy
 from .policy import locate_policy
+from .policy_files import CONFIG, KEPT, STATE, check_controller, find_checkpoint
 from .symmetry import MirroredMeanStd, MirroredPolicy
 from .vec_env import ThreadedVecEnv
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+import scipy  # loads its parts when they are first asked for
 
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
@@ -129,8 +129,8 @@ def low_pass(values: np.ndarray, cutoff: float) -> np.ndarray:
     """`values` (F, …) through a Butterworth filter of second order, forward and back."""
     if cutoff >= 0.5 / RATE:
         return values
-    sections = butter(2, cutoff, fs=1.0 / RATE, output="sos")
-    return sosfiltfilt(sections, values, axis=0, padlen=min(len(values) - 1, 15))
+    sections = scipy.signal.butter(2, cutoff, fs=1.0 / RATE, output="sos")
+    return scipy.signal.sosfiltfilt(sections, values, axis=0, padlen=min(len(values) - 1, 15))
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -55,6 +55,18 @@ def test_help_is_light() -> None:
         assert name in done.stdout
 
 
+@pytest.mark.parametrize("module", ["evaluation.run", "trials.jobs"])
+def test_a_quadratic_program_is_evaluated_without_torch(module: str) -> None:
+    """Neither who evaluates nor his workers load it, or Matplotlib, before there is a use for it."""
+    code = (
+        f"import sys\nimport poise.training.benchmarking.{module}\n"
+        "heavy = {'torch', 'stable_baselines3', 'matplotlib', 'scipy.signal', 'scipy.stats'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize(
     "args",
     [

@@ -8,16 +8,15 @@ import pytest
 
 from poise.configs.errors import ConfigError, PoiseError
 from poise.training.learning import checkpoints
-from poise.training.learning.checkpoints import (
+from poise.training.learning.checkpoints import restore, save_checkpoint
+from poise.training.learning.policy_files import (
     FILES,
     POLICY,
     STATE,
     STATISTICS,
     find_checkpoint,
-    restore,
-    save_checkpoint,
+    read_state,
 )
-from poise.training.learning.policy_files import read_state
 from poise.training.learning.train import _training_envs, make_model
 from tests.support.shared import finished_run, robot, tiny_config
 

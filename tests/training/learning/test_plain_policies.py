@@ -13,8 +13,8 @@ import pytest
 from stable_baselines3 import PPO
 
 from poise.configs.files import packaged_folder
-from poise.training.learning.checkpoints import POLICY, STATISTICS
 from poise.training.learning.policy import load_policy
+from poise.training.learning.policy_files import POLICY, STATISTICS
 from poise.training.learning.train import train
 from tests.support.shared import finished_run, policies_here, tiny_config
 

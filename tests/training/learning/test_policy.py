@@ -17,17 +17,16 @@ import poise
 from poise.configs.errors import ConfigError
 from poise.envs import replicate
 from poise.training import ThreadedVecEnv
-from poise.training.learning.checkpoints import (
+from poise.training.learning.checkpoints import restore, save_checkpoint
+from poise.training.learning.policy import load_policy
+from poise.training.learning.policy_files import (
     CONFIG,
     FILES,
     POLICY,
     STATE,
     STATISTICS,
     controller_fingerprint,
-    restore,
-    save_checkpoint,
 )
-from poise.training.learning.policy import load_policy
 from poise.training.learning.train import _training_envs, make_model
 from tests.support.shared import finished_run, robot, tiny_config
 

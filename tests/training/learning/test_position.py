@@ -14,9 +14,9 @@ from poise.configs.schema import build
 from poise.envs.balance.position import PositionBalanceEnv
 from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.learning import train as training
-from poise.training.learning.checkpoints import STATE
 from poise.training.learning.config import TrainConfig, train_config
 from poise.training.learning.policy import load_policy
+from poise.training.learning.policy_files import STATE
 from poise.training.learning.train import _training_envs, train
 from tests.support.shared import robot, tiny_config
 

@@ -27,9 +27,9 @@ from poise.envs.physics.pushes.sampler import PushSampler
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.trials.agents import load_agent
 from poise.training.learning import callbacks, curriculum
-from poise.training.learning.checkpoints import FILES, KEPT, POLICY, STATE
 from poise.training.learning.config import Curriculum, PPOConfig, TrainConfig, train_config
 from poise.training.learning.policy import load_policy
+from poise.training.learning.policy_files import FILES, KEPT, POLICY, STATE
 from poise.training.learning.seeds.train import train_seeds
 from poise.training.learning.train import _env_seed, train
 from tests.support.shared import finished_run, robot, tiny_config

@@ -23,8 +23,8 @@ from poise.configs.errors import ConfigError, PoiseError
 from poise.configs.schema import read_yaml, to_yaml
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.cli.train import run as train_command
-from poise.training.learning.checkpoints import find_checkpoint
 from poise.training.learning.config import PPOConfig
+from poise.training.learning.policy_files import find_checkpoint
 from poise.training.learning.seeds import train as module
 from poise.training.learning.seeds.train import SeedRun, train_seeds
 from poise.training.learning.train import train

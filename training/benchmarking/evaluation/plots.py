@@ -29,7 +29,7 @@ from poise.training.benchmarking.trials.step_limits import (
     groups,
     line_name,
 )
-from poise.training.learning.checkpoints import KEPT
+from poise.training.learning.policy_files import KEPT
 from poise.training.pictures.figures.envelope import Curve, polar_envelope
 from poise.training.pictures.figures.learning_curve import Point, learning_curve
 from poise.training.pictures.figures.rates import fall_probability

@@ -49,7 +49,6 @@ from poise.training.running.summary import FORMAT, Summary
 from poise.training.running.terminal import print_paths, progress_bar
 
 from .folder import ResultFolder, Settings, check_folder
-from .plots import draw_plots
 from .tables import print_lost, print_summary, ranked
 from .tick_times import tick_times
 
@@ -147,7 +146,11 @@ class Run:
             ticks = tick_times(agents) if timed else dict.fromkeys(names)
             summary = self._summary(folder, plan, played, steps, ticks)
             learned = {name: agent.timesteps for name, agent in agents.items()}
-            drawn = draw_plots(self.out, plan, played, steps, learned) if plots else []
+            drawn = []
+            if plots:
+                from .plots import draw_plots  # loads Matplotlib
+
+                drawn = draw_plots(self.out, plan, played, steps, learned)
             rows = [(trial, name, outcome) for name in names for trial, outcome in played[name]]
             rows.sort(key=lambda row: row[0].number)  # of one number, in the order of the names
             folder.finish([trial_row(*row) for row in rows], summary)

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # loads its parts when they are first asked for: a worker needs none of this
 from numpy.typing import ArrayLike
-from scipy import signal
 
 CUTOFF = 10.0  # [Hz] of the second-order Butterworth low-pass
 QUIET_SWAY = 0.015  # [rad/s] below which the body has recovered
@@ -86,8 +86,8 @@ def sway_velocity(angle: ArrayLike, rate: float) -> np.ndarray:
         rate: samples per second; more than 20.
     """
     angle = np.asarray(angle, dtype=float)
-    b, a = signal.butter(2, CUTOFF, fs=rate)
-    return np.gradient(signal.filtfilt(b, a, angle), 1.0 / rate)
+    b, a = scipy.signal.butter(2, CUTOFF, fs=rate)
+    return np.gradient(scipy.signal.filtfilt(b, a, angle), 1.0 / rate)
 
 
 def recovery_time(angle: ArrayLike, start: int, rate: float) -> float | None:

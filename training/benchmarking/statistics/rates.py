@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # loads its parts when they are first asked for
 from numpy.typing import ArrayLike
-from scipy import stats
 
 
 class Interval(NamedTuple):
@@ -55,8 +55,8 @@ def poisson_interval(count: int, confidence: float = 0.95) -> Interval:
         raise ValueError(f"count must not be negative, got {count}")
     check_confidence(confidence)
     tail = 0.5 * (1.0 - confidence)
-    low = 0.0 if count == 0 else 0.5 * float(stats.chi2.ppf(tail, 2 * count))
-    return Interval(low, 0.5 * float(stats.chi2.ppf(1.0 - tail, 2 * count + 2)))
+    low = 0.0 if count == 0 else 0.5 * float(scipy.stats.chi2.ppf(tail, 2 * count))
+    return Interval(low, 0.5 * float(scipy.stats.chi2.ppf(1.0 - tail, 2 * count + 2)))
 
 
 def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> Interval:
@@ -75,7 +75,7 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> In
     check_confidence(confidence)
     if trials == 0:
         return Interval(0.0, 1.0)
-    z = float(stats.norm.ppf(0.5 + confidence / 2))
+    z = float(scipy.stats.norm.ppf(0.5 + confidence / 2))
     rate = successes / trials
     shrink = 1 + z**2 / trials
     centre = (rate + z**2 / (2 * trials)) / shrink
@@ -99,7 +99,7 @@ def mcnemar(only_a: int, only_b: int) -> McNemar:
     """
     if only_a < 0 or only_b < 0:
         raise ValueError(f"counts must not be negative, got {only_a} and {only_b}")
-    tail = float(stats.binom.cdf(min(only_a, only_b), only_a + only_b, 0.5))
+    tail = float(scipy.stats.binom.cdf(min(only_a, only_b), only_a + only_b, 0.5))
     return McNemar(int(only_a), int(only_b), min(1.0, 2 * tail), "exact binomial, two-sided")
 
 
@@ -111,7 +111,7 @@ def iqm(scores: ArrayLike) -> float:
     Raises:
         ValueError: no score, or one that is not finite.
     """
-    return float(stats.trim_mean(_finite(scores), 0.25, axis=None))
+    return float(scipy.stats.trim_mean(_finite(scores), 0.25, axis=None))
 
 
 def seed_aggregate(
@@ -136,7 +136,7 @@ def seed_aggregate(
     seeds, tasks = table.shape
     rows = np.random.default_rng(seed).integers(seeds, size=(resamples, seeds, tasks))
     drawn = np.take_along_axis(table[None], rows, axis=1)
-    replicates = stats.trim_mean(drawn.reshape(resamples, -1), 0.25, axis=1)
+    replicates = scipy.stats.trim_mean(drawn.reshape(resamples, -1), 0.25, axis=1)
     return SeedAggregate(iqm(table), percentile_interval(replicates, confidence), seeds, tasks)
 
 
@@ -154,7 +154,7 @@ def percentile_interval(
     if freedom is not None:
         n, k = freedom
         left = max(n - k, 1)
-        tail = stats.norm.cdf(np.sqrt(n / left) * stats.t.ppf(tail, left))
+        tail = scipy.stats.norm.cdf(np.sqrt(n / left) * scipy.stats.t.ppf(tail, left))
     low, high = np.percentile(replicates, [100 * tail, 100 * (1 - tail)])
     return Interval(float(low), float(high))
 

@@ -131,10 +131,8 @@ def _idle(name: str, env: BalanceEnv, content: str) -> Agent:
 
 
 def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
-    from poise.training.learning.checkpoints import controller_fingerprint
-    from poise.training.learning.policy import (
-        load_policy,  # loads torch, which the other agents do without
-    )
+    from poise.training.learning.policy import load_policy
+    from poise.training.learning.policy_files import controller_fingerprint
 
     policy = load_policy(name, robot)
     env = policy.make_env(robot=robot, **overrides)

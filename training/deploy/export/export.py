@@ -18,9 +18,9 @@ from poise.configs.reading import MIB, is_file, read_bytes, read_text
 from poise.configs.schema import build, read_yaml
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.robot import load_robot
-from poise.training.learning.checkpoints import CONFIG, FILES
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.policy import ACTOR, Policy, load_policy, locate_policy
+from poise.training.learning.policy_files import CONFIG, FILES
 
 from .card import card
 from .check import check_onnx

@@ -13,10 +13,16 @@ from scipy.linalg import block_diag
 
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.robots.mirror import Mirror
-from poise.training.learning.checkpoints import LEFT_OUT, POLICY, STATISTICS, plain
+from poise.training.learning.checkpoints import LEFT_OUT, plain
 from poise.training.learning.config import TrainConfig
 from poise.training.learning.policy import Policy
-from poise.training.learning.policy_files import MOMENTS, read_statistics, read_weights
+from poise.training.learning.policy_files import (
+    MOMENTS,
+    POLICY,
+    STATISTICS,
+    read_statistics,
+    read_weights,
+)
 from poise.training.learning.train import make_model
 from poise.training.learning.vec_env import ThreadedVecEnv
 

@@ -10,8 +10,7 @@ from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from poise.configs.errors import ConfigError
-from poise.training.learning.checkpoints import STATE, find_checkpoint
-from poise.training.learning.policy_files import read_state
+from poise.training.learning.policy_files import STATE, find_checkpoint, read_state
 from poise.training.running.terminal import ProgressLines
 
 from .records import SeedRun, SeedSummary, evaluations

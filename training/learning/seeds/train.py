@@ -19,9 +19,8 @@ from poise.configs.outputs import check_out_folder
 from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
 from poise.training.benchmarking.statistics.seeds import seed_figures
-from poise.training.learning.checkpoints import CONFIG, STATE, find_checkpoint
 from poise.training.learning.config import TrainConfig
-from poise.training.learning.policy_files import read_state
+from poise.training.learning.policy_files import CONFIG, STATE, find_checkpoint, read_state
 from poise.training.learning.train import LAST, check_folder, check_pushes, train
 from poise.training.running.executor import Executor, check_backend
 from poise.training.running.folder_lock import FolderLock
