@@ -72,10 +72,10 @@ def test_wrong_entries_are_refused_in_one_line(tmp_path: Path) -> None:
     for entry in summary["controllers"].values():
         entry["levels"] = [{"level": level, **rate, **more} for level in ("ideal", "field")]
     refused = accepted = 0
-    for place in places(summary):
+    for number, place in enumerate(places(summary)):
         if place[:2] == ("controllers", "abe07") and len(place) > 2:
             continue  # its entries are those of the other
-        for value in (GONE, *WRONG):
+        for value in (GONE, *WRONG[number % 3 :: 3]):  # neighbours of one kind share them
             path.write_text(json.dumps(changed(summary, place, value)))
             try:
                 read_summary(path)
@@ -94,7 +94,7 @@ def test_wrong_entries_are_refused_in_one_line(tmp_path: Path) -> None:
             ):
                 with contextlib.suppress(PoiseError):
                     read()
-    assert refused > 600 and accepted > 50
+    assert refused > 250 and accepted > 20
 
 
 @pytest.mark.parametrize("text", ["a\nb", "\x1b]0;a\x07", "\u202ea", "x" * 5000])
