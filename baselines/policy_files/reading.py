@@ -21,11 +21,13 @@ from .onnx.bounds import try_network
 from .onnx.files import description, digest, is_network, is_policy_place, only_network
 from .onnx.metadata import metadata_fields
 
+COMMONEST = "unitree_g1"  # of the robots that public policies are for
+
 
 def advice(network: str | Path) -> str:
     """What helps with a network that nothing describes."""
-    return (f"poise policies check {shlex.quote(str(network))} --robot ROBOT says what a "
-            "description of it needs")  # fmt: skip
+    return (f"poise policies check {shlex.quote(str(network))} --robot {COMMONEST} (or the robot "
+            "that it is for) says what a description of it needs")  # fmt: skip
 
 
 def is_policy(name: object) -> bool:

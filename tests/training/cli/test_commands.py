@@ -57,7 +57,7 @@ def test_help_is_light() -> None:
 
 @pytest.mark.parametrize("module", ["evaluation.run", "trials.jobs"])
 def test_a_quadratic_program_is_evaluated_without_torch(module: str) -> None:
-    """Neither who evaluates nor his workers load it, or Matplotlib, before there is a use for it."""
+    """Neither who evaluates nor his workers load it, or Matplotlib, before it is of use."""
     code = (
         f"import sys\nimport poise.training.benchmarking.{module}\n"
         "heavy = {'torch', 'stable_baselines3', 'matplotlib', 'scipy.signal', 'scipy.stats'}\n"

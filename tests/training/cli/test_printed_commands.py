@@ -10,6 +10,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from onnx import helper
 from rich.console import Console
 
 from poise.configs.errors import PoiseWarning
@@ -20,12 +21,15 @@ from poise.training.cli.entry import main
 from poise.training.cli.train import last_words
 from poise.training.pictures.sessions.spec import SessionSpec
 from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, write_suite
+from tests.support.policies import write_graph
 from tests.support.shared import finished_run, tiny_config
 from tests.support.small_urdf import write_urdf
 
 ROOT = Path(__file__).parents[3]
 PRINTED = re.compile(
-    r"\b(poise (?:view|replay|evaluate|robot) [^\n]*?)(?:\)?$|</code>| writes the)", re.M
+    r"\b(poise (?:view|replay|evaluate|robot|policies) [^\n]*?)"
+    r"(?:\)?$|</code>| writes the| \(or )",
+    re.M,
 )
 FIELD = "demi tour/проба"  # paths with a space, and letters beyond ASCII
 ENDS = {"view": ["--seconds", "0.2", "--port", "0"], "evaluate": ["--trials", "1"]}  # or hours
@@ -117,3 +121,14 @@ def test_of_a_guessed_robot(here: Path) -> None:
         load_robot(model)
     (command,) = [c for each in told for c in commands(str(each.message))]
     assert played(command) == 0 and Path(f"{model.stem}.yaml").is_file()
+
+
+def test_of_a_network_alone(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The check that is proposed says what a description of it needs."""
+    network = Path("a network.onnx")
+    inputs, outputs = [("obs", [1, 5], 1)], [("actions", [1, 5], 1)]
+    write_graph(network, [helper.make_node("Identity", ["obs"], ["actions"])], {}, inputs, outputs)
+    assert main(["evaluate", str(network), "--trials", "1", "--out", "out"]) == 2
+    (command,) = commands(capsys.readouterr().err)
+    assert played(command) == 1
+    assert "takes obs 5" in capsys.readouterr().out

@@ -76,5 +76,6 @@ def ankle_limits(played: Played, limits: PushLimits) -> np.ndarray:
 
 
 def lost(played: Played) -> list[int]:
-    """The numbers of the trials that were not recovered, in rising order."""
-    return [trial.number for trial, outcome in played if not outcome.recovered]
+    """The numbers of the trials of the suite's own level that were not recovered, rising: those
+    whose causes are counted."""
+    return [trial.number for trial, outcome in once(played) if not outcome.recovered]

@@ -1,5 +1,6 @@
 """The size of a push for a robot: over what its ankles hold, and over what its baseline holds."""
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -95,8 +96,9 @@ def load_limits(robot: Robot, name: str | Path | None = None) -> PushLimits:
     measured = build(MeasuredLimits, read_yaml(path), str(path))
     if measured.fingerprint != robot.fingerprint:
         raise ConfigError(
-            f"measured for another robot than {robot.name!r}: measure again with "
-            "poise evaluate momentum-qp --suite envelope --write-limits FILE",
+            f"measured for another robot than {robot.name!r}: measure again with poise evaluate "
+            f"momentum-qp --suite envelope --robot {shlex.quote(robot.name)} "
+            f"--write-limits {shlex.quote(str(path))}",
             source=path,
             field="fingerprint",
         )

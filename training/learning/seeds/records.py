@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,7 +103,8 @@ def expand_seeds(names: Sequence[str]) -> tuple[str, ...]:
         for run in read_seeds(Path(name)):
             if not run.get("finished"):
                 raise ConfigError(
-                    f"the run of seed {run['seed']} is not finished: poise train --resume goes on",
+                    f"the run of seed {run['seed']} is not finished: poise train --resume --out "
+                    f"{shlex.quote(name)} goes on",
                     source=Path(name) / SEEDS,
                 )
             expanded.append(str(Path(name) / run["folder"]))

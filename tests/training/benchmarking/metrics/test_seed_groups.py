@@ -93,7 +93,8 @@ def test_a_folder_of_seeds_stands_for_its_runs(tmp_path: Path, configurations: N
 def test_unfinished_and_damaged_seeds_are_refused(tmp_path: Path) -> None:
     """The text names the file, and the seed and the way out."""
     out = write_seeds(tmp_path / "two", a0=True, a1=False)
-    with pytest.raises(ConfigError, match="seeds.json: the run of seed 1 is not finished.*resume"):
+    on = "seeds.json: the run of seed 1 is not finished: poise train --resume --out .*two goes on"
+    with pytest.raises(ConfigError, match=on):
         expand_seeds([str(out)])
     for text in ("{", "[]", '{"runs": [{"seed": "one", "folder": "a"}]}', '{"runs": [{}]}'):
         (out / "seeds.json").write_text(text)
