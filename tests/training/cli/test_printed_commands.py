@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import html
-import io
 import re
 import shlex
 import shutil
 from pathlib import Path
 
 import pytest
-from onnx import helper
-from rich.console import Console
 
 from poise.configs.errors import PoiseWarning
 from poise.envs.robots.robot import load_robot
 from poise.training.benchmarking.evaluation import run as evaluation
-from poise.training.cli import demo
 from poise.training.cli.entry import main
 from poise.training.cli.train import last_words
 from poise.training.pictures.sessions.spec import SessionSpec
-from tests.support.evaluations import ENVELOPE, RANDOM, InProcess, write_suite
-from tests.support.policies import write_graph
+from tests.support.evaluations import RANDOM, InProcess, write_suite
+from tests.support.policies import helper, write_graph
 from tests.support.shared import finished_run, tiny_config
 from tests.support.small_urdf import write_urdf
 
@@ -86,15 +82,6 @@ def test_of_the_report(here: Path, can_render: None, capsys: pytest.CaptureFixtu
     shown = sorted(set(commands(page)))
     assert shown and all("--video trial.mp4" in command for command in shown)
     assert played(shown[0]) == 0 and Path("trial.mp4").stat().st_size > 0
-
-
-def test_of_the_demo(here: Path, can_render: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The film again."""
-    monkeypatch.setattr(demo, "SUITE", write_suite(here, ENVELOPE, "envelope"))
-    text = io.StringIO()
-    demo.demo(here / "my demo", controllers=("zero", "momentum-qp"), console=Console(file=text))
-    (command,) = [line for line in commands(text.getvalue()) if line.startswith("poise replay")]
-    assert played(command) == 0
 
 
 def test_of_a_training(here: Path) -> None:

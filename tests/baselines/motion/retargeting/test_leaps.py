@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from tests.support.physics import robot_named
 HUMANOID = "humanoid"
 
 
+@functools.cache
 def jump(name: str) -> RetargetedClip:
     return retarget_clip(make(name)[0], robot_named(HUMANOID))
 
