@@ -95,7 +95,8 @@ class Patience(event.Listener):
         if self.depth == 0:
             self.begun = time.perf_counter()
         self.depth += 1
-        ours = event.data["dispatcher"].py_func.__module__.startswith("poise.")
+        module = event.data["dispatcher"].py_func.__module__ or ""  # none, of a generated function
+        ours = module.startswith("poise.")
         if ours and time.perf_counter() - self.begun > PATIENCE:
             self.tell()
 

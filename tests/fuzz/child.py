@@ -94,7 +94,11 @@ def _warm_up(played: Kind, tell: Tell) -> None:
         play(played, case)
 
     _warm.add(played.name)
-    some()
+    try:
+        some()
+    except Exception as error:  # `play` raises nothing: no case could be drawn
+        tell("broken", f"{type(error).__name__}: {error}")
+        raise
 
 
 _warm: set[str] = set()

@@ -17,7 +17,7 @@ from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.controller import PolicyFile
 from poise.baselines.policy_files.reading import policy_config
 from poise.configs.files import packaged_folder
-from tests.support.policies import helper, lab_deploy, linear, write_onnx, write_yaml
+from tests.support.policies import gym_config, helper, lab_deploy, linear, write_onnx, write_yaml
 from tests.support.shared import robot
 
 from .texts import Draw, byte_edits, changed, edit_bytes
@@ -120,16 +120,24 @@ def cases(draw: Draw) -> Json:
         return {**case, "name": draw(st.sampled_from(LOCATIONS))}
     if how == "data":
         return {**case, "size": draw(st.sampled_from([0, 1, len(DATA) - 4, len(DATA) + 4]))}
-    described = (packaged_folder("rivals") / "unitree-g1-velocity/deploy.yaml").read_bytes()
-    if draw(st.booleans()):
-        return {**case, "file": packed(changed(draw, described))}
-    return {**case, "file": packed(changed(draw, _deploy()))}
+    described = draw(st.sampled_from([_deploy(), _gym(), _own()]))
+    return {**case, "file": packed(changed(draw, described))}
 
 
 @cache
 def _deploy() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         return write_yaml(Path(folder) / "deploy.yaml", **lab_deploy(N)).read_bytes()
+
+
+@cache
+def _gym() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        return write_yaml(Path(folder) / "deploy.yaml", **gym_config(N)).read_bytes()
+
+
+def _own() -> bytes:
+    return (packaged_folder("rivals") / "unitree-g1-velocity.yaml").read_bytes()
 
 
 def _network(case: Json) -> bytes:

@@ -35,6 +35,18 @@ def test_works_or_says_in_one_line_what_is_wrong(name: str) -> None:
     test()
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_every_sort_of_case_can_be_drawn(name: str) -> None:
+    """What cases are made from has not moved away."""
+
+    @settings(SETTINGS, max_examples=60, derandomize=True)
+    @given(kind(name).cases)
+    def test(case: Json) -> None:
+        json.dumps(case)
+
+    test()
+
+
 @pytest.mark.parametrize("path", sorted(FOUND.glob("*.json")), ids=lambda path: path.stem)
 def test_what_was_found_stays_mended(path: Path) -> None:
     """Cases that once ended in a traceback, a hang or a crash."""

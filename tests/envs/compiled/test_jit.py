@@ -9,7 +9,7 @@ import pytest
 from poise.envs.compiled import jit
 
 
-def compile_event(module: str) -> SimpleNamespace:
+def compile_event(module: str | None) -> SimpleNamespace:
     function = SimpleNamespace(__module__=module)
     return SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=function)})
 
@@ -43,6 +43,7 @@ def test_short_compilations_and_those_of_others_are_silent(clock, capsys) -> Non
     patience.on_start(compile_event("mine"))
     clock[0] = 20.0
     patience.on_start(compile_event("mine"))
+    patience.on_start(compile_event(None))  # of no module: what other libraries generate
     assert capsys.readouterr().err == ""
 
 
