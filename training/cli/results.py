@@ -120,7 +120,7 @@ def _print_replay(done: "Replay") -> None:
     events: list[Push | Kick] = [*done.trial.pushes, *done.trial.kicks]
     events.sort(key=lambda each: each.start)
     print("; ".join(map(push_told, events)) or "no push")
-    if reason := why(done.outcome.diagnosis, done.outcome.fall_time):
+    if reason := why(done.outcome, done.outcome.fall_time):
         print(reason)
     for name, (recorded, now) in done.differences.items():
         print(f"{name}: recorded {printable(recorded) or 'nothing'}, "

@@ -172,6 +172,9 @@ AT_LEVEL = (
     Figure("energy_median", "energy", ".0f", "J", "of trials without a fall"),
 )  # fmt: skip
 
+# of a cause of lost trials
+LOSSES = Figure("trials", "losses", ".0f")
+
 # of two controllers on the same trials
 PAIRED = (
     Figure("both", "both", ".0f", words="recovered by both"),
@@ -179,6 +182,7 @@ PAIRED = (
     Figure("only_b", "only b (won)", ".0f", words="won by b"),
     Figure("neither", "neither", ".0f"),
 )
+P_VALUE = Figure("p_mcnemar", "McNemar p", ".2g", words="McNemar's exact test of lost against won")
 GAIN = Figure("j50_gain", "J50 gain", "+.1%", words="of b over a, relative", ends="j50_gain_ci95")
 
 # of a direction

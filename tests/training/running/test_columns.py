@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator
+from pathlib import Path
 from typing import is_typeddict
 
 import pytest
 
+import poise.training
 from poise.training.running import columns, summary
 from poise.training.running.columns import NONE, Figure, known
 
@@ -25,6 +28,20 @@ def test_every_figure_is_one_of_a_summary() -> None:
     assert len(keys) > 100
     named = {key for each in figures() for key in (each.key, each.ends, each.of, each.bound) if key}
     assert named <= keys, named - keys
+
+
+def test_no_table_names_a_figure_on_its_own() -> None:
+    """Of a figure that is described here a report's column is `figure_column`, never a `Column`."""
+    named = {each.csv or each.key for each in figures()}
+    calls = [
+        (str(path), node.lineno, ast.literal_eval(node.args[0]))
+        for path in Path(poise.training.__path__[0]).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+        if node.func.id == "Column" and node.args and isinstance(node.args[0], ast.Constant)
+    ]  # fmt: skip
+    assert len(calls) > 20
+    assert not [call for call in calls if call[2] in named]
 
 
 @pytest.mark.parametrize(

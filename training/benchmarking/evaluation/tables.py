@@ -24,6 +24,7 @@ from poise.training.running.columns import (
     J50_WORST,
     NEVER_FELL,
     NONE,
+    P_VALUE,
     PAIRED,
     RECOVERED,
     ROBUST,
@@ -37,10 +38,9 @@ from poise.training.running.terminal import BESIDE, in_parts
 from .walk_tables import level_tables, motion_tables, walk_tables
 
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
-P_VALUE = "McNemar p"
 SEPARATED = 0.05  # p below which the trials separate two controllers
 SHOWN = 5  # lost trials of a controller that are listed
-IN_PAIRS = ("lost, won", P_VALUE)  # headings whose figures the table of pairs has
+IN_PAIRS = ("lost, won", P_VALUE.heading)  # headings whose figures the table of pairs has
 
 
 def ranked(entries: Mapping[str, Entry]) -> list[str]:
@@ -131,7 +131,7 @@ def _notes(summary: Summary, headings: Sequence[str]) -> list[str]:
     p_values = [pair["p_mcnemar"] for pair in summary["pairs"] if "p_mcnemar" in pair]
     if p_values:
         close = sum(p >= SEPARATED for p in p_values)
-        notes.append(f"{P_VALUE} ≥ {SEPARATED:g}: these trials do not separate the two"
+        notes.append(f"{P_VALUE.heading} ≥ {SEPARATED:g}: these trials do not separate the two"
                      f" ({close} of {len(p_values)} pairs)")  # fmt: skip
     return notes
 
@@ -178,8 +178,7 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         return f"{pair['only_a']}, {pair['only_b']}" if pair and "only_a" in pair else NONE
 
     def p_value(name: str) -> str:
-        pair = pairs.get(name)
-        return f"{pair['p_mcnemar']:.2g}" if pair and "p_mcnemar" in pair else NONE
+        return P_VALUE.text(pairs.get(name, {}))
 
     return [
         (J50_MEAN.heading, lambda name: j50_mean_text(entries[name])),
@@ -188,7 +187,7 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         column(RECOVERED, f"{RECOVERED.name}{of_mix}"),
         column(NEVER_FELL),
         ("lost, won", lost),
-        (P_VALUE, p_value),
+        (P_VALUE.heading, p_value),
         *map(column, (*AT_REST, STEPS_TAKEN, *ROBUST)),
     ]
 
@@ -206,13 +205,11 @@ def _pairs(summary: Summary, width: int) -> Table:
     table.add_column(
         "b against a", overflow="fold", width=_room(titles, min(max(width - 60, 16), 34))
     )
-    gain = known([GAIN], summary["pairs"])
-    for heading in (*(each.heading for each in PAIRED), P_VALUE, *(each.heading for each in gain)):
-        table.add_column(escape(heading), justify="right", overflow="fold")
+    columns = (*PAIRED, P_VALUE, *known([GAIN], summary["pairs"]))
+    for each in columns:
+        table.add_column(escape(each.heading), justify="right", overflow="fold")
     for title, pair in zip(titles, summary["pairs"], strict=True):
-        cells = [each.text(pair) for each in PAIRED]
-        cells.append(f"{pair['p_mcnemar']:.2g}" if "p_mcnemar" in pair else NONE)
-        table.add_row(escape(title), *cells, *(escape(each.text(pair)) for each in gain))
+        table.add_row(escape(title), *(escape(each.text(pair)) for each in columns))
     return table
 
 

@@ -53,7 +53,7 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
         "played": len(everything),
         "errors": sum(outcome.error is not None for _, outcome in everything),
     }
-    if found := losses((outcome.diagnosis, outcome.steps) for _, outcome in played):
+    if found := losses((outcome, outcome.steps) for _, outcome in played):
         entry["losses"] = found
     if directional := part(played, *DIRECTIONAL):
         entry.update(envelope(directional, plan.limits, steps))

@@ -8,7 +8,6 @@ from typing import Any
 from poise.baselines.walking.schedule import TimedCommand
 from poise.envs.physics.pushes.push import Kick, Push
 from poise.envs.terrain.terrain import Terrain
-from poise.training.benchmarking.diagnosis.diagnosis import COLUMNS as DIAGNOSIS_COLUMNS
 from poise.training.benchmarking.diagnosis.diagnosis import Diagnosis
 
 
@@ -89,8 +88,8 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """The outcome of a trial. Distances [m], times [s]; None where there is no such value, or
+class TrialFigures:
+    """The figures of a trial. Distances [m], times [s]; None where there is no such value, or
     where a simulation has blown up.
 
     Attributes:
@@ -151,7 +150,6 @@ class Outcome:
             that is performed, see `TrackingFigures`.
         drawn: of a robot that is drawn, its numbers as JSON, see `DrawnRobot.summary`.
         error: what the controller raised, on one line; the trial then counts as not recovered.
-        loss … hardware: why it was lost, see `Diagnosis`; None of a trial that was recovered.
     """
 
     recovered: bool
@@ -213,23 +211,14 @@ class Outcome:
     interruptions: float | None = None
     drawn: str | None = None
     error: str | None = None
-    loss: str | None = None
-    loss_body: str | None = None
-    full_motor: str | None = None
-    full_from: float | None = None
-    full_time: float | None = None
-    capture_left: float | None = None
-    capture_outside: float | None = None
-    foothold: str | None = None
-    foothold_time: float | None = None
-    foothold_error: float | None = None
-    failures_from: float | None = None
-    hardware: str | None = None
 
-    @property
-    def diagnosis(self) -> Diagnosis:
-        """Why it was lost."""
-        return Diagnosis(**{name: getattr(self, name) for name in DIAGNOSIS_COLUMNS})
+
+@dataclass(frozen=True)
+class Outcome(Diagnosis, TrialFigures):
+    """The outcome of a trial: its figures, then why it was lost, of which a recovered one has none.
+
+    Bases are listed from the last field to the first, as dataclasses collect them.
+    """
 
 
 def failed(error: Exception) -> Outcome:

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import jinja2
 from markupsafe import Markup
 
 from poise.configs.errors import ConfigError
 from poise.configs.files import write_atomic
 from poise.configs.outputs import check_out_file
-from poise.training.pictures.figures.palette import CARDS, variables
 from poise.training.pictures.figures.style import Inline
+from poise.training.pictures.report.pages import render_page
 
 
 class Picture(NamedTuple):
@@ -46,17 +45,5 @@ def write_page(path: Path, title: str, lead: str, pictures: Sequence[Picture]) -
 
     Raises PoiseError if the file cannot be written.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("poise.training.pictures.report", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    text = environment.get_template("motion.html.j2").render(
-        title=title,
-        lead=lead,
-        pictures=pictures,
-        colours={scheme: variables(scheme) for scheme in CARDS},
-    )
+    text = render_page("motion.html.j2", title=title, lead=lead, pictures=pictures)
     write_atomic(path, text)

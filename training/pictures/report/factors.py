@@ -13,7 +13,15 @@ from poise.training.pictures.figures.envelope import right_angle
 from poise.training.pictures.figures.rates import level_curves, level_text
 from poise.training.pictures.figures.series import rate_series
 from poise.training.pictures.figures.style import Inline
-from poise.training.running.columns import MARGINS, OVER_SEEDS, RECOVERED, SWAY, TRIED, Entry
+from poise.training.running.columns import (
+    MARGINS,
+    OVER_SEEDS,
+    P_VALUE,
+    RECOVERED,
+    SWAY,
+    TRIED,
+    Entry,
+)
 from poise.training.running.summary import Level, MarginFigures
 
 from .cells import Cell, Column, Table, cell, figure_cell, figure_column, name_cell, p_cell
@@ -87,7 +95,7 @@ def factor_table(results: Results) -> Table | None:
         *map(figure_column, (*TRIED, RECOVERED)),
         Column("lost", "lost", "against the standard case"),
         Column("won", "won", "against the standard case"),
-        Column("p_mcnemar", "p", "McNemar's exact test"),
+        figure_column(P_VALUE),
     ]
     rows = [
         [

@@ -8,7 +8,6 @@ import shlex
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import jinja2
 from rich.console import Console
 
 from poise.baselines.allowance import allow_words, allowing
@@ -17,7 +16,6 @@ from poise.configs.files import write_atomic
 from poise.configs.reading import JSON_BYTES, TABLE_BYTES, read_text
 from poise.training.benchmarking.evaluation.tables import assisted
 from poise.training.benchmarking.results.read import Record, Results, load_results
-from poise.training.pictures.figures.palette import CARDS, variables
 from poise.training.pictures.figures.style import Inline
 from poise.training.pictures.figures.time_series import signal_keys, trial_timeseries
 from poise.training.running.files import REPORT, SUMMARY, TRIALS
@@ -26,6 +24,7 @@ from poise.training.running.terminal import print_paths
 from . import factors, plots, walking, words
 from . import tables as report_tables
 from .cells import Download, download
+from .pages import render_page
 from .worst_trials import (
     AFTER,
     Exhibit,
@@ -81,13 +80,6 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
     console = console or Console(quiet=True)
     baseline = results.reference
     order = results.summary["ranking"]
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("poise.training.pictures.report", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     tables = {
         "ranking": report_tables.ranking(results, baseline),
         "directions": report_tables.directions(results),
@@ -109,7 +101,7 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
     cases, notes = _cases(results, baseline, order, films, console)
     envelope, own_envelopes = plots.envelopes(results)
     falls, curves = plots.falls(results)
-    return environment.get_template("report.html.j2").render(
+    return render_page("report.html.j2",
         summary=results.summary,
         trial_count=len({record.trial for record in results.records}),
         controllers=[
@@ -136,7 +128,6 @@ def render(results: Results, *, films: bool = True, console: Console | None = No
         trials=_trials(results),
         summary_file=_summary_file(results),
         crowded=len(order) > CROWD,
-        colours={scheme: variables(scheme) for scheme in CARDS},
     )  # fmt: skip
 
 

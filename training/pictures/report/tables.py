@@ -23,6 +23,8 @@ from poise.training.running.columns import (
     J50_MEAN,
     J50_PER_MASS,
     J50_WORST,
+    LOSSES,
+    P_VALUE,
     PAIRED,
     RECOVERED,
     ROOT,
@@ -64,7 +66,7 @@ def ranking(results: Results, baseline: str) -> Table:
         *map(figure_column, found),
         Column("lost", "lost", f"trials that {baseline} recovers and this controller does not"),
         Column("won", "won", f"trials that this controller recovers and {baseline} does not"),
-        Column("p_mcnemar", "p", "McNemar's exact test of lost against won"),
+        figure_column(P_VALUE),
         *map(figure_column, others),
     ]
     rows = []
@@ -93,7 +95,7 @@ def pairs(results: Results) -> Table:
         Column("b", "b"),
         Column("a", "against a"),
         *map(figure_column, PAIRED),
-        Column("p_mcnemar", "p", "McNemar's exact test"),
+        figure_column(P_VALUE),
         figure_column(GAIN),
     ]
     rows, order = [], results.controllers
@@ -149,11 +151,11 @@ def losses(results: Results, order: Sequence[str]) -> Table | None:
     """How often what was the cause of a loss; None in older results, and where nothing was lost."""
     columns = [
         Column("controller", "controller"),
-        Column("trials", "losses"),
+        figure_column(LOSSES),
         Column("cause", "cause"),
     ]
     rows = [
-        [name_cell(name, results.controllers.index(name)), cell(loss["trials"], "d"),
+        [name_cell(name, results.controllers.index(name)), figure_cell(LOSSES, loss),
          Cell(loss["cause"], loss["cause"])]
         for name in order
         for loss in results.summary["controllers"][name].get("losses", [])

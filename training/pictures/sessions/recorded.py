@@ -65,7 +65,7 @@ def recorded_trial(
         done = replay(results, trial, name, watch=recorder, allow=allow)
         differs = "differs from the record" if done.differences else "exactly as recorded"
         lines.append(f"trial {trial}, {name}: {_end(done.outcome)}, {differs}")
-        if reason := why(done.outcome.diagnosis, done.outcome.fall_time):
+        if reason := why(done.outcome, done.outcome.fall_time):
             reasons[name] = reason
             lines.append(f"  {reason}")
     envs = [recorder.env for recorder in recorders if recorder.env is not None]
