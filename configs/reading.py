@@ -22,6 +22,7 @@ from .errors import ConfigError, PoiseError, shown
 from .yaml_loader import DEPTH, DIGITS, Loader
 
 MIB = 1 << 20
+POINTER = b"version https://git-lfs.github.com/spec/"  # that Git LFS leaves in a file's place
 YAML_BYTES = 1 * MIB
 JSON_BYTES = 16 * MIB
 TABLE_BYTES = 128 * MIB  # trials of a benchmark: 40 MiB are 100,000
@@ -84,7 +85,7 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
     """The content of a regular file of at most `limit` bytes; a pipe or a device is none.
 
     Raises:
-        ConfigError: no such file, no permission, no file, a larger one.
+        ConfigError: no such file, no permission, no file, a larger one, a pointer of Git LFS.
     """
     try:
         # without O_NONBLOCK a pipe would be waited for
@@ -102,6 +103,9 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
         raise ConfigError("cannot be read (no name of a file)", source=path) from None
     if len(data) > limit:
         raise ConfigError(f"is larger than {limit / MIB:g} MiB", source=path)
+    if data.startswith(POINTER):
+        raise ConfigError("is a pointer of Git LFS, not the file itself: run git lfs pull in its "
+                          "checkout", source=path)  # fmt: skip
     return data
 
 

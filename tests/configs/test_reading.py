@@ -208,6 +208,9 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     assert message(lambda: read_yaml(large)) == f"{large}: is larger than 1 MiB"
     assert "not a regular file" in message(lambda: read_yaml(tmp_path))
     assert "not a regular file" in message(lambda: read_bytes("/dev/zero", MIB))
+    pointer = tmp_path / "pointer.bvh"
+    pointer.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 3\n")
+    assert "is a pointer of Git LFS" in message(lambda: read_bytes(pointer, MIB))
     os.mkfifo(tmp_path / "pipe.yaml")
     assert "not a regular file" in message(lambda: read_yaml(tmp_path / "pipe.yaml"))
     assert "no name of a file" in message(lambda: read_yaml("a\0b"))

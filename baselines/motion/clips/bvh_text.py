@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ MOST_LEVELS = 100  # of joints on joints
 MOST_VALUES = 20_000_000
 HIERARCHY = ("HIERARCHY", "ROOT", "JOINT", "End Site", "{", "}", "OFFSET", "CHANNELS", "MOTION",
              "Frames:", "Frame Time:")  # fmt: skip
+FRAMES = re.compile(r"\s*(frames|frame\s*time)\s*:(.*)", re.IGNORECASE)
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 
 
@@ -48,7 +50,8 @@ class BvhText:
 def read_bvh_text(path: Path) -> BvhText:
     """The joints and the values of a BVH file.
 
-    A byte order mark before it and end marks after it do not count.
+    Marks before and after it do not count, nor the case of keywords, the spaces about a colon, and
+    whether ``{`` stands in a line of its own.
 
     Raises ConfigError, with the number of the line, for what is no BVH file within bounds: at most
     64 MiB, 500 joints, 100 levels, 20 million values; all numbers finite; one root; as many rows of
@@ -57,8 +60,7 @@ def read_bvh_text(path: Path) -> BvhText:
     lines = enumerate(_text(path).splitlines(), start=1)
     head = _Head(path)
     for number, line in lines:
-        words = line.split()
-        if words and head.take(number, words):
+        if any(head.take(number, words) for words in _statements(line)):
             break
     else:
         raise ConfigError("ends before a line 'Frame Time:'", source=path)
@@ -74,10 +76,24 @@ def _text(path: Path) -> str:
     """Names may be in any encoding; all else is ASCII."""
     data = read_bytes(path, BVH_BYTES)
     try:
-        text = data.decode("utf-8-sig")
+        text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     return text.rstrip("\x1a\0 \t\r\n")
+
+
+def _statements(line: str) -> list[list[str]]:
+    """The words of a line before the values, keywords as the format's authors write them."""
+    if frames := FRAMES.fullmatch(line):
+        first = ["Frames:"] if frames[1].lower() == "frames" else ["Frame", "Time:"]
+        return [first + frames[2].split()]
+    words = line.split()
+    for word in (*HIERARCHY, "End"):
+        if words and words[0].upper() == word.upper():
+            words[0] = word
+    if words[1:] and words[-1] == "{":
+        return [words[:-1], ["{"]]
+    return [words] if words else []
 
 
 class _Head:

@@ -15,7 +15,6 @@ BYTES = 64 * MIB  # of each file
 ONNX = (".onnx",)
 DESCRIPTIONS = ("policy.yaml", "deploy.yaml", "params/deploy.yaml")
 NETWORKS = ("", "exported", "params")  # folders in which frameworks put them
-POINTER = b"version https://git-lfs.github.com/spec/"  # that Git LFS leaves in a file's place
 
 
 def is_network(path: Path) -> bool:
@@ -64,7 +63,7 @@ def digest(path: Path, source: str | Path) -> str:
     Raises ConfigError where it is no ONNX file, or one of these is missing, lies elsewhere than
     beside it, or is still to be fetched by Git LFS.
     """
-    content = _content(path, source)
+    content = read_bytes(path, BYTES)
     found = hashlib.sha256(content)
     for name in () if is_script(path) else sorted(_outside(content, path)):  # whatever it is called
         if name in ("", "..") or Path(name).name != name:
@@ -73,16 +72,8 @@ def digest(path: Path, source: str | Path) -> str:
         if not is_file(path.with_name(name)):
             raise ConfigError(f"{path.name} needs the file {shown(name)} beside it, which is "
                               "missing", source=source, field="policy")  # fmt: skip
-        found.update(_content(path.with_name(name), source))
+        found.update(read_bytes(path.with_name(name), BYTES))
     return found.hexdigest()
-
-
-def _content(path: Path, source: str | Path) -> bytes:
-    content = read_bytes(path, BYTES)
-    if content.startswith(POINTER):
-        raise ConfigError(f"{path.name} is a pointer of Git LFS, not the network itself: run git "
-                          "lfs pull in its checkout", source=source, field="policy")  # fmt: skip
-    return content
 
 
 def _outside(content: bytes, path: Path) -> set[str]:

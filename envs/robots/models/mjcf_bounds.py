@@ -12,7 +12,7 @@ from pathlib import Path
 import mujoco
 
 from poise.configs.errors import ConfigError
-from poise.configs.reading import MIB, exists, is_file, is_folder, read_text
+from poise.configs.reading import MIB, POINTER, exists, is_file, is_folder, read_text
 
 MJCF_BYTES = 4 * MIB  # of all files of a model together
 ELEMENTS = 20_000  # of the XML, copies counted
@@ -26,7 +26,6 @@ ASSET_BYTES = 16 * MIB  # of a file of a mesh, a texture or a height field
 PIXELS = 10_000_000  # of all textures and height fields together, and of a camera
 LISTS = {"bodies": 1000, "joints": 1000, "geoms": 5000, "keys": 1000, "sensors": 5000}
 MEMORY = 256 * MIB  # of a simulation's stack
-POINTER = b"version https://git-lfs"  # what a file of Git LFS begins with before it is fetched
 LONGEST = 10_000  # of what elements may reserve: user data, keyframes, dimensions of a sensor
 _RESERVED = ("nkey", "nuserdata", "nuser_actuator", "nuser_body", "nuser_cam", "nuser_geom",
              "nuser_jnt", "nuser_sensor", "nuser_site", "nuser_tendon")  # fmt: skip
@@ -164,7 +163,7 @@ def _check_assets(spec: mujoco.MjSpec, folders: set[Path], source: str, field: s
              for folder in folders}  # fmt: skip
     for file in {file.resolve() for file in tried if is_file(file)}:
         with file.open("rb") as opened:
-            head = opened.read(24)
+            head = opened.read(len(POINTER))
         if file.stat().st_size > ASSET_BYTES:
             raise _wrong(f"{file} is larger than {ASSET_BYTES / MIB:g} MiB", source, field)
         if head.startswith(POINTER):

@@ -266,7 +266,7 @@ LIMITS = "observation_terms_clip"
 BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
     "no data file": (no_data, ("policy.onnx needs the file 'policy.onnx.data' beside it",)),
     "data elsewhere": (data_elsewhere, ("has data in '../../etc/passwd', not beside it",)),
-    "a pointer": (pointer, ("policy: policy.onnx is a pointer of Git LFS", "git lfs pull")),
+    "a pointer": (pointer, ("policy.onnx: is a pointer of Git LFS", "git lfs pull")),
     "no ONNX": (scribbled, ("policy.onnx: is no ONNX file",)),
     "two networks": (two_networks, ("policy: several networks", "choices: a.onnx, b.onnx")),
     "no network": (lambda f: write_yaml(f / "deploy.yaml", **lab_deploy(N)).parent,

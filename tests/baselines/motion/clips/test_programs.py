@@ -119,6 +119,39 @@ def test_marks_and_suffixes_do_not_count(tmp_path: Path, name: str, mark: str) -
     assert np.array_equal(clip.places(), plain.places())
 
 
+SPELLINGS = {
+    "small letters": ("CHANNELS", "channels"),
+    "capital letters": ("End Site", "END SITE"),
+    "a word of another case": ("HIERARCHY", "Hierarchy"),
+    "no space after a colon": ("Frames: ", "Frames:"),
+    "a space before a colon": ("Frames:", "Frames :"),
+    "no space in a keyword": ("Frame Time:", "FrameTime:"),
+    "a brace in the line of the name": ("\n{", " {"),
+}
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_keywords_are_read_as_programs_spell_them(tmp_path: Path, spelling: str) -> None:
+    text = body_bvh(PLAIN)
+    other = text.replace(*SPELLINGS[spelling])
+    assert other != text
+    assert np.array_equal(read(tmp_path, other).places(), read(tmp_path, text).places())
+
+
+@pytest.mark.parametrize("order", ["le", "be"])
+def test_wide_characters_with_a_mark_are_read(tmp_path: Path, order: str) -> None:
+    """As editors of Windows save them."""
+    (tmp_path / "wide.bvh").write_bytes(f"\ufeff{body_bvh(PLAIN)}".encode(f"utf-16-{order}"))
+    assert read_bvh(tmp_path / "wide.bvh").clip.skeleton.names[0] == "Hips"
+
+
+def test_a_short_file_of_wide_characters_is_refused(tmp_path: Path) -> None:
+    """Half a character at its end, as a copy that broke off leaves it."""
+    (tmp_path / "wide.bvh").write_bytes(b"\xff\xfeH\x00I")
+    with pytest.raises(ConfigError, match="line 1: "):
+        read_bvh(tmp_path / "wide.bvh")
+
+
 def test_names_in_another_encoding_are_read(tmp_path: Path) -> None:
     text = body_bvh(PLAIN).replace("Spine", "Rücken").encode("latin-1")
     (tmp_path / "a.bvh").write_bytes(text)
