@@ -1,4 +1,4 @@
-"""The cone of wrenches that a flat sole can transmit without sliding or tipping."""
+"""The friction cone of a flat sole: the wrenches that it transmits without sliding or tipping."""
 
 import numpy as np
 from scipy.spatial import ConvexHull
