@@ -281,7 +281,7 @@ BAD: dict[str, tuple[Any, tuple[str, ...]]] = {
     "least action above largest": (lambda f: bare(f, action_clip=[[-1, 1], [2, 1]]),
                                    ("own.yaml: action_clip[1]: 2.0 is above 1.0",)),
     "nothing seen": (bare, ("own.yaml: observations: what the policy sees is not said",
-                            "poise policies check ", "policy.onnx --robot ROBOT")),
+                            "poise policies check ", "policy.onnx --robot unitree_g1")),
     "an input without terms": (lambda f: bare(f, observations={"obs": []}),
                                ("own.yaml: observations: what the policy sees is not said",)),
     "names that are no list": (metadata(dof_names="[1,"), ("dof_names: is no list in JSON",)),

@@ -74,7 +74,7 @@ def test_a_bare_script_is_code(tmp_path: Path, capsys: pytest.CaptureFixture[str
     torch.jit.save(torch.jit.script(torch.nn.Linear(84, N)), str(path))
     check = ["policies", "check", str(path), "--robot", "compact"]
     assert main(["evaluate", str(path), "--robot", "compact"]) == 2
-    assert f"poise policies check {path} --robot ROBOT" in capsys.readouterr().err
+    assert f"poise policies check {path} --robot unitree_g1" in capsys.readouterr().err
     assert main(check) == 2
     assert "wants to run code" in capsys.readouterr().err
     assert main([*check, "--allow", str(path)]) == 1
