@@ -19,6 +19,7 @@ from poise.training.learning.seeds import train as train_seeds
 from poise.training.learning.tuning import search
 from poise.training.pictures.figures import video
 from poise.training.pictures.report import page
+from poise.training.pictures.view import view as viewing
 
 from .samples import copy_sample
 from .texts import Draw
@@ -90,7 +91,7 @@ def _stops() -> tuple[tuple[Any, str], ...]:
     return (
         (run, "Executor"), (search, "Executor"), (train_seeds, "Executor"),
         (stable_baselines3.PPO, "learn"), (export, "recoveries"), (page, "film"),
-        (video, "record"),
+        (video, "record"), (viewing, "_serve"),
     )  # fmt: skip
 
 
