@@ -205,15 +205,22 @@ def test_a_floor_has_few_doors() -> None:
 
 
 def test_tests_stand_in_the_rooms_of_what_they_test() -> None:
-    """tests/ has the folders of the package, and three of its own."""
+    """tests/ has the folders of the package, and five of its own. A test that has a file's name
+    stands in that file's room, not in one that holds it."""
     tests = ROOT / "tests"
     if not tests.is_dir():
         pytest.skip("not a checkout")
     own = {"integration", "support", "performance", "fuzz", "endurance"}
-    folders = {str(path.parent.relative_to(tests)) for path in tests.rglob("test_*.py")} - {"."}
-    strange = {f for f in folders if f.split("/")[0] not in own and not (ROOT / f).is_dir()}
-    assert strange == set()
-    assert [path.name for path in tests.glob("test_*.py")] == []
+    mirrored = [path.relative_to(tests) for path in tests.rglob("test_*.py")]
+    mirrored = [path for path in mirrored if path.parts[0] not in own]
+    assert {path.parent for path in mirrored if not (ROOT / path.parent).is_dir()} == set()
+    assert [path for path in mirrored if len(path.parts) == 1] == []
+    deeper: list[tuple[Path, Path]] = []
+    for path in mirrored:
+        room, name = ROOT / path.parent, path.stem.removeprefix("test_")
+        here = (room / f"{name}.py").is_file() or (room / name).is_dir()
+        deeper += [] if here else [(path, file) for file in room.rglob(f"{name}.py")]
+    assert deeper == []
 
 
 def test_a_room_is_imported_without_those_above_it() -> None:

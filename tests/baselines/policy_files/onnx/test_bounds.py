@@ -1,4 +1,4 @@
-"""Networks that would take all time or memory; policy_files/bounds.py, onnx_tensors.py."""
+"""Networks that would take all time or memory; policy_files/onnx/bounds.py, tensors.py."""
 
 from __future__ import annotations
 
