@@ -94,7 +94,7 @@ def test_wrong_entries_are_refused_in_one_line(tmp_path: Path) -> None:
             ):
                 with contextlib.suppress(PoiseError):
                     read()
-    assert refused > 250 and accepted > 20
+    assert refused > 500 and accepted > 50
 
 
 @pytest.mark.parametrize("text", ["a\nb", "\x1b]0;a\x07", "\u202ea", "x" * 5000])
