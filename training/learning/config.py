@@ -117,12 +117,15 @@ class Curriculum:
         realism: Level of realism at the start of the run, over its final one: see
             `Realism.scaled`.
         mixed: Train environment k of n under (k + ½)/n of the level, and not all under the whole.
+        levels: Levels of realism that the environments have in turn, one each, instead of
+            `env.realism`, which evaluations keep.
         share: Fraction of the run over which both grow.
     """
 
     start: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0})
     realism: float = field(default=1.0, metadata={"above": 0.0, "max": 1.0, "omit": "default"})
     mixed: bool = field(default=False, metadata={"omit": "default"})
+    levels: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
     share: float = field(default=0.3, metadata={"min": 0.0, "max": 1.0})
 
 

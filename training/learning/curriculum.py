@@ -4,6 +4,8 @@ from dataclasses import replace
 
 from stable_baselines3.common.callbacks import BaseCallback
 
+from poise.envs.sensing.realism import Realism, load_realism
+
 from .config import TrainConfig
 
 
@@ -13,6 +15,7 @@ class CurriculumCallback(BaseCallback):
     def __init__(self, config: TrainConfig):
         super().__init__()
         self.config = config
+        self.levels = [load_realism(name) for name in config.curriculum.levels]
 
     def _on_rollout_start(self) -> None:
         curriculum, env = self.config.curriculum, self.config.env
@@ -24,14 +27,18 @@ class CurriculumCallback(BaseCallback):
             scaled = replace(env.pushes, magnitude=(min(low, factor * high), factor * high))
             self.training_env.set_attr("push_sampler", scaled)
             self.logger.record("curriculum/largest", scaled.magnitude[1])
-        if curriculum.realism < 1.0 or curriculum.mixed:
+        if curriculum.realism < 1.0 or curriculum.mixed or curriculum.levels:
             factor = curriculum.realism + (1.0 - curriculum.realism) * done
-            n = self.training_env.num_envs if curriculum.mixed else 1
-            for i in range(n):
-                level = env.realism.scaled(factor * (i + 0.5) / n if curriculum.mixed else factor)
-                envs = i if curriculum.mixed else None  # None: all
-                self.training_env.set_attr("realism", level, indices=envs)
+            for i, level in enumerate(self._levels(factor)):
+                self.training_env.set_attr("realism", level, indices=i)
             self.logger.record("curriculum/realism", factor)
+
+    def _levels(self, factor: float) -> list[Realism]:
+        """The level of each environment, `factor` of the way from `ideal`."""
+        curriculum, n = self.config.curriculum, self.training_env.num_envs
+        spread = [(i + 0.5) / n if curriculum.mixed else 1.0 for i in range(n)]
+        levels = self.levels or [self.config.env.realism]
+        return [levels[i % len(levels)].scaled(factor * spread[i]) for i in range(n)]
 
     def _on_step(self) -> bool:
         return True
