@@ -24,6 +24,7 @@ from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot, on_terrain
 
 from .drawn import DrawnRobot
+from .external_force import ExternalForce, allocate_force, begin_force, observe_force
 from .inekf import (
     ATTITUDE,
     ENCODER,
@@ -125,6 +126,7 @@ class Belief(Block):
     views: SimViews  # of its simulation
     state: StateArrays
     rollout: Rollout
+    force: ExternalForce
     steps: np.ndarray  # (6,) int: physics steps, see SENSE and its like
     axes: np.ndarray  # (3, 3) of the root, led on
     q: np.ndarray  # (nj,) likewise
@@ -157,12 +159,18 @@ def believe(b: Belief):
         if b.steps[INVARIANT]:
             for a in range(3):
                 b.v[3 + a] -= b.invariant.gyro_bias[a]
+    if b.steps[HORIZON] > 0:
+        _write_state(b, row)
+        observe_force(b.force, b.robot, b.state, r, known, b.steps[EXACT] > 0)
     ahead = b.steps[HORIZON] - b.steps[SENSE] + now - known  # at an episode's start less is late
     if b.steps[HORIZON] > 0 and b.steps[SIMULATED] + b.rollout.motors.bus.servoed[0] > 1:
-        roll_out(b.rollout, known, ahead, b.steps[EARLIER], b.position, b.axes, b.q, b.v)
+        roll_out(
+            b.rollout, known, ahead, b.steps[EARLIER], b.force.wrench,
+            b.position, b.axes, b.q, b.v,
+        )  # fmt: skip
     elif b.steps[HORIZON] > 0:
         predict(
-            o.promises, known, ahead, b.steps[EARLIER], b.robot.timestep,
+            o.promises, known, ahead, b.steps[EARLIER], b.robot.timestep, b.force.acceleration,
             b.position, b.axes, b.q, b.v,
         )  # fmt: skip
     _write_state(b, row)
@@ -236,7 +244,7 @@ class EstimatedState(StateSource, Copyable):
         nv, zeros = plant.simulation.model.nv, guarded_zeros
         self.belief = Belief(
             rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
-            make_rollout(self.ahead, self.motors),
+            make_rollout(self.ahead, self.motors), allocate_force(),
             zeros(6, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
         self.drive = Program.of([(drive_motors, self.motors)])
@@ -262,6 +270,7 @@ class EstimatedState(StateSource, Copyable):
         )  # fmt: skip
         self._begin_odometry()
         self._begin_invariant()
+        begin_force(self.belief.force)
         self.update()
 
     def _begin_odometry(self) -> None:

@@ -65,7 +65,7 @@ def turn_axes(R: np.ndarray, x: float, y: float, z: float):
 
 @compiled
 def predict(
-    p: Promises, first: int, count: int, earlier: int, dt: float,
+    p: Promises, first: int, count: int, earlier: int, dt: float, more: np.ndarray,
     position: np.ndarray, R: np.ndarray, q: np.ndarray, v: np.ndarray,
 ):  # fmt: skip
     """Lead a state on from the physics step `first` by `count` steps of `dt` [s], in place.
@@ -84,6 +84,10 @@ def predict(
         if asked >= 0 and asked < p.written[0]:
             for j in range(nv):
                 v[j] += dt * p.rows[asked % n, j]
+        for a in range(3):
+            v[a] += dt * more[a]
+            for c in range(3):
+                v[3 + a] += dt * R[c, a] * more[3 + c]
         for a in range(3):
             position[a] += dt * v[a]
         turn_axes(R, dt * v[3], dt * v[4], dt * v[5])
@@ -107,7 +111,7 @@ def make_rollout(simulation: Simulation, motors: Motors) -> Rollout:
 
 @compiled
 def roll_out(
-    o: Rollout, first: int, count: int, earlier: int,
+    o: Rollout, first: int, count: int, earlier: int, wrench: np.ndarray,
     position: np.ndarray, R: np.ndarray, q: np.ndarray, v: np.ndarray,
 ):  # fmt: skip
     """Lead a state on by `count` physics steps of the known robot, in place.
@@ -122,6 +126,14 @@ def roll_out(
     copy_into(v, views.qvel)
     mj_step1(views.model_address, views.data_address)
     written = m.written[0]
+    body = o.robot.root_body
+    com, at, given = views.subtree_com[body], views.xipos[body], views.xfrc_applied[body]
+    x, y, z = com[0] - at[0], com[1] - at[1], com[2] - at[2]
+    for a in range(6):
+        given[a] = wrench[a]
+    given[3] += y * wrench[2] - z * wrench[1]
+    given[4] += z * wrench[0] - x * wrench[2]
+    given[5] += x * wrench[1] - y * wrench[0]
     for x in range(first, first + count):
         asked = m.asked[max(min(x - earlier, written - 1), 0) % n]
         for i in range(views.ctrl.shape[0]):
