@@ -66,7 +66,7 @@ from .realism import Realism
 from .source import StateSource
 
 POSITIVE = {"above": 0.0}
-SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT = range(6)  # entries of `Belief.steps`
+SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED = range(7)  # entries of `Belief.steps`
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 #: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
@@ -87,6 +87,7 @@ class EstimatorConfig:
             `promised` by the accelerations that the QP has promised, `rollout` by a simulation of
             the known robot with what its motors were asked for, `none` not at all; `auto` is
             `rollout` while motors run servos, whose accelerations nobody promises, else `promised`.
+        external_force: Whether a rollout is pushed on by the force that nothing else explains.
         filtered: Whether joint velocities are filtered.
         joint_acceleration: Acceleration of joints that nobody knows of, step to step [rad/s²].
         turn_acceleration: Angular acceleration of the root that nobody knows of [rad/s²].
@@ -100,6 +101,7 @@ class EstimatorConfig:
 
     kind: Literal["auto", "odometry", "inekf", "exact"] = "auto"
     predictor: Literal["auto", "promised", "rollout", "none"] = "auto"
+    external_force: bool = True
     filtered: bool = True
     joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
     turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
@@ -127,7 +129,7 @@ class Belief(Block):
     state: StateArrays
     rollout: Rollout
     force: ExternalForce
-    steps: np.ndarray  # (6,) int: physics steps, see SENSE and its like
+    steps: np.ndarray  # (7,) int: physics steps, see SENSE and its like
     axes: np.ndarray  # (3, 3) of the root, led on
     q: np.ndarray  # (nj,) likewise
     v: np.ndarray  # (nv,)
@@ -159,7 +161,7 @@ def believe(b: Belief):
         if b.steps[INVARIANT]:
             for a in range(3):
                 b.v[3 + a] -= b.invariant.gyro_bias[a]
-    if b.steps[HORIZON] > 0:
+    if b.steps[PUSHED]:
         _write_state(b, row)
         observe_force(b.force, b.robot, b.state, r, known, b.steps[EXACT] > 0)
     ahead = b.steps[HORIZON] - b.steps[SENSE] + now - known  # at an episode's start less is late
@@ -170,7 +172,7 @@ def believe(b: Belief):
         )  # fmt: skip
     elif b.steps[HORIZON] > 0:
         predict(
-            o.promises, known, ahead, b.steps[EARLIER], b.robot.timestep, b.force.acceleration,
+            o.promises, known, ahead, b.steps[EARLIER], b.robot.timestep,
             b.position, b.axes, b.q, b.v,
         )  # fmt: skip
     _write_state(b, row)
@@ -245,7 +247,7 @@ class EstimatedState(StateSource, Copyable):
         self.belief = Belief(
             rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
             make_rollout(self.ahead, self.motors), allocate_force(),
-            zeros(6, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
+            zeros(7, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
         self.drive = Program.of([(drive_motors, self.motors)])
         self.sense = Program.of([(measure, self.sensors)])
@@ -265,12 +267,13 @@ class EstimatedState(StateSource, Copyable):
         earlier = max(acting, 0)  # below 0 the sensing's delay is underrated
         horizon = max(drawn.sense + acting, 0) if predicted else 0
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
+        pushed = c.external_force and horizon > 0 and SIMULATES[c.predictor] > 0
         self.belief.steps[:] = (
-            drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf"
+            drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf", pushed
         )  # fmt: skip
+        begin_force(self.belief.force)
         self._begin_odometry()
         self._begin_invariant()
-        begin_force(self.belief.force)
         self.update()
 
     def _begin_odometry(self) -> None:

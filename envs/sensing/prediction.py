@@ -65,7 +65,7 @@ def turn_axes(R: np.ndarray, x: float, y: float, z: float):
 
 @compiled
 def predict(
-    p: Promises, first: int, count: int, earlier: int, dt: float, more: np.ndarray,
+    p: Promises, first: int, count: int, earlier: int, dt: float,
     position: np.ndarray, R: np.ndarray, q: np.ndarray, v: np.ndarray,
 ):  # fmt: skip
     """Lead a state on from the physics step `first` by `count` steps of `dt` [s], in place.
@@ -84,10 +84,6 @@ def predict(
         if asked >= 0 and asked < p.written[0]:
             for j in range(nv):
                 v[j] += dt * p.rows[asked % n, j]
-        for a in range(3):
-            v[a] += dt * more[a]
-            for c in range(3):
-                v[3 + a] += dt * R[c, a] * more[3 + c]
         for a in range(3):
             position[a] += dt * v[a]
         turn_axes(R, dt * v[3], dt * v[4], dt * v[5])
@@ -117,7 +113,8 @@ def roll_out(
     """Lead a state on by `count` physics steps of the known robot, in place.
 
     In the step x its motors follow what was asked for in step x − `earlier`, as `drive_motors` has
-    it, by the joints of the simulation. Arguments as of `predict`.
+    it, by the joints of the simulation. All the while `wrench` (6,) acts on the root: a force, and
+    a moment about the CoM of the robot at the start, world axes. Other arguments as of `predict`.
     """
     views, m, n = o.views, o.motors, o.motors.asked.shape[0]
     copy_into(position, views.qpos[:3])
@@ -125,15 +122,8 @@ def roll_out(
     copy_into(q, views.qpos[7:])
     copy_into(v, views.qvel)
     mj_step1(views.model_address, views.data_address)
+    _push(o, wrench)
     written = m.written[0]
-    body = o.robot.root_body
-    com, at, given = views.subtree_com[body], views.xipos[body], views.xfrc_applied[body]
-    x, y, z = com[0] - at[0], com[1] - at[1], com[2] - at[2]
-    for a in range(6):
-        given[a] = wrench[a]
-    given[3] += y * wrench[2] - z * wrench[1]
-    given[4] += z * wrench[0] - x * wrench[2]
-    given[5] += x * wrench[1] - y * wrench[0]
     for x in range(first, first + count):
         asked = m.asked[max(min(x - earlier, written - 1), 0) % n]
         for i in range(views.ctrl.shape[0]):
@@ -150,3 +140,15 @@ def roll_out(
     axes_of(views.qpos[3:7], R)
     copy_into(views.qpos[7:], q)
     copy_into(views.qvel, v)
+
+
+@compiled
+def _push(o: Rollout, wrench: np.ndarray):
+    """Let a wrench about the robot's CoM act on the root: MuJoCo takes it about the root's."""
+    root = o.robot.root_body
+    com, at, given = o.views.subtree_com[root], o.views.xipos[root], o.views.xfrc_applied[root]
+    copy_into(wrench, given)
+    x, y, z = com[0] - at[0], com[1] - at[1], com[2] - at[2]
+    given[3] += y * wrench[2] - z * wrench[1]
+    given[4] += z * wrench[0] - x * wrench[2]
+    given[5] += x * wrench[1] - y * wrench[0]
