@@ -14,6 +14,7 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.noise import add_noise, normal
 from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays, SimViews
@@ -21,7 +22,6 @@ from poise.envs.physics.motor_bus import MotorBus, motor_bus
 from poise.envs.physics.simulation import Simulation
 
 from .drawn import DrawnRobot
-from .noise import add_noise, normal
 
 RING = 64  # physics steps that are remembered
 DRIFT_TIME = 1.0  # [s] correlation time of the attitude's drift

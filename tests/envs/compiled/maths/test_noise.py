@@ -1,4 +1,4 @@
-"""envs/sensing/noise.py: the distribution of what compiled code draws.
+"""envs/compiled/maths/noise.py: the distribution of what compiled code draws.
 
 A mean of n numbers of deviation s is off by more than 5 s/√n once in two million seeds.
 """
@@ -6,7 +6,7 @@ A mean of n numbers of deviation s is off by more than 5 s/√n once in two mill
 import numpy as np
 import pytest
 
-from poise.envs.sensing.noise import add_noise, normal, uniform
+from poise.envs.compiled.maths.noise import add_noise, normal, uniform
 
 COUNT, SIGMAS = 20_000, 5.0
 
