@@ -342,11 +342,19 @@ def test_the_curriculum_grows_the_pushes(tmp_path, monkeypatch):
     np.testing.assert_allclose(largest[:4], expected)
 
 
-@pytest.mark.parametrize("mixed", [False, True])
-def test_the_curriculum_grows_the_errors_of_the_robot(mixed, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("given", "parts"),
+    [
+        ({}, [1.0, 1.0, 1.0, 1.0]),
+        ({"mixed": True}, [0.125, 0.375, 0.625, 0.875]),
+        ({"levels": ("field", "lab", "late")}, [1.0, 0.2, 0.0, 1.0]),  # lab's is a fifth of field's
+        ({"levels": ("field", "lab"), "mixed": True}, [0.125, 0.075, 0.625, 0.175]),
+    ],
+)
+def test_the_curriculum_grows_the_errors_of_the_robot(given, parts, tmp_path, monkeypatch):
     """The level of realism is a part of the final one, and that one after its share of the run.
 
-    Mixed, the environments of a run have levels from ideal to that one.
+    Mixed, the environments of a run have levels from ideal to that one; with levels, these in turn.
     """
     noises = []
     start = curriculum.CurriculumCallback._on_rollout_start
@@ -357,11 +365,10 @@ def test_the_curriculum_grows_the_errors_of_the_robot(mixed, tmp_path, monkeypat
         noises.append([level.sensors.gyro_noise for level in levels])
 
     monkeypatch.setattr(curriculum.CurriculumCallback, "_on_rollout_start", spy)
-    config = tiny_config(steps=256, curriculum=Curriculum(realism=0.2, mixed=mixed, share=0.5))
+    config = tiny_config(steps=256, curriculum=Curriculum(realism=0.2, share=0.5, **given))
     config = replace(config, env=replace(config.env, realism=load_realism("field")))
     config = replace(config, evaluation=replace(config.evaluation, trials=1))
     train(config, tmp_path, progress=False)
-    parts = [0.125, 0.375, 0.625, 0.875] if mixed else [1.0, 1.0, 1.0, 1.0]
     expected = 0.05 * np.outer([0.2, 0.6, 1.0, 1.0], parts)
     np.testing.assert_allclose(noises[:4], expected)
 
