@@ -56,6 +56,7 @@ LOADERS: dict[str, Callable[[Any], Any]] = {
     "envs": env_config,
     "controllers": controller_config,
     "rivals": controller_config,
+    "guards": guard_config,
     "motions": lambda path: load_motion(path, robot()),
     "suites": load_suite,
     "training": train_config,
