@@ -18,8 +18,8 @@ import pytest
 import yaml
 
 from poise.baselines.balance.references.motion import load_motion
-from poise.baselines.motion.space_time.constraints.reading import read_constraints
 from poise.baselines.environments.guard.config import guard_config
+from poise.baselines.motion.space_time.constraints.reading import read_constraints
 from poise.baselines.registry import controller_config
 from poise.configs.archives import MEMBERS, UNPACKED_BYTES, Archive, read_arrays
 from poise.configs.errors import ConfigError, PoiseError, shown

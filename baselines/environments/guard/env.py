@@ -38,10 +38,10 @@ class GuardedEnv(ResidualWholeEnv):
         self._guard = Guard(guard.margin, float(np.cos(guard.tilt)), guarded_zeros(1, np.int64))
         super().__init__(*arguments, **named)
 
-    @ResidualWholeEnv.controller.setter  # type: ignore[attr-defined]
+    @ResidualWholeEnv.controller.setter
     def controller(self, controller: Controller) -> None:
         """The walker. Raises ConfigError as `ResidualWholeEnv`, and for one that does not walk."""
-        ResidualWholeEnv.controller.fset(self, controller)  # type: ignore[attr-defined]
+        ResidualWholeEnv.controller.fset(self, controller)
         if self.command is None:
             raise ConfigError("does not walk: it sees no velocity_commands", field="walker")
 

@@ -160,9 +160,7 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
     return Agent(name, env, policy.act, content, timesteps=policy.state["timesteps"])
 
 
-def _guarded(
-    name: str, guard: GuardConfig, robot: Robot, overrides: dict[str, object]
-) -> Agent:
+def _guarded(name: str, guard: GuardConfig, robot: Robot, overrides: dict[str, object]) -> Agent:
     """A walker and the recovery policy that takes over from it."""
     from poise.training.learning.policy import load_policy
 

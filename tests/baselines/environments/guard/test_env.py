@@ -133,7 +133,7 @@ def test_once_calm_the_walker_begins_anew_with_its_command(walker: str) -> None:
         begun.append(env.steps)
         reset(state)
 
-    env.controller.reset = counted  # type: ignore[method-assign]
+    env.controller.reset = counted
     options = {"push": {**PUSH, "impulse": 9.0}, "noise": 0.0, "command": COMMAND}
     env.reset(seed=3, options=options)
     shares = [0.0]
