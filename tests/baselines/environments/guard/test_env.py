@@ -14,6 +14,8 @@ from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.configs.errors import ConfigError
 from poise.envs.balance.mdp.termination import uprightness
 from poise.envs.balance.vector.batch import replicate
+from poise.envs.sensing.estimator import RAW, EstimatedState, EstimatorConfig
+from poise.envs.sensing.realism import load_realism
 from tests.support.policies import linear, write_onnx, write_yaml
 from tests.support.shared import robot as shared_robot
 
@@ -96,6 +98,16 @@ def test_it_takes_over_at_its_limits_by_what_is_believed(
         if off:
             break
     assert off and env.simulation.time > 0.1
+
+
+def test_the_state_is_estimated_whatever_the_walker_reads(walker: str) -> None:
+    """A policy from outside gets what is measured; the guard asks for velocities."""
+    level = load_realism("field")
+    plain = ResidualBalanceEnv(shared_robot("compact"), controller=walker, realism=level)
+    env = guarded(walker, FAR, realism=level)
+    for each, config in ((plain, RAW), (env, EstimatorConfig())):
+        assert isinstance(each.state_source, EstimatedState)
+        assert each.state_source.config == config
 
 
 def test_its_servos_have_all_torques(walker: str) -> None:
