@@ -135,9 +135,16 @@ def blend_torques(step: WholeStep):
 @compiled
 def whole_tick(step: WholeStep):
     """The control tick of `policy_tick`, with the servos' authority w over the torques."""
+    if step.base.episode.ticks[0] == 0:
+        set_authority(step.hand, step.base)
+    shared_tick(step)
+
+
+@compiled
+def shared_tick(step: WholeStep):
+    """A control tick with the authority that is set."""
     base, hand, e = step.base, step.hand, step.base.episode
     if e.ticks[0] == 0:
-        set_authority(hand, base)
         first = base.inputs.residual.moved.shape[0]
         aim(step.servos, e.action[first:-1])
     if hand.memory[AUTHORITY] == 0.0:

@@ -18,6 +18,7 @@ import pytest
 import yaml
 
 from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.environments.guard.config import guard_config
 from poise.baselines.motion.space_time.constraints.reading import read_constraints
 from poise.baselines.registry import controller_config
 from poise.configs.archives import MEMBERS, UNPACKED_BYTES, Archive, read_arrays
@@ -56,6 +57,7 @@ LOADERS: dict[str, Callable[[Any], Any]] = {
     "envs": env_config,
     "controllers": controller_config,
     "rivals": controller_config,
+    "guards": guard_config,
     "motions": lambda path: load_motion(path, robot()),
     "suites": load_suite,
     "training": train_config,

@@ -9,6 +9,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from poise.baselines.balance.references.motion import load_motion
+from poise.baselines.environments.guard.config import guard_config
 from poise.baselines.registry import load_controller
 from poise.configs.files import packaged_folder
 from poise.configs.schema import to_yaml
@@ -44,6 +45,7 @@ LOADERS: dict[str, Callable[[Path], Any]] = {
     "robots": load_robot,
     "controllers": lambda path: load_controller(path, robot()),
     "rivals": lambda path: load_controller(path, robot()),
+    "guards": guard_config,
     "policies": lambda path: train_config(path).make_env(robot()),
     "training": lambda path: train_config(path).make_env(robot()),
     "suites": _suite,

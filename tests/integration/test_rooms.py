@@ -44,7 +44,8 @@ FLOORS = """
 12 baselines/walking
 13 baselines/registry
 14 baselines/environments
-15 baselines, training/benchmarking/diagnosis, training/deploy/policy_check, training/learning
+15 baselines, baselines/environments/guard, training/benchmarking/diagnosis
+15 training/deploy/policy_check, training/learning
 15 training/motion/tracking
 16 training/benchmarking/trials, training/learning/seeds, training/motion
 17 training/benchmarking/suites, training/deploy/robot_check/standing, training/deploy/standalone

@@ -9,6 +9,13 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import is_plugin
+from poise.baselines.environments.guard.config import (
+    GuardConfig,
+    guard_config,
+    is_guard,
+    walker_config,
+)
+from poise.baselines.environments.guard.env import GuardedEnv
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
@@ -59,7 +66,8 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
         name: a packaged controller or a path to a ``.yaml`` of one (played with action zero),
             a packaged policy (``residual``), ``zero`` (no torque at all), a folder written by
             ``poise train``, a policy from outside (an ONNX file, or a folder with a
-            ``deploy.yaml``), or ``module:Class`` or ``file.py:Class`` of a controller or a policy.
+            ``deploy.yaml``), ``module:Class`` or ``file.py:Class`` of a controller or a policy, or
+            a guard (a packaged one or its ``.yaml``).
         robot: who is controlled. A policy must have been trained on it.
         overrides: arguments of the environment, or fields of its `EnvConfig`.
 
@@ -72,6 +80,8 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
         return _idle(name, TorqueBalanceEnv(robot, **overrides), NO_CONTROL)
     if name in packaged("policies") or (is_folder(name) and not is_policy(name)):
         return _policy(name, robot, overrides)
+    if is_guard(name):
+        return _guarded(name, guard_config(name), robot, overrides)
     if is_plugin(name) and not _is_controller(name, robot):
         return _outside_policy(name, robot, overrides)
     config = controller_config(name)
@@ -94,7 +104,7 @@ def check_may_walk(name: str, source: str) -> ControllerConfig | None:
     """
     check_name(name)
     described = name in packaged("controllers") or Path(name).suffix in (".yaml", ".yml")
-    if not described or is_policy(name):
+    if not described or is_policy(name) or is_guard(name):
         return None
     config = controller_config(name)
     if not isinstance(config, (WalkConfig, SimbiconConfig, PluginConfig, PolicyFileConfig)):
@@ -147,6 +157,29 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
     world = {k: v for k, v in to_dict(policy.config).items() if k not in TRAINING}
     below = controller_fingerprint(policy.config)
     content = _hash(to_yaml(world).encode(), below.encode(), *policy.content())
+    return Agent(name, env, policy.act, content, timesteps=policy.state["timesteps"])
+
+
+def _guarded(name: str, guard: GuardConfig, robot: Robot, overrides: dict[str, object]) -> Agent:
+    """A walker and the recovery policy that takes over from it."""
+    from poise.training.learning.policy import load_policy
+
+    walker = walker_config(guard, name)
+    if guard.recovery not in packaged("policies") and not is_folder(guard.recovery):
+        raise ConfigError(f"no such policy: {shown(guard.recovery)}", source=name,
+                          field="recovery", choices=packaged("policies"))  # fmt: skip
+    policy = load_policy(guard.recovery, robot)
+    own = policy.config
+    if own.action != "whole":
+        raise ConfigError(f"{shown(guard.recovery)} moves {own.action!r}, not servos that take "
+                          "over (whole)", source=name, field="recovery")  # fmt: skip
+    env = GuardedEnv(
+        robot, own.env, guard=guard, controller=walker, servos=own.servos,
+        hand_over=replace(own.hand_over, calm_time=guard.calm_time), smoothing=own.smoothing,
+        **overrides,
+    )  # fmt: skip
+    below = to_yaml(_wherever(walker)).encode()
+    content = _hash(to_yaml(guard).encode(), below, to_yaml(own.env).encode(), *policy.content())
     return Agent(name, env, policy.act, content, timesteps=policy.state["timesteps"])
 
 

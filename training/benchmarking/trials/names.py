@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from poise.baselines.allowance import is_plugin, is_script
+from poise.baselines.environments.guard.config import GUARDS
 from poise.baselines.policy_files.known import RIVALS
 from poise.baselines.policy_files.reading import advice, is_policy
 from poise.configs.errors import ConfigError, meant, shown
@@ -38,7 +39,8 @@ def check_name(name: str) -> None:
 
     Nothing is loaded for that, and nothing compiled; what the name stands for may still be wrong.
     """
-    names = (*packaged("controllers"), *packaged(RIVALS), *packaged("policies"), NO_CONTROL)
+    kinds = ("controllers", RIVALS, "policies", GUARDS)
+    names = (*(name for kind in kinds for name in packaged(kind)), NO_CONTROL)
     if is_script(name) and is_file(name):
         raise ConfigError(f"a network alone does not say what its numbers mean; {advice(name)}",
                           source=name, field="controller")  # fmt: skip

@@ -15,6 +15,7 @@ KINDS = {
     "controllers": "where a CONTROLLER is named",
     "policies": "where a CONTROLLER is named; poise.load_policy(NAME)",
     "rivals": "someone else's policies, where a CONTROLLER is named",
+    "guards": "a recovery policy over a walker, where a CONTROLLER is named",
     "suites": "--suite",
     "realism": "--realism",
     "training": "poise train --config",
