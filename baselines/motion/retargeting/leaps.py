@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import BPoly
 from scipy.spatial.transform import Rotation
 
+from poise.baselines.balance.references.footing import unwound
 from poise.baselines.balance.references.footwork import FootPlan
 from poise.baselines.balance.references.legs import nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
@@ -30,6 +31,7 @@ PUSH = 0.3  # [s] of pushing off, and of landing, at most
 OFF_AT, DEEPEST = 1.0, 0.84  # [h] of the CoM at lift-off; deeper, flat feet bend ankles too far
 DEPTH = 0.38  # of v · push by which it goes down first
 SWIFTEST = 1.2  # [g] of soles in the air, sideways: faster, legs and their motors fall behind
+LEAN = 0.26  # [rad] of the trunk, ahead, while it jumps: hips are behind and ankles bend less
 PEAK = 5.77  # of α'', see `ease`
 CLEAR = 0.012  # [h] that soles rise more than the CoM does
 BEFORE, AFTER = 1.0, 1.2  # [s] of standing before the first and after the last push, at least
@@ -135,7 +137,8 @@ def plan_leaps(
     times, at = np.arange(len(coarse)) * RATE, np.arange(frames) * dt
     joints = np.stack([np.interp(at, times, column) for column in coarse.T], axis=1)
     level = Rotation.from_euler("z", yaws.reshape(-1, 1)).as_rotvec().reshape(frames, 2, 3)
-    root = np.column_stack([np.zeros((frames, 2)), facing])
+    lean = LEAN * _lean(np.array(takes) * dt, count * dt, frames, dt)
+    root = unwound(Rotation.from_euler("ZY", np.column_stack([facing, lean])).as_rotvec())
     return FootPlan(dt, joints, root, height, places, level, planted), FINE * lead
 
 
@@ -143,6 +146,14 @@ def _stance(tracks: Tracks, begin: float, end: float) -> tuple[np.ndarray, np.nd
     """Soles (2, 3) [m] and headings (2,) [rad] of a time on the ground."""
     own = slice(round(begin / RATE), max(round(end / RATE), round(begin / RATE) + 1))
     return np.median(tracks.soles[own], axis=0), np.median(tracks.yaws[own], axis=0)
+
+
+def _lean(takes: np.ndarray, flight: float, frames: int, dt: float) -> np.ndarray:
+    """(F,) from 0 to 1 before the first crouch, and back after the last one."""
+    t = np.arange(frames) * dt
+    into = np.clip((t - takes[0] + PUSH + 0.6) / 0.6, 0.0, 1.0)
+    back = np.clip((takes[-1] + flight + PUSH + 0.8 - t) / 0.8, 0.0, 1.0)
+    return np.asarray(ease(np.minimum(into, back)))
 
 
 def _heights(
