@@ -16,7 +16,8 @@ from poise.envs.robots.robot import Robot
 
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
-LONGEST, FASTEST = 0.72, 0.4  # [h] of a step, [hω] of a walk: further and faster, robots fall
+LONGEST, FASTEST = 0.72, 0.5  # [h] of a step, [hω] of a walk: further and faster, robots fall
+BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
 QUICKEST = 0.75  # [1/ω] of a swing; and what it lasts at most:
@@ -77,7 +78,8 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     going = np.hypot(commands[:, 1], commands[:, 2])
     turning = np.maximum(np.abs(commands[:, 3]), 1e-9)
     limits = [LONGEST * h / np.maximum(going, 1e-9), MOST_TURN / turning,
-              BEND * h * omega / np.maximum(going * turning, 1e-9)]  # fmt: skip
+              BEND * h * omega / np.maximum(going * turning, 1e-9),
+              np.where(going > BRISK * h * omega, QUICK / omega, np.inf)]  # fmt: skip
     swing = np.minimum(commands[:, 4], np.min(limits, axis=0)) - BOTH / omega
     commands[:, 4] = np.clip(swing, QUICKEST / omega, SLOWEST / omega)
     return Walked(commands, tempo)
