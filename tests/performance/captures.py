@@ -71,7 +71,7 @@ def judge(path: Path, starts: int, seed: int, folder: Path) -> Row:
     file = folder / f"{path.stem}.npz"
     write_robot_clip(made.clip, file)
     trials = follow(file, "walk" if how == "walk" else "motion-step", starts=starts, seed=seed)
-    caught = float(np.mean([trial.interruptions for trial in trials]))
+    caught = float(np.nan_to_num(np.mean([trial.interruptions for trial in trials])))
     return row._replace(falls=sum(trial.fallen for trial in trials), caught=caught)
 
 

@@ -25,9 +25,9 @@ from .tracks import Tracks
 FINE = 4  # frames of a jump's motion for each of others: pushing off is quick
 TOGETHER = 0.15  # [s] between two feet that leave the ground, or land, in one jump
 #: seconds in the air, and shares of the clip's way and turn, that are tried
-FLIGHTS = (0.34, 0.32, 0.3, 0.28, 0.26, 0.24, 0.22, 0.2, 0.15, 0.1)
+FLIGHTS = (0.34, 0.32, 0.28, 0.25, 0.22, 0.2, 0.15, 0.1)
 WAYS = (1.0, 0.85, 0.7, 0.5, 0.3, 0.15, 0.0)
-STANDS = 0.48  # [s] on the ground between two jumps, at least
+STANDS = 0.5  # [s] on the ground between two jumps, at least
 PUSH = 0.3  # [s] of pushing off, and of landing, at most
 OFF_AT, DEEPEST = 0.965, 0.84  # [h] of the CoM at lift-off; deeper, flat feet bend ankles too far
 DEPTH = 0.38  # of v · push by which it goes down first
@@ -121,10 +121,11 @@ def plan_leaps(
         spots[a : b + 1] += ease(u)[:, None] * (goal - spots[a])
         spots[b:], planted[a + 1 : b] = goal, False
         soles, _ = _soles(spots[a : b + 1])
-        if np.linalg.norm(np.diff(soles, 2, axis=0), axis=2).max() / dt**2 > SWIFTEST * g:
+        swift = np.linalg.norm(np.diff(soles, 2, axis=0), axis=2).max() / dt**2 / g
+        if swift > SWIFTEST:
             far = np.linalg.norm(soles[-1] - soles[0], axis=1).max()
-            raise ConfigError(f"a leap of {far:.2f} m in {flight:.2f} s is too fast for the legs",
-                              field="feet")  # fmt: skip
+            raise ConfigError(f"a leap of {far:.2f} m in {flight:.2f} s asks {swift:.1f} g of the "
+                              f"feet, and legs do {SWIFTEST:g} g", field="feet")  # fmt: skip
         lifts[a : b + 1] = (float(height[a : b + 1].max()) - (OFF_AT - CLEAR) * h) * hump(u)
         early, late = max(a - round(0.5 * PUSH / dt), 0), min(b + round(0.5 * PUSH / dt), frames)
         turn = np.linspace(0.0, 1.0, late - early)

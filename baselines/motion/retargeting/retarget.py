@@ -16,7 +16,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.extras import how_to_install
 from poise.envs.robots.robot import Robot
 
-from .leaps import FLIGHTS, WAYS, Leap, find_leaps, plan_leaps, tempo_of
+from .leaps import FLIGHTS, STANDS, WAYS, Leap, find_leaps, plan_leaps, tempo_of
 from .limbs import Limbs, find_limbs
 from .paces import find_paces, frames_before, plan_paces
 from .targets import BodyTargets, between_standing, clip_targets, standing_targets
@@ -175,7 +175,7 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
             made = _retargeted(solved[tempo]._replace(qpos=qpos), clip, robot, limbs,
                                planted=plan.planted, stride=stride,
                                begins=RATE * frames_before(timed, frames))  # fmt: skip
-            return _bounded(made._replace(tempo=tempo), bound)
+            return made._replace(tempo=tempo, bound=bound if stride * tempo < ENOUGH else "")
     assert reason is not None
     raise reason
 
@@ -186,10 +186,12 @@ def _leaping(
     """The highest jumps up to the clip's that the robot can do at 0.7 of its way and speed or more,
     slower ones where it would not stand long enough between two; if there are none, lesser ones."""
     solve, solved = _solver("solve_tracks"), {}
-    longest, reason, bound = min(leap.land - leap.lift for leap in leaps), None, ""
-    flights = [longest, *(each for each in FLIGHTS if each < longest)]
+    longest, reason = min(leap.land - leap.lift for leap in leaps), None
+    bound = f"it has to stand for {STANDS:g} s between two jumps"
+    flights = [each for each in FLIGHTS if each <= longest]
     tried = [(flight, way, tempo_of(leaps, flight)) for flight, way in product(flights, WAYS)]
     tried.sort(key=lambda each: each[1] * each[2] < ENOUGH)  # and else the highest first
+    highest = tried[0][0] if tried else 0.0
     for flight, way, tempo in tried:
         if tempo not in solved:
             tracks = find_tracks(clip.at_speed(tempo), robot, limbs, smooth)
@@ -202,17 +204,15 @@ def _leaping(
             qpos = perform_plan(robot, plan, clip.name)
         except ConfigError as error:
             reason = error
-            bound = error.message if way * tempo >= ENOUGH and not bound else bound
+            if way * tempo >= ENOUGH and flight == highest:
+                bound = error.message
             continue
         made = _retargeted(one._replace(qpos=qpos), clip, robot, limbs, stride=way,
                            planted=plan.planted, begins=begin * plan.dt)  # fmt: skip
         fine = replace(made.clip, dt=plan.dt)
-        return _bounded(made._replace(clip=fine, flight=flight / longest, tempo=tempo), bound)
+        return made._replace(clip=fine, flight=flight / longest, tempo=tempo,
+                             bound=bound if way * tempo < ENOUGH else "")  # fmt: skip
     raise reason or ConfigError("its jumps are too short", source=clip.name, field="feet")
-
-
-def _bounded(made: Retargeted, bound: str) -> Retargeted:
-    return made if made.stride * made.tempo >= ENOUGH else made._replace(bound=bound)
 
 
 def retarget_freely(clip: Clip, robot: Robot, *, smooth: float = SMOOTH) -> Retargeted:

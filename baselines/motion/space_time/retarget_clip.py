@@ -105,8 +105,8 @@ def retarget_clip(
             reference_from(made.clip, robot, clip.name)
             if asked or made.stride * made.tempo >= ENOUGH:
                 return made
-            reason = (f"its feet would do {made.stride:.2f} of their way at {made.tempo:.2f} of "
-                      f"the tempo (as --steps writes it), for {made.bound}")  # fmt: skip
+            reason = (f"{made.bound}; with {made.stride:.2f} of its way at {made.tempo:.2f} of its "
+                      "tempo it can be done (--steps)")  # fmt: skip
         except ConfigError as error:
             reason = error.message
             if asked or error.field not in UNPERFORMED:
