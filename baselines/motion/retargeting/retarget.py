@@ -184,13 +184,13 @@ def _leaping(
     leaps: list[Leap], clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float
 ) -> Retargeted:
     """The highest jumps up to the clip's that the robot can do at 0.7 of its way and speed or more,
-    slower ones where it would not stand long enough between two; if there are none, lesser ones."""
+    slower ones where it would not stand long enough between two; if there are none, the fastest."""
     solve, solved = _solver("solve_tracks"), {}
     longest, reason = min(leap.land - leap.lift for leap in leaps), None
     bound = f"it has to stand for {STANDS:g} s between two jumps"
     flights = [each for each in FLIGHTS if each <= longest]
     tried = [(flight, way, tempo_of(leaps, flight)) for flight, way in product(flights, WAYS)]
-    tried.sort(key=lambda each: each[1] * each[2] < ENOUGH)  # and else the highest first
+    tried.sort(key=lambda each: -min(each[1] * each[2], ENOUGH))  # and else the highest first
     highest = tried[0][0] if tried else 0.0
     for flight, way, tempo in tried:
         if tempo not in solved:
