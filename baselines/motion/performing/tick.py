@@ -19,6 +19,7 @@ from poise.baselines.balance.stepping.tick import (
     has_landed,
     solve_contacts,
 )
+from poise.baselines.whole_body.tick import go_on_from
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import copy_into, rotated, turned
@@ -43,6 +44,7 @@ from .schedule import (
 
 UNLOADED, LEAST_LOAD = 1.15, 0.03  # [m g] that a foot may bear when it begins to, and as it, leaves
 AIR, WEIGHTLESS = 30.0, 0.01  # [1/s] of soles in the air when both are; [m g] that they bear then
+LEAST_SHARE = 0.1  # of what soles in the air are asked for, that is tried
 SETTLING = 0.3  # [s] before the first lift-off until which the motion's frame is that of the soles
 
 
@@ -142,29 +144,51 @@ def in_flight(t: PerformTick, phase: int, time: float) -> bool:
 
 
 @compiled
-def fly(t: PerformTick, time: float) -> None:
-    """A tick with both feet in the air: soles go where the motion has them, and bear nothing."""
+def lead_soles(t: PerformTick, time: float, share: float) -> None:
+    """What the QP asks of soles in the air: the `share` of what leads them where the motion has
+    them that is not falling freely."""
     c, p, s = t.own, t.performance, t.own.state
-    contacts = c.on_both
-    problem, limits = contacts.problem, contacts.load_limits
+    problem = c.on_both.problem
     accel, damping = problem.workspace.sole_accel, problem.parameters.sole_damping
     late = max(time - p.switches[p.begun[0]], 0.0)
     for foot in range(2):
-        limits[foot] = WEIGHTLESS * c.robot.mass * c.robot.gravity
+        up = s.sole_axes[foot, :, 2]
         for a in range(3):
             j, r = PLACE[foot] + a, 6 * foot + a
             gap = p.samples[0, j] - s.sole_point[foot, a]
             if a == 2:
                 gap -= p.landing_speed * late
             rate = p.samples[1, j] - s.J_v[r]
-            accel[r] = p.samples[2, j] + AIR**2 * gap + 2.0 * AIR * rate + damping * s.J_v[r]
-        up = s.sole_axes[foot, :, 2]
-        accel[6 * foot + 3] = AIR**2 * up[1] - (2.0 * AIR - damping) * s.J_v[6 * foot + 3]
-        accel[6 * foot + 4] = -(AIR**2) * up[0] - (2.0 * AIR - damping) * s.J_v[6 * foot + 4]
-        accel[6 * foot + 5] = -(2.0 * AIR - damping) * s.J_v[6 * foot + 5]
+            accel[r] = p.samples[2, j] + AIR**2 * gap + 2.0 * AIR * rate
+            accel[r + 3] = -2.0 * AIR * s.J_v[r + 3]
+        accel[6 * foot + 3] += AIR**2 * up[1]
+        accel[6 * foot + 4] -= AIR**2 * up[0]
+        for r in range(6 * foot, 6 * foot + 6):
+            accel[r] = share * accel[r] + damping * s.J_v[r]
+        accel[6 * foot + 2] -= (1.0 - share) * c.robot.gravity
+
+
+@compiled
+def fly(t: PerformTick, time: float) -> None:
+    """A tick with both feet in the air: soles go where the motion has them, and bear nothing.
+
+    Where the motors cannot lead them so, they do as much of it as they can.
+    """
+    c = t.own
+    contacts = c.on_both
+    accel, memory = contacts.problem.workspace.sole_accel, contacts.memory
+    for foot in range(2):
+        contacts.load_limits[foot] = WEIGHTLESS * c.robot.mass * c.robot.gravity
     contacts.limited[0] = 1
     ask_for(t, reached_region(t))
-    solve_contacts(c, contacts)
+    share, failures = 1.0, memory.failures[0]
+    while True:
+        lead_soles(t, time, share)
+        solve_contacts(c, contacts)
+        if memory.failures[0] == failures or share < LEAST_SHARE:
+            break
+        go_on_from(contacts, memory.torques)
+        memory.failures[0], share = failures, 0.5 * share
     for r in range(accel.shape[0]):
         accel[r] = 0.0
 

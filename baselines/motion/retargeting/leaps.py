@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import BPoly
 from scipy.spatial.transform import Rotation
 
+from poise.baselines.balance.references.footing import unwound
 from poise.baselines.balance.references.footwork import FootPlan
 from poise.baselines.balance.references.legs import nominal_feet
 from poise.baselines.balance.references.robot_clip import RATE
@@ -24,13 +25,15 @@ from .tracks import Tracks
 FINE = 4  # frames of a jump's motion for each of others: pushing off is quick
 TOGETHER = 0.15  # [s] between two feet that leave the ground, or land, in one jump
 #: seconds in the air, and shares of the clip's way and turn, that are tried
-FLIGHTS, WAYS = (0.26, 0.2, 0.15, 0.1), (1.0, 0.7, 0.5, 0.3, 0.15, 0.0)
-STANDS = 0.44  # [s] on the ground between two jumps, at least
+FLIGHTS = (0.34, 0.32, 0.28, 0.25, 0.22, 0.2, 0.15, 0.1)
+WAYS = (1.0, 0.85, 0.7, 0.5, 0.3, 0.15, 0.0)
+STANDS = 0.5  # [s] on the ground between two jumps, at least
 PUSH = 0.3  # [s] of pushing off, and of landing, at most
-OFF_AT, DEEPEST = 1.0, 0.84  # [h] of the CoM at lift-off; deeper, flat feet bend ankles too far
+OFF_AT, DEEPEST = 0.965, 0.84  # [h] of the CoM at lift-off; deeper, flat feet bend ankles too far
 DEPTH = 0.38  # of v · push by which it goes down first
-SWIFTEST = 1.2  # [g] of soles in the air, sideways: faster, legs and their motors fall behind
-PEAK = 5.77  # of α'', see `ease`
+SWIFTEST = 3.5  # [g] of soles in the air, sideways: faster, legs and their motors fall behind
+LEAN = 0.3  # [rad] of the trunk, ahead, while it jumps: hips are behind and ankles bend less
+HEADING = 2  # of the entries of `_spots`
 CLEAR = 0.012  # [h] that soles rise more than the CoM does
 BEFORE, AFTER = 1.0, 1.2  # [s] of standing before the first and after the last push, at least
 
@@ -104,38 +107,40 @@ def plan_leaps(
     takes = [round((middle - 0.5 * flight) / dt) for middle in middles]
     count = round(flight / dt)
     height = _heights(np.array(takes) * dt, count * dt, frames, dt, h, g)
-    nominal = nominal_feet(robot) * [1.0, 1.0, 0.0]
-    places, yaws = np.repeat(nominal[None], frames, axis=0), np.zeros((frames, 2))
-    facing, planted = np.zeros(frames), np.ones((frames, 2), dtype=bool)
+    nominal = _spots(nominal_feet(robot), np.zeros(2))
+    spots, facing = np.repeat(nominal[None], frames, axis=0), np.zeros(frames)
+    lifts, planted = np.zeros(frames), np.ones((frames, 2), dtype=bool)
     stances = [0.0, *(leap.land for leap in leaps)]
     ends = [*(leap.lift for leap in leaps), tracks.pelvis.shape[0] * RATE]
-    rests = [_stance(tracks, a, b) for a, b in zip(stances, ends, strict=True)]
-    origin = rests[0][0].mean(axis=0)
+    rests = [_spots(*_stance(tracks, a, b)) for a, b in zip(stances, ends, strict=True)]
+    rests = [spot - np.pad(rests[0][:2], (0, len(spot) - 2)) for spot in rests]
     u = np.linspace(0.0, 1.0, count + 1)
-    for a, (soles, turns) in zip(takes, rests[1:], strict=True):
+    for a, spot in zip(takes, rests[1:], strict=True):
         b = a + count
-        goal = nominal + way * (soles - origin - nominal) * [1.0, 1.0, 0.0]
-        far = np.linalg.norm((goal - places[a])[:, :2], axis=1).max()
-        if PEAK * far / flight**2 > SWIFTEST * g:
-            raise ConfigError(f"a leap of {far:.2f} m in {flight:.2f} s is too fast for the legs",
-                              field="feet")  # fmt: skip
-        rise = float(height[a : b + 1].max()) - OFF_AT * h + CLEAR * h
-        places[a : b + 1] += ease(u)[:, None, None] * (goal - places[a])
-        places[a : b + 1, :, 2] += rise * hump(u)[:, None]
-        yaws[a : b + 1] += ease(u)[:, None] * (way * turns - yaws[a])
-        places[b:], yaws[b:] = goal, way * turns
-        planted[a + 1 : b] = False
+        goal = nominal + way * (spot - nominal)
+        spots[a : b + 1] += ease(u)[:, None] * (goal - spots[a])
+        spots[b:], planted[a + 1 : b] = goal, False
+        soles, _ = _soles(spots[a : b + 1])
+        swift = np.linalg.norm(np.diff(soles, 2, axis=0), axis=2).max() / dt**2 / g
+        if swift > SWIFTEST:
+            far = np.linalg.norm(soles[-1] - soles[0], axis=1).max()
+            raise ConfigError(f"a leap of {far:.2f} m in {flight:.2f} s asks {swift:.1f} g of the "
+                              f"feet, and legs do {SWIFTEST:g} g", field="feet")  # fmt: skip
+        lifts[a : b + 1] = (float(height[a : b + 1].max()) - (OFF_AT - CLEAR) * h) * hump(u)
         early, late = max(a - round(0.5 * PUSH / dt), 0), min(b + round(0.5 * PUSH / dt), frames)
         turn = np.linspace(0.0, 1.0, late - early)
-        facing[early:late] += ease(turn) * (yaws[b].mean() - facing[early])
-        facing[late:] = yaws[b].mean()
+        facing[early:late] += ease(turn) * (goal[HEADING] - facing[early])
+        facing[late:] = goal[HEADING]
+    flat, yaws = _soles(spots)
+    places = np.concatenate([flat, np.repeat(lifts[:, None, None], 2, axis=1)], axis=2)
     standing, (least, most) = robot.standing_qpos[7:], (robot.joint_range + [MARGIN, -MARGIN]).T
     calm = np.clip(low_pass(qpos[:, 7:], SWINGING), least, most)
     coarse = led(calm, standing, standing, lead, lead, 2 * lead + len(calm))
     times, at = np.arange(len(coarse)) * RATE, np.arange(frames) * dt
     joints = np.stack([np.interp(at, times, column) for column in coarse.T], axis=1)
     level = Rotation.from_euler("z", yaws.reshape(-1, 1)).as_rotvec().reshape(frames, 2, 3)
-    root = np.column_stack([np.zeros((frames, 2)), facing])
+    lean = LEAN * _lean(np.array(takes) * dt, count * dt, frames, dt)
+    root = unwound(Rotation.from_euler("ZY", np.column_stack([facing, lean])).as_rotvec())
     return FootPlan(dt, joints, root, height, places, level, planted), FINE * lead
 
 
@@ -143,6 +148,32 @@ def _stance(tracks: Tracks, begin: float, end: float) -> tuple[np.ndarray, np.nd
     """Soles (2, 3) [m] and headings (2,) [rad] of a time on the ground."""
     own = slice(round(begin / RATE), max(round(end / RATE), round(begin / RATE) + 1))
     return np.median(tracks.soles[own], axis=0), np.median(tracks.yaws[own], axis=0)
+
+
+def _lean(takes: np.ndarray, flight: float, frames: int, dt: float) -> np.ndarray:
+    """(F,) from 0 to 1 before the first crouch, and back after the last one."""
+    t = np.arange(frames) * dt
+    into = np.clip((t - takes[0] + PUSH + 0.6) / 0.6, 0.0, 1.0)
+    back = np.clip((takes[-1] + flight + PUSH + 0.8 - t) / 0.8, 0.0, 1.0)
+    return np.asarray(ease(np.minimum(into, back)))
+
+
+def _spots(soles: np.ndarray, yaws: np.ndarray) -> np.ndarray:
+    """(9,) of soles (2, ≥ 2) and their headings (2,): middle, heading, places and headings from
+    there. Shares of these, unlike shares of places, do not bring feet together that turn."""
+    middle, heading = soles[:, :2].mean(axis=0), yaws.mean()
+    cos, sin = np.cos(heading), np.sin(heading)
+    own = (soles[:, :2] - middle) @ np.array([[cos, -sin], [sin, cos]])
+    return np.concatenate([middle, [heading], own.ravel(), yaws - heading])
+
+
+def _soles(spots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Soles (n, 2, 2) and headings (n, 2) of `_spots` (n, 9)."""
+    heading, own = spots[:, HEADING], spots[:, HEADING + 1 : -2].reshape(-1, 2, 2)
+    cos, sin = np.cos(heading)[:, None], np.sin(heading)[:, None]
+    x, y = own[..., 0], own[..., 1]
+    turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=2)
+    return spots[:, None, :HEADING] + turned, heading[:, None] + spots[:, -2:]
 
 
 def _heights(

@@ -16,7 +16,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.extras import how_to_install
 from poise.envs.robots.robot import Robot
 
-from .leaps import FLIGHTS, WAYS, Leap, find_leaps, plan_leaps, tempo_of
+from .leaps import FLIGHTS, STANDS, WAYS, Leap, find_leaps, plan_leaps, tempo_of
 from .limbs import Limbs, find_limbs
 from .paces import find_paces, frames_before, plan_paces
 from .targets import BodyTargets, between_standing, clip_targets, standing_targets
@@ -32,6 +32,7 @@ TRIED = sorted(
     key=lambda each: -each[0] * each[1],
 )
 LOWER = (0.98, 0.965, 0.95, 0.935)  # heights of the CoM over standing that steps are tried at
+ENOUGH = 0.7  # of the clip's speed: what is slower is not taken for the clip
 OFF = 0.003  # [m] by which a planted sole may be off
 SWIFTER = 2.0  # times `smooth` is what is kept of a motion that need not be performed
 
@@ -48,6 +49,7 @@ class Retargeted(NamedTuple):
         begins: when the clip begins in the motion [s].
         tempo: how many times as fast as the clip it is.
         flight: share of the time that the clip is in the air.
+        bound: what keeps it from 0.7 of the clip's speed; empty where nothing does.
     """
 
     clip: RobotClip
@@ -61,6 +63,7 @@ class Retargeted(NamedTuple):
     begins: float = LEAD
     tempo: float = 1.0
     flight: float = 1.0
+    bound: str = ""
 
 
 def retarget(
@@ -154,7 +157,7 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
     paces, scale = find_paces(clip), limbs.leg_length / clip.skeleton.leg_length
     frames, solve = max(round(lead / RATE), 1), _solver("solve_tracks")
     solved: dict[float, Any] = {}
-    reason = None
+    reason, bound = None, ""
     for stride, tempo in TRIED:
         slower = clip if tempo == 1.0 else clip.at_speed(tempo)
         tracks = find_tracks(slower, robot, limbs, smooth, stride)
@@ -167,11 +170,12 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
                 qpos = perform_plan(robot, plan, clip.name)
             except ConfigError as error:
                 reason = error
+                bound = error.message if stride * tempo >= ENOUGH else bound
                 continue
             made = _retargeted(solved[tempo]._replace(qpos=qpos), clip, robot, limbs,
                                planted=plan.planted, stride=stride,
                                begins=RATE * frames_before(timed, frames))  # fmt: skip
-            return made._replace(tempo=tempo)
+            return made._replace(tempo=tempo, bound=bound if stride * tempo < ENOUGH else "")
     assert reason is not None
     raise reason
 
@@ -179,12 +183,16 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
 def _leaping(
     leaps: list[Leap], clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float
 ) -> Retargeted:
-    """The highest and longest jumps up to the clip's that the robot can do, and slower ones where
-    it would not stand long enough between two."""
+    """The highest jumps up to the clip's that the robot can do at 0.7 of its way and speed or more,
+    slower ones where it would not stand long enough between two; if there are none, the fastest."""
     solve, solved = _solver("solve_tracks"), {}
     longest, reason = min(leap.land - leap.lift for leap in leaps), None
-    for flight, way in product((each for each in FLIGHTS if each <= longest), WAYS):
-        tempo = tempo_of(leaps, flight)
+    bound = f"it has to stand for {STANDS:g} s between two jumps"
+    flights = [each for each in FLIGHTS if each <= longest]
+    tried = [(flight, way, tempo_of(leaps, flight)) for flight, way in product(flights, WAYS)]
+    tried.sort(key=lambda each: -min(each[1] * each[2], ENOUGH))  # and else the highest first
+    highest = tried[0][0] if tried else 0.0
+    for flight, way, tempo in tried:
         if tempo not in solved:
             tracks = find_tracks(clip.at_speed(tempo), robot, limbs, smooth)
             solved[tempo] = tracks, solve(robot, limbs, tracks, smooth)
@@ -196,11 +204,14 @@ def _leaping(
             qpos = perform_plan(robot, plan, clip.name)
         except ConfigError as error:
             reason = error
+            if way * tempo >= ENOUGH and flight == highest:
+                bound = error.message
             continue
         made = _retargeted(one._replace(qpos=qpos), clip, robot, limbs, stride=way,
                            planted=plan.planted, begins=begin * plan.dt)  # fmt: skip
         fine = replace(made.clip, dt=plan.dt)
-        return made._replace(clip=fine, flight=flight / longest, tempo=tempo)
+        return made._replace(clip=fine, flight=flight / longest, tempo=tempo,
+                             bound=bound if way * tempo < ENOUGH else "")  # fmt: skip
     raise reason or ConfigError("its jumps are too short", source=clip.name, field="feet")
 
 

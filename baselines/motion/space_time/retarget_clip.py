@@ -16,6 +16,7 @@ from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
 from poise.baselines.motion.retargeting.limbs import find_limbs
 from poise.baselines.motion.retargeting.retarget import (
+    ENOUGH,
     LEAD,
     SMOOTH,
     Retargeted,
@@ -38,7 +39,6 @@ from .walked import find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
-ENOUGH = 0.7  # of the speed: where steps are slower, the planner of walks does better
 CROSSOVER = 2.0  # [Hz] what is asked faster than this is smoothed
 
 
@@ -56,6 +56,7 @@ class RetargetedClip(NamedTuple):
         begins: when the clip begins in the motion [s].
         tempo: how many times as fast as the clip it is.
         flight: share of the time that the clip is in the air.
+        bound: as of `Retargeted`.
     """
 
     clip: RobotClip
@@ -67,6 +68,7 @@ class RetargetedClip(NamedTuple):
     begins: float = LEAD
     tempo: float = 1.0
     flight: float = 1.0
+    bound: str = ""
 
 
 def retarget_clip(
@@ -85,40 +87,40 @@ def retarget_clip(
     """A robot's motion of a clip: one that can be performed, else one that can be seen.
 
     With `kinematic` it is what `retarget_freely` makes, with False what `performable` makes; with
-    None the latter. Where no controller could perform that, or steps are shorter than 0.7 of what
-    the legs' ratio gives, and nothing was asked with `solver`, `constraints` or `planted`, it is
-    the former, with what `find_commands` has for a planner that walks. Of what does not walk either
-    `about.unperformed` says why. A clip may be the
-    name of a packaged one, or a path. All else, and what is raised, is as of these two.
+    None the latter. Where no controller could perform that, or its way or tempo are less than 0.7
+    of the clip's, and nothing was asked with `solver`, `constraints` or `planted`, it is the
+    former, with what `find_commands` has for a planner that walks. Of what is no faster so either,
+    `about.unperformed` says why. A clip may be the name of a packaged one, or a path. All else, and
+    what is raised, is as of these two.
     """
     clip = clip if isinstance(clip, Clip) else read_bvh(find_bvh(clip)).clip
-    reason, short = "it was retargeted by kinematics alone (--kinematic)", None
+    reason = "it was retargeted by kinematics alone (--kinematic)"
     if not kinematic:
+        asked = kinematic is not None or solver is not None or constraints or planted
         try:
             made = performable(
                 clip, robot, solver=solver, constraints=constraints, smooth=smooth, lead=lead,
                 planted=planted, crossover=crossover, progress=progress,
             )  # fmt: skip
             reference_from(made.clip, robot, clip.name)
-            if kinematic is not None or made.stride * made.tempo >= ENOUGH:
+            if asked or made.stride * made.tempo >= ENOUGH:
                 return made
-            short = made
+            reason = (f"{made.bound}; with {made.stride:.2f} of its way at {made.tempo:.2f} of its "
+                      "tempo it can be done (--steps)")  # fmt: skip
         except ConfigError as error:
-            reason, asked = error.message, solver is not None or constraints or planted
-            if kinematic is not None or asked or error.field not in UNPERFORMED:
+            reason = error.message
+            if asked or error.field not in UNPERFORMED:
                 raise
     free, tempo = retarget_freely(clip, robot, smooth=smooth), 1.0
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
     if not kinematic:
         try:
-            commands, tempo = find_commands(clip, robot, free.scale)
+            commands, tempo = find_commands(clip, robot, free.scale, ENOUGH)
             walks = replace(free.clip, commands=commands, dt=free.clip.dt / tempo)
             reference_from(walks, robot, clip.name)
             seen = walks
         except ConfigError as error:
-            if short is not None:
-                return short
-            if error.field == "contacts":
+            if error.field == "speed":
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
     scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
     return _stepped(free._replace(clip=seen), scene)._replace(tempo=tempo)
@@ -217,7 +219,7 @@ def _stepped(made: Retargeted, scene: Scene) -> RetargetedClip:
         made.limit_excess, {}, jerk(scene.qpos, scene.dt), np.nan, made.direction_error, (),
     )  # fmt: skip
     return RetargetedClip(made.clip, quality, "frame", made.scale, made.time_per_frame, made.stride,
-                          made.begins, made.tempo, made.flight)  # fmt: skip
+                          made.begins, made.tempo, made.flight, made.bound)  # fmt: skip
 
 
 def _scene(

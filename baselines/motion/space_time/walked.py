@@ -15,7 +15,9 @@ from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot
 
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
-LONGEST, FASTEST = 0.72, 0.4  # [h] of a step, [hω] of a walk: further and faster, robots fall
+TOGETHER = 0.15  # [s] before a jump, in which both feet stand
+LONGEST, FASTEST = 0.72, 0.5  # [h] of a step, [hω] of a walk: further and faster, robots fall
+BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
 QUICKEST = 0.75  # [1/ω] of a swing; and what it lasts at most:
@@ -30,24 +32,20 @@ class Walked(NamedTuple):
     tempo: float
 
 
-def find_commands(clip: Clip, robot: Robot, scale: float) -> Walked:
+def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) -> Walked:
     """The velocity along the heading [m/s], the turning rate [rad/s] and the time of a swing [s] of
     a clip, step by step.
 
     Both are means over two steps, times `scale`, the ratio of the legs. Where the clip is too fast
-    for legs to follow, all is slower. Where it bends too sharply, steps are shorter and quicker.
+    for legs to follow, all is slower. Where it bends too sharply, steps are shorter and quicker. A
+    run is walked.
 
     Raises:
-        ConfigError: both feet are off the ground; it takes no two steps, or goes nowhere.
+        ConfigError: both feet leave the ground at once; it takes no two steps, goes nowhere, or is
+            walked at less than `least` of its speed.
     """
     planted = measure_contacts(clip).planted
-    flying = np.flatnonzero(~planted.any(axis=1))
-    runs = np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
-    longest = max(runs, key=len)
-    if len(longest) * clip.dt > FLIGHT:
-        raise ConfigError(f"both feet are off the ground for {len(longest) * clip.dt:.2f} s at "
-                          f"{longest[0] * clip.dt:.2f} s", source=clip.name,
-                          field="contacts")  # fmt: skip
+    run = _run(clip, planted)
     lands = np.sort(np.nonzero(np.diff(planted.astype(int), axis=0) > 0)[0]) * clip.dt
     if len(lands) < 2:
         raise ConfigError("its feet move, but take no two steps", source=clip.name, field="feet")
@@ -65,6 +63,10 @@ def find_commands(clip: Clip, robot: Robot, scale: float) -> Walked:
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
     tempo = min(FASTEST * h * omega / max(float(speed.max()), 1e-9), 1.0)
+    if tempo < least:
+        raise ConfigError(f"{run}it goes at {speed.max():.2f} m/s, and the planner of walks at "
+                          f"{FASTEST * h * omega:.2f} m/s at most, {tempo:.2f} of it (--speed "
+                          f"{tempo:.2f} plays it so)", source=clip.name, field="speed")  # fmt: skip
     each = max(period, walk.duration / MOST_COMMANDS)
     rows = []
     for start in np.arange(0.0, walk.duration, each):
@@ -76,10 +78,26 @@ def find_commands(clip: Clip, robot: Robot, scale: float) -> Walked:
     going = np.hypot(commands[:, 1], commands[:, 2])
     turning = np.maximum(np.abs(commands[:, 3]), 1e-9)
     limits = [LONGEST * h / np.maximum(going, 1e-9), MOST_TURN / turning,
-              BEND * h * omega / np.maximum(going * turning, 1e-9)]  # fmt: skip
+              BEND * h * omega / np.maximum(going * turning, 1e-9),
+              np.where(going > BRISK * h * omega, QUICK / omega, np.inf)]  # fmt: skip
     swing = np.minimum(commands[:, 4], np.min(limits, axis=0)) - BOTH / omega
     commands[:, 4] = np.clip(swing, QUICKEST / omega, SLOWEST / omega)
     return Walked(commands, tempo)
+
+
+def _run(clip: Clip, planted: np.ndarray) -> str:
+    """What says that a clip runs; empty where it walks. Raises ConfigError where it jumps."""
+    flying = np.flatnonzero(~planted.any(axis=1))
+    flights = np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
+    longest = max(flights, key=len)
+    if len(longest) * clip.dt <= FLIGHT:
+        return ""
+    says = (f"both feet are off the ground for {len(longest) * clip.dt:.2f} s at "
+            f"{longest[0] * clip.dt:.2f} s")  # fmt: skip
+    first = int(longest[0])
+    if planted[max(first - round(TOGETHER / clip.dt), 0) : first].any(axis=0).all():
+        raise ConfigError(says, source=clip.name, field="contacts")
+    return f"{says}, so that it would be walked; "
 
 
 def _mean(values: np.ndarray, size: int) -> np.ndarray:

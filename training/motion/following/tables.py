@@ -144,10 +144,12 @@ def _walks(made: RetargetedClip) -> list[tuple[str, str]]:
     if told is None:
         return []
     ahead, left, turn = np.abs(told[:, 1:4]).max(axis=0)
+    planted = made.clip.planted
+    run = planted is not None and not planted.any(axis=1).all()
     return [
         (
             "performed by a planner that walks",
-            f"at {made.tempo:.2f} of the clip's speed: up to "
+            f"{'a run as a walk, ' if run else ''}at {made.tempo:.2f} of the clip's speed: up to "
             f"{np.hypot(ahead, left):.2f} m/s and {np.degrees(turn):.0f} °/s (--controller walk)",
         )
     ]

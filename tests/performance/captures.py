@@ -1,0 +1,110 @@
+"""Captures performed: at what share of their speed, and how often without a fall.
+
+    python -m tests.performance.captures                       # 15 captures, 20 starts each
+    python -m tests.performance.captures walk cmu02_jump --starts 5
+
+Five of others, found by name as `poise motion import` finds them (POISE_CLIPS, see
+docs/motions.md), and the ten that `tests.support.captures` makes. Each is imported as that command
+does it, and followed as `poise motion follow --seed 21` by `walk` if a planner walks it, else by
+`motion-step`. Its speed is its way times its tempo, as shares of the clip's. `caught` is how often
+the planner of steps took over in a trial, mean. Bar: 80 % at 0.7 of their speed without a fall.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from poise.baselines.balance.references.robot_clip import RobotClip, write_robot_clip
+from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
+from poise.baselines.motion.clips.library import captured_clips
+from poise.baselines.motion.space_time.retarget_clip import RetargetedClip, retarget_clip
+from poise.envs.robots.robot import load_robot
+from poise.training.motion.following.follow import follow
+from tests.support.captures import CAPTURES, make
+
+OTHERS = ("cmu02_jump", "cmu_12_01_walk", "cmu_jumping_jacks", "fair1_jumping", "makehuman_walk1")
+SPEED, SHARE = 0.7, 0.8  # of a clip's speed, of the clips: the bars
+
+
+class Row(NamedTuple):
+    """What came of one capture: shares of the clip's way, tempo and time in the air at a time."""
+
+    name: str
+    how: str
+    way: float
+    tempo: float
+    flight: float
+    falls: int
+    caught: float
+    refused: str
+
+    @property
+    def speed(self) -> float:
+        return self.way * self.tempo
+
+    @property
+    def met(self) -> bool:
+        return not self.refused and self.falls == 0 and self.speed >= SPEED - 5e-3
+
+
+def kind_of(clip: RobotClip) -> str:
+    """How a motion is performed."""
+    if clip.commands is not None:
+        return "walk"
+    if clip.planted is None:
+        return "stands"
+    return "steps" if clip.planted.any(axis=1).all() else "jumps"
+
+
+def judge(path: Path, starts: int, seed: int, folder: Path) -> Row:
+    """Import a capture, and perform it from disturbed starts."""
+    made: RetargetedClip = retarget_clip(read_bvh(path).clip, load_robot("humanoid"))
+    how, reason = kind_of(made.clip), made.clip.about.unperformed
+    row = Row(path.stem, how, made.stride, made.tempo, made.flight, 0, 0.0, reason)
+    if reason:
+        return row._replace(how="refused")
+    file = folder / f"{path.stem}.npz"
+    write_robot_clip(made.clip, file)
+    trials = follow(file, "walk" if how == "walk" else "motion-step", starts=starts, seed=seed)
+    caught = float(np.nan_to_num(np.mean([trial.interruptions for trial in trials])))
+    return row._replace(falls=sum(trial.fallen for trial in trials), caught=caught)
+
+
+def main() -> None:
+    """A line for each capture as it is done, and how many meet the bar."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("names", nargs="*", help="of captures; all")
+    parser.add_argument("--starts", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=21)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="poise-") as temporary:
+        folder = Path(temporary)
+        for name in CAPTURES:
+            write_bvh(make(name)[0], folder / f"{name}.bvh")
+        known = captured_clips()
+        paths = [known[name] for name in OTHERS if name in known]
+        paths += [folder / f"{name}.bvh" for name in CAPTURES]
+        chosen = [path for path in paths if not given.names or path.stem in given.names]
+        print("| capture | as | way | tempo | time in the air | speed | falls | caught | |\n"
+              + "|---" * 9 + "|")  # fmt: skip
+        rows = []
+        for path in chosen:
+            row = judge(path, given.starts, given.seed, folder)
+            rows.append(row)
+            figures = (f"{row.way:.2f} | {row.tempo:.2f} | {row.flight:.2f} | {row.speed:.2f} | "
+                       f"{row.falls} of {given.starts} | {row.caught:.1f}")  # fmt: skip
+            end = row.refused or ("met" if row.met else "missed")
+            print(f"| {row.name} | {row.how} | " + (" | " * 5 if row.refused else figures)
+                  + f" | {end} |", flush=True)  # fmt: skip
+    met = sum(row.met for row in rows)
+    print(f"{met} of {len(rows)} at {SPEED} of their speed or more without a fall "
+          f"(bar {SHARE:.0%}), {sum(bool(row.refused) for row in rows)} refused")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
