@@ -103,8 +103,8 @@ def _weigh(e: ExternalForce, dt: float):
 
         f ← max(1 − (CLEAR σ/|f|)², 0) f
 
-    σ² is the mean square of what has been seen. What is above CLEAR σ counts as 2 σ² there, so that
-    a push is hardly taken for noise, and a noise that has grown is learned in time.
+    σ² is the mean square of what has been seen, of which what is above CLEAR σ counts as that: the
+    errors of a robot that steps grow at once, and are not to be taken for a push.
     """
     e.ticks[0] += 1
     rate = max(1.0 / e.ticks[0], dt / MEMORY)
@@ -115,7 +115,7 @@ def _weigh(e: ExternalForce, dt: float):
             square += e.smooth[a] * e.smooth[a]
         weight = 0.0
         if e.ticks[0] > LEARNING and square > most:
-            weight, square = 1.0 - most / square, 2.0 * e.noise[part]
+            weight, square = 1.0 - most / square, most
         e.noise[part] += rate * (square - e.noise[part])
         for a in range(3 * part, 3 * part + 3):
             e.wrench[a] = weight * e.smooth[a]
