@@ -16,7 +16,7 @@ from poise.envs.robots.robot import Robot
 
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
-LONGEST, FASTEST = 0.72, 0.5  # [h] of a step, [hω] of a walk: further and faster, robots fall
+LONGEST, FASTEST = 0.72, 0.45  # [h] of a step, [hω] of a walk: further and faster, robots fall
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most

@@ -99,7 +99,7 @@ def test_soles_in_the_air_go_as_far_as_motors_lead_them() -> None:
     (trial,) = follow(reference_from(made, robot, "straddle"), "motion-step", starts=1,
                       watch=watched)  # fmt: skip
     assert not trial.fallen and not trial.interruptions and not trial.solver_failures
-    assert abs(ends[-1][0] - ends[-1][1]) == pytest.approx(0.58, abs=0.03)
+    assert abs(ends[-1][0] - ends[-1][1]) > 0.55  # of 0.58; legs that hang land nearer together
 
 
 @pytest.mark.parametrize("name", ["jump", "jump-turn"])

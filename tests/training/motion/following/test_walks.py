@@ -52,10 +52,10 @@ def test_the_planner_is_told_the_clip_s_speed_turn_and_steps(name: str) -> None:
 
 
 def test_what_is_too_fast_is_slower_and_says_so() -> None:
-    commands, tempo = find_commands(make("walk")[0].at_speed(1.6), robot_named(HUMANOID), 0.9)
+    commands, tempo = find_commands(make("walk")[0].at_speed(1.5), robot_named(HUMANOID), 0.9)
     assert 0.7 < tempo < 0.9
-    assert commands[:, 1] == pytest.approx(tempo * 1.6 * 1.2 * 0.9, abs=0.06)
-    assert commands[-1, 0] + commands[1, 0] == pytest.approx(4.0 / 1.6 / tempo, rel=0.3)
+    assert commands[:, 1] == pytest.approx(tempo * 1.5 * 1.2 * 0.9, abs=0.06)
+    assert commands[-1, 0] + commands[1, 0] == pytest.approx(4.0 / 1.5 / tempo, rel=0.3)
     assert (commands[:, 4] + 0.037 < 0.35).all()  # brisk walks have quick steps
 
 
@@ -71,7 +71,7 @@ def test_jumps_are_no_walks_and_runs_are_told_as_such() -> None:
     assert made.clip.commands is None
     assert re.match(
         r"both feet are off the ground for 0\.\d\d s at 0\.\d\d s, so that it would be walked; it "
-        r"goes at 2\.\d\d m/s, and the planner of walks at 1\.39 m/s at most, 0\.5\d of it",
+        r"goes at 2\.\d\d m/s, and the planner of walks at 1\.25 m/s at most, 0\.\d\d of it",
         made.clip.about.unperformed,
     )
 
