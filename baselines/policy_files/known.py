@@ -18,6 +18,7 @@ from .config import KnownFile, Origin, PolicyFileConfig
 from .onnx.files import BYTES, ONNX
 
 RIVALS = "rivals"  # folder of descriptions of policies of others, which are for one robot each
+GUARDS = "guards"  # folder of recovery policies that take over from such a one
 PLACES = "POISE_POLICIES"  # environment variable: folders, with the system's separator between them
 SHARED = "shared/rivals"  # beside the repository
 FILES = 20_000  # that are looked at in a place

@@ -5,15 +5,13 @@ from pathlib import Path
 from typing import Literal
 
 from poise.baselines.policy_files.config import PolicyFileConfig
-from poise.baselines.policy_files.known import RIVALS
+from poise.baselines.policy_files.known import GUARDS, RIVALS
 from poise.baselines.policy_files.reading import is_policy
 from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, read_yaml
 from poise.configs.schema import build, on_base
-
-GUARDS = "guards"  # folder of packaged ones
 
 
 @dataclass(frozen=True)

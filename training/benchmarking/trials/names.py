@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from poise.baselines.allowance import is_plugin, is_script
-from poise.baselines.environments.guard.config import GUARDS
-from poise.baselines.policy_files.known import RIVALS
+from poise.baselines.policy_files.known import GUARDS, RIVALS
 from poise.baselines.policy_files.reading import advice, is_policy
 from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.files import packaged, resolve
