@@ -45,7 +45,7 @@ GOOD: list[list[str]] = [
     ["qp-set", "--out", "out", "--count", "3", "--form", "full", "--controller", "momentum-qp"],
     ["train", "--out", "out", "--config", "torque", "--steps", "64", "--ppo.n-envs", "2"],
     ["train", "--out", "out", "--robot", "compact", "--seed", "1", "--threads", "1"],
-    ["train", "--out", "out", "--ppo.gamma", "0.9", "--env.duration", "1.0", "--resume"],
+    ["train", "--out", "out", "--ppo.n-envs", "2", "--env.duration", "1.0", "--resume"],
     ["train", "--out", "out", "--seeds", "1", "2", "--backend", "local", "--workers", "1"],
 ]
 TOKENS = [
