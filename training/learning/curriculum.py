@@ -4,9 +4,21 @@ from dataclasses import replace
 
 from stable_baselines3.common.callbacks import BaseCallback
 
+from poise.configs.errors import ConfigError
 from poise.envs.sensing.realism import Realism, load_realism
 
 from .config import TrainConfig
+
+
+def curriculum_levels(config: TrainConfig) -> list[Realism]:
+    """The levels of `curriculum.levels`; raises ConfigError for one that there is not."""
+    try:
+        return [load_realism(name) for name in config.curriculum.levels]
+    except ConfigError as error:
+        if error.field != "realism" or error.source:  # a file's own mistake says where it is
+            raise
+        raise ConfigError(error.message, field="curriculum.levels",
+                          choices=error.choices) from None  # fmt: skip
 
 
 class CurriculumCallback(BaseCallback):
@@ -15,7 +27,7 @@ class CurriculumCallback(BaseCallback):
     def __init__(self, config: TrainConfig):
         super().__init__()
         self.config = config
-        self.levels = [load_realism(name) for name in config.curriculum.levels]
+        self.levels = curriculum_levels(config)
 
     def _on_rollout_start(self) -> None:
         curriculum, env = self.config.curriculum, self.config.env

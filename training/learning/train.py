@@ -32,7 +32,7 @@ from poise.training.running.stopping import keeps
 from .callbacks import Checkpoints, Progress, RewardTerms, Throughput
 from .checkpoints import restore
 from .config import TrainConfig
-from .curriculum import CurriculumCallback
+from .curriculum import CurriculumCallback, curriculum_levels
 from .exploration import ExplorationCallback, shape_exploration
 from .imported import import_policy
 from .policy import locate_policy
@@ -76,6 +76,7 @@ def train(
     checkpoint = check_folder(config, out, resume)
     keeps(out / LAST, f"what is trained is kept in {out}; go on with --resume")
     start = None if checkpoint else first_policy(config.start_from)
+    curriculum_levels(config)  # refused before anything is compiled
     torch.set_num_threads(1)
     resolve("robots", config.robot)
     if config.action not in ("torque", "position"):  # else nothing of the controllers is called

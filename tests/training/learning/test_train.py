@@ -402,6 +402,17 @@ def test_bad_configurations_are_refused(section, named):
         build(TrainConfig, section, "test")
 
 
+def test_a_level_that_is_not_there_is_refused_before_anything_is_written(tmp_path):
+    """One error with field and choices, no folder; seeds likewise."""
+    config = tiny_config(curriculum=Curriculum(levels=("field", "lat")))
+    named = "^curriculum.levels: no such name: 'lat', did you mean late.*choices: field, ideal"
+    with pytest.raises(ConfigError, match=named):
+        train(config, tmp_path / "run")
+    with pytest.raises(ConfigError, match=named):
+        train_seeds(config, [0, 1], tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
 @pytest.mark.parametrize("which", ["env", "evaluation"])
 def test_pushes_that_do_not_fit_the_robot_are_refused_before_anything_is_written(tmp_path, which):
     """A body that the robot lacks: one error with field and choices, no folder; seeds likewise."""

@@ -20,6 +20,7 @@ from poise.configs.reading import whole_path
 from poise.configs.schema import to_yaml
 from poise.training.benchmarking.statistics.seeds import seed_figures
 from poise.training.learning.config import TrainConfig
+from poise.training.learning.curriculum import curriculum_levels
 from poise.training.learning.policy_files import CONFIG, STATE, find_checkpoint, read_state
 from poise.training.learning.train import LAST, check_folder, check_pushes, train
 from poise.training.running.executor import Executor, check_backend
@@ -81,6 +82,7 @@ def train_seeds(
     given, seeds = seeds, _all_seeds(seeds, out, resume)
     runs = [_run(replace(config, seed=seed, threads=1), seed_folder(out, seed)) for seed in seeds]
     missing = [run for run in runs if not _finished(run)]
+    curriculum_levels(config)
     env = config.make_env()  # compiles all that the runs need, once
     check_pushes(config, env)
     env.close()
