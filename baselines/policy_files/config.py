@@ -88,6 +88,34 @@ class Held:
 
 
 @dataclass(frozen=True)
+class JointLaw:
+    """What a joint adds to its target, by the attitude that an IMU tells, and its factors.
+
+        q* = offset + action · scale · a + pitch · θ + pitch_rate · ω_y + roll · φ + roll_rate · ω_x
+
+    R = R_z(yaw) R_y(θ) R_x(φ) is the root's attitude, ω its angular velocity along its own axes.
+    A joint on the right has the mirror image of this law.
+
+    Attributes:
+        action: factor of what the policy asks for.
+        stiffness: factor of K.
+        damping: factor of D.
+        pitch: of θ [rad/rad].
+        pitch_rate: of ω_y [rad/(rad/s)].
+        roll: of φ [rad/rad].
+        roll_rate: of ω_x [rad/(rad/s)].
+    """
+
+    action: float = field(default=1.0, metadata={"above": 0.0, "max": 10.0})
+    stiffness: float = field(default=1.0, metadata={"above": 0.0, "max": 10.0})
+    damping: float = field(default=1.0, metadata={"above": 0.0, "max": 10.0})
+    pitch: float = 0.0
+    pitch_rate: float = 0.0
+    roll: float = 0.0
+    roll_rate: float = 0.0
+
+
+@dataclass(frozen=True)
 class Memory:
     """What a network gives in a step and is given in the next; zero when a trial starts.
 
@@ -208,6 +236,7 @@ class PolicyFileConfig:
     held: tuple[float, ...] | dict[str, float | Held] | None = field(
         default=None, metadata={"omit": "default"}
     )
+    law: dict[str, JointLaw] = field(default_factory=dict, metadata={"omit": "default"})
     outputs: dict[str, str | int] = field(default_factory=dict, metadata={"omit": "default"})
     memory: tuple[Memory, ...] = _new(())
     batch: bool = _new(True)

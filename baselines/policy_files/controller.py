@@ -31,7 +31,7 @@ from .config import PolicyFileConfig
 from .joints import joint_servos
 from .networks import load_network
 from .observations import Observer, follows_commands
-from .terms import Seen
+from .terms import Seen, roll_pitch
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,10 @@ class PolicyFile(CompiledController):
                 raise PoiseError(f"{self.config.policy}: {role}: {lost} of {len(values)} numbers "
                                  f"are not finite at {now:.2f} s")  # fmt: skip
         self.action[:] = action = answer.pop("action")
-        self._servos.target[self.joints.moved] = self.joints.targets(action)
+        roll, pitch = roll_pitch(state)
+        turn_roll, turn_pitch = state.qvel[3:5]
+        attitude = np.array([pitch, turn_pitch, roll, turn_roll])
+        self._servos.target[self.joints.moved] = self.joints.targets(action, attitude)
         for gain, values in answer.items():
             getattr(self._servos, gain)[self.joints.moved] = np.maximum(values, 0.0)
 

@@ -9,9 +9,12 @@ import numpy as np
 from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.description import match_names
+from poise.envs.robots.mirror import mirror_robot
 from poise.envs.robots.robot import Robot
 
 from .config import Held, PerJoint, PolicyFileConfig
+
+IMAGE = np.array([1.0, 1.0, -1.0, -1.0])  # of θ, ω_y, φ, ω_x when left and right are exchanged
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +30,12 @@ class JointServos:
     stiffness: np.ndarray  # (nj,) [N·m/rad]
     damping: np.ndarray  # (nj,) [N·m·s/rad]
     target: np.ndarray  # (nj,) before the first action [rad]
+    law: np.ndarray  # (na, 4) of `attitude`
 
-    def targets(self, action: np.ndarray) -> np.ndarray:
-        """(na,) targets [rad] of an action."""
-        return self.offset + self.scale * np.clip(action, self.clip[:, 0], self.clip[:, 1])
+    def targets(self, action: np.ndarray, attitude: np.ndarray) -> np.ndarray:
+        """(na,) targets [rad] of an action, at `attitude` (4,): θ, ω_y, φ, ω_x."""
+        asked = self.scale * np.clip(action, self.clip[:, 0], self.clip[:, 1])
+        return self.offset + asked + self.law @ attitude
 
 
 def joint_servos(robot: Robot, config: PolicyFileConfig) -> JointServos:
@@ -70,10 +75,29 @@ def joint_servos(robot: Robot, config: PolicyFileConfig) -> JointServos:
     servos = JointServos(
         index, index[list(places)], default, offset_moved,
         _spread(config.action_scale, names[:na], "action_scale", config), bounds, stiffness,
-        damping, target,
+        damping, target, np.zeros((na, 4)),
     )  # fmt: skip
     _hold(servos, robot, config)
+    _obey(servos, robot, config)
     return servos
+
+
+def _obey(servos: JointServos, robot: Robot, config: PolicyFileConfig) -> None:
+    """Take what `law` says of the joints that the action moves."""
+    if not config.law:
+        return
+    moved = [int(joint) for joint in servos.moved]
+    names = [robot.joint_names[joint] for joint in moved]
+    left = Simulation(robot).data.xanchor[1:, 1] >= 0.0  # in the standing posture
+    for name, law in match_names(config.law, names, config.described_in, "law").items():
+        i = names.index(name)
+        joint = moved[i]
+        servos.scale[i] *= law.action
+        servos.stiffness[joint] *= law.stiffness
+        servos.damping[joint] *= law.damping
+        servos.law[i] = law.pitch, law.pitch_rate, law.roll, law.roll_rate
+        if np.any(servos.law[i]) and not left[joint]:
+            servos.law[i] *= mirror_robot(robot)["joints"].sign[joint] * IMAGE
 
 
 def _hold(servos: JointServos, robot: Robot, config: PolicyFileConfig) -> None:

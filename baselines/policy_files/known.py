@@ -12,7 +12,7 @@ from poise.baselines.allowance import is_script
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.reading import is_folder, read_bytes, read_yaml
-from poise.configs.schema import build
+from poise.configs.schema import build, on_base
 
 from .config import KnownFile, Origin, PolicyFileConfig
 from .onnx.files import BYTES, ONNX
@@ -44,7 +44,7 @@ def known_policies() -> list[Known]:
     found = []
     for name in packaged(RIVALS):
         path = resolve(RIVALS, name)
-        data = read_yaml(path)
+        data = on_base(read_yaml(path), RIVALS, path)
         period = data.get("policy_period", PolicyFileConfig.policy_period)
         found.append(Known(name, build(Origin, data.get("origin", {}), f"{path}: origin"), period))
     return found

@@ -11,7 +11,7 @@ from poise.baselines.allowance import check_allowed, is_script
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder, read_yaml, whole_path
-from poise.configs.schema import build
+from poise.configs.schema import build, on_base
 
 from .config import Origin, PolicyFileConfig
 from .deploy import deploy_fields, is_deploy
@@ -51,7 +51,7 @@ def policy_config(name: str | Path) -> PolicyFileConfig:
         return _in_folder(place)
     if is_network(place):
         return policy_file_config({"policy": place.name}, place)
-    data = read_yaml(place)
+    data = on_base(read_yaml(place), RIVALS, place)
     return policy_file_config({"deploy": place.name} if is_deploy(data) else data, place)
 
 

@@ -32,9 +32,9 @@ def _turned(seen: Seen, vector: np.ndarray) -> np.ndarray:
     return seen.state.root_axes.T @ vector
 
 
-def _roll_pitch(seen: Seen) -> np.ndarray:
+def roll_pitch(state: RobotState) -> np.ndarray:
     """Rotations about the axes ahead and to the left, as R = R_z(yaw) R_y(pitch) R_x(roll)."""
-    x, y, z = seen.state.root_axes[2]
+    x, y, z = state.root_axes[2]
     return np.array([np.arctan2(y, z), np.arcsin(np.clip(-x, -1.0, 1.0))])
 
 
@@ -46,7 +46,7 @@ TERMS: dict[str, Callable[[Seen], np.ndarray]] = {
     "base_lin_vel": lambda seen: _turned(seen, seen.state.qvel[:3]),
     "base_ang_vel": lambda seen: seen.state.qvel[3:6],
     "projected_gravity": lambda seen: _turned(seen, DOWN),
-    "roll_pitch": _roll_pitch,
+    "roll_pitch": lambda seen: roll_pitch(seen.state),
     COMMAND: lambda seen: seen.command,
     "joint_pos": lambda seen: seen.q,
     "joint_pos_rel": lambda seen: seen.q - seen.default,
