@@ -57,7 +57,8 @@ class Affine:
 class Translation:
     """Between a policy's observations and actions and those of an environment with servos.
 
-    Raises ConfigError for an environment without servos, and as `joint_servos` does.
+    Raises ConfigError for an environment without servos, for a law of attitude, and as
+    `joint_servos` does.
     """
 
     def __init__(self, env: BalanceEnv, config: PolicyFileConfig):
@@ -67,6 +68,9 @@ class Translation:
             )
         self.env, self.config = env, config
         self.joints = joint_servos(env.robot, config)
+        if np.any(self.joints.law):
+            raise ConfigError("targets that follow the attitude cannot be imported",
+                              source=config.described_in, field="law")  # fmt: skip
         driven = [int(dof) - 6 for dof in env.servos.dofs]
         motors = np.array([driven.index(int(joint)) for joint in self.joints.moved])
         after = 1 if isinstance(env, ResidualWholeEnv) else 0  # entries behind the motors'

@@ -190,6 +190,7 @@ def test_a_slow_actor_moves_by_its_share() -> None:
             r"observations\[0\]: shows joint_vel of 1 steps ago: observation.history must be 2",
         ),
         ({"observations": [{"term": "joint_vel", "clip": [-1.0, 1.0]}]}, "with limits"),
+        ({"law": {"*": {"pitch": 0.1}}}, "law: targets that follow the attitude"),
     ],
 )
 def test_what_cannot_be_imported_is_said(changes: dict, named: str, tmp_path: Path) -> None:

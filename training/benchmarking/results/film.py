@@ -9,15 +9,13 @@ from pathlib import Path
 from poise.baselines.allowance import allowing
 from poise.envs.viewing.camera import Camera, beside
 from poise.training.benchmarking.trials.trial import Trial
-from poise.training.pictures.figures.video import Episode, record_together
+from poise.training.pictures.figures.video import SIZE, Episode, record_together, usual
 from poise.training.running.files import SETTINGS
 
 from .player import player
 from .read import Results, load_results
 
-SIZE = (640, 480)  # [pixels] of one controller alone
-NARROW = (480, 480)  # of one of several
-WEBP_SIZE, WEBP_RATE = (320, 320), 12.5  # [1/s]; for pages, so small
+NARROW = (480, 480)  # [pixels] of one of several
 
 
 def film(
@@ -39,9 +37,9 @@ def film(
         trial: its number in trials.csv; all of `controllers` have played it.
         controllers: names, from left to right.
         path: of the video, ending in .mp4 or .webp.
-        fps: frames a second that are wanted [1/s]; None: 25, of a WebP `WEBP_RATE`.
-        size: width and height of each picture [pixels]; None: `SIZE`, `NARROW` of several, of a
-            WebP `WEBP_SIZE`.
+        fps: frames a second that are wanted [1/s]; None: as of `record`.
+        size: width and height of each picture [pixels]; None: as of `record`, but `NARROW` of
+            several that are no WebP.
         allow: controllers from outside (``module:Class``) that may run.
 
     Raises:
@@ -49,9 +47,10 @@ def film(
         PoiseError: nothing can be drawn or encoded here, or the file cannot be written.
     """
     where = folder.folder if isinstance(folder, Results) else Path(folder)
-    small = Path(path).suffix.lower() == ".webp"
-    size = size or (WEBP_SIZE if small else SIZE if len(controllers) == 1 else NARROW)
-    fps = fps or (WEBP_RATE if small else 25.0)
+    usual_size, usual_rate = usual(path)
+    if len(controllers) > 1 and usual_size == SIZE:
+        usual_size = NARROW
+    size, fps = size or usual_size, fps or usual_rate
     with allowing(allow, source=where / SETTINGS), ExitStack() as stack:
         results = folder if isinstance(folder, Results) else load_results(where)
         episodes = {}

@@ -18,6 +18,8 @@ from .encoder import FORMS, Encoder
 from .style import saved_figure
 
 INK = (20, 20, 20)  # of names over pictures
+SIZE, RATE = (640, 480), 25.0  # [pixels], [1/s]
+WEBP_SIZE, WEBP_RATE = (320, 320), 12.5  # for pages, so small
 
 
 def record(
@@ -26,24 +28,25 @@ def record(
     path: str | Path,
     reset_kwargs: dict[str, Any] | None = None,
     *,
-    fps: float = 25.0,
+    fps: float | None = None,
     slow_motion: float = 1.0,
-    size: tuple[int, int] = (640, 480),
+    size: tuple[int, int] | None = None,
     camera: Camera | str | int | None = None,
 ) -> dict[str, Any]:
     """Play one episode and write it as an MP4 (H.264, yuv420p) that browsers play, or as a WebP.
 
     The file appears complete or not at all. Every n-th policy step is drawn, with n such that the
-    video has about `fps` frames a second; drawing takes most of the time.
+    video has about `fps` frames a second; drawing takes most of the time. A WebP is for pages, and
+    small by default.
 
     Args:
         env: one of Poise's environments, wrapped or not, in any render mode.
         act: the action for an observation.
         path: where to write, ending in .mp4 or .webp.
         reset_kwargs: `seed` and `options` of the reset.
-        fps: frames a second that are wanted [1/s].
+        fps: frames a second that are wanted [1/s]; None: `RATE`, of a WebP `WEBP_RATE`.
         slow_motion: how much longer the video takes than the episode.
-        size: width and height [pixels], even.
+        size: width and height [pixels], even; None: `SIZE`, of a WebP `WEBP_SIZE`.
         camera: where it stands, or which one of the model it is, see `find_camera`.
 
     Returns:
@@ -54,6 +57,8 @@ def record(
         ConfigError: the path, rate, slow motion or size is not valid.
         PoiseError: nothing can be drawn or encoded here, or the file cannot be written.
     """
+    usual_size, usual_rate = usual(path)
+    size, fps = size or usual_size, usual_rate if fps is None else fps
     _check(path, fps, slow_motion, size)
     with Episode(env, act, reset_kwargs, size, camera) as episode:
         every, rate = _drawn(episode.base, fps, slow_motion)
@@ -69,11 +74,17 @@ def record(
     }
 
 
+def usual(path: str | Path) -> tuple[tuple[int, int], float]:
+    """Size and frames a second of a video that nobody has said these of."""
+    small = Path(path).suffix.lower() == ".webp"
+    return (WEBP_SIZE, WEBP_RATE) if small else (SIZE, RATE)
+
+
 def record_together(
     episodes: Mapping[str, Episode],
     path: str | Path,
     *,
-    fps: float = 25.0,
+    fps: float = RATE,
 ) -> int:
     """Film several episodes side by side, each under its name; returns the number of frames.
 
@@ -114,7 +125,7 @@ class Episode:
         env: gymnasium.Env,
         act: Callable[[np.ndarray], np.ndarray],
         reset_kwargs: dict[str, Any] | None = None,
-        size: tuple[int, int] = (640, 480),
+        size: tuple[int, int] = SIZE,
         camera: Camera | str | int | None = None,
     ):
         base = env.unwrapped

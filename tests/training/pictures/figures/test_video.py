@@ -3,11 +3,17 @@
 import gymnasium
 import imageio_ffmpeg
 import numpy as np
+import PIL.Image
 import pytest
 from matplotlib.image import imread
 
 from poise.configs.errors import ConfigError, PoiseError
-from poise.training.pictures.figures.video import frame_strip, record
+from poise.training.pictures.figures.video import (
+    WEBP_RATE,
+    WEBP_SIZE,
+    frame_strip,
+    record,
+)
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +45,15 @@ def test_video_holds_the_episode(can_render, env, tmp_path):
     assert summary["seconds"] == pytest.approx(0.2) and summary["fps"] == 25.0
     assert summary["fallen"] is False and np.isfinite(summary["return"])
     assert [p.name for p in path.parent.iterdir()] == ["a.mp4"]
+
+
+def test_a_webp_is_small(can_render, env, tmp_path):
+    """Nobody has said its size: that of a page."""
+    summary = record(env, still, tmp_path / "a.webp")
+    with PIL.Image.open(tmp_path / "a.webp") as picture:
+        assert picture.size == WEBP_SIZE
+        assert picture.n_frames == summary["frames"] == 4  # of 0.2 s, both ends drawn
+    assert summary["fps"] == WEBP_RATE
 
 
 @pytest.mark.parametrize("fps, slow, frames, rate", [(50, 1, 11, 50), (25, 4, 11, 12.5)])
