@@ -16,7 +16,8 @@ import pytest
 import torch
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
-from poise.configs.files import packaged
+from poise.configs.files import packaged, resolve
+from poise.configs.reading import read_yaml
 from poise.envs.robots.menagerie import WHEEL
 from poise.envs.robots.robot import Robot
 from tests.support.policies import onnx_session
@@ -68,6 +69,7 @@ class Loop(NamedTuple):
     moved: list[int] | None = None
     held: Any = None
     bound: float = np.inf
+    adds: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None  # of roll, pitch and gyro
 
 
 def frame(*parts: Any) -> np.ndarray:
@@ -293,9 +295,30 @@ def unitree_lab() -> Loop:
     return Loop(order, default, kp, kd, 0.25, observe)
 
 
+def booster_deploy_law() -> Loop:
+    """That of Booster with our law: on the right, rolls and yaws turn the other way round."""
+    plain, law = booster_deploy(), read_yaml(resolve("rivals", "booster-deploy-t1-law"))["law"]
+    own = [next((law[k] for k in law if k.strip("*") in name), {}) for name in plain.joints]
+    factor = {key: np.array([each.get(key, 1.0) for each in own])
+              for key in ("action", "stiffness", "damping")}  # fmt: skip
+    gain = {key: np.array([each.get(key, 0.0) for each in own])
+            for key in ("pitch", "pitch_rate", "roll", "roll_rate")}  # fmt: skip
+    right = np.array(["Right" in name for name in plain.joints])
+    turned = right & np.array(["Pitch" not in name for name in plain.joints])
+
+    def adds(roll_pitch: np.ndarray, gyro: np.ndarray) -> np.ndarray:
+        ahead = gain["pitch"] * roll_pitch[1] + gain["pitch_rate"] * gyro[1]
+        aside = gain["roll"] * roll_pitch[0] + gain["roll_rate"] * gyro[0]
+        return np.where(turned, -1.0, 1.0) * (ahead + np.where(right, -1.0, 1.0) * aside)
+
+    return plain._replace(kp=plain.kp * factor["stiffness"], kd=plain.kd * factor["damping"],
+                          scale=plain.scale * factor["action"], adds=adds)  # fmt: skip
+
+
 LOOPS: dict[str, Callable[[], Loop]] = {
     "asap-loco-g1": asap,
     "booster-deploy-t1": booster_deploy,
+    "booster-deploy-t1-law": booster_deploy_law,
     "booster-gym-t1": booster_gym,
     "falcon-g1": falcon,
     "falcon-loco-g1": falcon_loco,
@@ -348,6 +371,8 @@ def played_apart(loop: Loop, path: Path, robot: Robot, data: Any) -> Iterator[np
         yield action
         bounded = np.clip(action, -loop.bound, loop.bound)
         target[dofs[moved] - 6] = default[moved] + loop.scale * bounded
+        if loop.adds is not None:
+            target[dofs[moved] - 6] += loop.adds(roll_pitch, now.gyro)
         for _ in range(SUBSTEPS):
             data.ctrl[:] = (kp * (target - data.qpos[7:]) - kd * data.qvel[6:])[motors]
             mujoco.mj_step(model, data)

@@ -11,9 +11,8 @@ from poise.envs.viewing.renderer import SceneRenderer
 from poise.training.benchmarking.trials.play import Watch
 from poise.training.benchmarking.trials.trial import Trial
 from poise.training.pictures.figures.encoder import Encoder
+from poise.training.pictures.figures.video import usual
 from poise.training.pictures.sessions.ghost import Ghost, ghost_of
-
-RATE = 25.0  # [1/s] of the frames
 
 
 class Film:
@@ -26,6 +25,7 @@ class Film:
 
     Attributes:
         frames: how many have been written.
+        rate: how many there are a second of the motion [1/s].
     """
 
     def __init__(
@@ -33,12 +33,13 @@ class Film:
         others: Callable[[Trial], Watch] | None = None,
     ):  # fmt: skip
         self.path, self.size, self.others = path, size, others
+        self.rate = usual(path)[1]
         self.frames, self._first = 0, True
         self._renderer: SceneRenderer | None = None
         self._ghost: Ghost | None = None
 
     def __enter__(self) -> Film:
-        self._encoder = Encoder(self.path, self.size, RATE)
+        self._encoder = Encoder(self.path, self.size, self.rate)
         self._encoder.__enter__()
         return self
 
@@ -69,7 +70,7 @@ class Film:
             width, height = self.size
             self._renderer = SceneRenderer(env.simulation, False, width, height)
             self._ghost = ghost_of(env)
-        if env.simulation.time < self.frames / RATE - 1e-9:
+        if env.simulation.time < self.frames / self.rate - 1e-9:
             return
         posture = None if self._ghost is None else self._ghost.posture(_motion_time(env))
         frame = self._renderer.render(posture)

@@ -11,7 +11,7 @@ import pytest
 from poise.baselines.balance.references.motion import load_motion
 from poise.training.cli.entry import main
 from poise.training.motion.following.follow import follow
-from poise.training.pictures.motion_report.film import RATE, Film
+from poise.training.pictures.motion_report.film import Film
 from poise.training.pictures.motion_report.performance import Watched
 from tests.support.physics import robot_named
 
@@ -33,13 +33,13 @@ def test_the_first_trial_is_filmed_and_the_ghost_goes_where_the_robot_is_pushed_
     assert len(watched.tracers) == 2
     reader = imageio_ffmpeg.read_frames(str(path))
     about = next(reader)
-    assert about["size"] == (160, 120) and about["fps"] == RATE
+    assert about["size"] == (160, 120) and about["fps"] == film.rate == 25.0
     frames = [np.frombuffer(data, np.uint8).reshape(120, 160, 3) for data in reader]
     trace = watched.tracers[0].trace()
-    assert len(frames) == film.frames == pytest.approx(trace.time[-1] * RATE, abs=2)
+    assert len(frames) == film.frames == pytest.approx(trace.time[-1] * film.rate, abs=2)
     seen = [yellow(frame) for frame in frames]
     ((start, _),) = trace.pushes
-    assert max(seen[int(start * RATE) :]) > 1.5 * seen[0] > 0  # no more inside of the robot
+    assert max(seen[int(start * film.rate) :]) > 1.5 * seen[0] > 0  # no more inside of the robot
 
 
 def test_what_is_no_video_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
