@@ -261,3 +261,15 @@ def test_the_walks_of_the_architecture_name_what_there_is() -> None:
             found = [node for node in inside if getattr(node, "name", None) == part]
             assert found, (path, name)
             inside = getattr(found[0], "body", [])
+
+
+def test_the_places_of_the_architecture_hold_what_they_are_told_to() -> None:
+    """Each name of *Where things are* is defined in one of the files beside it."""
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    table = page.partition("## Where things are\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| [^|]+ \| ([^|]+) \| ([^|]+) \|$", table, re.M)
+    assert len(rows) > 15
+    for places, names in rows[2:]:
+        files = re.findall(r"`([\w/]+/[\w/]+\.py)`", places)
+        defined = {getattr(node, "name", None) for path in files for node in sources()[path].body}
+        assert set(re.findall(r"`(\w+)`", names)) <= defined, places
