@@ -32,6 +32,7 @@ class Figure:
         scale: SI units times this are `unit`.
         ends: key of its 95 % interval.
         of: key of the count that it is a part of; the terminal then says "2 of 9".
+        beside: key of a count that is told with it; the terminal then says "2, 9".
         bound: key of what it is only a bound of.
         csv: its name in the report's CSV files, where it is not `key`.
         where: whether an entry is one that the figure says something of; not given: all are.
@@ -45,6 +46,7 @@ class Figure:
     scale: float = 1.0
     ends: str = ""
     of: str = ""
+    beside: str = ""
     bound: str = ""
     csv: str = ""
     where: Callable[[Entry], object] | None = None
@@ -75,6 +77,7 @@ class Figure:
             return NONE
         text = f"{self.sign(entry)}{self.scale * value:{self.form}}"
         if not self.ends:
+            text += f", {entry[self.beside]}" if self.beside else ""
             return f"{text} of {entry[self.of]}" if self.of else text
         return f"{text} {self.range(entry)}"
 
@@ -182,6 +185,8 @@ PAIRED = (
     Figure("only_b", "only b (won)", ".0f", words="won by b"),
     Figure("neither", "neither", ".0f"),
 )
+LOST_WON = Figure("only_a", "lost, won", ".0f", beside="only_b",
+                  words="of the trials that both played")  # fmt: skip
 P_VALUE = Figure("p_mcnemar", "McNemar p", ".2g", words="McNemar's exact test of lost against won")
 GAIN = Figure("j50_gain", "J50 gain", "+.1%", words="of b over a, relative", ends="j50_gain_ci95")
 
