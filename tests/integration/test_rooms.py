@@ -39,7 +39,7 @@ FLOORS = """
  9 baselines/balance/in_place, baselines/balance/stepping/planning, baselines/motion/feasibility
  9 baselines/motion/retargeting, baselines/policy_files, envs/balance/vector
 10 baselines/balance/stepping, baselines/motion/space_time/constraints
-10 baselines/motion/synthesis, envs, training/motion/open_loop
+10 baselines/motion/synthesis, envs
 11 baselines/motion/performing, baselines/motion/space_time, baselines/walking/planner
 12 baselines/walking
 13 baselines/registry
