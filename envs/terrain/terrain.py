@@ -78,16 +78,13 @@ class Terrain(OfKind):
 
     def floor(self) -> float:
         """The height of the plane below all surfaces [m]."""
-        lowest = [_lowest(surface) for surface in self.surfaces()]
+        lowest = [each.height - 0.5 * abs(each.gradient) * (each.x_max - each.x_min)
+                  for each in self.surfaces()]  # fmt: skip
         return min([0.0, *lowest])
 
     def height(self, x: float, y: float) -> float:
         """The height of the ground at (x, y) [m]."""
         return height_at(self.surfaces(), self.floor(), x, y)
-
-
-def _lowest(surface: Surface) -> float:
-    return surface.height - 0.5 * abs(surface.gradient) * (surface.x_max - surface.x_min)
 
 
 def height_at(surfaces: Sequence[Surface], floor: float, x: float, y: float) -> float:

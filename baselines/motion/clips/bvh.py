@@ -182,12 +182,9 @@ def _axes(
         up = nearest_axis(_middle(pose, roles, "hip") - _middle(pose, roles, "ankle"))
     if forward == "auto":
         across = raw.rest[roles["hip_left"]] - raw.rest[roles["hip_right"]]
-        forward = nearest_axis(np.cross(across, axes_of(*_any_forward(up)).matrix[2]))
+        any_forward = "x" if up[-1] != "x" else "y"
+        forward = nearest_axis(np.cross(across, axes_of(up, any_forward).matrix[2]))
     return axes_of(up, forward, length, source)
-
-
-def _any_forward(up: str) -> tuple[str, str]:
-    return up, "x" if up[-1] != "x" else "y"
 
 
 def _unit(raw: Skeleton, roles: dict[str, int], source: str) -> float:
