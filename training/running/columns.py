@@ -178,12 +178,20 @@ AT_LEVEL = (
 # of a cause of lost trials
 LOSSES = Figure("trials", "losses", ".0f")
 
-# of two controllers on the same trials
+# of two controllers, or of a level and the standard case, on the same trials
 PAIRED = (
     Figure("both", "both", ".0f", words="recovered by both"),
     Figure("only_a", "only a (lost)", ".0f", words="lost by b"),
     Figure("only_b", "only b (won)", ".0f", words="won by b"),
     Figure("neither", "neither", ".0f"),
+)
+AGAINST = (
+    Figure(
+        "lost", "lost", ".0f", words="trials that what it is compared with recovers, and this not"
+    ),
+    Figure(
+        "won", "won", ".0f", words="trials that this recovers, and what it is compared with not"
+    ),
 )
 LOST_WON = Figure("only_a", "lost, won", ".0f", beside="only_b",
                   words="of the trials that both played")  # fmt: skip

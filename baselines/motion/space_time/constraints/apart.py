@@ -39,5 +39,4 @@ class Apart(Constraint):
             yield Rows({frame: way[None] @ moved}, np.array([length]), low, high)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"{self.point} and {self.to} apart by {self.distance:g} m"

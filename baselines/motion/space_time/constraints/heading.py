@@ -55,5 +55,4 @@ class Heading(Constraint):
         return float(np.degrees(1.0))
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"heading of the {self.of} {self.angle:g}°"

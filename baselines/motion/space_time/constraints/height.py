@@ -40,7 +40,6 @@ class Height(Constraint):
             yield Rows({frame: derivative}, point.place(data)[2:], low, high)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"height of {self.point} {between(self.least, self.most, 'm')}"
 
 

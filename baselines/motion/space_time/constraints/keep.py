@@ -42,7 +42,6 @@ class Keep(Constraint):
             yield Rows({frame: derivative}, places[frame] - middle, -bound, bound, shared=True)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"keep {self.point}" + (f" to {self.to}" if self.to else "")
 
 

@@ -41,5 +41,4 @@ class OverSupport(Constraint):
             yield Rows({frame: derivative}, value, np.full(len(sides), -np.inf), bound)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"{self.point} over the support by {self.margin:g} m"

@@ -59,5 +59,4 @@ class Speed(Constraint):
         return 1.0 / scene.dt
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"speed of {self.point} {between(self.least, self.most, 'm/s')}"

@@ -60,7 +60,6 @@ class Touch(Constraint):
             yield Rows({frame: derivative}, np.array([distance]), low, high)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"{self.point} touches {self.body}"
 
 
