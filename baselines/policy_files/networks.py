@@ -1,7 +1,5 @@
 """The network of a policy: numbers in, numbers out, with whatever it remembers in between."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Mapping, Sequence

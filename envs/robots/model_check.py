@@ -1,8 +1,6 @@
 """Models that MuJoCo takes and Poise cannot play: endless, with numbers that are none, with a root
 that does not float, with other things that move."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

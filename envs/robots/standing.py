@@ -1,7 +1,5 @@
 """The standing posture: both soles exactly flat on the ground, the robot facing along +x."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import mujoco

@@ -1,8 +1,6 @@
 """What a robot walks on: surfaces above a floor, as a robot's planner believes them, and as they
 are."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple

@@ -4,8 +4,6 @@ The terminal, the leaderboard (Markdown) and the report (HTML and CSV) take name
 words from here. `summary.json` and the CSV files have the figures in SI units.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast

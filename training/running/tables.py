@@ -1,7 +1,5 @@
 """Tables in the terminal: what each row is of to the left, figures to the right."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from rich.markup import escape

@@ -1,7 +1,5 @@
 """BVH files in and out; what is written is written by the library pybvh."""
 
-from __future__ import annotations
-
 import tempfile
 import warnings
 from collections.abc import Mapping

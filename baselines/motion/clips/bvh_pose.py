@@ -1,7 +1,5 @@
 """From the channels of a BVH file to a rigid skeleton that hangs on its hips, and how it moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Clips for a robot to be put together from, and the robot's motion of what they became."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from pathlib import Path

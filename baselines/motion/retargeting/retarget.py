@@ -1,7 +1,5 @@
 """A clip of any skeleton as a motion of a robot: its soles stay planted, or step as the clip's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple

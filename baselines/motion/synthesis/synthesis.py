@@ -1,7 +1,5 @@
 """A script and a graph become one clip, with a record of every choice."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """A result for people: tables in the terminal, what their words mean, rows of the leaderboard."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path

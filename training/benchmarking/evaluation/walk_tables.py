@@ -1,7 +1,5 @@
 """Tables of walks, motions and levels: by command, by the phase of a push, by motion, by level."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Trials and outcomes as lines of trials.csv: what is written reads back exactly."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict

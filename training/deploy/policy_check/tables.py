@@ -1,7 +1,5 @@
 """Checks of policies, and the policies that are known, for people in the terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from rich.console import Console

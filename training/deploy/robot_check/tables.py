@@ -1,7 +1,5 @@
 """The check of a robot for people: tables in the terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rich.console import Console

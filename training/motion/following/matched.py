@@ -1,7 +1,5 @@
 """Motion matching from the command line: commands as text, the motion, and what it is made of."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from pathlib import Path

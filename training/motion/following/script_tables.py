@@ -1,7 +1,5 @@
 """What a person reads of motion graphs and of plans."""
 
-from __future__ import annotations
-
 from rich.console import Console
 from rich.markup import escape
 

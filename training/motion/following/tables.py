@@ -1,7 +1,5 @@
 """What a person reads of followed motions and of retargeting."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

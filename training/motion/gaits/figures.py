@@ -1,7 +1,5 @@
 """What is found of a gait, the table of it, and the picture of [Zhao, fig. 12]."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

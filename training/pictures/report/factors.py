@@ -1,7 +1,5 @@
 """Tables that only some suites have: sensitivity to factors, indicators, seeds, errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypedDict, cast

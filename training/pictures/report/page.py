@@ -1,7 +1,5 @@
 """A result folder as one HTML file that opens from disk, with nothing outside it."""
 
-from __future__ import annotations
-
 import base64
 import re
 import shlex

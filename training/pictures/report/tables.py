@@ -1,7 +1,5 @@
 """The tables of a report, from a summary."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """One walk: played, told in lines while it goes on, filmed, and its figures in words."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Plots over time beside the scene, a line for each controller."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A clip that follows a command, made of pieces that are searched for as it goes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

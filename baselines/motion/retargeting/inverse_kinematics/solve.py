@@ -1,7 +1,5 @@
 """One interface to all methods of inverse kinematics."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two points that keep a distance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal

@@ -1,7 +1,5 @@
 """The CoM, or another point, over the planted soles."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal

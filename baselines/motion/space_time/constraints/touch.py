@@ -1,7 +1,5 @@
 """A part of the body that touches another one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
