@@ -56,12 +56,15 @@ class GaitFigures:
     j50: float | None = None
 
 
-#: of `GaitFigures`
+#: of `GaitFigures`; a terminal has no room for the longest names
 COLUMNS = (
     Figure("falls", "fell", ".0f", of="starts"),
     FOLLOWED[0],
     FOLLOWED[3],
-    *COSTS[:4],
+    replace(COSTS[0], name="CoT"),
+    COSTS[1],
+    replace(COSTS[2], name="knee"),
+    replace(COSTS[3], unit=""),
     Figure("knee_rmse", "RMSE to humans", ".2f"),
     Figure("force_peak", "force peak", ".2f", "m g"),
     Figure("height_amplitude", "height ±", ".1f", "mm", scale=1e3),
@@ -76,7 +79,7 @@ def print_gaits(figures: Sequence[GaitFigures], console: Console) -> None:
         own = [vars(each) for each in figures if each.speed == speed]
         rows = (([each["controller"]], each) for each in own)
         table = figure_table(f"{speed:g} m/s", ["controller"], known(COLUMNS, own), rows)
-        table.columns[0].min_width = 11  # so that no name is broken
+        table.columns[0].no_wrap = True  # so that no name is broken
         console.print(table)
 
 
