@@ -73,36 +73,4 @@ if TYPE_CHECKING:
     from poise.baselines.whole_body.gains import MomentumQPConfig
     from poise.baselines.whole_body.momentum_qp import MomentumQP
 else:
-    __getattr__, __dir__ = lazy(
-        __name__,
-        {
-            "controller": (
-                "BaseController",
-                "CompiledController",
-                "Controller",
-                "Targets",
-                "WrappedController",
-            ),
-            "environments.residual": ("ResidualBalanceEnv",),
-            "environments.scales": ("ResidualScales", "StepScales", "WholeScales"),
-            "environments.stepping": ("ResidualStepEnv",),
-            "environments.walking": ("ResidualWalkEnv",),
-            "environments.whole": ("ResidualWholeEnv",),
-            "motion.retargeting.inverse_kinematics.goals": ("IkGoal",),
-            "motion.retargeting.inverse_kinematics.options": ("IkOptions", "IkResult"),
-            "motion.retargeting.inverse_kinematics.prior": ("PosePrior",),
-            "motion.retargeting.inverse_kinematics.solve": ("InverseKinematics", "solve_ik"),
-            "balance.references.motion": ("load_motion",),
-            "balance.references.reference_motion": ("ReferenceMotion",),
-            "registry": ("load_controller",),
-            "motion.space_time.retarget_clip": ("retarget_clip",),
-            "balance.stepping.capture_step": ("CaptureStep",),
-            "balance.stepping.planning.config": ("CaptureStepConfig",),
-            "balance.stepping.controller": ("SteppingController",),
-            "walking.planner.command": ("GaitCommand",),
-            "walking.controller": ("WalkingController",),
-            "walking.schedule": ("CommandSampler",),
-            "whole_body.gains": ("MomentumQPConfig",),
-            "whole_body.momentum_qp": ("MomentumQP",),
-        },
-    )
+    __getattr__, __dir__ = lazy(__name__, __file__)

@@ -10,8 +10,6 @@ it is to run its module. `find_plugin`, the one function that imports what has b
 A scope ends with its block, in its thread; processes are sent it with their work (`carried`).
 """
 
-from __future__ import annotations
-
 import functools
 import inspect
 import os

@@ -1,7 +1,5 @@
 """Controllers and policies from outside this package, by `module:Class` or `file.py:Class`."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib
 import importlib.util

@@ -1,7 +1,5 @@
 """Archives that anybody may have written, unpacked within bounds: zip files, and arrays in them."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Sequence

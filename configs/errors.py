@@ -1,7 +1,5 @@
 """Exceptions that a user of Poise may catch; all share one base class."""
 
-from __future__ import annotations
-
 import difflib
 import re
 import reprlib

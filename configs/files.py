@@ -1,7 +1,5 @@
 """Files: packaged ones by name, and files that are written whole or not at all."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Configurations that are told apart by their `kind`, each kind in a file of its own."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Iterator

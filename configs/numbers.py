@@ -1,7 +1,5 @@
 """Numbers that a caller hands over, looked at before anything is computed with them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from numbers import Integral
 from typing import Any

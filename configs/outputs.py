@@ -1,7 +1,5 @@
 """What a command is to write: refused before anything is computed, and nothing is made."""
 
-from __future__ import annotations
-
 import errno
 import os
 from pathlib import Path

@@ -4,8 +4,6 @@ What comes back are plain values; everything else is a ConfigError of one line, 
 a file that is missing, too large, no file at all, or not what it should be.
 """
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import io

@@ -1,7 +1,5 @@
 """Configuration as dataclasses: read YAML, build strictly, write back."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import types

@@ -5,8 +5,6 @@ A name comes from a file, a folder or a result of somebody else. Where it goes i
 by themselves, and a `Terminal` prints what cannot be printed as an escape.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path

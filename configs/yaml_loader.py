@@ -1,7 +1,5 @@
 """The reader of YAML: PyYAML's safe loader, within bounds, with two of its surprises removed."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Any

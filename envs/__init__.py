@@ -69,32 +69,4 @@ if TYPE_CHECKING:
     from poise.envs.viewing.gl import choose_gl_backend
     from poise.envs.viewing.renderer import SceneRenderer
 else:
-    __getattr__, __dir__ = lazy(
-        __name__,
-        {
-            "balance.base": ("BalanceEnv",),
-            "balance.config": ("EnvConfig",),
-            "balance.mdp.observation": ("observation_table",),
-            "balance.position": ("PositionBalanceEnv",),
-            "balance.mdp.reward": ("RewardWeights",),
-            "balance.servos": ("ServoConfig",),
-            "balance.mdp.termination": ("FallLimits",),
-            "balance.torque": ("TorqueBalanceEnv",),
-            "physics.simulation": ("Simulation",),
-            "physics.state": ("RobotState",),
-            "balance.plain_info": ("PlainInfo",),
-            "physics.pushes.options": ("parse_pushes",),
-            "physics.pushes.push": ("Kick", "Push"),
-            "physics.pushes.sampler": ("PushSampler",),
-            "robots.robot": ("Robot", "load_robot", "on_terrain"),
-            "sensing.estimator": ("EstimatedState", "EstimatorConfig"),
-            "sensing.realism": ("Realism",),
-            "sensing.source": ("StateSource",),
-            "terrain.terrain": ("Terrain", "make_terrain"),
-            "balance.vector.batch": ("EnvBatch", "replicate"),
-            "balance.vector.vector_env": ("BalanceVectorEnv",),
-            "viewing.camera": ("Camera",),
-            "viewing.gl": ("choose_gl_backend",),
-            "viewing.renderer": ("SceneRenderer",),
-        },
-    )
+    __getattr__, __dir__ = lazy(__name__, __file__)

@@ -54,26 +54,4 @@ if TYPE_CHECKING:
     from poise.training.pictures.figures.video import frame_strip, record
     from poise.training.pictures.report.page import write_report
 else:
-    __getattr__, __dir__ = lazy(
-        __name__,
-        {
-            "benchmarking.evaluation.evaluate": ("benchmark", "evaluate"),
-            "deploy.export.dataset": ("write_dataset",),
-            "deploy.export.export": ("export_policy",),
-            "pictures.figures.video": ("frame_strip", "record"),
-            "learning.config": ("TrainConfig", "train_config"),
-            "learning.policy": ("Policy", "load_policy"),
-            "learning.train": ("train",),
-            "learning.seeds.train": ("train_seeds",),
-            "learning.vec_env": ("ThreadedVecEnv",),
-            "pictures.report.page": ("write_report",),
-            "benchmarking.results.compare": ("compare",),
-            "benchmarking.results.read": ("load_results",),
-            "benchmarking.results.replay": ("replay",),
-            "deploy.standalone.controller": ("StandaloneController", "load_standalone"),
-            "deploy.standalone.measurement": ("Measurement",),
-            "deploy.standalone.readings": ("Readings",),
-            "deploy.standalone.sensed": ("MotorCommand", "SensedController"),
-            "learning.tuning.search": ("tune",),
-        },
-    )
+    __getattr__, __dir__ = lazy(__name__, __file__)

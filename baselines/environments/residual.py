@@ -213,7 +213,6 @@ class ResidualBalanceEnv(ControlledEnv):
         set_targets(self._target_inputs())
 
     def _target_inputs(self) -> TargetInputs:
-        """The block for `set_targets`; the same object until something is replaced."""
         if self._inputs is None:
             source = self.state_source
             self._inputs = TargetInputs(

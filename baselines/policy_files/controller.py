@@ -207,12 +207,10 @@ class PolicyFile(CompiledController):
     def compiled_tick(
         self, state: RobotState, targets: Targets
     ) -> tuple[Kernel[PolicyTick], PolicyTick]:
-        """See `CompiledController`."""
         tick = self.tick(state)
         return address_of(policy_tick, tick), tick
 
     def outputs(self) -> Outputs:
-        """See `Outputs`."""
         s = self._servos
         servos = ServoOutputs(s.target, s.stiffness, s.damping)
         return Outputs(s.tau, self._no_wrench, self._failures, False, servos=servos)

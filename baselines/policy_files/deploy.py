@@ -1,7 +1,5 @@
 """Configurations of other projects that say how a policy is deployed, as fields of Poise's own."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar

@@ -1,7 +1,5 @@
 """The joints of a robot that a policy moves, and the gains of all joints."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

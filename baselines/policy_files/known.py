@@ -1,7 +1,5 @@
 """Public policies that are known: where their networks are looked for, and found by their sums."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Iterator

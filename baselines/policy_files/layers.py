@@ -1,7 +1,5 @@
 """The layers of a policy's network, out of its ONNX file or TorchScript."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

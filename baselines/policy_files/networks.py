@@ -1,7 +1,5 @@
 """The network of a policy: numbers in, numbers out, with whatever it remembers in between."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Mapping, Sequence
@@ -12,7 +10,7 @@ import numpy as np
 
 from poise.baselines.allowance import is_script
 from poise.configs.errors import ConfigError, PoiseError
-from poise.configs.extras import how_to_install
+from poise.configs.extras import needing
 from poise.configs.reading import read_bytes
 
 from .config import Memory, PolicyFileConfig
@@ -20,7 +18,6 @@ from .onnx.bounds import Clocked
 from .onnx.files import BYTES
 
 MEMORY = 10_000_000  # numbers that a network may remember, of each kind
-HOW = f"needs the package onnxruntime: {how_to_install('onnx')}"
 #: ONNX's types of an input → NumPy's
 TYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(float16)": np.float16,
          "tensor(int64)": np.int64, "tensor(int32)": np.int32}  # fmt: skip
@@ -55,10 +52,8 @@ def load_network(path: Path, config: PolicyFileConfig | None = None) -> Network:
 
 def onnx_session(path: Path) -> Any:
     """onnxruntime's session of a file, on one thread: results do not depend on the machine's."""
-    try:
+    with needing("onnx", path):
         import onnxruntime
-    except ImportError:
-        raise ConfigError(HOW, source=path) from None
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3

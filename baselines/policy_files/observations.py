@@ -1,7 +1,5 @@
 """The observations of a policy: terms side by side, of one step or of several."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """From a YAML file, a folder or an ONNX file to the configuration of a policy."""
 
-from __future__ import annotations
-
 import shlex
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a policy sees: terms by the names of mjlab, Isaac Lab and legged_gym."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The compiled dual active-set method behind the solver interface."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, field
 

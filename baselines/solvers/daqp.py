@@ -1,7 +1,5 @@
 """DAQP, a dual active-set method in C [Arnstrom22], behind the solver interface."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, field
 

@@ -6,8 +6,6 @@ the active ones depend on each other in the metric of H⁻¹. Rows of unit lengt
 variables do well; in the metric of H⁻¹ they took ten times the iterations on the momentum QP.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import asdict, dataclass, field
 

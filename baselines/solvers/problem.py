@@ -1,7 +1,5 @@
 """A quadratic program, its solution, how good that is, and who finds it: solvers by name."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from dataclasses import dataclass

@@ -151,7 +151,6 @@ class Simbicon(Commanded, BaseController):
         return self.stage // 2
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] for the next `period`."""
         if self._yaw is None:
             self._yaw = state.heading_yaw
         self._clock += self.period

@@ -227,12 +227,10 @@ class Walk(Commanded, CaptureStep):
         )  # fmt: skip
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
-        """Return the kernel that compiled code calls instead of `torques`, and its block."""
         tick = self.walk_tick(state, targets)
         return address_of(walk_tick, tick), tick
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] for the next `period`."""
         tick = self.walk_tick(state, targets)
         walk_tick(tick)
         if tick.capture.to_python[0]:

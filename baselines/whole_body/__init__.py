@@ -15,11 +15,4 @@ if TYPE_CHECKING:
     from poise.baselines.whole_body.limits.limit import Bounds
     from poise.baselines.whole_body.tasks.task import Rows
 else:
-    __getattr__, __dir__ = lazy(
-        __name__,
-        {
-            "formulation": ("build",),
-            "limits.limit": ("Bounds",),
-            "tasks.task": ("Rows",),
-        },
-    )
+    __getattr__, __dir__ = lazy(__name__, __file__)

@@ -184,11 +184,6 @@ class ContactSets(Copyable):
         forget(self.memory)
         self.chosen[0], self.follows[0] = -1, 0
 
-    def follow(self, torques: np.ndarray) -> None:
-        """Go on from the joint `torques` (nv−6,) of another controller's last tick."""
-        self.applied[:] = self.memory.torques[:] = torques
-        self.follows[0] = 1
-
     def problem(
         self,
         state: RobotState,

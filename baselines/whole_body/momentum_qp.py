@@ -221,7 +221,6 @@ class AroundQP(BaseController):
 
     @property
     def failures(self) -> int:
-        """Ticks since the reset at which the QP was not solved."""
         return self.qp.failures
 
     @property

@@ -1,7 +1,5 @@
 """A wrapper whose `info` is arrays throughout, for recorders that take nothing else."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym

@@ -5,8 +5,6 @@ data with a model of its own. What shared memory, or held an address of it, woul
 that of the original. So arrays and data are handed to them as what stands for them here.
 """
 
-from __future__ import annotations
-
 import copy
 import pickle
 from typing import Any

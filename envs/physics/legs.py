@@ -1,7 +1,5 @@
 """The joints of a leg: how far its knee is bent, and the axes that its ankle turns about."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import mujoco

@@ -1,7 +1,5 @@
 """Actuators of any kind become plain torque motors: the control is the joint torque in N·m."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

@@ -1,7 +1,5 @@
 """The description of a robot: which model it is, where its feet are, how it stands."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Literal, TypeVar

@@ -1,7 +1,5 @@
 """The floor of a robot's world: of whatever a model has, one level plane, z = 0."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

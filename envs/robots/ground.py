@@ -1,7 +1,5 @@
 """Contacts with the ground: who touches whom, friction, the sensors that count; options."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import mujoco

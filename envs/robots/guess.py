@@ -1,7 +1,5 @@
 """A description guessed from a model alone: root, feet, forward, posture, armature, roles."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The models of MuJoCo Menagerie on this machine. They are public robots; Poise ships none."""
 
-from __future__ import annotations
-
 import glob
 import importlib.util
 import os

@@ -1,8 +1,6 @@
 """Models that MuJoCo takes and Poise cannot play: endless, with numbers that are none, with a root
 that does not float, with other things that move."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 
@@ -73,7 +71,8 @@ def check_bodies(model: mujoco.MjModel, description: RobotDescription, source: s
 def _check_root(model: mujoco.MjModel, root: int, source: str) -> None:
     """The root hangs on the world by a free joint, and nothing else moves."""
     name, top = model.body(root).name, int(model.body_rootid[root])
-    above = _joints(model, [root, *_ancestors(model, root)])
+    bodies = [root, *_ancestors(model, root)]
+    above = [i for i in range(model.njnt) if model.jnt_bodyid[i] in bodies]
     kinds = [int(model.jnt_type[joint]) for joint in above]
     floating = [model.body(model.jnt_bodyid[i]).name for i in range(model.njnt)
                 if model.jnt_type[i] == FREE]  # fmt: skip
@@ -105,10 +104,6 @@ def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:
     while (body := int(model.body_parentid[body])) != 0:
         found.append(body)
     return found
-
-
-def _joints(model: mujoco.MjModel, bodies: list[int]) -> list[int]:
-    return [i for i in range(model.njnt) if model.jnt_bodyid[i] in bodies]
 
 
 def _named(model: mujoco.MjModel, joints: list[int]) -> str:

@@ -1,7 +1,5 @@
 """A robot: a floating-base biped, compiled from its description for everything built on it."""
 
-from __future__ import annotations
-
 import hashlib
 import shlex
 import warnings

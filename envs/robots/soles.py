@@ -1,7 +1,5 @@
 """Soles: the flat polygon on which a foot stands, found from its collision geometry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 

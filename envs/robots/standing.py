@@ -1,7 +1,5 @@
 """The standing posture: both soles exactly flat on the ground, the robot facing along +x."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import mujoco
@@ -158,7 +156,7 @@ def centre_com(
         values, jacobian = _stance(model, data, root, feet, planes)
         if max(np.abs(level).max(), np.abs(values - goal).max()) < TOLERANCE:
             break
-        jacobian = np.where(_one_leg(rows), jacobian, 0.0)
+        jacobian = np.where(np.any(rows != 0.0, axis=0), jacobian, 0.0)  # the dofs of one leg
         inverse = np.linalg.pinv(rows, rcond=CUT_OFF)
         change = -inverse @ level
         free = np.eye(model.nv) - inverse @ rows
@@ -183,11 +181,6 @@ def _turn(model: mujoco.MjModel, data: mujoco.MjData, change: np.ndarray) -> Non
     """Move the joints by (nv,), no joint by more than `STEP`."""
     shorter = min(1.0, STEP / max(float(np.abs(change).max()), 1e-12))
     mujoco.mj_integratePos(model, data.qpos, shorter * change, 1.0)
-
-
-def _one_leg(rows: np.ndarray) -> np.ndarray:
-    """(nv,) the dofs that `_levelness` moves."""
-    return np.any(rows != 0.0, axis=0)
 
 
 def _stance(

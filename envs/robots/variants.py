@@ -1,7 +1,5 @@
 """A robot that differs from the described one: longer steps of its physics."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The robot of one episode, drawn from a level."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The simulated robot that an episode draws: one model, changed in place at every reset."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import replace
 

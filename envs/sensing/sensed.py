@@ -1,7 +1,5 @@
 """A robot in a simulation, how real it is, and the source of what is believed of its state."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import mujoco

@@ -1,7 +1,5 @@
 """The source of the state that a controller and a policy believe: by default the truth."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from poise.envs.compiled.calls import Program, run

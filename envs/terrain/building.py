@@ -1,7 +1,5 @@
 """Terrain in MuJoCo: a box under every surface, and the sensors that see all of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import mujoco

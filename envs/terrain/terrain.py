@@ -1,8 +1,6 @@
 """What a robot walks on: surfaces above a floor, as a robot's planner believes them, and as they
 are."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple
@@ -78,16 +76,13 @@ class Terrain(OfKind):
 
     def floor(self) -> float:
         """The height of the plane below all surfaces [m]."""
-        lowest = [_lowest(surface) for surface in self.surfaces()]
+        lowest = [each.height - 0.5 * abs(each.gradient) * (each.x_max - each.x_min)
+                  for each in self.surfaces()]  # fmt: skip
         return min([0.0, *lowest])
 
     def height(self, x: float, y: float) -> float:
         """The height of the ground at (x, y) [m]."""
         return height_at(self.surfaces(), self.floor(), x, y)
-
-
-def _lowest(surface: Surface) -> float:
-    return surface.height - 0.5 * abs(surface.gradient) * (surface.x_max - surface.x_min)
 
 
 def height_at(surfaces: Sequence[Surface], floor: float, x: float, y: float) -> float:

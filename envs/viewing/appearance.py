@@ -1,7 +1,5 @@
 """A copy of a robot's model that looks good: light, ground, sky. The original is not touched."""
 
-from __future__ import annotations
-
 import copy
 
 import mujoco

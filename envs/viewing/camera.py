@@ -1,7 +1,5 @@
 """The camera: Poise's own, which follows the robot, or one of the robot's model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 

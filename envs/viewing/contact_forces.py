@@ -1,7 +1,5 @@
 """The forces that bodies have from the ground, as arrows."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

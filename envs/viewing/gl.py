@@ -1,7 +1,5 @@
 """Choose MuJoCo's off-screen renderer. Does not import MuJoCo, which reads the choice only once."""
 
-from __future__ import annotations
-
 import ctypes.util
 import os
 import sys

@@ -1,7 +1,5 @@
 """An off-screen OpenGL buffer. Several may live side by side, and close in any order."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from typing import ClassVar

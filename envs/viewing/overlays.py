@@ -15,8 +15,6 @@ lowest. `contact_forces.py` has one more mark, and a planned foothold is a sky b
 (`foothold_mark`).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mujoco

@@ -4,8 +4,6 @@ The colours are from Okabe and Ito's palette, told apart with any colour vision.
 them in a picture means this quantity and nothing else.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 RGB = tuple[float, float, float]  # of 0 to 1

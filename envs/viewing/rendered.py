@@ -1,7 +1,5 @@
 """Environments that can be drawn: what Gymnasium asks of one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 

@@ -1,7 +1,5 @@
 """Pictures of a simulation, off-screen or in MuJoCo's viewer. The simulation is only read."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 

@@ -1,7 +1,5 @@
 """MuJoCo's passive viewer: a window that shows what it is given, and closes without a crash."""
 
-from __future__ import annotations
-
 import atexit
 import threading
 import warnings

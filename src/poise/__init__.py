@@ -82,16 +82,4 @@ if TYPE_CHECKING:
     from poise.training.deploy.standalone.controller import load_standalone
     from poise.training.learning.policy import load_policy, make_env
 else:
-    __getattr__, __dir__ = lazy(
-        __name__,
-        {
-            "": ("baselines", "envs", "training"),
-            "baselines.allowance": ("allowing",),
-            "baselines.registry": ("load_controller",),
-            "configs.errors": ("ConfigError", "PoiseError"),
-            "envs.robots.robot": ("load_robot",),
-            "training.benchmarking.evaluation.evaluate": ("benchmark", "evaluate"),
-            "training.learning.policy": ("load_policy", "make_env"),
-            "training.deploy.standalone.controller": ("load_standalone",),
-        },
-    )
+    __getattr__, __dir__ = lazy(__name__, __file__)

@@ -2,39 +2,48 @@
 
 from __future__ import annotations
 
+import ast
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
+from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 
-def lazy(
-    package: str, modules: Mapping[str, Sequence[str]]
-) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """`__getattr__` and `__dir__` for a package whose public names stand in its modules.
+def lazy(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """`__getattr__` and `__dir__` for a package in whose `file` a block imports the public names.
 
-    `modules` maps a module, relative to the package, to its names, as an import writes them:
-    ``name``, or ``name as other``. The names of the empty module are subpackages.
+    The block is that of ``if TYPE_CHECKING:``, which Python does not run: it is read here, so that
+    editors, type checkers and users get every name from the same line.
     """
-    places = {
-        line.split()[-1]: (module, line.split()[0])
-        for module, lines in modules.items()
-        for line in lines
-    }
+
+    @cache
+    def places() -> dict[str, tuple[str, str]]:
+        """Public name → its module, and its name there."""
+        body = ast.parse(Path(file).read_bytes()).body
+        blocks = [node for node in body if isinstance(node, ast.If)]
+        (block,) = (node for node in blocks if ast.unparse(node.test) == "TYPE_CHECKING")
+        imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
+        return {
+            alias.asname or alias.name: (str(node.module), alias.name)
+            for node in imports
+            for alias in node.names
+        }
 
     def find(name: str) -> Any:
         itself = sys.modules[package]
-        if name not in places:
+        if name not in places():
             message = f"module {package!r} has no attribute {name!r}"
             raise AttributeError(message, name=name, obj=itself)
-        module, own = places[name]
-        if not module:
+        module, own = places()[name]
+        if module == package:  # a package in it
             return import_module(f"{package}.{own}")
-        value = getattr(import_module(f"{package}.{module}"), own)
+        value = getattr(import_module(module), own)
         setattr(itself, name, value)  # the next lookup does without this function
         return value
 
     def names() -> list[str]:
-        return sorted({*vars(sys.modules[package]), *places})
+        return sorted({*vars(sys.modules[package]), *places()})
 
     return find, names

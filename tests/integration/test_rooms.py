@@ -39,7 +39,7 @@ FLOORS = """
  9 baselines/balance/in_place, baselines/balance/stepping/planning, baselines/motion/feasibility
  9 baselines/motion/retargeting, baselines/policy_files, envs/balance/vector
 10 baselines/balance/stepping, baselines/motion/space_time/constraints
-10 baselines/motion/synthesis, envs, training/motion/open_loop
+10 baselines/motion/synthesis, envs
 11 baselines/motion/performing, baselines/motion/space_time, baselines/walking/planner
 12 baselines/walking
 13 baselines/registry
@@ -261,3 +261,15 @@ def test_the_walks_of_the_architecture_name_what_there_is() -> None:
             found = [node for node in inside if getattr(node, "name", None) == part]
             assert found, (path, name)
             inside = getattr(found[0], "body", [])
+
+
+def test_the_places_of_the_architecture_hold_what_they_are_told_to() -> None:
+    """Each name of *Where things are* is defined in one of the files beside it."""
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    table = page.partition("## Where things are\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| [^|]+ \| ([^|]+) \| ([^|]+) \|$", table, re.M)
+    assert len(rows) > 15
+    for places, names in rows[2:]:
+        files = re.findall(r"`([\w/]+/[\w/]+\.py)`", places)
+        defined = {getattr(node, "name", None) for path in files for node in sources()[path].body}
+        assert set(re.findall(r"`(\w+)`", names)) <= defined, places

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from poise.baselines.balance.stepping.planner import StepPlan
 from poise.baselines.balance.stepping.planning.cop_region import (
     DIRECTIONS,
     LOAD_FRACTIONS,
@@ -12,6 +11,7 @@ from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.recentring import LOADING, SHIFTING
 from poise.envs.compiled.maths.polygons import nearest_inside
 from poise.envs.compiled.maths.vectors import turn
+from tests.support.planned import StepPlan
 
 FROZEN = 0.03
 

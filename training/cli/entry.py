@@ -105,11 +105,6 @@ def _unread(stream: TextIO | None) -> bool:
     return bool(poll.poll(0))
 
 
-def _unknown(name: str) -> ConfigError:
-    """The error of a sub-command that does not exist, with the one that it looks like."""
-    return ConfigError(f"no such command: {shown(name)}{meant(name, COMMANDS)}", choices=COMMANDS)
-
-
 def _shell(given: list[str]) -> str:
     """The shell that a completion is asked for; raises ConfigError for any other."""
     if len(given) != 1 or given[0] not in SHELLS:
@@ -130,7 +125,9 @@ def _run(args: list[str]) -> int:
     if name.startswith("-"):
         raise ConfigError(f"no such option{suggestion(name, ALONE)}", field=name, choices=ALONE)
     if name not in COMMANDS:
-        raise _unknown(name)
+        raise ConfigError(
+            f"no such command: {shown(name)}{meant(name, COMMANDS)}", choices=COMMANDS
+        )
     if name == "train":  # its flags are the fields of a heavy dataclass
         check_flags(given, {"--config": "training", "--robot": "robots"})
         from .train import run

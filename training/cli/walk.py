@@ -65,9 +65,10 @@ def walk(
     check_names([controller], robot=robot, realism=realism)
     from poise.training.pictures.sessions.walk import walk
 
-    walk(speed, left=left, turn=math.radians(turn), step_time=step_time,
-         step_length=step_length, width=width, clearance=clearance, arm_swing=arm_swing,
-         duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
+    command = {"ahead": speed, "left": left, "turn": math.radians(turn), "step_time": step_time,
+               "step_length": step_length, "width": width, "clearance": clearance,
+               "arm_swing": arm_swing}  # fmt: skip
+    walk(command, duration=duration, controller=controller, robot=robot, terrain=_terrain(terrain),
          realism=realism, push=push, push_at=push_at, seed=seed, video=video, say=_say,
          allow=allow)  # fmt: skip
 

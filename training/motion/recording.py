@@ -4,8 +4,6 @@ They are keyframes of the default humanoid, in configs/motions and configs/clips
 file of anybody else is needed to try retargeting, motion graphs and scripts.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path

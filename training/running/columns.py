@@ -4,8 +4,6 @@ The terminal, the leaderboard (Markdown) and the report (HTML and CSV) take name
 words from here. `summary.json` and the CSV files have the figures in SI units.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
@@ -32,6 +30,7 @@ class Figure:
         scale: SI units times this are `unit`.
         ends: key of its 95 % interval.
         of: key of the count that it is a part of; the terminal then says "2 of 9".
+        beside: key of a count that is told with it; the terminal then says "2, 9".
         bound: key of what it is only a bound of.
         csv: its name in the report's CSV files, where it is not `key`.
         where: whether an entry is one that the figure says something of; not given: all are.
@@ -45,6 +44,7 @@ class Figure:
     scale: float = 1.0
     ends: str = ""
     of: str = ""
+    beside: str = ""
     bound: str = ""
     csv: str = ""
     where: Callable[[Entry], object] | None = None
@@ -75,6 +75,7 @@ class Figure:
             return NONE
         text = f"{self.sign(entry)}{self.scale * value:{self.form}}"
         if not self.ends:
+            text += f", {entry[self.beside]}" if self.beside else ""
             return f"{text} of {entry[self.of]}" if self.of else text
         return f"{text} {self.range(entry)}"
 
@@ -175,13 +176,23 @@ AT_LEVEL = (
 # of a cause of lost trials
 LOSSES = Figure("trials", "losses", ".0f")
 
-# of two controllers on the same trials
+# of two controllers, or of a level and the standard case, on the same trials
 PAIRED = (
     Figure("both", "both", ".0f", words="recovered by both"),
     Figure("only_a", "only a (lost)", ".0f", words="lost by b"),
     Figure("only_b", "only b (won)", ".0f", words="won by b"),
     Figure("neither", "neither", ".0f"),
 )
+AGAINST = (
+    Figure(
+        "lost", "lost", ".0f", words="trials that what it is compared with recovers, and this not"
+    ),
+    Figure(
+        "won", "won", ".0f", words="trials that this recovers, and what it is compared with not"
+    ),
+)
+LOST_WON = Figure("only_a", "lost, won", ".0f", beside="only_b",
+                  words="of the trials that both played")  # fmt: skip
 P_VALUE = Figure("p_mcnemar", "McNemar p", ".2g", words="McNemar's exact test of lost against won")
 GAIN = Figure("j50_gain", "J50 gain", "+.1%", words="of b over a, relative", ends="j50_gain_ci95")
 

@@ -1,7 +1,5 @@
 """A file of finished trials, one JSON line each, that a kill or a full disk cannot spoil."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import json

@@ -28,7 +28,6 @@ class Guided(AroundQP, ABC):
         """(2,) p [m], the CoP that the pendulum is to have."""
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] for the next `period`."""
         if self._guided is None:
             self._guided = Targets.standing(self.robot, state)
         guided = self._guided

@@ -65,7 +65,6 @@ class JacobianTranspose(BaseController):
         return np.concatenate([force, k * (turn + c.root_damping / omega * rate)])
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] for the next `period`."""
         wrenches = sole_wrenches(state, self.virtual_wrench(state, targets))
         tau = joint_torques(state, wrenches)
         tau += self.stiffness * (targets.q_ref - state.q)

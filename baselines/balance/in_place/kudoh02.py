@@ -55,7 +55,6 @@ class Kudoh02(AroundQP):
         self._qp_fraction = 0.0  # of the QP in the torques
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] for the next `period`."""
         away = np.linalg.norm(state.capture_point - targets.com[:2])
         limit = self.config.near if self.large else self.config.far
         self.large = bool(away > limit * self.robot.height_com)

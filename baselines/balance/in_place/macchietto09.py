@@ -36,6 +36,5 @@ class Macchietto09(AroundQP):
         self.qp.parameters.torque_limit[:] *= UNBOUND
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] for the next `period`."""
         limit = self.robot.torque_limit
         return np.clip(self.qp.torques(state, targets), -limit, limit)

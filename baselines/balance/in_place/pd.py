@@ -65,7 +65,6 @@ class PD(BaseController):
         """Nothing is remembered."""
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] for the next `period`."""
         tau = self.stiffness * (targets.q_ref - state.q)
         tau += self.damping * (targets.v_ref - state.qvel[6:])
         if self.config.feedforward:
@@ -114,7 +113,6 @@ class StablePD(BaseController):
         """Nothing is remembered."""
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] for the next `period`."""
         v = state.qvel[6:]
         tau = self.stiffness * (targets.q_ref - state.q - self.period * v)
         tau += self.damping * (targets.v_ref - v)

@@ -1,7 +1,5 @@
 """Steps of keyframe motions: when a foot is in the air, and the way that it goes there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """A motion whose feet leave the ground, with a centre of mass that the soles on it can bear."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mujoco

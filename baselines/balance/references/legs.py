@@ -1,7 +1,5 @@
 """Postures with a given centre of mass, trunk and arms whose legs reach the soles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import mujoco

@@ -1,7 +1,5 @@
 """A robot's postures as frames: a file of them, and the reference motion that they make."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

@@ -1,7 +1,5 @@
 """Where the soles of a robot's postures stand: as in standing or not, moved, and put to rest."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import NamedTuple, TypedDict
+from typing import TypedDict
 
 import numpy as np
 
@@ -19,18 +19,7 @@ from .planning.blocks import Search
 from .planning.config import FallFeedback, FootholdChoice, PivotConfig, StepFeedback, StepLimits
 from .planning.cop_region import CopRegion
 from .planning.feedback import feedback_arrays
-from .planning.search import capture_foothold, plan_step, replan_step, set_foot
-from .planning.swing import Swing
-
-
-class StepPlan(NamedTuple):
-    """A step."""
-
-    foot: int  #: the foot that steps
-    foothold: np.ndarray  #: (2,) [m]
-    time: float  #: from now to touchdown [s]
-    cost: float  #: [m]
-    time_offset: float = 0.0  #: part of the time that feedback and a policy added [s]
+from .planning.search import capture_foothold
 
 
 class SearchLimits(TypedDict):
@@ -128,46 +117,3 @@ class StepPlanner(Copyable):
             best_foot=guarded_zeros(1, dtype=np.int64),
             foothold_rule=NO_KERNEL,
         )
-
-    def _along(self, state: RobotState, yaw: float) -> Search:
-        search = self.search(state)
-        search.heading[:] = np.cos(yaw), np.sin(yaw)
-        return search
-
-    def plan(self, state: RobotState, yaw: float) -> StepPlan:
-        """The best step of either foot from where they stand."""
-        search = self._along(state, yaw)
-        plan_step(search)
-        return best_plan(search)
-
-    def replan(self, state: RobotState, foot: int, yaw: float, swing: Swing) -> StepPlan:
-        """The foothold and the time left of a running step."""
-        search = self._along(state, yaw)
-        replan_step(search, foot, swing.arrays)
-        return best_plan(search)
-
-    def footholds(
-        self, state: RobotState, foot: int, yaw: float, times: np.ndarray, start: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Footholds (n, 2) of steps of `foot` that land after `times` (n,) [s], and how far ξ will
-        then be outside the CoP region of both soles [m], no less than −margin.
-
-        The CoP is taken to stay at p, where the stance sole brakes ξ most, so that ξ drifts to
-        p + (ξ − p) e^(ωt) [Koolen12]; the foothold is what limits of place and speed allow of the
-        one desired there.
-        """
-        search = self._along(state, yaw)
-        set_foot(search, foot)
-        search.start[:] = start
-        footholds, costs = np.empty((len(times), 2)), np.empty(len(times))
-        for k, time in enumerate(times):
-            search.time[0] = time
-            self.foothold_rule(search)
-            footholds[k], costs[k] = search.foothold, search.cost[0]
-        return footholds, costs
-
-
-def best_plan(search: Search) -> StepPlan:
-    """The best step of a search."""
-    x, y, time, cost, offset = search.best.tolist()
-    return StepPlan(int(search.best_foot[0]), np.array([x, y]), time, cost, offset)

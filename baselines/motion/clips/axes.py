@@ -1,7 +1,5 @@
 """What a file leaves open: which axis is up, which way it faces, how long its unit is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

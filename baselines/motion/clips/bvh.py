@@ -1,7 +1,5 @@
 """BVH files in and out; what is written is written by the library pybvh."""
 
-from __future__ import annotations
-
 import tempfile
 import warnings
 from collections.abc import Mapping
@@ -12,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from poise.configs.errors import ConfigError, shown
-from poise.configs.extras import how_to_install
+from poise.configs.extras import needing
 from poise.configs.files import write_atomic
 
 from .axes import FileAxes, axes_of, named_unit, nearest_axis, unit_from_legs
@@ -113,7 +111,9 @@ def write_bvh(clip: Clip, path: str | Path, axes: FileAxes = Y_UP) -> None:
     if Path(path).suffix.lower() != ".bvh":
         raise ConfigError("must be the name of a .bvh file", source=path, choices=("*.bvh",))
     clip = depth_first(clip)
-    from_clip = _library().Bvh(
+    with needing("motion", "motion"):
+        from pybvh import Bvh
+    from_clip = Bvh(
         nodes=_nodes(clip.skeleton, axes),
         root_pos=axes.file_places(clip.root),
         joint_angles=_angles(axes.file_turns(clip.rotations), clip.skeleton.orders),
@@ -148,15 +148,6 @@ def depth_first(clip: Clip) -> Clip:
     return replace(clip, skeleton=moved, rotations=clip.rotations[:, order])
 
 
-def _library():  # a module
-    try:
-        import pybvh
-    except ImportError:
-        raise ConfigError(f"needs the package pybvh: {how_to_install('motion')}",
-                          source="motion") from None  # fmt: skip
-    return pybvh
-
-
 def _angles(turns: np.ndarray, orders: tuple[str, ...]) -> np.ndarray:
     """The Euler angles (F, J, 3) [rad] of rotations (F, J, 4)."""
     angles = np.empty((*turns.shape[:2], 3))
@@ -189,12 +180,9 @@ def _axes(
         up = nearest_axis(_middle(pose, roles, "hip") - _middle(pose, roles, "ankle"))
     if forward == "auto":
         across = raw.rest[roles["hip_left"]] - raw.rest[roles["hip_right"]]
-        forward = nearest_axis(np.cross(across, axes_of(*_any_forward(up)).matrix[2]))
+        any_forward = "x" if up[-1] != "x" else "y"
+        forward = nearest_axis(np.cross(across, axes_of(up, any_forward).matrix[2]))
     return axes_of(up, forward, length, source)
-
-
-def _any_forward(up: str) -> tuple[str, str]:
-    return up, "x" if up[-1] != "x" else "y"
 
 
 def _unit(raw: Skeleton, roles: dict[str, int], source: str) -> float:
@@ -214,20 +202,21 @@ def _signed(axis: str) -> str:
 
 def _nodes(skeleton: Skeleton, axes: FileAxes) -> list[object]:
     """pybvh's tree of a skeleton whose joints are depth first, as files have them."""
-    library = _library()
+    from pybvh import bvhnode  # it is there: `write_bvh` has used it
+
     offsets, tips = axes.file_places(skeleton.offsets), axes.file_places(skeleton.end_offsets)
     nodes: list[object] = []
     made: dict[int, object] = {}
     for i, (name, parent) in enumerate(zip(skeleton.names, skeleton.parents, strict=True)):
         order, above = list(skeleton.orders[i]), made.get(int(parent))
         if above is None:
-            made[i] = library.bvhnode.BvhRoot(name, offsets[i], list("XYZ"), order, [], None)
+            made[i] = bvhnode.BvhRoot(name, offsets[i], list("XYZ"), order, [], None)
         else:
-            made[i] = library.bvhnode.BvhJoint(name, offsets[i], order, [], above)
+            made[i] = bvhnode.BvhJoint(name, offsets[i], order, [], above)
             above.children = [*above.children, made[i]]  # type: ignore[attr-defined]
         nodes.append(made[i])
         for k in np.flatnonzero(skeleton.end_parents == i):
-            end = library.bvhnode.BvhEndSite(f"EndSite{name}", tips[k], made[i])
+            end = bvhnode.BvhEndSite(f"EndSite{name}", tips[k], made[i])
             made[i].children = [*made[i].children, end]  # type: ignore[attr-defined]
             nodes.append(end)
     return nodes

@@ -1,7 +1,5 @@
 """From the channels of a BVH file to a rigid skeleton that hangs on its hips, and how it moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,7 +87,7 @@ def rooted_at_hips(posed: Posed, roles: dict[str, int]) -> Posed:
     rest = above[0] if still else np.array([1.0, 0.0, 0.0, 0.0])
     local = multiply(multiply(rest, posed.turns), inverse(rest))
     local[:, top] = multiply(turns[:, top], inverse(rest))
-    kept = _below(old.parents, top)
+    kept = np.array([joint for joint in range(len(old.parents)) if top in _way(old.parents, joint)])
     moved = replace(posed, shifts=rotate(rest, posed.shifts))
     return _kept(moved, kept, places[:, top], local, rotate(rest, old.offsets), roles, rest)
 
@@ -163,8 +161,3 @@ def _first_branch(parents: np.ndarray) -> int:
     while len(children := np.flatnonzero(parents == joint)) == 1:
         joint = int(children[0])
     return joint if len(children) else 0
-
-
-def _below(parents: np.ndarray, top: int) -> np.ndarray:
-    """A joint and all that hang on it."""
-    return np.array([joint for joint in range(len(parents)) if top in _way(parents, joint)])

@@ -1,7 +1,5 @@
 """The text of a BVH file, read line by line, so that an error says in which line it is."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What a clip's feet do: where they are planted, how much they skate, how deep they sink."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

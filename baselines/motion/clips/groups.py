@@ -1,7 +1,5 @@
 """Link groups: joints of any skeleton chosen by a rule, as a view of a data base is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 

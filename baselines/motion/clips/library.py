@@ -1,7 +1,5 @@
 """The clips that come with Poise, by name, and captured ones where they are found."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

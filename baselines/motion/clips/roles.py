@@ -1,8 +1,6 @@
 """Roles of joints, such as the left knee: by the names that programs give them, and where names
 say nothing, by the shape of the skeleton alone."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence

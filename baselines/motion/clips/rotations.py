@@ -1,7 +1,5 @@
 """Arrays of unit quaternions (…, 4), scalar first, by SciPy's Rotation."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -1,7 +1,5 @@
 """Joins of motions with steps: where both soles stand as in standing, wherever that is."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Whether a robot can do a motion: the ground, the motors and the joints, sample by sample."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

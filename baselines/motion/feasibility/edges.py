@@ -1,7 +1,5 @@
 """A join against its limits, where the first and last samples are also the clips'."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A motion changed until the robot can do it: slower, or with its centre of mass elsewhere."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What the momentum QP makes of a motion that it is exactly on."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

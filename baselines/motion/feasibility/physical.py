@@ -1,7 +1,5 @@
 """The join that a robot can do: how long it lasts and how it bends are chosen by physics."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """A join of a given length, bent until the ground, the motors and the joints allow it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The ground's wrench, shared by the soles; and what the motors then have to do."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull

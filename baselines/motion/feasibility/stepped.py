@@ -1,7 +1,5 @@
 """A motion with steps as a trajectory of the whole robot, on the soles that are planted."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

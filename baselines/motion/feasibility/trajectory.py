@@ -1,7 +1,5 @@
 """A motion of joints as a motion of the whole robot whose soles stay where they are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

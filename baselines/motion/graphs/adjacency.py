@@ -1,7 +1,5 @@
 """Transitions between all pairs of frames of two clips, by the coefficient of a cubic join."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Which parts of a motion graph reach each other: its largest strongly connected component."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components

@@ -1,7 +1,5 @@
 """The k cheapest paths of a graph that meet no node twice."""
 
-from __future__ import annotations
-
 import heapq
 import itertools
 

@@ -6,8 +6,6 @@ in its first quarter and left in its last one. So a way is a way of moments; of 
 clip the later one is reached by playing on.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The moments of clips at which something may begin or end, and the edges between them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Start and goal states: the frames of clips that are nearest to a posture."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

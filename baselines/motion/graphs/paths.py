@@ -1,7 +1,5 @@
 """What a way through a motion graph must do, and such a way."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The cheapest ways through a motion graph that play wanted clips in order."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from poise.configs.errors import ConfigError, shown

@@ -63,7 +63,6 @@ class MotionStep(CaptureStep):
         return super().failures + self.perform_sets.failures
 
     def reset(self, state: RobotState | None = None) -> None:
-        """Forget the last trial."""
         super().reset(state)
         self.perform_sets.reset()
         if self.performance is not None:
@@ -114,14 +113,12 @@ class MotionStep(CaptureStep):
         )  # fmt: skip
 
     def compiled_tick(self, state: RobotState, targets: Targets) -> tuple[Kernel, Block]:
-        """Return the kernel that compiled code calls instead of `torques`, and its block."""
         if self.performance is None:
             return super().compiled_tick(state, targets)
         tick = self.perform_tick(state, targets)
         return address_of(perform_tick, tick), tick
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
-        """Joint torques (nu,) [N·m] for the next `period`."""
         if self.performance is None:
             return super().torques(state, targets)
         tick = self.perform_tick(state, targets)

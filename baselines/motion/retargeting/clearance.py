@@ -1,7 +1,5 @@
 """A limit of mink that keeps a robot's links off the floor and off each other."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Jumps with both feet on a robot: when it leaves the ground, for how long, and where it lands."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

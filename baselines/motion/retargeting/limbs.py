@@ -1,7 +1,5 @@
 """Where a robot has hips, knees, ankles, shoulders, elbows and hands: read off its model."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mujoco

@@ -1,11 +1,8 @@
 """Clips for a robot to be put together from, and the robot's motion of what they became."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -33,7 +30,7 @@ from poise.baselines.motion.clips.support import Support
 from poise.baselines.motion.graphs.joining.coefficient import best_duration, moved_shares
 from poise.baselines.motion.graphs.joining.joins import ends, insert
 from poise.configs.errors import ConfigError
-from poise.configs.extras import how_to_install
+from poise.configs.extras import needing
 from poise.configs.files import packaged_folder
 from poise.configs.reading import MIB, read_bytes
 from poise.envs.robots.robot import Robot
@@ -87,7 +84,9 @@ def planted_qpos(clip: Clip, robot: Robot) -> np.ndarray:
     Raises ConfigError for a clip of another skeleton, PoiseError for a posture to which none with
     planted soles is near.
     """
-    return np.asarray(_plant()(robot, find_limbs(robot), robot_qpos(clip, robot)))
+    with needing("motion", "motion"):
+        from .solve import plant
+    return plant(robot, find_limbs(robot), robot_qpos(clip, robot))
 
 
 def robot_clip_of(clip: Clip, robot: Robot, name: str, source: str = "") -> RobotClip:
@@ -174,12 +173,3 @@ def _led(clip: Clip, robot: Robot) -> Clip:
                                      time_price=TIME_PRICE).duration  # fmt: skip
             clip = replace(insert(*pair, duration), name=clip.name, licence=clip.licence)
     return clip
-
-
-def _plant() -> Any:  # the function `plant`
-    try:
-        from .solve import plant
-    except ImportError as error:
-        raise ConfigError(f"needs the package {error.name}: {how_to_install('motion')}",
-                          source="motion") from None  # fmt: skip
-    return plant

@@ -1,7 +1,5 @@
 """A clip of any skeleton as a motion of a robot: its soles stay planted, or step as the clip's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple
@@ -13,7 +11,7 @@ from poise.baselines.balance.references.robot_clip import RATE, About, RobotClip
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts
 from poise.configs.errors import ConfigError
-from poise.configs.extras import how_to_install
+from poise.configs.extras import needing
 from poise.envs.robots.robot import Robot
 
 from .leaps import FLIGHTS, STANDS, WAYS, Leap, find_leaps, plan_leaps, tempo_of
@@ -116,7 +114,9 @@ def retarget_to(
         return _leaping(leaps, clip, robot, limbs, smooth, lead)
     if steps:
         return _stepped(clip, robot, limbs, smooth, lead)
-    solved = _solver("solve_frames")(robot, limbs, whole, smooth)
+    with needing("motion", "motion"):
+        from .solve import solve_frames
+    solved = solve_frames(robot, limbs, whole, smooth)
     return _retargeted(solved, clip, robot, limbs, begins=lead)
 
 
@@ -155,14 +155,16 @@ def _stepped(clip: Clip, robot: Robot, limbs: Limbs, smooth: float, lead: float)
     """The fastest motion up to the clip's that the robot can do: steps and tempo as of `TRIED`, the
     CoM as high as legs reach then."""
     paces, scale = find_paces(clip), limbs.leg_length / clip.skeleton.leg_length
-    frames, solve = max(round(lead / RATE), 1), _solver("solve_tracks")
+    with needing("motion", "motion"):
+        from .solve_tracks import solve_tracks
+    frames = max(round(lead / RATE), 1)
     solved: dict[float, Any] = {}
     reason, bound = None, ""
     for stride, tempo in TRIED:
         slower = clip if tempo == 1.0 else clip.at_speed(tempo)
         tracks = find_tracks(slower, robot, limbs, smooth, stride)
         if tempo not in solved:
-            solved[tempo] = solve(robot, limbs, tracks, smooth)
+            solved[tempo] = solve_tracks(robot, limbs, tracks, smooth)
         timed = [pace.at_speed(tempo) for pace in paces]
         for low in LOWER:
             plan = plan_paces(timed, tracks, solved[tempo].qpos, robot, frames, scale, low)
@@ -185,7 +187,9 @@ def _leaping(
 ) -> Retargeted:
     """The highest jumps up to the clip's that the robot can do at 0.7 of its way and speed or more,
     slower ones where it would not stand long enough between two; if there are none, the fastest."""
-    solve, solved = _solver("solve_tracks"), {}
+    with needing("motion", "motion"):
+        from .solve_tracks import solve_tracks
+    solved: dict[float, Any] = {}
     longest, reason = min(leap.land - leap.lift for leap in leaps), None
     bound = f"it has to stand for {STANDS:g} s between two jumps"
     flights = [each for each in FLIGHTS if each <= longest]
@@ -195,7 +199,7 @@ def _leaping(
     for flight, way, tempo in tried:
         if tempo not in solved:
             tracks = find_tracks(clip.at_speed(tempo), robot, limbs, smooth)
-            solved[tempo] = tracks, solve(robot, limbs, tracks, smooth)
+            solved[tempo] = tracks, solve_tracks(robot, limbs, tracks, smooth)
         timed = [Leap(leap.lift / tempo, leap.land / tempo) for leap in leaps]
         tracks, one = solved[tempo]
         frames = max(round(lead / RATE), 1)
@@ -234,25 +238,13 @@ def retarget_freely(clip: Clip, robot: Robot, *, smooth: float = SMOOTH) -> Reta
         ConfigError: unknown joints, fewer than 8 frames, mink is missing.
         PoiseError: no posture keeps the soles and the limits.
     """
+    with needing("motion", "motion"):
+        from .solve_tracks import solve_tracks
     limbs, stride = find_limbs(robot), 1.0
     while True:
         tracks = find_tracks(clip, robot, limbs, SWIFTER * smooth, stride)
-        solved = _solver("solve_tracks")(robot, limbs, tracks, SWIFTER * smooth)
+        solved = solve_tracks(robot, limbs, tracks, SWIFTER * smooth)
         if solved.sole_error < OFF or stride * SHORTER < SHORTEST:
             break
         stride *= SHORTER
     return _retargeted(solved, clip, robot, limbs, planted=tracks.planted, stride=stride)
-
-
-def _solver(name: str) -> Any:  # a function of a module that imports mink
-    try:
-        if name == "solve_frames":
-            from .solve import solve_frames
-
-            return solve_frames
-        from .solve_tracks import solve_tracks
-
-        return solve_tracks
-    except ImportError as error:
-        raise ConfigError(f"needs the package {error.name}: {how_to_install('motion')}",
-                          source="motion") from None  # fmt: skip

@@ -4,8 +4,6 @@ Each hinge is a joint of the clip at the hinge's anchor; hinges of one body are 
 So any anchors and axes are exact, and the angle is read off again without a search.
 """
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Postures of a robot that meet targets frame by frame, by mink, with planted soles."""
 
-from __future__ import annotations
-
 import time
 from typing import NamedTuple
 

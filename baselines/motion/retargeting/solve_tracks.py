@@ -1,7 +1,5 @@
 """Postures of a robot whose pelvis and soles go along given tracks, frame by frame, by mink."""
 
-from __future__ import annotations
-
 import time
 
 import mink

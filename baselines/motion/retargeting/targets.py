@@ -1,7 +1,5 @@
 """What a clip asks of any body: directions of its segments and the height of its pelvis."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mujoco

@@ -3,8 +3,6 @@
 mink is imported here and in `solve.py` only, and these only when something is retargeted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import mink

@@ -1,7 +1,5 @@
 """Where a clip of a biped leads a robot's pelvis and soles, wherever it goes, turns or leaps."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mujoco

@@ -1,7 +1,5 @@
 """What the clip asks of every frame, and the clearance of links; needs mink."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import mujoco

@@ -1,7 +1,5 @@
 """Constraints by trial in steps, as Semakin has them: keyframe by keyframe."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The whole clip's problem about its postures now: their cost, and the next quadratic program."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """A sparse quadratic program with penalised rows, solved by OSQP."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """How good a retargeted motion is, measured from its postures alone: the same for all solvers."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A clip on a robot by any of the solvers, with constraints of the user's."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The optimum over a whole clip: a sequence of quadratic programs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from poise.configs.errors import PoiseError

@@ -1,7 +1,5 @@
 """Soles that are planted: where, when, and how postures move that keep them there."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mujoco

@@ -1,7 +1,5 @@
 """Coordinates of a clip's postures and their third derivative."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import sparse
 

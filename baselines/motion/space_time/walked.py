@@ -1,7 +1,5 @@
 """What a planner of steps is told so that a robot walks and turns as a clip does."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a script wants played, in order: brackets and names of its own resolved, overlays made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

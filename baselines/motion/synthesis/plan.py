@@ -1,7 +1,5 @@
 """What a script is to play, and what is played."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

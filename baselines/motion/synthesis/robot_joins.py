@@ -1,7 +1,5 @@
 """The joins of a robot's clips: ways that it can do, each found once."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple

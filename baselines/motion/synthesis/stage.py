@@ -1,7 +1,5 @@
 """The clips that a script plays: those of a graph, and those that it makes of them on the way."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

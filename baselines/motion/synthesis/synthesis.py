@@ -1,7 +1,5 @@
 """A script and a graph become one clip, with a record of every choice."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, replace
 from itertools import pairwise
@@ -71,7 +69,12 @@ class Synthesis:
 
         Raises ConfigError with line and column, or for a script that has no way.
         """
-        reader = Reader(script, self.stage, lambda inner: self._inner(inner, script), self._again)
+        reader = Reader(
+            script,
+            self.stage,
+            lambda inner: self._play(self._plan(inner, 1, script))[0],
+            self._again,
+        )
         actions = reader.actions()
         return self._plan(actions, k, script)
 
@@ -91,10 +94,6 @@ class Synthesis:
             "others": [{"cost": path.cost, "clips": [step.clip for step in path.steps]}
                        for path in plan.paths[1:]],
         }  # fmt: skip
-
-    def _inner(self, actions: Actions, script: Script) -> Clip:
-        """A sequence in brackets as one clip."""
-        return self._play(self._plan(actions, 1, script))[0]
 
     def _again(self, clip: Clip) -> Clip:
         """A clip after a change: what has steps is planned again for them."""
@@ -203,7 +202,8 @@ class Synthesis:
             kind = plan.kinds.get(number, self.kind) if before.wanted else self.kind
             number += step.wanted
             both, physics = self._joined(kind, last, part, transition)
-            head, last = _split(both, len(both) - len(part))
+            seam = len(both) - len(part)
+            head, last = both.part(slice(0, seam)), both.part(slice(seam, None))
             done.append(head)
             frames += len(head)
             begins = frames * last.dt
@@ -255,8 +255,3 @@ class Synthesis:
             enter = min(enter, clip.duration - clip.dt)
             leave = enter + clip.dt
         return clip.cut(enter, leave)
-
-
-def _split(clip: Clip, frame: int) -> tuple[Clip, Clip]:
-    """The frames before one, and those from it on."""
-    return clip.part(slice(0, frame)), clip.part(slice(frame, None))

@@ -5,8 +5,6 @@ asked for the first time in a process of its own, whose time and memory the syst
 depends on the observation is stopped by a thread that looks at the clock.
 """
 
-from __future__ import annotations
-
 import contextlib
 import subprocess
 import sys

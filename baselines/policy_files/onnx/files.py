@@ -1,7 +1,5 @@
 """The files of a policy: where they lie, and the digest of their version."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The metadata that mjlab and holosoma write into the ONNX files that they export."""
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path

@@ -4,8 +4,6 @@ Every place is looked at where ONNX allows a tensor: graphs, graphs within nodes
 training. The package onnx would do, but playing a network does not need it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import islice
 

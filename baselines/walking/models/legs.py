@@ -10,7 +10,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.kinematics import StateArrays
-from poise.envs.physics.legs import Leg, find_legs, standing_data
+from poise.envs.physics.legs import find_legs, standing_data
 from poise.envs.robots.robot import Robot
 
 
@@ -63,7 +63,10 @@ def leg_arrays(robot: Robot) -> LegArrays:
         if leg.knee is None:
             raise ConfigError(f"needs a knee, the leg of {leg.foot!r} has none", field="gait.model")
     model, data = robot.model, standing_data(robot)
-    hips, knees, ankles = ([model.joint(name).id for name in names] for names in _joints(legs))
+    hips, knees, ankles = (
+        [model.joint(str(getattr(leg, name))).id for leg in legs]
+        for name in ("hip", "knee", "ankle")
+    )
     places = [data.xanchor[joints] for joints in (hips, knees, ankles)]
     rods = np.linalg.norm(np.diff(places, axis=0), axis=2)  # thigh and shank of each leg
     dofs = model.jnt_dofadr[knees]
@@ -106,11 +109,6 @@ def no_legs() -> LegArrays:
         hip_dof=none, hip_sign=np.ones(2), hip=np.zeros((2, 3)), ankle=np.zeros((2, 3)),
         sole=np.zeros((2, 2)), flexion=np.zeros(2), flexion_rate=np.zeros(2),
     )  # fmt: skip
-
-
-def _joints(legs: tuple[Leg, ...]) -> list[list[str]]:
-    """Names of the hips', knees' and ankles' joints."""
-    return [[str(getattr(leg, name)) for leg in legs] for name in ("hip", "knee", "ankle")]
 
 
 def _sign(model: mujoco.MjModel, data: mujoco.MjData, joints: tuple[int, int, int]) -> float:

@@ -85,11 +85,9 @@ class PointContact(Contact[PointContactBlock]):
         )  # fmt: skip
 
     def chain(self, block: PointContactBlock) -> np.ndarray:
-        """The degrees of freedom that move the point."""
         return block.point.chain
 
     def rows(self, state: RobotState, block: PointContactBlock) -> ContactRows:
-        """Motion, cone and load in NumPy."""
         motion = point_motion(state, block.point)
         return ContactRows(
             position=motion.position,

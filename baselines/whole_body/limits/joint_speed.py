@@ -65,7 +65,6 @@ class JointSpeed(Limit[JointSpeedBlock]):
         return len(block.joints)
 
     def rows(self, state: RobotState, block: JointSpeedBlock, torques: np.ndarray) -> Bounds:
-        """Return the rows in (v̇, w), in NumPy."""
         dofs = 6 + block.joints
         v = state.qvel[dofs]
         low = np.minimum((-block.largest - v) / block.horizon, block.floor)

@@ -54,6 +54,5 @@ class Torque(Limit[TorqueBlock]):
         return len(block.joints)
 
     def rows(self, state: RobotState, block: TorqueBlock, torques: np.ndarray) -> Bounds:
-        """Return the rows in (v̇, w), in NumPy."""
         bias = state.h[6:][block.joints]
         return Bounds(torques[block.joints], -block.largest - bias, block.largest - bias)

@@ -1,7 +1,5 @@
 """The `info` of many environments at once: an array for each key."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import TypedDict
 

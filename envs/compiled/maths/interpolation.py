@@ -1,7 +1,5 @@
 """Curves through keyframes, by name [Notes, lecture 4]."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, KroghInterpolator, PPoly
 

@@ -1,7 +1,5 @@
 """The standard MuJoCo humanoid with ankles, built from Gymnasium's own ``humanoid.xml``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import gymnasium

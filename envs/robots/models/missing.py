@@ -1,7 +1,5 @@
 """Missing files of meshes, textures, height fields and skins, as MuJoCo looks for them."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Read an MJCF file, also when mesh and texture files that only serve the eye are absent."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

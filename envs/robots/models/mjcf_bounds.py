@@ -1,7 +1,5 @@
 """Bounds of an MJCF model, checked before MuJoCo builds it: nothing stops MuJoCo once it began."""
 
-from __future__ import annotations
-
 import html
 import math
 import re

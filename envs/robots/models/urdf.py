@@ -1,7 +1,5 @@
 """Read a URDF file by MuJoCo's own reader: as it stands in ROS, with a root that floats."""
 
-from __future__ import annotations
-
 import os
 import sysconfig
 import xml.etree.ElementTree as ElementTree

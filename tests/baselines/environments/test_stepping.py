@@ -13,6 +13,7 @@ from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.configs.errors import ConfigError
 from poise.envs.balance.vector.batch import EnvBatch, replicate
 from poise.envs.sensing.realism import Realism, load_realism
+from tests.support import planned
 from tests.support.sensing import PLAIN
 from tests.support.shared import robot
 
@@ -95,11 +96,11 @@ def test_the_foothold_moves_by_what_is_added(env):
     """Seen where the step begins, for the foot and the time that are planned."""
     play(env, until=swinging)
     planner, state = env.controller.planner, env.simulation.state
-    plan = planner.plan(state, 0.0)
+    plan = planned.plan(planner, state, 0.0)
     start = state.sole_points[plan.foot, :2]
 
     def foothold():
-        return planner.footholds(state, plan.foot, 0.0, np.array([plan.time]), start)[0][0]
+        return planned.footholds(planner, state, plan.foot, 0.0, np.array([plan.time]), start)[0][0]
 
     before = foothold().copy()
     env.controller.offsets.foothold[:] = 0.04, 0.02
@@ -113,7 +114,7 @@ def test_the_foothold_stays_within_the_limits_of_a_step(env):
     foot, side = controller.foot, controller.planner.foot_sign[controller.foot]
     controller.offsets.foothold[1] = -1e20 * side
     start = state.sole_points[foot, :2]
-    footholds, _ = controller.planner.footholds(state, foot, 0.0, np.array([9.0]), start)
+    footholds, _ = planned.footholds(controller.planner, state, foot, 0.0, np.array([9.0]), start)
     width = side * (footholds[0] - state.sole_points[1 - foot, :2])[1]
     least = controller.config.limits.width_min * controller.robot.height_com
     assert width == pytest.approx(least, abs=1e-9)

@@ -10,6 +10,7 @@ from poise.baselines.whole_body.contact_sets import ContactSets
 from poise.baselines.whole_body.formulation import build, unknowns
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.baselines.whole_body.momentum_qp import MomentumQP
+from poise.baselines.whole_body.tick import go_on_from
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 from tests.support.shared import generic_state, robot
@@ -117,7 +118,7 @@ def test_torques_follow_those_of_before():
     free = bounded.tick(state, targets, (1,), [rows])
     assert np.abs(free / limit).max() > 0.3
     bounded.reset()
-    bounded.follow(before)
+    go_on_from(bounded.sets[(1,)].block, before)
     torques = bounded.tick(state, targets, (1,), [rows])
     assert np.abs(torques / limit).max() <= 0.3 + 1e-9
     ws = bounded.workspace

@@ -26,7 +26,12 @@ def test_every_figure_is_one_of_a_summary() -> None:
     forms = [form for form in vars(summary).values() if is_typeddict(form)]
     keys = {key for form in forms for key in form.__annotations__}
     assert len(keys) > 100
-    named = {key for each in figures() for key in (each.key, each.ends, each.of, each.bound) if key}
+    named = {
+        key
+        for each in figures()
+        for key in (each.key, each.ends, each.of, each.beside, each.bound)
+        if key
+    }
     assert named <= keys, named - keys
 
 

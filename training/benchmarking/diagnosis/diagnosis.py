@@ -1,7 +1,5 @@
 """Why a trial was lost: the criterion, and what went wrong before it, each with its time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What is kept of a trial at every policy step, so that its loss can be explained."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

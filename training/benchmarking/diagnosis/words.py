@@ -1,7 +1,5 @@
 """A diagnosis in words: one line on a trial, a few words to count trials by."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -29,7 +27,7 @@ SIDE = re.compile(r"(^|_)(left|right|l|r)(?=_|$)")
 
 def diagnosis_of(line: Mapping[str, str]) -> Diagnosis:
     """The diagnosis in a line of trials.csv; empty where older results have none."""
-    numbers = {name for name, hint in Diagnosis.__annotations__.items() if "float" in hint}
+    numbers = {name for name, hint in Diagnosis.__annotations__.items() if "float" in str(hint)}
     given: dict[str, Any] = {name: line.get(name) or None for name in COLUMNS}
     for name in numbers:
         given[name] = None if given[name] is None else float(given[name])

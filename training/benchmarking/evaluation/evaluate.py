@@ -1,7 +1,5 @@
 """Playing a suite with several controllers: `poise evaluate` and `poise benchmark`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 

@@ -6,8 +6,6 @@
 - summary.json: written last; with it, the result is finished
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace

@@ -1,7 +1,5 @@
 """A result for people: tables in the terminal, what their words mean, rows of the leaderboard."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -22,6 +20,7 @@ from poise.training.running.columns import (
     HALF_AT,
     J50_MEAN,
     J50_WORST,
+    LOST_WON,
     NEVER_FELL,
     NONE,
     P_VALUE,
@@ -33,6 +32,7 @@ from poise.training.running.columns import (
     known,
 )
 from poise.training.running.summary import Entry, Summary
+from poise.training.running.tables import figure_table
 from poise.training.running.terminal import BESIDE, in_parts
 
 from .walk_tables import level_tables, motion_tables, walk_tables
@@ -40,7 +40,7 @@ from .walk_tables import level_tables, motion_tables, walk_tables
 ROOT_FORCE = 1.0  # [N] more than a numerical residual
 SEPARATED = 0.05  # p below which the trials separate two controllers
 SHOWN = 5  # lost trials of a controller that are listed
-IN_PAIRS = ("lost, won", P_VALUE.heading)  # headings whose figures the table of pairs has
+IN_PAIRS = (LOST_WON.heading, P_VALUE.heading)  # headings whose figures the table of pairs has
 
 
 def ranked(entries: Mapping[str, Entry]) -> list[str]:
@@ -173,12 +173,8 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
     def column(figure: Figure, name: str = "") -> tuple[str, Callable[[str], str]]:
         return name or figure.heading, lambda name: figure.text(entries[name])
 
-    def lost(name: str) -> str:
-        pair = pairs.get(name)
-        return f"{pair['only_a']}, {pair['only_b']}" if pair and "only_a" in pair else NONE
-
-    def p_value(name: str) -> str:
-        return P_VALUE.text(pairs.get(name, {}))
+    def beside(figure: Figure) -> tuple[str, Callable[[str], str]]:
+        return figure.heading, lambda name: figure.text(pairs.get(name, {}))
 
     return [
         (J50_MEAN.heading, lambda name: j50_mean_text(entries[name])),
@@ -186,8 +182,7 @@ def table_columns(summary: Summary) -> list[tuple[str, Callable[[str], str]]]:
         column(HALF_AT, f"{HALF_AT.name}, of {summary['scale']}"),
         column(RECOVERED, f"{RECOVERED.name}{of_mix}"),
         column(NEVER_FELL),
-        ("lost, won", lost),
-        (P_VALUE.heading, p_value),
+        *map(beside, (LOST_WON, P_VALUE)),
         *map(column, (*AT_REST, STEPS_TAKEN, *ROBUST)),
     ]
 
@@ -200,16 +195,10 @@ def j50_mean_text(entry: Entry) -> str:
 
 def _pairs(summary: Summary, width: int) -> Table:
     """For a console of this width, of which the figures need some 60 columns."""
-    table = Table()
-    titles = [f"{pair['b']} against {pair['a']}" for pair in summary["pairs"]]
-    table.add_column(
-        "b against a", overflow="fold", width=_room(titles, min(max(width - 60, 16), 34))
-    )
-    columns = (*PAIRED, P_VALUE, *known([GAIN], summary["pairs"]))
-    for each in columns:
-        table.add_column(escape(each.heading), justify="right", overflow="fold")
-    for title, pair in zip(titles, summary["pairs"], strict=True):
-        table.add_row(escape(title), *(escape(each.text(pair)) for each in columns))
+    rows = [([f"{pair['b']} against {pair['a']}"], pair) for pair in summary["pairs"]]
+    figures = (*PAIRED, P_VALUE, *known([GAIN], summary["pairs"]))
+    table = figure_table("", ["b against a"], figures, rows)
+    table.columns[0].width = _room((own[0] for own, _ in rows), min(max(width - 60, 16), 34))
     return table
 
 

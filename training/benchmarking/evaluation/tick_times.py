@@ -1,7 +1,5 @@
 """The time of a control tick is measured here, of all controllers in turn in one process."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """A controller's entry of summary.json is computed here."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

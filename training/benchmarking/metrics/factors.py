@@ -1,7 +1,5 @@
 """Figures of factors that are varied alone, and EUROBENCH's indicators."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from poise.training.benchmarking.statistics.eurobench import (

@@ -1,7 +1,5 @@
 """Figures of a suite's parts at each level of realism."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Suites that perform motions: their stage, falls and errors by motion and share, J50 in motion."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import cast

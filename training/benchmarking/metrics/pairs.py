@@ -1,7 +1,5 @@
 """Two controllers compared: on the trials that both met, and by their mean J50."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from poise.training.benchmarking.statistics.bootstrap import j50_gain

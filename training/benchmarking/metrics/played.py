@@ -1,7 +1,5 @@
 """Trials of one controller with their outcomes, as arrays and in parts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Training seeds: runs of one configuration that differ in the seed alone, taken together."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Figures of trials that walk: falls per minute, how exact, at what cost; J50 by phase."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import cast
 

@@ -1,7 +1,5 @@
 """Two results are compared here, with intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path

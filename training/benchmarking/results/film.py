@@ -1,7 +1,5 @@
 """One trial of a result, filmed: with one controller, or with several side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path

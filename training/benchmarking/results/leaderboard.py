@@ -1,7 +1,5 @@
 """The leaderboard pages, generated from committed files summary.json."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final

@@ -1,7 +1,5 @@
 """The controller of a result, as it took part."""
 
-from __future__ import annotations
-
 from poise.configs.errors import ConfigError, shown
 from poise.configs.schema import build
 from poise.envs.robots.robot import load_robot

@@ -1,7 +1,5 @@
 """The folder of a finished result, read back and checked."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Playing one trial of a result again, exactly, from its folder."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path

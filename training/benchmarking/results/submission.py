@@ -1,7 +1,5 @@
 """A result packed for the leaderboards: checked, and without any code in it."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

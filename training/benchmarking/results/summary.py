@@ -1,7 +1,5 @@
 """summary.json, read back: anybody may have written it, so all of it is checked first."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The page of the controllers that walk, generated from committed files summary.json."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

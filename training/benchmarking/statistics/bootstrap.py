@@ -5,8 +5,6 @@ are resampled together: a replicate that draws a trial draws it for both, so tha
 hard for both cancels in the gain.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Differences of two estimates, with intervals made of the intervals of the two."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ the stability margin and the normalisation by size those of "Reaction to impulsi
 Where the protocols leave a choice open, it is made here and said.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Recovery is not monotone in the impulse near the limit, so J50 is a fit over man
 bisection. All bootstrap replicates of a fit are solved together, as rows of one array.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -4,8 +4,6 @@ Every function takes NumPy arrays (or what `np.asarray` takes), keeps no state, 
 random numbers draws them from a seed, so that the same trials give the same figures.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

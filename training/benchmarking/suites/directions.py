@@ -1,7 +1,5 @@
 """Parts that ask the same of every direction: the envelope of J50, the grid, and margins."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal, Self

@@ -1,7 +1,5 @@
 """Trials are drawn here: every draw depends on the seed and the trial's number alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Parts in which conditions differ from the standard case: in one factor, or in all at once."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

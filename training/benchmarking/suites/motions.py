@@ -1,7 +1,5 @@
 """The part of suites in which motions are performed, pushed by shares of the controller's J50."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """All trials of a suite for a robot, as far as they are known."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -4,8 +4,6 @@ A trial depends on the seed and its number alone, so more of them leave the firs
 were.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 from poise.envs.physics.pushes.push import Push

@@ -5,8 +5,6 @@ that goes through the phases of the gait evenly from trial to trial (the golden 
 whatever their size and direction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """The figures of a walk: its speed against the command, its steps, what it costs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The record of a walk, from which its figures are computed when the trial is over."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Jobs tell a process what to play, and `play` plays it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path

@@ -106,7 +106,7 @@ def walked(env: BalanceEnv, trial: Trial, outcome: Outcome, record: WalkRecord) 
     assert isinstance(env, CommandedEnv)  # it has taken the commands
     walk = Walk(record.arrays(), trial.commands, outcome.fall_time, env.transfer_time or 0.0)
     figures: dict[str, Any] = {
-        name: _finite_or_none(value) for name, value in walk.figures().items()
+        name: None if value is None else _finite(value) for name, value in walk.figures().items()
     }
     weight = env.robot.mass * float(np.linalg.norm(env.model.opt.gravity))
     for name, per_metre in (
@@ -227,10 +227,6 @@ class Settled:
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _finite_or_none(value: float | None) -> float | None:
-    return None if value is None else _finite(value)
 
 
 class Touchdowns:

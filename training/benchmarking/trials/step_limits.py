@@ -1,7 +1,5 @@
 """The N-step limit of a linear inverted pendulum: an upper bound of what steps recover."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import cast

@@ -1,7 +1,5 @@
 """Trials and outcomes as lines of trials.csv: what is written reads back exactly."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -13,7 +11,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.reading import parse_json
 from poise.configs.schema import build, to_dict
 from poise.envs.physics.pushes.push import Kick, Push
-from poise.envs.terrain.terrain import Terrain, make_terrain
+from poise.envs.terrain.terrain import make_terrain
 
 from .trial import Conditions, Outcome, Trial
 
@@ -107,7 +105,9 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
             level=line["level"] or None,
             commands=many["commands"],
             kicks=many["kicks"],
-            terrain=_read_terrain(line["terrain"], path),
+            terrain=make_terrain(parse_json(line["terrain"]), str(path))
+            if line["terrain"]
+            else None,
             motion=line["motion"] or None,
             share=_number(line["share"]),
         )
@@ -122,10 +122,6 @@ def _read_push(line: Mapping[str, str]) -> dict[str, object]:
     }
     data["point"] = [data.pop(key) for key in ("point_x", "point_y", "point_z")]
     return data
-
-
-def _read_terrain(text: str, path: Path) -> Terrain | None:
-    return make_terrain(parse_json(text), str(path)) if text else None
 
 
 def _number(text: str) -> float | None:

@@ -1,7 +1,5 @@
 """One trial: a start, the pushes, the conditions that they meet, and what became of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

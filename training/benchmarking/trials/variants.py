@@ -1,7 +1,5 @@
 """An agent in the standard conditions, and in others."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

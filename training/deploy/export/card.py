@@ -1,7 +1,5 @@
 """The model card: README.md as Hugging Face reads it, a YAML head and a page."""
 
-from __future__ import annotations
-
 import html
 from collections.abc import Sequence
 from typing import Any

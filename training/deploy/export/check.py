@@ -1,7 +1,5 @@
 """Whether an exported file does what the policy does."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

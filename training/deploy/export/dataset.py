@@ -1,7 +1,5 @@
 """Trials of a suite as a data set of Minari: what was observed, done, earned and pushed."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

@@ -1,7 +1,5 @@
 """`poise export`: a policy as a folder for other programs, checked before it is there."""
 
-from __future__ import annotations
-
 import json
 import os
 import zipfile

@@ -1,7 +1,5 @@
 """The figures of a policy's card, each read from a result that exists."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

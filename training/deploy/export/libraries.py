@@ -1,7 +1,5 @@
 """The libraries that an export needs besides Poise's own; named once, where they are missing."""
 
-from __future__ import annotations
-
 import importlib
 from typing import Any
 

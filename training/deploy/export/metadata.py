@@ -3,8 +3,6 @@
 Words are mjlab's where it has one, see `policy_files/metadata.py`: lists have commas between them.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """A policy as an ONNX graph: raw observations in, actions out."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

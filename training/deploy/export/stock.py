@@ -1,7 +1,5 @@
 """The policy as Stable-Baselines3's own, which its `PPO.load` reads without Poise."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace

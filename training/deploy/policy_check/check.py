@@ -1,7 +1,5 @@
 """All that is found out about a policy of somebody else on a robot."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass, fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a network's sizes tell of its observation, where nothing describes it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product

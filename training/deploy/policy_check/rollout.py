@@ -1,7 +1,5 @@
 """A rollout that a policy's maker recorded, and what it tells of a description."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,16 +1,13 @@
 """Checks of policies, and the policies that are known, for people in the terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from poise.baselines.allowance import is_script
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.known import PLACES, Known, find_network, how_to_get, places
+from poise.training.running.tables import text_table
 
 from .check import SECONDS, PolicyCheck
 from .guess import WORDS
@@ -20,10 +17,7 @@ VERDICTS = {True: "right", False: "WRONG", None: "not told"}
 
 def print_policies(known: list[Known], console: Console) -> None:
     """The known policies: whose, for which robot, and whether they are here."""
-    table = Table()
-    for name in ("policy", "robot", "Hz", "project, commit", "licence", "here"):
-        table.add_column(name, overflow="fold", no_wrap=name == "policy")
-    missing = []
+    missing, rows = [], []
     for each in known:
         found, origin = find_network(each.origin), each.origin
         here = str(found.network or "no")
@@ -34,7 +28,10 @@ def print_policies(known: list[Known], console: Console) -> None:
         elif is_script(found.network):
             here += " (TorchScript: --allow it)"
         project, rate = f"{origin.project} {origin.commit}", f"{1.0 / each.period:g}"
-        table.add_row(each.name, origin.robot, rate, project, origin.licence, escape(here))
+        rows.append((each.name, origin.robot, rate, project, origin.licence, here))
+    headings = ("policy", "robot", "Hz", "project, commit", "licence", "here")
+    table = text_table("", headings, (), rows)
+    table.columns[0].no_wrap = True
     console.print(table)
     _print_places(known, console)
     for each in missing:

@@ -1,7 +1,5 @@
 """All that is known of a robot before a controller is tried on it."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any

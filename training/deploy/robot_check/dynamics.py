@@ -1,7 +1,5 @@
 """What of a robot's model the physics step, the floor or a flag make other than it seems."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import mujoco

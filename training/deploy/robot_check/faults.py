@@ -1,7 +1,5 @@
 """Faults of a robot that will keep it from standing or walking, and their remedies."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 

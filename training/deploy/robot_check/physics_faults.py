@@ -1,7 +1,5 @@
 """Faults that physics show: what is not as a model's file says, and what does not rest."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 from .dynamics import LIGHT, Dynamics, JointDynamics

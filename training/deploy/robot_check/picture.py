@@ -1,7 +1,5 @@
 """A robot in its standing posture, from three sides with its CoM and support, and its soles."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

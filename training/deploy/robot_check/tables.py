@@ -1,7 +1,5 @@
 """The check of a robot for people: tables in the terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rich.console import Console
@@ -9,6 +7,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from poise.envs.physics.legs import Leg
+from poise.training.running.tables import fact_table, text_table
 
 from .check import RobotCheck
 from .standing.holding import Holding
@@ -20,12 +19,7 @@ EVERY = 2  # of the directions, in the table
 
 def print_check(check: RobotCheck, console: Console) -> None:
     """The robot, its directions, who can use it, what will go wrong."""
-    table = Table(title=escape(check.name), title_justify="left", show_header=False)
-    table.add_column("of the robot", no_wrap=True)
-    table.add_column("value", overflow="fold")
-    for name, value in _rows(check):
-        table.add_row(name, escape(value))
-    console.print(table)
+    console.print(fact_table(check.name, _rows(check)))
     console.print(_directions(check))
     for family, uses in check.controllers.items():
         takes = ", ".join(uses.takes) or "none"
@@ -49,24 +43,24 @@ def _rows(check: RobotCheck) -> Iterator[tuple[str, str]]:
     yield "torque limits", _limits(check.torque_limits)
     for sole in check.soles:
         yield (
-            f"sole {escape(sole.name)}",
+            f"sole {sole.name}",
             (
                 f"{1000 * sole.length:.0f} × {1000 * sole.width:.0f} mm, {len(sole.corners)} "
                 f"corners, {check.sole_contacts[sole.name]} contacts, on {sole.body}"
             ),
         )
     for leg in check.legs:
-        yield f"leg {escape(leg.foot)}", _leg(leg)
+        yield f"leg {leg.foot}", _leg(leg)
     posture = check.posture
     yield "posture", (f"from {posture.keyframe or 'the zero posture of the model'}, legs adjusted "
                       f"by {_difference(posture.levelling)}")  # fmt: skip
     for name, difference in posture.differences.items():
-        yield f"against {escape(name)}", f"at most {_difference(difference)}"
+        yield f"against {name}", f"at most {_difference(difference)}"
     yield "keyframes", ", ".join(posture.keyframes) or "none"
     yield "to stand", _holding(check.both_feet)
     for foot, holding in check.one_foot.items():
         text = "no posture found" if holding is None else _holding(holding)
-        yield f"on {escape(foot)} alone", text
+        yield f"on {foot} alone", text
     yield "at rest", _rest(check.rest)
     model = check.dynamics
     yield "physics", (f"steps of {1000 * model.timestep:g} ms; friction of soles and ground "
@@ -110,18 +104,14 @@ def _holding(holding: Holding) -> str:
 
 def _directions(check: RobotCheck) -> Table:
     """Every other direction, and the mean over all."""
-    table = Table(title="push of 0.1 s", title_justify="left")
     headings = ("direction", "CoM to edge [mm]", "CoP by ankles [mm]", "in place [N·s]",
                 "in place [N·s/kg]", "one step ≤ [N·s]", "one step ≤ [N·s/kg]")  # fmt: skip
-    for heading in headings:
-        table.add_column(escape(heading), justify="right", overflow="fold")
-    for each in check.directions[::EVERY]:
-        table.add_row(
-            f"{each.direction:g}°",
-            f"{1000 * each.margin:.0f}",
-            f"{1000 * each.reach:.0f}",
-            *_impulses(each.in_place, each.one_step, check.mass),
-        )
+    rows = (
+        (f"{each.direction:g}°", f"{1000 * each.margin:.0f}", f"{1000 * each.reach:.0f}",
+         *_impulses(each.in_place, each.one_step, check.mass))
+        for each in check.directions[::EVERY]
+    )  # fmt: skip
+    table = text_table("push of 0.1 s", (), headings, rows)
     table.add_section()
     table.add_row("mean", "", "", *_impulses(check.in_place, check.one_step, check.mass))
     return table

@@ -1,7 +1,5 @@
 """Contacts in the standing posture: of bodies with each other, of soles with the ground."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import mujoco

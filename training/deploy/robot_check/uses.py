@@ -1,7 +1,5 @@
 """The packaged controllers that take a robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from poise.baselines.balance.stepping.capture_step import CaptureStep

@@ -1,7 +1,5 @@
 """A guessed description as a file, for its owner to correct."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import yaml

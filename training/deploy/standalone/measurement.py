@@ -1,7 +1,5 @@
 """What the sensors of a robot measure at one moment; none of them tells where it is."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

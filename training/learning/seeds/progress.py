@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from poise.configs.errors import ConfigError
 from poise.training.learning.policy_files import STATE, find_checkpoint, read_state
+from poise.training.running.tables import text_table
 from poise.training.running.terminal import ProgressLines
 
 from .records import SeedRun, SeedSummary, evaluations
@@ -77,16 +77,13 @@ class SeedProgress:
 
 def print_seeds(summary: SeedSummary, console: Console) -> None:
     """A row per seed, and the interquartile mean over them."""
-    table = Table(title="held-out pushes during training, recovered", title_justify="left")
-    for name in ("seed", "at the start", "best", "at step", "fell", "mean |action|"):
-        table.add_column(name, justify="right")
-    for entry in summary["runs"]:
-        start, best = evaluations(entry)
-        table.add_row(
-            str(entry["seed"]), f"{start['recovered']:.1%}", f"{best['recovered']:.1%}",
-            f"{best['timesteps']:,.0f}", f"{best['fallen']:.1%}", f"{best['mean_abs_action']:.3f}",
-        )  # fmt: skip
-    console.print(table)
+    rows = (
+        (str(entry["seed"]), f"{start['recovered']:.1%}", f"{best['recovered']:.1%}",
+         f"{best['timesteps']:,.0f}", f"{best['fallen']:.1%}", f"{best['mean_abs_action']:.3f}")
+        for entry in summary["runs"] for start, best in [evaluations(entry)]
+    )  # fmt: skip
+    headings = ("seed", "at the start", "best", "at step", "fell", "mean |action|")
+    console.print(text_table("held-out pushes during training, recovered", (), headings, rows))
     found = summary["recovered"]
     low, high = found["iqm_ci95"]
     console.print(

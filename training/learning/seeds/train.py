@@ -1,7 +1,5 @@
 """One training run for each seed, spread over processes, and what they reached taken together."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterable, Sequence

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from poise.baselines.allowance import allows
 from poise.configs.errors import ConfigError
-from poise.configs.extras import how_to_install
+from poise.configs.extras import needing
 from poise.configs.files import resolve, write_atomic
 from poise.configs.outputs import check_out_folder
 from poise.configs.reading import is_file, parse_json, read_lines
@@ -178,11 +178,8 @@ class _Search:
     """CMA-ES, and how far the pushes have followed the candidates."""
 
     def __init__(self, config: TuneConfig, gains: Gains):
-        try:
+        with needing("dev"):
             import cma
-        except ImportError:
-            raise ConfigError(f"needs the library cma: {how_to_install('dev')}") from None
-
         self.config, self.gains, self.robot = config, gains, load_robot(config.robot)
         rng = np.random.default_rng(config.seed)
         options = {

@@ -1,7 +1,5 @@
 """How fast a motion may be played until a controller falls."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

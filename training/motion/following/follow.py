@@ -1,7 +1,5 @@
 """Trials in which a controller performs a motion from disturbed starts, and may be pushed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path

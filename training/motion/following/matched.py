@@ -1,21 +1,18 @@
 """Motion matching from the command line: commands as text, the motion, and what it is made of."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.library import find_bvh, packaged_clips
 from poise.baselines.motion.graphs.matching.database import MatchingDatabase
 from poise.baselines.motion.graphs.matching.player import Command, Matched, match_motion
 from poise.configs.errors import ConfigError, shown
+from poise.training.running.tables import text_table
 
 FASTEST = 10.0  # [m/s, rad/s] that is asked for at most
 LONGEST = 120.0  # [s]
@@ -76,15 +73,13 @@ def matched(
 def print_matched(made: Matched, database: MatchingDatabase, console: Console) -> None:
     """What is played of which clip, and how fast the whole goes."""
     dt = database.clips[0].dt
-    table = Table(title=f"{len(made.pieces)} pieces of {made.clip.duration:.1f} s",
-                  title_justify="left")  # fmt: skip
-    for column in ("clip", "from", "to", "away"):
-        table.add_column(column, overflow="fold")
-    for piece in made.pieces[:MOST_ROWS]:
-        name = database.clips[piece.clip].name
-        table.add_row(escape(name), f"{piece.first * dt:.2f} s", f"{piece.last * dt:.2f} s",
-                      f"{piece.distance:.2f}")  # fmt: skip
-    console.print(table)
+    rows = (
+        (database.clips[piece.clip].name, f"{piece.first * dt:.2f} s", f"{piece.last * dt:.2f} s",
+         f"{piece.distance:.2f}")
+        for piece in made.pieces[:MOST_ROWS]
+    )  # fmt: skip
+    title = f"{len(made.pieces)} pieces of {made.clip.duration:.1f} s"
+    console.print(text_table(title, ("clip", "from", "to", "away"), (), rows))
     if len(made.pieces) > MOST_ROWS:
         console.print(f"and {len(made.pieces) - MOST_ROWS} pieces more")
     way = float(np.linalg.norm(np.diff(made.clip.root[:, :2], axis=0), axis=1).sum())

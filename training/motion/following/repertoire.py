@@ -1,7 +1,5 @@
 """The motions of a suite: put on the robot once, kept beside the trials, the same for all."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass

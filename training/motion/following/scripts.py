@@ -1,7 +1,5 @@
 """The clips that scripts are made of, ready to be put together, and what becomes of a script."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Sequence

@@ -1,13 +1,10 @@
 """What a person reads of followed motions and of retargeting."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from poise.baselines.motion.clips.axes import LEG, UNITS, FileAxes
 from poise.baselines.motion.clips.clip import Clip
@@ -15,45 +12,32 @@ from poise.baselines.motion.clips.contacts import measure_contacts
 from poise.baselines.motion.feasibility.check import Feasibility, shown
 from poise.baselines.motion.space_time.constraints.constraint import Violation
 from poise.baselines.motion.space_time.retarget_clip import RetargetedClip
+from poise.training.running.columns import PERFORMED, Figure
+from poise.training.running.tables import fact_table, text_table
 
 from .follow import Followed
 
-#: what is shown of a motion with steps: name, field, factor, unit
-WALK = (
-    ("went, of the way told", "walked", 100.0, "%"),
-    ("turned, of what was told", "turned", 100.0, "%"),
-)
-STEPS = (
-    ("a sole in the air, RMS", "swing_error", 1e3, "mm"),
-    ("a sole as it lands, at most", "placement_error", 1e3, "mm"),
-    ("a planted sole slid by", "support_slide", 1e3, "mm"),
-    ("left to catch a fall", "interruptions", 1.0, "times"),
+ERRORS = {*Followed.__dataclass_fields__} - {"motion_delay"}
+#: of a walk, whose way is told, and of every motion
+FIGURES = (
+    Figure("walked", "walked", ".1f", "%", "of the way that was told", 100.0),
+    Figure("turned", "turned", ".1f", "%", "of the turn that was told", 100.0),
+    *(each for each in PERFORMED if each.key in ERRORS),
 )
 
 
 def print_followed(trials: Sequence[Followed], title: str, console: Console) -> None:
     """Falls, and errors over the trials that did not fall."""
-    table = _table(title)
-    falls = sum(trial.fallen for trial in trials)
-    table.add_row("trials, falls", f"{len(trials)}, {falls}")
-    table.add_row("solver failures", str(sum(trial.solver_failures for trial in trials)))
-    stood = [trial for trial in trials if not trial.fallen]
-    walked = any(np.isfinite([(trial.walked, trial.turned) for trial in stood]).ravel())
-    stepped = any(np.isfinite(trial.swing_error) for trial in trials)
-    for name, field, factor, unit in (
-        ("joints, RMS", "joint_rms", np.degrees(1.0), "°"),
-        ("bodies, mean distance", "body_error", 1e3, "mm"),
-        ("the same, from the root", "body_error_root", 1e3, "mm"),
-        ("bodies in the last second", "body_error_last", 1e3, "mm"),
-        ("centre of mass", "com_error", 1e3, "mm"),
-        *(WALK if walked else ()),
-        *(STEPS if stepped else (("a sole slid or stepped by", "sole_slide", 1e3, "mm"),)),
-    ):
-        values = [factor * getattr(trial, field) for trial in stood]
-        values = [value for value in values if np.isfinite(value)]
-        text = f"{np.mean(values):.1f} {unit}, largest {max(values):.1f}" if values else "-"
-        table.add_row(name, text)
-    console.print(table)
+    falls, failures = (sum(getattr(trial, name) for trial in trials)
+                       for name in ("fallen", "solver_failures"))  # fmt: skip
+    rows = []
+    for each in FIGURES:
+        values = each.scale * np.array([getattr(t, each.key) for t in trials if not t.fallen])
+        if len(values := values[np.isfinite(values)]):
+            mean, largest = (format(value, each.form) for value in (values.mean(), values.max()))
+            rows.append((each.heading, each.words, mean, largest))
+    title = f"{title}: {falls} of {len(trials)} fell, {failures} ticks unsolved"
+    console.print(text_table(title, ("error", "which is"), ("mean", "largest"), rows))
 
 
 def _unit(metres: float) -> str:
@@ -66,8 +50,7 @@ def print_clip(clip: Clip, axes: FileAxes, console: Console) -> None:
     """What a file of motion capture holds, and how it was understood."""
     contacts = measure_contacts(clip)
     up, forward = axes.names
-    table = _table(clip.name)
-    for name, value in (
+    console.print(fact_table(clip.name, (
         ("joints", f"{len(clip.skeleton.names)}, {len(clip.skeleton.roles)} of them with a role"),
         ("frames", f"{len(clip)} at {1 / clip.dt:.4g} Hz, {clip.duration:.2f} s"),
         ("unit, up, forward", f"{_unit(axes.unit)}, {up}, {forward}"),
@@ -78,23 +61,19 @@ def print_clip(clip: Clip, axes: FileAxes, console: Console) -> None:
         ("skating, mean and largest", f"{100 * contacts.skating:.1f}, "
          f"{100 * contacts.skating_largest:.1f} cm/s"),
         ("below the floor", f"{1000 * contacts.penetration:.1f} mm"),
-    ):  # fmt: skip
-        table.add_row(name, value)
-    console.print(table)
+    )))  # fmt: skip
 
 
 def print_retargeted(made: RetargetedClip, console: Console) -> None:
     """What the robot's postures miss, and which of the user's constraints are violated."""
-    table = _table(f"{made.clip.about.name} on {made.clip.about.robot}, by {made.solver}")
     quality = made.quality
     worst = sorted(quality.directions.items(), key=lambda item: -item[1])
     directions = ", ".join(f"{name} {np.degrees(error):.1f}°" for name, error in worst)
     hands = ", ".join(f"{side} {100 * error:.1f} cm" for side, error in quality.hands.items())
-    for name, value in (
-        (
-            "frames",
-            f"{len(made.clip.qpos)} at {1 / made.clip.dt:.3g} Hz, {made.clip.duration:.2f} s",
-        ),
+    title = f"{made.clip.about.name} on {made.clip.about.robot}, by {made.solver}"
+    console.print(fact_table(title, (
+        ("frames", f"{len(made.clip.qpos)} at {1 / made.clip.dt:.3g} Hz, "
+         f"{made.clip.duration:.2f} s"),
         ("legs over the clip's", f"{made.scale:.3f}"),
         ("steps", _steps(made)),
         ("off the ground", _flight(made)),
@@ -108,9 +87,7 @@ def print_retargeted(made: RetargetedClip, console: Console) -> None:
         ("directions, RMS", directions),
         ("third derivative of joints, RMS", f"{quality.jerk:.1f} rad/s³"),
         ("time a frame", f"{1000 * made.time_per_frame:.1f} ms of the processor"),
-    ):  # fmt: skip
-        table.add_row(name, value)
-    console.print(table)
+    )))  # fmt: skip
     if quality.violations:
         print_violations(quality.violations, console)
     if made.clip.about.unperformed:
@@ -120,14 +97,10 @@ def print_retargeted(made: RetargetedClip, console: Console) -> None:
 def print_violations(violations: Sequence[Violation], console: Console) -> None:
     """By how much each constraint of the user's is missed, where it is missed most."""
     missed = sum(not each.holds for each in violations)
-    table = Table(title=f"constraints, {missed} of {len(violations)} violated",
-                  title_justify="left")  # fmt: skip
-    for name in ("constraint", "missed by", "at", ""):
-        table.add_column(name)
-    for each in violations:
-        table.add_row(escape(each.about), f"{each.largest:.3g} {each.unit}", f"{each.time:.2f} s",
-                      "" if each.holds else "violated")  # fmt: skip
-    console.print(table)
+    rows = ((each.about, f"{each.largest:.3g} {each.unit}", f"{each.time:.2f} s",
+             "" if each.holds else "violated") for each in violations)  # fmt: skip
+    title = f"constraints, {missed} of {len(violations)} violated"
+    console.print(text_table(title, ("constraint", "missed by", "at", ""), (), rows))
 
 
 def _steps(made: RetargetedClip) -> str:
@@ -167,18 +140,10 @@ def _flight(made: RetargetedClip) -> str:
 
 def print_feasibility(judged: Feasibility, title: str, console: Console) -> None:
     """Each criterion at its worst sample."""
-    table = Table(title=escape(title), title_justify="left")
-    for name in ("criterion", "worst", "at", "where", "needed", ""):
-        table.add_column(name)
-    for c in judged.criteria:
-        sign = "≥" if c.least else "≤"
-        table.add_row(c.name, shown(c.worst, c.unit), f"{c.time:.2f} s", c.where,
-                      f"{sign} {shown(c.bound, c.unit)}", "" if c.holds else "no")  # fmt: skip
-    console.print(table)
-
-
-def _table(title: str) -> Table:
-    table = Table(title=escape(title), title_justify="left", show_header=False)
-    table.add_column("of the motion", no_wrap=True)
-    table.add_column("value", overflow="fold")
-    return table
+    rows = (
+        (c.name, shown(c.worst, c.unit), f"{c.time:.2f} s", c.where,
+         f"{'≥' if c.least else '≤'} {shown(c.bound, c.unit)}", "" if c.holds else "no")
+        for c in judged.criteria
+    )  # fmt: skip
+    headings = ("criterion", "worst", "at", "where", "needed", "")
+    console.print(text_table(title, headings, (), rows))

@@ -1,7 +1,5 @@
 """The comparison of [Zhao]: reference models of a walk at the same commands."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, replace

@@ -1,19 +1,16 @@
 """What is found of a gait, the table of it, and the picture of [Zhao, fig. 12]."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from poise.training.pictures.figures.palette import GREY
 from poise.training.pictures.figures.style import legend_below, look, saved_figure
-from poise.training.running.columns import Figure, known
+from poise.training.running.columns import COSTS, FOLLOWED, J50_MEAN, TICK, Figure, known
+from poise.training.running.tables import figure_table
 
 from .human import POINTS, KneeMoment
 
@@ -59,34 +56,30 @@ class GaitFigures:
     j50: float | None = None
 
 
-#: of `GaitFigures`; a terminal has no room for longer names
+#: of `GaitFigures`; a terminal has no room for the longest names
 COLUMNS = (
     Figure("falls", "fell", ".0f", of="starts"),
-    Figure("speed_ahead", "speed", ".3f", "m/s"),
-    Figure("speed_error_rms", "RMS error", ".3f"),
-    Figure("cost_of_transport", "CoT", ".2f"),
-    Figure("positive_cost_of_transport", "of positive work", ".2f"),
-    Figure("knee_mean", "knee", ".2f", "N·m/kg"),
-    Figure("knee_peak", "peak", ".2f"),
+    FOLLOWED[0],
+    FOLLOWED[3],
+    replace(COSTS[0], name="CoT"),
+    COSTS[1],
+    replace(COSTS[2], name="knee"),
+    replace(COSTS[3], unit=""),
     Figure("knee_rmse", "RMSE to humans", ".2f"),
     Figure("force_peak", "force peak", ".2f", "m g"),
     Figure("height_amplitude", "height ±", ".1f", "mm", scale=1e3),
-    Figure("j50", "J50", ".1f", "N·s"),
-    Figure("tick", "tick", ".0f", "µs"),
+    replace(J50_MEAN, key="j50", ends=""),
+    replace(TICK, key="tick"),
 )
 
 
 def print_gaits(figures: Sequence[GaitFigures], console: Console) -> None:
     """A table for each speed."""
     for speed in dict.fromkeys(each.speed for each in figures):
-        table = Table(title=f"{speed:g} m/s", title_justify="left")
-        table.add_column("controller", overflow="fold", min_width=11)
         own = [vars(each) for each in figures if each.speed == speed]
-        shown = known(COLUMNS, own)
-        for column in shown:
-            table.add_column(escape(column.heading), justify="right", overflow="fold")
-        for each in own:
-            table.add_row(escape(each["controller"]), *(column.text(each) for column in shown))
+        rows = (([each["controller"]], each) for each in own)
+        table = figure_table(f"{speed:g} m/s", ["controller"], known(COLUMNS, own), rows)
+        table.columns[0].no_wrap = True  # so that no name is broken
         console.print(table)
 
 

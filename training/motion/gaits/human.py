@@ -1,7 +1,5 @@
 """The human knee over stance: a band that curves of controllers are compared with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

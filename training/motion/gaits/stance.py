@@ -1,7 +1,5 @@
 """What the legs do while they stand: the knee's torque, the ground's force, the CoM's height."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

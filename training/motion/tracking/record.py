@@ -1,7 +1,5 @@
 """The record of a performed motion: errors over its time, falls relative to it, its end."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 

@@ -1,7 +1,5 @@
 """How near the feet stay to a motion with steps: in the air, at touchdown, and planted."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The recovery envelope, seen from above."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import cast
 

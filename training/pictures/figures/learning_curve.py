@@ -1,7 +1,5 @@
 """What a policy recovers against the environment steps that it has learned from."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

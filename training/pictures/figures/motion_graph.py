@@ -1,7 +1,5 @@
 """Pictures of a motion graph: its adjacency matrix as a heat map, and the graph as a circle."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """The colours of all pictures, and in pages, where they are variables for light and dark."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from matplotlib.colors import to_hex, to_rgb

@@ -1,7 +1,5 @@
 """A motion without physics, as a video: the robot, and the skeleton of the file beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Rates: falls over the size of the push, recoveries at the levels of a factor; rows of values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """The figures of one controller, and how their marks and intervals look in every picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

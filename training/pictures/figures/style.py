@@ -1,7 +1,5 @@
 """The look of every picture of Poise, and how it is saved. No pyplot, no global backend."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO

@@ -72,12 +72,9 @@ class Film:
             self._ghost = ghost_of(env)
         if env.simulation.time < self.frames / self.rate - 1e-9:
             return
-        posture = None if self._ghost is None else self._ghost.posture(_motion_time(env))
+        time = float(getattr(env, "motion_time", env.simulation.time))
+        posture = None if self._ghost is None else self._ghost.posture(time)
         frame = self._renderer.render(posture)
         assert frame is not None  # it is open, and off-screen
         self._encoder.send(frame)
         self.frames += 1
-
-
-def _motion_time(env: BalanceEnv) -> float:
-    return float(getattr(env, "motion_time", env.simulation.time))

@@ -1,7 +1,5 @@
 """A motion's ZMP inside the soles, and the errors of its performance, over time."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pictures of motions as one HTML file that opens from disk, in the colours of the report."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The pages of graphs, of scripts, and of one trial against the motion that it performs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A script over time: what is played when, what lies over it, and how it is led on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What happens in one performance of a motion, from policy step to policy step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Tables that only some suites have: sensitivity to factors, indicators, seeds, errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypedDict, cast
@@ -14,6 +12,7 @@ from poise.training.pictures.figures.rates import level_curves, level_text
 from poise.training.pictures.figures.series import rate_series
 from poise.training.pictures.figures.style import Inline
 from poise.training.running.columns import (
+    AGAINST,
     MARGINS,
     OVER_SEEDS,
     P_VALUE,
@@ -88,14 +87,12 @@ def factor_plots(results: Results, order: Sequence[str]) -> list[FactorPlot]:
 
 def factor_table(results: Results) -> Table | None:
     """Every level of every factor; None without factors."""
+    figures = (*TRIED, RECOVERED, *AGAINST)
     columns = [
         Column("controller", "controller"),
         Column("factor", "factor"),
         Column("level", "level"),
-        *map(figure_column, (*TRIED, RECOVERED)),
-        Column("lost", "lost", "against the standard case"),
-        Column("won", "won", "against the standard case"),
-        figure_column(P_VALUE),
+        *map(figure_column, (*figures, P_VALUE)),
     ]
     rows = [
         [
@@ -103,14 +100,12 @@ def factor_table(results: Results) -> Table | None:
             Cell(factor, factor),
             Cell(level["level"], level_text(level["level"])
                  + (" (standard)" if level["standard"] else "")),
-            *(figure_cell(each, level) for each in (*TRIED, RECOVERED)),
-            cell(level["lost"], "d"),
-            cell(level["won"], "d"),
+            *(figure_cell(each, level) for each in figures),
             p_cell(level["p_mcnemar"]),
         ]
         for name, factor, level in factor_levels(results)
     ]  # fmt: skip
-    caption = "Recovery rate at every level of every factor."
+    caption = "Recovery rate at every level of every factor, lost and won against the standard."
     return Table("factors", caption, columns, rows) if rows else None
 
 

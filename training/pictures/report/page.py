@@ -1,7 +1,5 @@
 """A result folder as one HTML file that opens from disk, with nothing outside it."""
 
-from __future__ import annotations
-
 import base64
 import re
 import shlex
@@ -185,9 +183,10 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
     """A case for the template."""
     record = case.record
     trial = results.trial(record)
-    start = _float(record.line.get("start"))
+    start = float(text) if (text := record.line.get("start")) else None
     pushes = words.push_times(trial)
-    end = _end(record, start or 0.0)
+    # the last time worth showing
+    end = (record.fall_time if record.fallen else (start or 0.0) + 3.0) + AFTER
     parts = []
     for played in films:
         who, t = played.record, played.signals.t
@@ -222,11 +221,6 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
             *allow_words(record.controller),
         ]),
     }  # fmt: skip
-
-
-def _end(record: Record, start: float) -> float:
-    """Last time worth showing of a trial that was lost [s]."""
-    return (record.fall_time if record.fallen else start + 3.0) + AFTER
 
 
 def _ending(record: Record) -> str:
@@ -268,7 +262,3 @@ def _trials(results: Results) -> Download | None:
 def _summary_file(results: Results) -> Download:
     text = read_text(results.folder / SUMMARY, JSON_BYTES)
     return download(SUMMARY, text, pack=len(text) > EMBEDDED)
-
-
-def _float(text: str | None) -> float | None:
-    return float(text) if text not in (None, "") else None

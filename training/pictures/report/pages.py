@@ -1,7 +1,5 @@
 """A page from its template, in the colours of the pictures on it."""
 
-from __future__ import annotations
-
 import jinja2
 
 from poise.training.pictures.figures.palette import CARDS, variables

@@ -1,7 +1,5 @@
 """The plots of a report, from results."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import cast
 

@@ -1,7 +1,5 @@
 """The tables of a report, from a summary."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,6 +8,7 @@ from typing import cast
 from poise.training.benchmarking.evaluation.tables import places
 from poise.training.benchmarking.results.read import Results
 from poise.training.running.columns import (
+    AGAINST,
     AIMED,
     ERRORS,
     ETA_MEAN,
@@ -30,6 +29,7 @@ from poise.training.running.columns import (
     ROOT,
     TICK,
     TRIED,
+    Entry,
 )
 from poise.training.running.summary import Bound, Direction, Sector
 
@@ -64,23 +64,19 @@ def ranking(results: Results, baseline: str) -> Table:
         Column("rank", "#", "by mean J50, else by the fraction of the limit, else by rate"),
         Column("controller", "controller"),
         *map(figure_column, found),
-        Column("lost", "lost", f"trials that {baseline} recovers and this controller does not"),
-        Column("won", "won", f"trials that this controller recovers and {baseline} does not"),
-        figure_column(P_VALUE),
-        *map(figure_column, others),
+        *map(figure_column, (*AGAINST, P_VALUE, *others)),
     ]
     rows = []
     rank = places(results.summary["controllers"])
     for name in ranked:
         entry = results.summary["controllers"][name]
-        lost, won, p = against.get(name, (None, None, None))
+        pair = against.get(name, {})
         rows.append([
             cell(rank[name], "d"),
             name_cell(name, order.index(name)),
             *(figure_cell(each, entry) for each in found),
-            cell(lost, "d"),
-            cell(won, "d"),
-            p_cell(p),
+            *(figure_cell(each, pair) for each in AGAINST),
+            p_cell(pair.get("p_mcnemar")),
             *(figure_cell(each, entry) for each in others),
         ])  # fmt: skip
     caption = f"Controllers, the best first. Lost and won are counted against {baseline}."
@@ -134,16 +130,16 @@ def bound_of(entry: Direction | Sector) -> Bound:
     return cast(Bound, bound)
 
 
-def _against(results: Results, baseline: str) -> dict[str, tuple[int, int, float]]:
-    """controller → (trials lost, trials won, p) against the baseline."""
-    found: dict[str, tuple[int, int, float]] = {}
+def _against(results: Results, baseline: str) -> dict[str, Entry]:
+    """controller → trials lost and won against the baseline, and p."""
+    found: dict[str, Entry] = {}
     for pair in results.summary["pairs"]:
         if baseline not in (pair["a"], pair["b"]) or "p_mcnemar" not in pair:
             continue
-        if pair["a"] == baseline:
-            found[pair["b"]] = (pair["only_a"], pair["only_b"], pair["p_mcnemar"])
-        else:
-            found[pair["a"]] = (pair["only_b"], pair["only_a"], pair["p_mcnemar"])
+        lost, won, other = pair["only_a"], pair["only_b"], pair["b"]
+        if other == baseline:
+            lost, won, other = won, lost, pair["a"]
+        found[other] = {"lost": lost, "won": won, "p_mcnemar": pair["p_mcnemar"]}
     return found
 
 

@@ -1,7 +1,5 @@
 """What the report shows of walks, motions and levels: by command, by phase of a push, by motion."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sentences of a report."""
 
-from __future__ import annotations
-
 import math
 
 from poise.training.benchmarking.diagnosis.words import towards

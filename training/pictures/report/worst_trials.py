@@ -1,7 +1,5 @@
 """The trials that a report shows are chosen and played again: frames and signals."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 But for what the user has named on the command line.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from poise.baselines.policy_files.known import RIVALS

@@ -1,7 +1,5 @@
 """What is seen of a robot at one moment: poses, marks, and the values that are plotted."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

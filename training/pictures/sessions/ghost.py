@@ -1,7 +1,5 @@
 """The ghost of a motion: where the robot is if it follows its reference exactly."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mujoco

@@ -1,7 +1,5 @@
 """What is played: a session that runs, or a trial that was recorded; both with their frames."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From what is asked for in text to a session that can be played."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

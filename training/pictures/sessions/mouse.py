@@ -1,7 +1,5 @@
 """Pushing with the mouse: a body is dragged, and the arrow that this draws is the push."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mujoco

@@ -1,7 +1,5 @@
 """Simulated time against the wall clock."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A trial of a result, played again as `poise replay` does, as frames to scrub through."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Controllers side by side, all in one trial, which goes on and is pushed while it runs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

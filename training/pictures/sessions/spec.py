@@ -1,7 +1,5 @@
 """What is to be shown, in text: the command and the link that show the same again."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Collection
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """One walk: played, told in lines while it goes on, filmed, and its figures in words."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -38,15 +36,8 @@ Say = Callable[[str], object]  # prints a line
 
 @allows("controller")
 def walk(
-    speed: float = 0.5,
+    command: Mapping[str, float | None],
     *,
-    left: float = 0.0,
-    turn: float = 0.0,
-    step_time: float | None = None,
-    step_length: float | None = None,
-    width: float | None = None,
-    clearance: float | None = None,
-    arm_swing: float | None = None,
     duration: float = 20.0,
     controller: str = "walk",
     robot: str = "humanoid",
@@ -62,9 +53,7 @@ def walk(
     """Play one walk at a command and tell of it in lines; returns its outcome.
 
     Args:
-        speed, left: of the command [m/s].
-        turn: of the command [rad/s].
-        step_time, step_length, width, clearance, arm_swing: of the command, see `GaitCommand`.
+        command: fields of a `GaitCommand`; of None its default.
         duration: of the walk [s].
         controller: one that walks, as `load_agent` takes it.
         robot: a packaged robot or a path to its description.
@@ -88,10 +77,7 @@ def walk(
     if seed < 0:
         raise ConfigError(f"must be at least 0, not {seed}", field="seed")
     loaded = load_robot(robot)
-    asked = {"ahead": speed, "left": left, "turn": turn, "step_time": step_time,
-             "step_length": step_length, "width": width, "clearance": clearance,
-             "arm_swing": arm_swing}  # fmt: skip
-    commands = parse_commands(asked, "command")
+    commands = parse_commands(command, "command")
     pushes = () if push is None else (parse_push(push, push_at, duration, loaded),)
     ground = make_terrain(terrain, "walk")
     check_asked(controller, loaded, commands, ground)  # a controller takes long to be made
@@ -101,9 +87,9 @@ def walk(
     )  # fmt: skip
     check_walks(controller, agent, "walk")
     trial = Trial(0, seed, pushes, commands=commands)
-    command = commands[0]
-    say(f"{controller}, {loaded.name}: {command.ahead:g} m/s ahead, {command.left:g} left, "
-        f"{np.degrees(command.turn):g} °/s for {duration:g} s")  # fmt: skip
+    told = commands[0]
+    say(f"{controller}, {loaded.name}: {told.ahead:g} m/s ahead, {told.left:g} left, "
+        f"{np.degrees(told.turn):g} °/s for {duration:g} s")  # fmt: skip
     outcome = run_trial(agent, trial, Told(say))
     for line in lines(outcome, trial, agent):
         say(line)

@@ -1,7 +1,5 @@
 """The page and the loop that plays: time, what the user asks for, pictures."""
 
-from __future__ import annotations
-
 import queue
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The marks of `envs/viewing/overlays.py` in viser's scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 

@@ -1,7 +1,5 @@
 """MuJoCo's own window: one controller, pushed by keys and by the mouse."""
 
-from __future__ import annotations
-
 import queue
 import time
 from collections.abc import Callable

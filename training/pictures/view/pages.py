@@ -1,7 +1,5 @@
 """The open pages: what they are told and sent as files, and where their cameras are."""
 
-from __future__ import annotations
-
 import io
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """The controls beside the scene. They only ask: what is asked is done between two steps."""
 
-from __future__ import annotations
-
 import html
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Plots over time beside the scene, a line for each controller."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,7 +24,9 @@ class Plots:
 
     def __init__(self, gui: viser.GuiApi, names: Sequence[str]):
         self._names = names
-        series = (uplot.Series(label="t [s]"), *(_series(k, name) for k, name in enumerate(names)))
+        lines = (uplot.Series(label=name, stroke=look(k).colour, width=2.0, points={"show": False})
+                 for k, name in enumerate(names))  # fmt: skip
+        series = (uplot.Series(label="t [s]"), *lines)
         axis = uplot.Axis(stroke=GREY, grid={"stroke": FAINT}, ticks={"stroke": FAINT})
         empty = tuple(np.zeros(1) for _ in series)
         plots = {
@@ -69,7 +69,3 @@ def _scale(reach: float) -> uplot.Scale:
         "max": {"soft": reach, "mode": 1, "pad": 0.1},
     }
     return uplot.Scale(range=ends)
-
-
-def _series(index: int, name: str) -> uplot.Series:
-    return uplot.Series(label=name, stroke=look(index).colour, width=2.0, points={"show": False})

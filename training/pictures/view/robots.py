@@ -1,7 +1,5 @@
 """Robots in viser's scene: the bodies of one model, drawn once for each robot."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,7 +1,5 @@
 """The scene: ground, robots side by side, their names and marks; the camera goes with them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

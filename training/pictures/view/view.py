@@ -1,7 +1,5 @@
 """`poise view`: what is named is checked, then loaded, then shown until the user ends it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 

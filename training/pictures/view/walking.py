@@ -1,7 +1,5 @@
 """Sliders for the command of controllers that walk."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

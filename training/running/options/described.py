@@ -1,7 +1,5 @@
 """What each option of a configuration means: its sentence is that of its field's docstring."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import re

@@ -1,7 +1,5 @@
 """What can be named, with a line on each: robots, controllers, policies, suites and the like."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A page of help: options in groups, each with its sentence, default and range."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Arguments read by a function's signature: what is wrong with them is an error of one line."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import inspect

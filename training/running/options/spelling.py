@@ -1,7 +1,5 @@
 """Older and other spellings of options, and what a wrong one looks like."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 from poise.configs.errors import meant

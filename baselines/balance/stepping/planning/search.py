@@ -124,7 +124,13 @@ def distance_outside(q: Search, x: float, y: float) -> float:
 
 @compiled
 def capture_foothold(q: Search) -> None:
-    """The foothold under ξ(T) and its cost, see `StepPlanner.footholds`."""
+    """The foothold under ξ(T); its cost is how far ξ(T) is outside the CoP region of both soles
+    [m], no less than −margin.
+
+    The CoP is taken to stay at p, where the stance sole brakes ξ most, so that ξ drifts to
+    p + (ξ − p) e^(ωT) [Koolen12]; the foothold is what limits of place and speed allow of the one
+    desired there.
+    """
     foot = q.foot[0]
     end_x, end_y = end_capture_point(q)
     x, y = to_step_frame(q, end_x, end_y)

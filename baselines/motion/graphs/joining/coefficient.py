@@ -4,8 +4,6 @@ Semakin's dissertation has such a coefficient, "found empirically", and does not
 is the least bending energy of a cubic join, weighted by what the joints move.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

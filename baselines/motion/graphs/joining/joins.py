@@ -5,8 +5,6 @@
 at its entry, D the duration, α(u) = 10u³ − 15u⁴ + 6u⁵.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

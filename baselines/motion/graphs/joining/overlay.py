@@ -1,7 +1,5 @@
 """Overlay: other clips over parts of a base clip, by link groups, as Semakin's `|` [Semakin04]."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

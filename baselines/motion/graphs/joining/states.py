@@ -1,7 +1,5 @@
 """Postures of a skeleton, their differences, and their rates at a time of a clip."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Clips as points in the space of their features, and the exact search for the nearest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple

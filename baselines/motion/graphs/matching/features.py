@@ -1,7 +1,5 @@
 """What frames are compared by, seen from where the body stands and faces [Notes, lectures 5, 6]."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

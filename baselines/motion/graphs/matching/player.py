@@ -1,7 +1,5 @@
 """A clip that follows a command, made of pieces that are searched for as it goes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -64,7 +62,6 @@ def match_motion(
     duration: float,
     *,
     start: tuple[int, int] = (0, 0),
-    half_life: float = HALF_LIFE,
 ) -> Matched:
     """A motion that does what a command of the time [s] asks for, from frame `start` on.
 
@@ -77,17 +74,16 @@ def match_motion(
         command: asked at every search.
         duration: [s]; at least 2 frames.
         start: number of a clip, and of a frame in it that is not its last.
-        half_life: of the join [s]; at least 2 frames.
 
     Raises:
-        ConfigError: a duration or half-life that is too short, or no such frame.
+        ConfigError: a duration that is too short, or no such frame.
     """
     pieces = find_pieces(database, command, duration, start)
     dt = database.clips[0].dt
     parts = [database.clips[piece.clip].cut(piece.first * dt, piece.last * dt) for piece in pieces]
     whole = parts[0]
     for part in parts[1:]:
-        whole = inertial(whole, part, half_life)
+        whole = inertial(whole, part, HALF_LIFE)
     return Matched(whole, tuple(pieces))
 
 

@@ -1,7 +1,5 @@
 """Joint limits as bounds of a nonlinear least-squares problem, and a prior beside the goals."""
 
-from __future__ import annotations
-
 import numpy as np
 from mujoco import minimize
 

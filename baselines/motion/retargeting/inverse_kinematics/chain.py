@@ -1,7 +1,5 @@
 """The joints between a body that stays and bodies that are to be moved, and their kinematics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import mujoco

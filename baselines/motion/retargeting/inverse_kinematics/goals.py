@@ -1,7 +1,5 @@
 """What a posture is to reach, and by how much it misses that."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What the methods of inverse kinematics are asked for, and what they answer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

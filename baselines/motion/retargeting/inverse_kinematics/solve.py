@@ -1,7 +1,5 @@
 """One interface to all methods of inverse kinematics."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -100,9 +98,10 @@ class InverseKinematics(Copyable):
         misses = Misses(self.chain, goals, self.options.lever)
         objective = Objective(misses, self.prior, self.prior_weight)
         best, count, taken = self.chain.q.copy(), 0, 0
-        least = np.inf
+        least, first = np.inf, self.chain.clipped(best) if self.options.limits else best
         for count in range(1, restarts + 2):
-            first = self._first(best) if count == 1 else self._random(objective, rng)
+            if count > 1:
+                first = self._random(objective, rng)
             q, steps = self._descend(objective, first)
             taken += steps
             if (value := objective.value(q)) < least:
@@ -110,9 +109,6 @@ class InverseKinematics(Copyable):
             if self.prior is None and self._residual(misses, best) <= self.options.tolerance:
                 break
         return self._result(misses, best, whole, taken, count, least)
-
-    def _first(self, q: np.ndarray) -> np.ndarray:
-        return self.chain.clipped(q) if self.options.limits else q
 
     def _random(self, objective: Objective, rng: np.random.Generator) -> np.ndarray:
         """Of `SAMPLES` random positions (n,) those with the least objective."""

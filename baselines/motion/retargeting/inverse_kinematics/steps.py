@@ -4,8 +4,6 @@ With mobilities M = diag(m), J = ∂e/∂q, each gives a displacement Δq (n,); 
 clipping what comes of it. CCD clips joint by joint. [Wang91], [Buss04]
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

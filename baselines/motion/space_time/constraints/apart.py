@@ -1,7 +1,5 @@
 """Two points that keep a distance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -39,5 +37,4 @@ class Apart(Constraint):
             yield Rows({frame: way[None] @ moved}, np.array([length]), low, high)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"{self.point} and {self.to} apart by {self.distance:g} m"

@@ -1,7 +1,5 @@
 """What a constraint is: rows of the whole clip, begun where the motion is now."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple

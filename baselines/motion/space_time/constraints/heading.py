@@ -1,7 +1,5 @@
 """Where the body faces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -55,5 +53,4 @@ class Heading(Constraint):
         return float(np.degrees(1.0))
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"heading of the {self.of} {self.angle:g}°"

@@ -1,7 +1,5 @@
 """How high a point is."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -40,7 +38,6 @@ class Height(Constraint):
             yield Rows({frame: derivative}, point.place(data)[2:], low, high)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"height of {self.point} {between(self.least, self.most, 'm')}"
 
 

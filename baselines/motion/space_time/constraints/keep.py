@@ -1,7 +1,5 @@
 """A point that stays where it is."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -42,7 +40,6 @@ class Keep(Constraint):
             yield Rows({frame: derivative}, places[frame] - middle, -bound, bound, shared=True)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"keep {self.point}" + (f" to {self.to}" if self.to else "")
 
 

@@ -1,7 +1,5 @@
 """The CoM, or another point, over the planted soles."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -41,5 +39,4 @@ class OverSupport(Constraint):
             yield Rows({frame: derivative}, value, np.full(len(sides), -np.inf), bound)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"{self.point} over the support by {self.margin:g} m"

@@ -1,7 +1,5 @@
 """When a constraint holds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

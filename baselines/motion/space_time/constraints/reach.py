@@ -1,7 +1,5 @@
 """A point at a place."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -49,6 +47,5 @@ class Reach(Constraint):
             yield Rows({frame: derivative[given]}, place[given] - goal, -bound, bound)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         place = ", ".join("free" if value is None else f"{value:g}" for value in self.place)
         return f"reach ({place}) by {self.point}" + (f" from {self.to}" if self.to else "")

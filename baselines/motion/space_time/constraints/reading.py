@@ -1,7 +1,5 @@
 """Constraints in a YAML file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How fast a point moves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -59,5 +57,4 @@ class Speed(Constraint):
         return 1.0 / scene.dt
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"speed of {self.point} {between(self.least, self.most, 'm/s')}"

@@ -1,7 +1,5 @@
 """A part of the body that touches another one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -60,7 +58,6 @@ class Touch(Constraint):
             yield Rows({frame: derivative}, np.array([distance]), low, high)
 
     def about(self) -> str:
-        """The constraint in a few words."""
         return f"{self.point} touches {self.body}"
 
 

@@ -1,7 +1,5 @@
 """Scripts that come with Poise, and scripts by name, file or text."""
 
-from __future__ import annotations
-
 from poise.configs.files import packaged_folder
 from poise.configs.reading import is_file
 

@@ -1,7 +1,5 @@
 """Scripts are read by recursive descent; the grammar is in `tree.py`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from poise.configs.errors import ConfigError, shown

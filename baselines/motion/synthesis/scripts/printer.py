@@ -1,7 +1,5 @@
 """A tree as text: what `parse` reads as the same tree."""
 
-from __future__ import annotations
-
 from poise.configs.errors import ConfigError, shown
 
 from .tree import Arrow, ClipName, Modifier, Overlay, Script, Sequence, StateName, Term

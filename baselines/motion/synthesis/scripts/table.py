@@ -1,7 +1,5 @@
 """A script as a table, as Semakin's figure 4: columns follow each other, rows happen at once."""
 
-from __future__ import annotations
-
 import csv
 import io
 

@@ -1,7 +1,5 @@
 """Words of a script with their places, and errors that say line and column."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from typing import NamedTuple

@@ -17,6 +17,7 @@ from poise.baselines.registry import controller_config, load_controller
 from poise.envs.compiled.maths.pendulum import pendulum
 from poise.envs.compiled.maths.polygons import nearest_inside
 from tests.baselines.balance.stepping.test_capture_step import trial
+from tests.support import planned
 from tests.support.shared import generic_state, robot
 from tests.support.stepping_reference import drifted
 
@@ -77,8 +78,8 @@ def test_a_policy_and_the_configuration_move_footholds(foot):
     feedback = StepFeedback(ahead=SignalGains(0.03), outward=SignalGains(0.04))
     plain, moved = planner(0.5), planner(0.5, lateral_offset=0.05, feedback=feedback)
     moved.offsets.foothold[:] = 0.02, -0.01
-    (before,), _ = plain.footholds(state, foot, yaw, times, start)
-    (after,), _ = moved.footholds(state, foot, yaw, times, start)
+    (before,), _ = planned.footholds(plain, state, foot, yaw, times, start)
+    (after,), _ = planned.footholds(moved, state, foot, yaw, times, start)
     side = 1.0 if foot == 0 else -1.0  # the left foot is the first
     cos, sin = state.heading
     local = np.array([[cos, sin], [-sin, cos]]) @ (after - before)
@@ -101,7 +102,7 @@ def test_without_limits_a_linear_pendulum_steps_onto_the_capture_point():
     found = {}
     for arc in (0.0, 1.0):
         plan = planner(arc)
-        footholds, cut = plan.footholds(state, 0, yaw, times, start)
+        footholds, cut = planned.footholds(plan, state, 0, yaw, times, start)
         cos, sin = state.heading
         found[arc] = footholds + np.array([[cos, -sin], [sin, cos]]) @ plan.region.middle[0]
         np.testing.assert_allclose(cut, 0.0, atol=1e-12)
@@ -123,8 +124,8 @@ def test_limits_hold_and_say_what_they_cost():
     for velocity in (1.5, -1.5):
         state.arrays.com_vel[:2] = velocity * state.heading
         state.arrays.capture_point[:] = state.com[:2] + state.com_vel[:2] / state.omega
-        held, cost = narrow.footholds(state, 0, yaw, times, start)
-        free, _ = far.footholds(state, 0, yaw, times, start)
+        held, cost = planned.footholds(narrow, state, 0, yaw, times, start)
+        free, _ = planned.footholds(far, state, 0, yaw, times, start)
         cos, sin = state.heading
         local = (held[0] - state.sole_points[1, :2]) @ np.array([[cos, -sin], [sin, cos]])
         assert abs(local[0]) <= 0.1 * narrow.units.height + 1e-9

@@ -15,6 +15,7 @@ from poise.baselines.balance.stepping.planning.config import (
 from poise.baselines.balance.stepping.planning.cop_region import CopRegion
 from poise.baselines.balance.stepping.planning.feedback import LATER_STEP
 from poise.baselines.balance.stepping.planning.swing import Swing
+from tests.support import planned
 from tests.support.shared import generic_state, robot
 from tests.support.stepping_reference import ReadablePlanner
 
@@ -64,7 +65,7 @@ def test_plan_is_that_of_the_readable_planner(offset, feedback, falls):
     for seed in range(12):
         state, yaw, _ = falling(seed)
         plans.feedback.signals[LATER_STEP] = seed % 3 == 0  # the law of first steps is another one
-        plan = plans.plan(state, yaw)
+        plan = planned.plan(plans, state, yaw)
         agree(plan, readable.plan(state, yaw))
         feet.add(plan.foot)
     assert feet == {0, 1}
@@ -85,7 +86,9 @@ def test_a_running_step_is_planned_as_by_the_readable_planner(offset, feedback):
         swing.aim(state.sole_points[foot, :2] + rng.uniform(-0.2, 0.2, 2))
         for _ in range(rng.integers(1, 60)):
             swing.advance(0.004)
-        agree(plans.replan(state, foot, yaw, swing), readable.replan(state, foot, yaw, swing))
+        agree(
+            planned.replan(plans, state, foot, yaw, swing), readable.replan(state, foot, yaw, swing)
+        )
 
 
 def test_footholds_are_those_of_the_readable_planner_at_all_limits():
@@ -97,7 +100,7 @@ def test_footholds_are_those_of_the_readable_planner_at_all_limits():
         for seed in range(4):
             state, yaw, _ = falling(seed)
             foot, start = seed % 2, state.sole_points[seed % 2, :2]
-            footholds, left = plans.footholds(state, foot, yaw, times, start)
+            footholds, left = planned.footholds(plans, state, foot, yaw, times, start)
             for k, time in enumerate(times):
                 foothold, outside = readable.foothold(state, foot, yaw, time, start)
                 np.testing.assert_allclose(footholds[k], foothold, atol=1e-9)

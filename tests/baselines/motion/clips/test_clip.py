@@ -80,6 +80,10 @@ def test_slerp_has_constant_speed_on_the_shorter_way() -> None:
         way = angle_between(a, slerp(a, b, np.full(50, u)))
         assert np.abs(way - u * angle_between(a, b)).max() < 1e-7
         assert way.max() <= np.pi * u + 1e-7
+    line = 0.75 * a + 0.25 * np.where((a * b).sum(axis=1, keepdims=True) < 0.0, -b, b)
+    normalised = line / np.linalg.norm(line, axis=1, keepdims=True)
+    slow = angle_between(a, normalised) - 0.25 * angle_between(a, b)
+    assert slow.max() < 0.0  # a line of quaternions begins slowly
 
 
 def test_closed_ends_as_it_begins_and_keeps_the_rest(walk: Clip) -> None:

@@ -40,7 +40,9 @@ def test_a_fall_is_told(tmp_path: Path) -> None:
     """A push that nothing holds: when it fell; a video of it is written."""
     told: list[str] = []
     path = tmp_path / "walk.webp"
-    outcome = walk(0.3, duration=4.0, push="90@90", push_at=0.5, video=path, say=told.append)
+    outcome = walk(
+        {"ahead": 0.3}, duration=4.0, push="90@90", push_at=0.5, video=path, say=told.append
+    )
     assert outcome.fallen and f"fell after {outcome.fall_time:.1f} s" in told
     assert path.stat().st_size > 1000 and told[-1] == str(path)
 

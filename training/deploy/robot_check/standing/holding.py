@@ -1,7 +1,5 @@
 """The fraction of its torque limits that holds a posture: inverse dynamics at rest."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

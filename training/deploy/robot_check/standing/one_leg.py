@@ -1,7 +1,5 @@
 """A posture on one leg: the CoM over one foot, the other lifted."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

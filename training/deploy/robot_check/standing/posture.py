@@ -1,7 +1,5 @@
 """The standing posture beside the described one and those of the model."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import mujoco

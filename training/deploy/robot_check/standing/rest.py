@@ -1,7 +1,5 @@
 """Two seconds at rest with the QP: whether the robot stands before anything pushes it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The reach of the CoP from a standing robot's CoM, and the push that it stops."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from poise.envs.physics.pushes.sampler import LIMIT_DURATION

@@ -5,9 +5,9 @@ import pytest
 
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import load_robot
-from poise.training.motion.open_loop.plant import Plant
-from poise.training.motion.open_loop.search import replay, samcon, search_whole
-from tests.training.motion.open_loop.test_plant import short_plant
+from tests.performance.open_loop.plant import Plant
+from tests.performance.open_loop.search import replay, samcon, search_whole
+from tests.performance.open_loop.test_plant import short_plant
 
 BUDGET = 7.0  # [s], ten times the motion
 

@@ -8,8 +8,8 @@ from poise.baselines.balance.references.motion import MotionDescription, load_mo
 from poise.configs.errors import ConfigError
 from poise.configs.schema import build
 from poise.envs.robots.robot import Robot, load_robot
-from poise.training.motion.open_loop.plant import FALLEN, Plant
-from poise.training.motion.open_loop.search import replay
+from tests.performance.open_loop.plant import FALLEN, Plant
+from tests.performance.open_loop.search import replay
 
 RNG = np.random.default_rng(0)
 BEND = {"knees": 20, "hips_pitch": -10, "ankles_pitch": -10}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from poise.configs.errors import ConfigError
-from poise.configs.extras import how_to_install
+from poise.configs.extras import needing
 
 from .plant import FALLEN, Plant
 
@@ -57,10 +57,8 @@ def search_whole(plant: Plant, budget: float, seed: int = 0) -> OpenLoop:
     Raises:
         ConfigError: the package `cma` is missing; a budget that is not above 0.
     """
-    try:
+    with needing("dev"):
         import cma
-    except ImportError:
-        raise ConfigError(f"needs the package cma: {how_to_install('dev')}") from None
     _check(budget)
     before, shape = plant.simulated, (plant.windows, plant.size)
     best = replay(plant, np.zeros(shape))

@@ -15,8 +15,8 @@ import numpy as np
 from poise.baselines.balance.references.motion import load_motion
 from poise.envs.robots.robot import load_robot
 from poise.training.motion.following.follow import follow
-from poise.training.motion.open_loop.plant import Plant
-from poise.training.motion.open_loop.search import OpenLoop, replay, samcon, search_whole
+from tests.performance.open_loop.plant import Plant
+from tests.performance.open_loop.search import OpenLoop, replay, samcon, search_whole
 
 MOTIONS = ("squat", "weight_shift")
 VELOCITY = 0.05  # [m/s]
