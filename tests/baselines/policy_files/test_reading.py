@@ -89,7 +89,7 @@ def test_some_joints_are_moved_by_the_action(tmp_path: Path) -> None:
     write_onnx(tmp_path / "policy.onnx", linear(9 + 2 * N + 2, 2))
     joints = load_controller(str(tmp_path), robot("compact")).joints
     np.testing.assert_array_equal(joints.moved, [0, 6])
-    np.testing.assert_allclose(joints.targets(np.array([9.0, 9.0])), [0.25, 1.1])
+    np.testing.assert_allclose(joints.targets(np.array([9.0, 9.0]), np.zeros(4)), [0.25, 1.1])
 
 
 @pytest.mark.parametrize("phase", [False, True])
