@@ -86,7 +86,7 @@ def _obey(servos: JointServos, robot: Robot, config: PolicyFileConfig) -> None:
         return
     moved = [int(joint) for joint in servos.moved]
     names = [robot.joint_names[joint] for joint in moved]
-    left = Simulation(robot).data.xanchor[1:, 1] >= 0.0  # in the standing posture
+    left = Simulation(robot).data.xanchor[1:, 1] > -1e-6  # or in the middle, standing
     for name, law in match_names(config.law, names, config.described_in, "law").items():
         i = names.index(name)
         joint = moved[i]
