@@ -94,8 +94,9 @@ def _obey(servos: JointServos, robot: Robot, config: PolicyFileConfig) -> None:
         servos.stiffness[joint] *= law.stiffness
         servos.damping[joint] *= law.damping
         servos.law[i] = law.pitch, law.pitch_rate, law.roll, law.roll_rate
-        if np.any(servos.law[i]) and not left[joint]:
-            servos.law[i] *= mirror_robot(robot)["joints"].sign[joint] * IMAGE
+    if np.any(servos.law):
+        sign, right = mirror_robot(robot)["joints"].sign[moved], ~left[moved]
+        servos.law[right] *= sign[right, None] * IMAGE
 
 
 def _hold(servos: JointServos, robot: Robot, config: PolicyFileConfig) -> None:
