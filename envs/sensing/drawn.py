@@ -26,6 +26,7 @@ class DrawnRobot:
         payload: on the loaded body, over the robot's mass.
         friction, softness: of the ground, or None: as in the model.
         slope: (2,) tangent of the ground's fall along x and y.
+        bumps: height of the highest bump [m].
     """
 
     sense: int
@@ -48,6 +49,7 @@ class DrawnRobot:
     softness: float | None
     slope: np.ndarray
     seed: int  #: of the noise within the episode
+    bumps: float = 0.0
 
     @property
     def measured(self) -> bool:
@@ -69,6 +71,8 @@ class DrawnRobot:
         for name in ("friction", "softness"):
             if (value := getattr(self, name)) is not None:
                 told[name] = value
+        if self.bumps:
+            told["bumps"] = self.bumps
         return {name: round(value, 6) for name, value in told.items()}
 
 
@@ -129,4 +133,5 @@ def draw_robot(level: Realism, robot: Robot, rng: np.random.Generator) -> DrawnR
         softness=known(ground.softness),
         slope=np.tan(np.radians(number(ground.slope))) * direction(2),
         seed=int(rng.integers(2**63)),
+        bumps=number(ground.bumps),
     )

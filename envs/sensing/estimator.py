@@ -22,6 +22,7 @@ from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, update_state
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot, on_terrain
+from poise.envs.terrain.flat import Flat
 
 from .drawn import DrawnRobot
 from .external_force import ExternalForce, allocate_force, begin_force, observe_force
@@ -229,8 +230,9 @@ class EstimatedState(StateSource, Copyable):
     def __init__(self, plant: Plant, robot: Robot, config: EstimatorConfig):
         super().__init__(plant.simulation)
         self.plant, self.config = plant, config
-        self.known = Simulation(without_contacts(on_terrain(robot, plant.simulation.robot.terrain)))
-        self.ahead = Simulation(on_terrain(robot, plant.simulation.robot.terrain))
+        terrain = plant.robot.terrain
+        believed = on_terrain(robot, Flat() if terrain.unseen else terrain)
+        self.known, self.ahead = Simulation(without_contacts(believed)), Simulation(believed)
         self.sensors: Sensors = allocate_sensors(plant.simulation)
         self.bus = self.sensors.bus
         self.motors = allocate_motors(plant.simulation, self.bus)

@@ -6,17 +6,22 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from poise.configs.errors import ConfigError
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
-from poise.envs.robots.robot import Robot
+from poise.envs.robots.robot import Robot, on_terrain
+from poise.envs.terrain.arrays import HEIGHT
+from poise.envs.terrain.building import BUILT
+from poise.envs.terrain.bumps import Bumps
 
 from .drawn import DrawnRobot
 
 #: what an episode changes of a model
 CHANGED = (
     *("body_mass", "body_inertia", "body_ipos", "dof_frictionloss"),
-    *("geom_friction", "pair_friction", "geom_solref", "pair_solref"),
+    *("geom_friction", "pair_friction", "geom_solref", "pair_solref", "geom_pos"),
 )
+HIGHEST = 0.05  # [m] that a bump is built; an episode lets it down
 
 
 class Plant:
@@ -26,11 +31,19 @@ class Plant:
         robot: that it differs from.
         simulation: of a model of its own. Sizes, names and motors are those of `robot`, so that a
             controller made for that fits; its arrays have the true mass.
+        bumpy: whether its ground has bumps.
+
+    Raises ConfigError for bumps on a terrain.
     """
 
-    def __init__(self, robot: Robot):
+    def __init__(self, robot: Robot, bumpy: bool = False):
+        self.robot, self.bumpy = robot, bumpy
+        if bumpy:
+            if not robot.terrain.flat:
+                raise ConfigError("only on level ground, not on a terrain", source="realism",
+                                  field="ground.bumps")  # fmt: skip
+            robot = on_terrain(robot, Bumps(lowest=HIGHEST, highest=HIGHEST))
         model = copy.copy(robot.model)
-        self.robot = robot
         self._nominal = {name: getattr(model, name).copy() for name in CHANGED}
         self._gravity = float(np.linalg.norm(model.opt.gravity))
         self._scratch = mujoco.MjData(model)
@@ -60,5 +73,19 @@ class Plant:
                 solref[soft, 0] = np.maximum(solref[soft, 0], drawn.softness)
         up = np.array([-drawn.slope[0], -drawn.slope[1], 1.0])  # of gravity, seen from the ground
         model.opt.gravity[:] = -self._gravity * up / np.linalg.norm(up)
+        if self.bumpy:
+            self._let_down(drawn)
         mujoco.mj_setConst(model, self._scratch)
         self.simulation.arrays.replace_number("mass", float(model.body_subtreemass[self._root]))
+
+    def _let_down(self, drawn: DrawnRobot) -> None:
+        """Let half of the bumps down by what they are less than built, the others under the floor.
+
+        Only down: MuJoCo looks for contacts in boxes that were made when the model was built.
+        """
+        model, surfaces = self.simulation.model, self.simulation.arrays.surfaces
+        rng = np.random.default_rng(drawn.seed)
+        heights = drawn.bumps * np.maximum(rng.uniform(-1.0, 1.0, len(surfaces) - 1), 0.0)
+        for i, height in enumerate(heights.tolist(), start=1):
+            surfaces[i, HEIGHT] = height
+            model.geom(f"{BUILT}{i}").pos[2] -= HIGHEST - (height or -HIGHEST)

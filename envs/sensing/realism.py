@@ -11,6 +11,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
 from poise.configs.schema import build, on_base, overlay, read_yaml, to_dict
@@ -125,11 +127,13 @@ class GroundErrors(RealismPart):
         friction: Sliding friction of all geoms; None: the model's.
         softness: Least time constant of contacts, MuJoCo's `solref` [s]; None: the model's.
         slope: Slope of all ground in any direction, which is thought level [deg].
+        bumps: Height of the highest of the bumps around the start, which nobody knows of [m].
     """
 
     friction: Spread | None = field(default=None, metadata={"above": 0.0, "max": 10.0})
     softness: Spread | None = field(default=None, metadata={"above": 0.0, "max": 1.0})
     slope: Spread = field(default=0.0, metadata={"min": 0.0, "max": 30.0})
+    bumps: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.05, "omit": "default"})
 
 
 @dataclass(frozen=True)
@@ -161,6 +165,11 @@ class Realism:
     def ideal(self) -> bool:
         """True where nothing differs from the model: the state is known exactly and at once."""
         return replace(self, name=IDEAL) == Realism()
+
+    @property
+    def bumpy(self) -> bool:
+        """True where there may be bumps, of which the model must be built."""
+        return bool(np.any(self.ground.bumps))
 
     def scaled(self, factor: float) -> Realism:
         """The level on the way from `ideal` (0) to this one (1) and beyond, for a curriculum.

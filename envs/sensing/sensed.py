@@ -44,22 +44,23 @@ class SensedRobot:
     def realism(self) -> Realism:
         """What the robot of an episode is drawn from; may be replaced between episodes.
 
-        Raises ConfigError for delays that are longer than what can be led on.
+        Raises ConfigError for delays that are longer than what can be led on, and for bumps on a
+        terrain.
         """
         return self._realism
 
     @realism.setter
     def realism(self, level: Realism) -> None:
         check_latency(level, self.robot.model.opt.timestep)
-        self._realism, self.drawn = level, None
         source = self._state_source
         if level.ideal:
             if isinstance(source, EstimatedState):
                 self.simulation = Simulation(source.plant.robot)
-        elif not isinstance(source, EstimatedState):
-            plant = Plant(self._simulation.robot)
+        elif not isinstance(source, EstimatedState) or source.plant.bumpy != level.bumpy:
+            plant = Plant(self.known_robot, level.bumpy)
             self._simulation = plant.simulation
             self._take(EstimatedState(plant, self.robot, self._estimator()))
+        self._realism, self.drawn = level, None
 
     @property
     def known_robot(self) -> Robot:
@@ -126,6 +127,9 @@ class SensedRobot:
             return
         level = overlaid(self.realism, given, "reset: realism") if asked else self.realism
         check_latency(level, self.robot.model.opt.timestep)
+        if level.bumpy and not source.plant.bumpy:
+            raise ConfigError("the environment's realism has no bumps, so that none are built",
+                              source="reset: realism", field="ground.bumps")  # fmt: skip
         self.drawn = draw_robot(level, self.robot, rng.spawn(1)[0])
         source.plant.become(self.drawn)
 

@@ -9,6 +9,7 @@ from .terrain import Surface, Terrain
 
 THICKNESS = 0.05  # [m] of a box below the floor; half of that of a slanting one
 SHADES = ((0.80, 0.82, 0.84, 1.0), (0.70, 0.72, 0.75, 1.0))
+BUILT = "terrain_"  # prefix of the geoms, the surface's number behind it
 EDGE_SENSOR = "edges_"  # prefix of the sensors of contacts' directions
 SLOTS = 16  # contacts of a foot that such a sensor shows
 FOUND, NORMAL = 1, 32  # bits of what a contact sensor gives
@@ -27,7 +28,7 @@ def build_terrain(spec: mujoco.MjSpec, terrain: Terrain, ground: str) -> None:
     for i, surface in enumerate(terrain.surfaces()):
         if surface.gradient == 0.0 and surface.height == floor:
             continue  # it is the plane's
-        name = f"terrain_{i}"
+        name = f"{BUILT}{i}"
         box = spec.worldbody.add_geom(name=name, **_box(surface, floor))
         box.rgba = SHADES[i % len(SHADES)]
         for attribute in ALIKE:

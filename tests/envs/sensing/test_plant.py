@@ -4,9 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from poise.configs.errors import ConfigError
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
+from poise.envs.robots.robot import on_terrain
 from poise.envs.sensing.plant import CHANGED, Plant
+from poise.envs.terrain.bumps import Bumps
 from tests.support.physics import random_state
 from tests.support.sensing import drawn_of
 from tests.support.shared import robot
@@ -94,3 +97,64 @@ def test_the_known_robot_stays_as_it_is(plant):
     assert isinstance(model, fresh) and model is not plant.simulation.model
     assert Simulation(robot()).arrays.mass == pytest.approx(model.body_mass.sum())
     assert plant.simulation.arrays.mass != pytest.approx(robot().mass, rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def bumpy() -> Plant:
+    return Plant(robot(), bumpy=True)
+
+
+def heights(plant: Plant) -> np.ndarray:
+    """Of what is built, as a ray from above meets it in the middle of each bump [m]."""
+    simulation, down, hit = plant.simulation, np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
+    mujoco.mj_kinematics(simulation.model, simulation.data)
+    found = []
+    for x, y in (
+        (0.5 * (s[0] + s[1]), 0.5 * (s[2] + s[3])) for s in simulation.arrays.surfaces[1:]
+    ):
+        origin = np.array([x, y, 0.2])
+        way = mujoco.mj_ray(simulation.model, simulation.data, origin, down, None, 1, -1, hit)
+        found.append(0.2 - way)
+    return np.array(found)
+
+
+def test_bumps_are_as_high_as_drawn_and_half_of_them_are_there(bumpy):
+    """What is built is what compiled code takes for the ground; the start is clear."""
+    for seed in (1, 2):
+        drawn = drawn_of({"ground": {"bumps": [0.01, 0.03]}}, seed)
+        bumpy.become(drawn)
+        bumpy.simulation.reset()
+        found, surfaces = heights(bumpy), bumpy.simulation.arrays.surfaces
+        alone = [not np.any((np.abs(surfaces[1:, 0] - s[0]) < 0.2)
+                            & (np.abs(surfaces[1:, 2] - s[2]) < 0.2)
+                            & (surfaces[1:, 0] != s[0])) for s in surfaces[1:]]  # fmt: skip
+        assert sum(alone) > 10
+        np.testing.assert_allclose(found[alone], surfaces[1:, 4][alone], atol=1e-9)
+        assert 0.9 * drawn.bumps < found.max() <= drawn.bumps
+        assert 0.3 < np.mean(surfaces[1:, 4] > 0.0) < 0.7
+        model = bumpy.simulation.model  # those that are not there share no plane with the floor
+        tops = np.array([model.geom(f"terrain_{i}").pos[2] + model.geom(f"terrain_{i}").size[2]
+                         for i in range(1, len(surfaces))])  # fmt: skip
+        np.testing.assert_allclose(tops, np.where(surfaces[1:, 4] > 0, surfaces[1:, 4], -0.05))
+        assert np.all(np.abs(surfaces[1:, :4]).reshape(-1, 2, 2).max(axis=2).max(axis=1) > 0.1)
+    bumpy.become(drawn_of({"ground": {"bumps": [0.01, 0.03]}}, 1))
+    assert not np.array_equal(surfaces[1:, 4], found)
+
+
+def test_a_foot_stands_on_a_bump(bumpy):
+    """Its sole is held up by the bump's height, wherever it was let down from."""
+    bumpy.become(drawn_of({"ground": {"bumps": 0.02}}, 5))
+    simulation = bumpy.simulation
+    highest = simulation.arrays.surfaces[1 + np.argmax(simulation.arrays.surfaces[1:, 4])]
+    qpos = robot().standing_qpos.copy()
+    foot = simulation.reset(qpos).arrays.sole_point[0]
+    qpos[:2] += 0.5 * (highest[[0, 2]] + highest[[1, 3]]) - foot[:2]
+    qpos[2] += highest[4]
+    state = simulation.reset(qpos)
+    assert state.contacts[0] == 1.0
+    assert state.ground[0] == pytest.approx(highest[4])
+
+
+def test_bumps_need_level_ground():
+    with pytest.raises(ConfigError, match="realism: ground.bumps: only on level ground"):
+        Plant(on_terrain(robot(), Bumps()), bumpy=True)

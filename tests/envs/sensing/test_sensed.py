@@ -87,9 +87,34 @@ def test_fields_are_fixed_at_a_reset(limp):
         ({"latency": {"sens": 0.01}}, "reset: realism: latency.sens: .*sense"),
         ({"latency": {"sense": 0.05, "command": 0.05}, "motors": {"lag": 0.1}}, "at most 0.124 s"),
         (0.01, "reset: realism: must be a mapping, not 0.01"),
+        ({"ground": {"bumps": 0.01}}, "ground.bumps: the environment's realism has no bumps"),
     ):
         with pytest.raises(ConfigError, match=message):
             limp.reset(options={"realism": given})
+
+
+def test_bumps_come_and_go_with_the_level(limp):
+    """Built for levels that have them; the robot is otherwise the one of the level without."""
+    told = under(limp, "field").reset(seed=2)[1]["realism"]
+    geoms = limp.model.ngeom
+    bumpy = under(limp, {"base": "field", "ground": {"bumps": [0.01, 0.02]}})
+    more = bumpy.reset(seed=2)[1]["realism"]
+    assert limp.model.ngeom > geoms + 50 and 0.01 <= more.pop("bumps") <= 0.02
+    assert {**more, "level": "field"} == told
+    assert limp.reset(seed=2, options={"realism": {"ground": {"bumps": 0.0}}})[1]["realism"] == more
+    assert under(limp, "lab").model.ngeom == geoms == under(limp, "ideal").model.ngeom
+    stairs = TorqueBalanceEnv(robot(), terrain="stairs", realism="lab")
+    with pytest.raises(ConfigError, match="ground.bumps: only on level ground"):
+        under(stairs, {"ground": {"bumps": 0.01}})
+    assert stairs.realism.name == "lab"
+
+
+@pytest.mark.parametrize("unseen", [False, True])
+def test_what_nobody_sees_is_not_believed(unseen):
+    """Known surfaces are in the model that is led on, unseen ones are not."""
+    terrain = {"kind": "slope", "unseen": unseen}
+    source = TorqueBalanceEnv(robot(), terrain=terrain, realism="lab").state_source
+    assert source.ahead.robot.terrain.flat == source.known.robot.terrain.flat == unseen
 
 
 def test_a_level_is_checked_when_it_is_set(limp):

@@ -7,6 +7,7 @@ from poise.configs.errors import ConfigError
 from poise.configs.schema import to_dict
 from poise.envs.balance.config import EnvConfig, env_config
 from poise.envs.terrain.arrays import ground_height, surface_arrays
+from poise.envs.terrain.bumps import Bumps
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.slope import Slope
 from poise.envs.terrain.stairs import Stairs
@@ -53,8 +54,21 @@ def test_errors_are_bounded_known_to_nobody_and_drawn_by_the_seed():
     assert Slope(unseen=True).believed() == [] != Slope().believed()
 
 
+def test_bumps_lie_around_a_clear_start_and_nobody_knows_of_them():
+    bumps = Bumps(count=50, side=0.1, radius=1.0, clear=0.4, lowest=0.005, highest=0.01, seed=2)
+    rest = bumps.surfaces()[1:]
+    assert len(rest) == 50 and bumps.believed() == [] and bumps.floor() == 0.0
+    assert all(0.005 <= s.height <= 0.01 and s.x_max - s.x_min == pytest.approx(0.1) for s in rest)
+    nearest = [np.hypot(*(min(max(0.0, low), high) for low, high in
+                          ((s.x_min, s.x_max), (s.y_min, s.y_max)))) for s in rest]  # fmt: skip
+    assert min(nearest) >= 0.4
+    assert rest != seeded(bumps, 3).surfaces()[1:]
+
+
 @pytest.mark.parametrize(
-    "terrain", [Stairs(down=True), Slope(), Stones(gap=0.05, spread=0.05), Flat()], ids=str
+    "terrain",
+    [Stairs(down=True), Slope(), Stones(gap=0.05, spread=0.05), Bumps(seed=3), Flat()],
+    ids=str,
 )
 def test_compiled_code_finds_the_same_heights(terrain):
     rows, floor = surface_arrays(terrain.surfaces()), terrain.floor()
