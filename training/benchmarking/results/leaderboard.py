@@ -186,10 +186,12 @@ def _ranked(summary: Summary) -> tuple[list[str], Cells]:
 
 
 def _levels(summary: Summary) -> Iterator[tuple[str, Callable[[str], str]]]:
-    """Columns for each level of realism: what was recovered of the same pushes, and J50 there."""
+    """Columns for each level of realism, the suite's own first: what was recovered of the same
+    pushes, and J50 there."""
     entries = summary["controllers"]
     for k, factor in enumerate(entries[summary["ranking"][0]].get("factors", ())):
-        for i, level in enumerate(factor["levels"] if factor["factor"] == "realism" else ()):
+        levels = enumerate(factor["levels"] if factor["factor"] == "realism" else ())
+        for i, level in sorted(levels, key=lambda each: not each[1]["standard"]):
 
             def rate(name: str, k: int = k, i: int = i) -> str:
                 return f"{entries[name]['factors'][k]['levels'][i]['recovered_rate']:.0%}"

@@ -9,7 +9,8 @@ RESULT = Path(__file__).parents[4] / "docs/results/booster_t1.json"
 
 
 def test_levels_of_realism_are_columns(tmp_path: Path) -> None:
-    """With what was recovered at each, of those that a suite plays; without them, none."""
+    """With what was recovered at each, of those that a suite plays, its own first; without them,
+    none."""
     summary = json.loads(RESULT.read_text())
     for entry in summary["controllers"].values():  # as a suite without levels has them
         entry["factors"] = [f for f in entry["factors"] if f["factor"] != "realism"]
@@ -19,6 +20,7 @@ def test_levels_of_realism_are_columns(tmp_path: Path) -> None:
         (delays,) = (f for f in entry["factors"] if f["factor"] == "delay")
         levels = [{**cell, "level": name} for cell, name in
                   zip(delays["levels"], ("ideal", "lab", "field"), strict=False)]  # fmt: skip
+        levels = [*levels[1:], levels[0]]  # a result has the suite's own level last
         entry["factors"].append({**delays, "factor": "realism", "levels": levels})
     result = tmp_path / "summary.json"
     result.write_text(json.dumps(summary))
@@ -27,7 +29,8 @@ def test_levels_of_realism_are_columns(tmp_path: Path) -> None:
     assert head.endswith("| chatter [1/s] | `ideal` | `lab` | `field` |")
     for name, entry in summary["controllers"].items():
         row = next(line for line in lines if f"| `{name}` |" in line).split(" | ")
-        cells = entry["factors"][-1]["levels"]
+        *others, own = entry["factors"][-1]["levels"]
+        cells = [own, *others]
         found = [cell.strip(" |") for cell in row[-3:]]
         assert found == [f"{cell['recovered_rate']:.0%}" for cell in cells], name
     plain = write_leaderboard([without], tmp_path / "plain.md").read_text()
