@@ -152,6 +152,15 @@ def on_terrain(robot: Robot, terrain: Terrain) -> Robot:
     return replace(moved, **{name: getattr(robot, name) for name in kept})
 
 
+def in_physics_of(robot: Robot, description: RobotDescription) -> Robot:
+    """The same robot with the simulation options of a description.
+
+    Raises ConfigError as `load_robot` does: the robot's file is read again.
+    """
+    described = replace(robot.description, options=description.options)
+    return _load(Path(robot.source), robot.terrain, described)
+
+
 def _keep_variation(old: mujoco.MjModel, new: mujoco.MjModel) -> None:
     """Let a model be like another one of the same bodies in what variants change."""
     new.opt.timestep = old.opt.timestep

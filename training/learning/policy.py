@@ -1,5 +1,6 @@
 """A trained policy, ready to use: observation in, action out, plain NumPy."""
 
+import warnings
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 from pathlib import Path
@@ -8,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from poise.baselines.allowance import allowing, carried
-from poise.configs.errors import ConfigError
-from poise.configs.files import packaged, packaged_folder
+from poise.configs.errors import ConfigError, PoiseWarning
+from poise.configs.files import packaged, packaged_folder, resolve
 from poise.configs.reading import is_file, is_folder, parsing
-from poise.configs.schema import build, read_yaml
+from poise.configs.schema import build, read_yaml, to_dict
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.compiled.copies import Copyable
 from poise.envs.robots.mirror import Mirror
-from poise.envs.robots.robot import Robot, load_robot
+from poise.envs.robots.robot import Robot, in_physics_of, load_robot, read_description
 
 from .config import TrainConfig, train_config
 from .policy_files import (
@@ -148,6 +149,9 @@ def load_policy(
     that they name: a policy on a controller from outside needs `allow`, the names
     (``module:Class``) that may run.
 
+    A `robot` that differs from the policy's by its description's `options` alone, such as the time
+    step, is taken, and a warning says which.
+
     Raises ConfigError naming the file when it is missing, truncated, made for another robot
     (of `robot`, or of the configuration's own), has another number of observations or actions, or
     names a controller from outside that is not allowed.
@@ -191,7 +195,8 @@ def _read_policy(path: Path, robot: Robot | None) -> Policy:
     mean, var, clip, epsilon = _read_statistics(path / STATISTICS)
     layers = _read_weights(path / POLICY)
     robot = robot or load_robot(config.robot)
-    check_robot(state, robot.fingerprint, path / STATE)
+    if not _in_other_physics(config, robot, state):
+        check_robot(state, robot.fingerprint, path / STATE)
     check_controller(state, config, path / STATE)
     env = config.make_env(robot)
     inputs, outputs = env.observation_space.shape[0], env.action_space.shape[0]
@@ -206,6 +211,27 @@ def _read_policy(path: Path, robot: Robot | None) -> Policy:
             )
     mirrors = env.mirrors() if config.ppo.symmetric else None
     return Policy(config, layers, mean, var, clip, epsilon, state, mirrors)
+
+
+def _in_other_physics(config: TrainConfig, robot: Robot, state: dict[str, Any]) -> bool:
+    """Whether a policy's robot differs from the one it was trained on by simulation options alone;
+    a warning then says which."""
+    if state.get("fingerprint") == robot.fingerprint or config.robot not in packaged("robots"):
+        return False
+    trained = read_description(resolve("robots", config.robot))
+    before, now = to_dict(trained.options), to_dict(robot.description.options)
+    differ = [name for name in now if now[name] != before[name]]
+    alike = differ and in_physics_of(robot, trained).fingerprint == state.get("fingerprint")
+    if not alike:
+        return False
+    words = [f"{name} {_option(now[name])} instead of {_option(before[name])}" for name in differ]
+    warnings.warn(f"{config.robot}: simulated otherwise than the policy was trained: "
+                  f"{', '.join(words)}", PoiseWarning, stacklevel=4)  # fmt: skip
+    return True
+
+
+def _option(value: object) -> str:
+    return "the model's own" if value is None else str(value)
 
 
 def locate_policy(folder: str | Path | None) -> Path:

@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import yaml
 from stable_baselines3.common.evaluation import evaluate_policy
 
 import poise
-from poise.configs.errors import ConfigError
-from poise.envs import replicate
+from poise.configs.errors import ConfigError, PoiseWarning
+from poise.configs.files import resolve
+from poise.envs import load_robot, replicate
 from poise.training import ThreadedVecEnv
 from poise.training.learning.checkpoints import restore, save_checkpoint
 from poise.training.learning.policy import load_policy
@@ -387,3 +389,25 @@ def test_the_shipped_policy_fits_the_packaged_controller():
         observation, _, fallen, _, _ = env.step(action)
         assert not fallen
     assert env.recovered
+
+
+def test_a_robot_in_other_physics_is_taken_and_told(tmp_path: Path) -> None:
+    """Other options of the simulation; not another body under the same options."""
+    other = yaml.safe_load(resolve("robots", "humanoid").read_text())
+    path = tmp_path / "other.yaml"
+    path.write_text(yaml.safe_dump({**other, "options": {"timestep": 0.001, "cone": "elliptic"}}))
+    told = (
+        "timestep 0.001 instead of 0.002, friction the model's own instead of 0.8, "
+        "cone elliptic instead of the model's own"
+    )
+    with pytest.warns(PoiseWarning, match=told):
+        policy = load_policy("residual-torque", load_robot(path))
+    known = load_policy("residual-torque")
+    env = known.make_env(robot=load_robot(path))
+    observation, _ = env.reset(seed=0)
+    assert np.array_equal(policy.act(observation), known.act(observation))
+    compact = yaml.safe_load(resolve("robots", "compact").read_text())
+    compact["source"]["mjcf"] = str(resolve("robots", "compact").parent / "compact.xml")
+    path.write_text(yaml.safe_dump({**compact, "options": {"timestep": 0.001}}))
+    with pytest.raises(ConfigError, match="was trained on the robot 'humanoid'"):
+        load_policy("residual-torque", load_robot(path))
