@@ -343,8 +343,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             "root_wrench": self.episode.root_wrench.copy(),
         }
         if self.drawn is not None:
-            drawn = self.drawn.summary(self.arrays.timestep)
-            info["realism"] = {"level": self.realism.name, **drawn}
+            info["realism"] = self.drawn_told.copy()
         return info
 
     def push_infos(self) -> list[PushInfo]:

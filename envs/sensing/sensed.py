@@ -1,6 +1,7 @@
 """A robot in a simulation, how real it is, and the source of what is believed of its state."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -23,11 +24,13 @@ class SensedRobot:
         robot: the robot that is known; the simulated one may differ, see `Realism`.
         estimator: how the state is estimated where it is not known exactly.
         drawn: the robot of the running episode; None where it is the one that is known.
+        drawn_told: what `info` tells of it.
     """
 
     robot: Robot
     estimator: EstimatorConfig
     drawn: DrawnRobot | None
+    drawn_told: dict[str, Any]
     _simulation: Simulation
     _state_source: StateSource
     _raw = False  # whether the controller brings an estimator of its own
@@ -132,6 +135,8 @@ class SensedRobot:
                               source="reset: realism", field="ground.bumps")  # fmt: skip
         self.drawn = draw_robot(level, self.robot, rng.spawn(1)[0])
         source.plant.become(self.drawn)
+        timestep = self.robot.model.opt.timestep
+        self.drawn_told = {"level": self.realism.name, **self.drawn.summary(timestep)}
 
     def _begin_sensing(self) -> None:
         """Let the estimator begin; the simulation has just been reset."""
