@@ -1,7 +1,7 @@
-"""A candidate of `poise tune` is judged here, by how pushes around the limit end."""
+"""A candidate of `poise tune` is judged here, by how pushes and walks around the limit end."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -9,8 +9,7 @@ import numpy as np
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config
-from poise.envs.physics.pushes.push import Push
-from poise.envs.physics.pushes.sampler import push_bodies
+from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.benchmarking.trials.agents import Agent
@@ -20,47 +19,7 @@ from poise.training.benchmarking.trials.trial import Trial
 if TYPE_CHECKING:  # it loads torch
     from poise.training.learning.policy import Policy
 
-START = 0.5  # [s] of a push
 UNQUIET, FALLEN = 0.6, 0.3  # what a trial counts at most that is up but not quiet, or fell
-
-
-@dataclass(frozen=True)
-class TuningPushes:
-    """Pushes of a generation: `levels` times the limit found so far, in each of `directions`.
-
-    Directions [°] are those of the environment's pushes, ± up to `jitter`; one that is named twice
-    counts twice. The limit of a direction starts at `impulse` [N·s/kg] and follows the candidates:
-    it rises while they recover more than half of its pushes, and falls else.
-    """
-
-    directions: tuple[float, ...] = tuple(22.5 * k for k in range(16))
-    jitter: float = field(default=11.25, metadata={"min": 0.0, "max": 180.0})
-    levels: tuple[float, ...] = (0.95, 1.05)
-    impulse: float = field(default=0.4, metadata={"above": 0.0})
-    duration: float = field(default=0.1, metadata={"above": 0.0})
-    seconds: float = field(default=5.0, metadata={"above": START})
-
-    def __post_init__(self) -> None:
-        if not self.directions:
-            raise ValueError("directions: must be one or more")
-        if not self.levels or min(self.levels) <= 0.0:
-            raise ValueError("levels: must be one or more fractions above 0")
-
-    def draw(self, seed: int, robot: Robot, limits: np.ndarray) -> list[Trial]:
-        """Trials, direction by direction; directions are jittered, so that all angles occur.
-
-        `limits` [N·s] has one for each.
-        """
-        rng = np.random.default_rng(seed)
-        body = push_bodies(robot)[0]
-        trials: list[Trial] = []
-        for direction, limit in zip(self.directions, limits, strict=True):
-            for level in self.levels:
-                angle = (direction + self.jitter * rng.uniform(-1.0, 1.0)) % 360.0
-                push = Push(body, START, self.duration, float(level * limit), float(angle))
-                number = len(trials)
-                trials.append(Trial(number, seed + number, (push,), limit_fraction=level))
-        return trials
 
 
 @dataclass(frozen=True)
@@ -108,9 +67,15 @@ def worth(agent: Agent, trial: Trial, in_place: bool, chatter: float = 0.0) -> f
     """1 for a recovery, 0.6 for one that does not come to rest, at most 0.3 for a fall, by the time
     until then; less `chatter` times |Δτ|/τ_max a tick, see `TuneConfig`.
 
-    With `in_place` one whose foot moved (`Outcome.foot_displaced`) is no recovery.
+    A walk is recovered where it goes as it is told, and worth nothing where its own gains put that
+    out of reach. With `in_place` a foot that moved (`Outcome.foot_displaced`) is no recovery.
     """
-    outcome, env = run_trial(agent, trial), agent.env
+    try:
+        outcome, env = run_trial(agent, trial), agent.env
+    except ConfigError:
+        if trial.commands:
+            return 0.0
+        raise
     period = env.controller.period if isinstance(env, ResidualBalanceEnv) else env.arrays.timestep
     price = chatter * period * (outcome.torque_variation or 0.0)
     if outcome.fallen:

@@ -26,9 +26,10 @@ from poise.training.running.executor import Executor
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
 
-from .candidates import Candidate, TuningPushes, follow, play
+from .candidates import Candidate, follow, play
 from .gains import Gains
 from .pace import Pace
+from .tasks import TuningPushes, TuningWalks
 
 CONFIG, GAINS, HISTORY = "config.yaml", "gains.yaml", "history.jsonl"
 AVERAGED = 16  # generations whose better halves the result is the mean of
@@ -42,6 +43,8 @@ class TuneConfig:
         controller: where the search starts: a packaged controller or a .yaml file.
         gains: the range of each number that is searched, by its path in the controller's
             configuration (``com.weight``); on a log scale if both ends are above 0.
+        pushes: what candidates meet, unless there are `walks`.
+        walks: what they are told instead, of a controller that walks.
         policy: a policy on top of the candidates counts too, by `policy_share` of the whole.
         in_place: a foot that moves is no recovery.
         realism: name or file of the level that trials are played at.
@@ -54,6 +57,7 @@ class TuneConfig:
     gains: dict[str, tuple[float, float]]
     robot: str = "humanoid"
     pushes: TuningPushes = field(default_factory=TuningPushes)
+    walks: TuningWalks | None = field(default=None, metadata={"omit": "default"})
     policy: str | None = None
     policy_share: float = field(default=0.4, metadata={"min": 0.0, "max": 1.0})
     in_place: bool = False
@@ -70,6 +74,11 @@ class TuneConfig:
         for path, (low, high) in self.gains.items():
             if not low < high:
                 raise ValueError(f"gains.{path}: must be [low, high] with low < high")
+
+    @property
+    def tasks(self) -> TuningPushes | TuningWalks:
+        """What candidates meet."""
+        return self.walks or self.pushes
 
 
 class Generation(TypedDict):
@@ -187,7 +196,7 @@ class _Search:
             "randn": lambda *shape: rng.standard_normal(shape),
         }  # fmt: skip
         self.cma = cma.CMAEvolutionStrategy(gains.first(), config.spread, options)
-        first = np.full(len(config.pushes.directions), config.pushes.impulse * self.robot.mass)
+        first = config.tasks.first(self.robot)
         self.limits = [first, first]  # alone, under the policy
         self.generation = 0
         self.mean = gains.first()  #: what the search has found
@@ -200,14 +209,14 @@ class _Search:
         seeds = [config.seed + 100_000 * (2 * self.generation + k + 1) for k in range(2)]
         with_policy = config.policy is not None and config.policy_share > 0.0
         alone, below = (
-            tuple(config.pushes.draw(seed, self.robot, limits))
+            tuple(config.tasks.draw(seed, self.robot, limits))
             for seed, limits in zip(seeds, self.limits, strict=True)
         )
         if with_policy and config.policy_share == 1.0:
             alone = ()
         jobs = [
             Candidate(
-                number, config.robot, self.gains.at(u), config.pushes.seconds, config.in_place,
+                number, config.robot, self.gains.at(u), config.tasks.seconds, config.in_place,
                 alone, config.policy if with_policy else None, below if with_policy else (),
                 config.realism, config.chatter,
             )
@@ -241,16 +250,16 @@ class _Search:
         self._take(units, values)
 
     def _are_worths(self, values: list[list[float]]) -> bool:
-        """True if these are values of all candidates and pushes, or of no pushes."""
-        found, pushes = np.asarray(values, float), self.config.pushes
-        trials = len(pushes.directions) * len(pushes.levels)
+        """True if these are values of all candidates and tasks, or of no tasks."""
+        found = np.asarray(values, float)
+        trials = len(self.limits[0]) * len(self.config.tasks.levels)
         sizes = [(self.config.population, count) for count in (0, trials)]
         return found.shape in sizes and bool(np.all((found >= 0.0) & (found <= 1.0)))
 
     def _take(self, units: list[np.ndarray], values: list[list[list[float]]]) -> None:
         fraction = self.config.policy_share if values[1][0] else 0.0
         scores = np.zeros(len(units))
-        shape = (len(units), len(self.limits[0]), len(self.config.pushes.levels))
+        shape = (len(units), len(self.limits[0]), len(self.config.tasks.levels))
         for agent, weight in enumerate((1.0 - fraction, fraction)):
             if values[agent][0]:
                 found = np.reshape(values[agent], shape)
@@ -271,6 +280,5 @@ class _Search:
         agents = ("alone", row["alone"]), (f"under {self.config.policy}", row["below"])
         for (who, worths), limits in zip(agents, self.limits, strict=True):
             if worths[0]:
-                text += f"; half recovered {who} at {limits.mean():.1f} N·s"
-                text += f" (worst {limits.min():.1f})"
+                text += f"; {self.config.tasks.words(who, limits)}"
         return text

@@ -18,9 +18,10 @@ from poise.envs.physics.pushes.sampler import push_bodies
 from poise.training.benchmarking.trials import play as playing
 from poise.training.benchmarking.trials.agents import Agent
 from poise.training.benchmarking.trials.trial import Trial
-from poise.training.learning.tuning.candidates import Candidate, TuningPushes, follow, play, worth
+from poise.training.learning.tuning.candidates import Candidate, follow, play, worth
 from poise.training.learning.tuning.gains import Gains
 from poise.training.learning.tuning.search import GAINS, HISTORY, TuneConfig, tune, tune_config
+from poise.training.learning.tuning.tasks import TuningPushes, TuningWalks
 from tests.support.rivals import KNOWN, allowed, network
 from tests.support.shared import robot
 
@@ -205,3 +206,60 @@ def test_a_search_ends_when_its_minutes_are_over(tmp_path, capsys):
         with pytest.raises(ConfigError, match="above 0"):
             tune(small(), tmp_path / "none", minutes=wrong)
     assert not (tmp_path / "none").exists()
+
+
+WALKS = {"commands": [{"ahead": 0.6}, {"ahead": 0.4, "left": 0.1, "turn": 0.3}], "seconds": 6.0}
+
+
+def walking(**changes) -> TuneConfig:
+    """A search for gains of a walk."""
+    settings = {"controller": "walk", "gains": {"gait.height": [0.9, 1.0]}, "walks": WALKS,
+                "generations": 1, "population": 4}  # fmt: skip
+    return build(TuneConfig, {**settings, **changes}, "tests")
+
+
+def test_walks_are_as_fast_as_the_search_has_got():
+    """Speeds times level and limit, to either side; steps as they are told."""
+    walks = walking(walks={**WALKS, "levels": [0.9, 1.1]}).tasks
+    assert isinstance(walks, TuningWalks) and np.array_equal(walks.first(robot()), [1.0, 1.0])
+    sides = set()
+    for seed in range(8):
+        trials = walks.draw(seed, robot(), np.array([1.0, 2.0]))
+        told = np.array([t.command.array()[:3] for t in trials])
+        np.testing.assert_allclose(told[:2], [[0.54, 0.0, 0.0], [0.66, 0.0, 0.0]])
+        np.testing.assert_allclose(np.abs(told[2:]), [[0.72, 0.18, 0.54], [0.88, 0.22, 0.66]])
+        assert np.array_equal(np.sign(told[2:, 1]), np.sign(told[2:, 2]))
+        sides |= set(np.sign(told[2:, 1]))
+        assert len({t.seed for t in trials}) == len(trials) and not any(t.pushes for t in trials)
+    assert sides == {-1.0, 1.0}
+
+
+def test_a_walk_is_worth_what_it_does_of_what_it_is_told():
+    """All where it goes so, less where it is too slow, least where it falls or cannot be told."""
+    data = to_dict(controller_config("walk"))
+
+    def of(speed: float, **gait: float) -> float:
+        walks = build(TuningWalks, {"commands": [{"ahead": speed}], "levels": [1.0]}, "tests")
+        changed = {**data, "gait": {**data["gait"], **gait}}
+        trials = tuple(walks.draw(3, robot(), walks.first(robot())))
+        ((value,), below) = play(Candidate(0, "humanoid", changed, 9.0, False, trials))
+        assert below == []
+        return value
+
+    assert of(0.5) == 1.0
+    assert of(1.0, acceleration=0.005) == 0.6  # it is on its way
+    assert 0.0 < of(1.7) < 0.3
+    assert of(0.5, step_time=4.9) == 0.0
+
+
+def test_a_search_for_a_walk(tmp_path):
+    """It is told as pushes are, and goes on from its file."""
+    console = Console(record=True, width=200)
+    tune(walking(), tmp_path, workers=1, console=console)
+    assert "half walk alone at 1.0" in console.export_text()
+    found = tune(walking(generations=2), tmp_path, workers=1, resume=True)
+    assert found["gait"]["height"] != to_dict(controller_config("walk"))["gait"]["height"]
+    none, still = {"commands": []}, {**WALKS, "levels": [0.0]}
+    for wrong, message in ((none, "commands: must be one"), (still, "levels: must be one")):
+        with pytest.raises(ConfigError, match=message):
+            walking(walks=wrong)
