@@ -5,8 +5,8 @@
 
 Five of others, found by name as `poise motion import` finds them (POISE_CLIPS, see
 docs/motions.md), and the ten that `tests.support.captures` makes. Each is imported as that command
-does it, and followed as `poise motion follow --seed 21` by `walk` if a planner walks it, else by
-`motion-step`. Its speed is its way times its tempo, as shares of the clip's. `caught` is how often
+does it, and followed as `poise motion follow --seed 21` by `walk` or, if it is fast, `walk-fast` where a
+planner walks it, else by `motion-step`. Its speed is its way times its tempo, as shares of the clip's. `caught` is how often
 the planner of steps took over in a trial, mean. Bar: 80 % at 0.7 of their speed without a fall.
 """
 
@@ -70,7 +70,7 @@ def judge(path: Path, starts: int, seed: int, folder: Path) -> Row:
         return row._replace(how="refused")
     file = folder / f"{path.stem}.npz"
     write_robot_clip(made.clip, file)
-    trials = follow(file, "walk" if how == "walk" else "motion-step", starts=starts, seed=seed)
+    trials = follow(file, made.walker or "motion-step", starts=starts, seed=seed)
     caught = float(np.nan_to_num(np.mean([trial.interruptions for trial in trials])))
     return row._replace(falls=sum(trial.fallen for trial in trials), caught=caught)
 

@@ -53,6 +53,7 @@ class RetargetedClip(NamedTuple):
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
         tempo: how many times as fast as the clip it is.
+        walker: the packaged controller that performs it by walking; empty where none is needed.
         flight: share of the time that the clip is in the air.
         bound: as of `Retargeted`.
     """
@@ -67,6 +68,7 @@ class RetargetedClip(NamedTuple):
     tempo: float = 1.0
     flight: float = 1.0
     bound: str = ""
+    walker: str = ""
 
 
 def retarget_clip(
@@ -109,19 +111,19 @@ def retarget_clip(
             reason = error.message
             if asked or error.field not in UNPERFORMED:
                 raise
-    free, tempo = retarget_freely(clip, robot, smooth=smooth), 1.0
+    free, tempo, walker = retarget_freely(clip, robot, smooth=smooth), 1.0, ""
     seen = replace(free.clip, about=replace(free.clip.about, unperformed=reason))
     if not kinematic:
         try:
-            commands, tempo = find_commands(clip, robot, free.scale, ENOUGH)
+            commands, tempo, name = find_commands(clip, robot, free.scale, ENOUGH)
             walks = replace(free.clip, commands=commands, dt=free.clip.dt / tempo)
             reference_from(walks, robot, clip.name)
-            seen = walks
+            seen, walker = walks, name
         except ConfigError as error:
             if error.field == "speed":
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
     scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
-    return _stepped(free._replace(clip=seen), scene)._replace(tempo=tempo)
+    return _stepped(free._replace(clip=seen), scene)._replace(tempo=tempo, walker=walker)
 
 
 def performable(

@@ -14,7 +14,9 @@ from poise.envs.robots.robot import Robot
 
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
-LONGEST, FASTEST = 0.72, 0.45  # [h] of a step, [hω] of a walk: further and faster, robots fall
+LONGEST, FASTEST = 0.72, 0.585  # [h] of a step, [hω] of a walk: further and faster, robots fall
+WALK, WALK_FAST = "walk", "walk-fast"  # controllers; the former falls above
+STEADY = 0.45  # [hω]
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
@@ -24,10 +26,12 @@ BOTH = 0.13  # [1/ω] that planners stand on both feet between two swings
 
 
 class Walked(NamedTuple):
-    """Commands (n, 5) in the clip's time, and how many times as fast as the clip that is."""
+    """Commands (n, 5) in the clip's time, how many times as fast as the clip that is, and the
+    packaged controller that walks so."""
 
     commands: np.ndarray
     tempo: float
+    walker: str
 
 
 def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) -> Walked:
@@ -80,7 +84,8 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
               np.where(going > BRISK * h * omega, QUICK / omega, np.inf)]  # fmt: skip
     swing = np.minimum(commands[:, 4], np.min(limits, axis=0)) - BOTH / omega
     commands[:, 4] = np.clip(swing, QUICKEST / omega, SLOWEST / omega)
-    return Walked(commands, tempo)
+    walker = WALK if going.max() <= STEADY * h * omega else WALK_FAST
+    return Walked(commands, tempo, walker)
 
 
 def _run(clip: Clip, planted: np.ndarray) -> str:

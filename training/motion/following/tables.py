@@ -123,7 +123,8 @@ def _walks(made: RetargetedClip) -> list[tuple[str, str]]:
         (
             "performed by a planner that walks",
             f"{'a run as a walk, ' if run else ''}at {made.tempo:.2f} of the clip's speed: up to "
-            f"{np.hypot(ahead, left):.2f} m/s and {np.degrees(turn):.0f} °/s (--controller walk)",
+            f"{np.hypot(ahead, left):.2f} m/s and {np.degrees(turn):.0f} °/s "
+            f"(--controller {made.walker})",
         )
     ]
 

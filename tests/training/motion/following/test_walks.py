@@ -39,7 +39,7 @@ def walking(name: str) -> RobotClip:
 @pytest.mark.parametrize("name", SPEEDS)
 def test_the_planner_is_told_the_clip_s_speed_turn_and_steps(name: str) -> None:
     scale, robot = 0.9, robot_named(HUMANOID)
-    commands, tempo = find_commands(make(name)[0], robot, scale)
+    commands, tempo, _ = find_commands(make(name)[0], robot, scale)
     ahead, left, turn = SPEEDS[name]
     told = np.median(commands[:, 1:4], axis=0)
     assert told == pytest.approx([scale * ahead, scale * left, turn], abs=0.06)
@@ -52,11 +52,13 @@ def test_the_planner_is_told_the_clip_s_speed_turn_and_steps(name: str) -> None:
 
 
 def test_what_is_too_fast_is_slower_and_says_so() -> None:
-    commands, tempo = find_commands(make("walk")[0].at_speed(1.5), robot_named(HUMANOID), 0.9)
-    assert 0.7 < tempo < 0.9
-    assert commands[:, 1] == pytest.approx(tempo * 1.5 * 1.2 * 0.9, abs=0.06)
-    assert commands[-1, 0] + commands[1, 0] == pytest.approx(4.0 / 1.5 / tempo, rel=0.3)
+    robot = robot_named(HUMANOID)
+    commands, tempo, walker = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
+    assert 0.7 < tempo < 0.9 and walker == "walk-fast"
+    assert commands[:, 1] == pytest.approx(tempo * 1.9 * 1.2 * 0.9, abs=0.06)
+    assert commands[-1, 0] + commands[1, 0] == pytest.approx(4.0 / 1.9 / tempo, rel=0.3)
     assert (commands[:, 4] + 0.037 < 0.35).all()  # brisk walks have quick steps
+    assert find_commands(make("walk")[0], robot, 0.9).walker == "walk"
 
 
 def test_jumps_are_no_walks_and_runs_are_told_as_such() -> None:
@@ -71,16 +73,20 @@ def test_jumps_are_no_walks_and_runs_are_told_as_such() -> None:
     assert made.clip.commands is None
     assert re.match(
         r"both feet are off the ground for 0\.\d\d s at 0\.\d\d s, so that it would be walked; it "
-        r"goes at 2\.\d\d m/s, and the planner of walks at 1\.25 m/s at most, 0\.\d\d of it",
+        r"goes at 2\.\d\d m/s, and the planner of walks at 1\.6\d m/s at most, 0\.\d\d of it",
         made.clip.about.unperformed,
     )
 
 
-def test_a_slow_run_is_walked_without_a_fall() -> None:
-    made = retarget_clip(make("run")[0].at_speed(0.65), robot_named(HUMANOID))
-    assert 0.7 < made.tempo < 0.9 and made.clip.commands is not None
+@pytest.mark.parametrize(("speed", "walker"), [(0.48, "walk"), (0.8, "walk-fast")])
+def test_a_slow_run_is_walked_without_a_fall(speed: float, walker: str) -> None:
+    made = retarget_clip(make("run")[0].at_speed(speed), robot_named(HUMANOID))
+    assert 0.7 < made.tempo <= 1.0 and made.clip.commands is not None
+    assert made.walker == walker
     reference = reference_from(made.clip, robot_named(HUMANOID), "run")
-    assert not any(trial.fallen for trial in follow(reference, "walk", starts=3))
+    trials = follow(reference, walker, starts=3)
+    assert not any(trial.fallen for trial in trials)
+    assert all(trial.walked > 0.8 for trial in trials)
 
 
 @pytest.mark.parametrize("name", ["circle", "turn-in-place", "backwards"])
