@@ -5,9 +5,10 @@
 
 Five of others, found by name as `poise motion import` finds them (POISE_CLIPS, see
 docs/motions.md), and the ten that `tests.support.captures` makes. Each is imported as that command
-does it, and followed as `poise motion follow --seed 21` by `walk` or, if it is fast, `walk-fast` where a
-planner walks it, else by `motion-step`. Its speed is its way times its tempo, as shares of the clip's. `caught` is how often
-the planner of steps took over in a trial, mean. Bar: 80 % at 0.7 of their speed without a fall.
+does it, and followed as `poise motion follow --seed 21` by `walk` or, if it is fast, `walk-fast`
+where a planner walks it, else by `motion-step`. Its speed is its way times its tempo, as shares of
+the clip's. `caught` is how often the planner of steps took over in a trial, mean. Bar: 80 % at 0.7
+of their speed without a fall.
 """
 
 from __future__ import annotations

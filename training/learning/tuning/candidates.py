@@ -9,16 +9,18 @@ import numpy as np
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.registry import controller_config
+from poise.baselines.walking.schedule import TimedCommand
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.benchmarking.trials.agents import Agent
 from poise.training.benchmarking.trials.play import run_trial
-from poise.training.benchmarking.trials.trial import Trial
+from poise.training.benchmarking.trials.trial import Outcome, Trial
 
 if TYPE_CHECKING:  # it loads torch
     from poise.training.learning.policy import Policy
 
+SLACK = 0.2  # by which a walk may be off what it is told
 UNQUIET, FALLEN = 0.6, 0.3  # what a trial counts at most that is up but not quiet, or fell
 
 
@@ -67,8 +69,8 @@ def worth(agent: Agent, trial: Trial, in_place: bool, chatter: float = 0.0) -> f
     """1 for a recovery, 0.6 for one that does not come to rest, at most 0.3 for a fall, by the time
     until then; less `chatter` times |Δτ|/τ_max a tick, see `TuneConfig`.
 
-    A walk is recovered where it goes as it is told, and worth nothing where its own gains put that
-    out of reach. With `in_place` a foot that moved (`Outcome.foot_displaced`) is no recovery.
+    A walk counts as `_as_told`, and nothing where its own gains put what it is told out of reach.
+    With `in_place` a foot that moved (`Outcome.foot_displaced`) is no recovery.
     """
     try:
         outcome, env = run_trial(agent, trial), agent.env
@@ -80,8 +82,24 @@ def worth(agent: Agent, trial: Trial, in_place: bool, chatter: float = 0.0) -> f
     price = chatter * period * (outcome.torque_variation or 0.0)
     if outcome.fallen:
         return FALLEN * env.steps / env.max_steps - price
+    if trial.command is not None:
+        return _as_told(trial.command, outcome) - price
     moved = in_place and outcome.foot_displaced
     return (1.0 if outcome.recovered and not moved else UNQUIET) - price
+
+
+def _as_told(command: TimedCommand, outcome: Outcome) -> float:
+    """1 for a walk as fast as it is told and turning so, 0.6 for one that is a fifth off, or more.
+
+    Speeds are means of the strides, along the path: in a curve feet point beside it.
+    """
+    told, turn = np.hypot(command.ahead, command.left), abs(command.turn)
+    if outcome.speed_ahead is None or outcome.speed_left is None or outcome.turn_rate is None:
+        return UNQUIET  # it has taken no strides
+    speed = np.hypot(outcome.speed_ahead, outcome.speed_left)
+    off = max(abs(speed / told - 1.0) if told else 0.0,
+              abs(outcome.turn_rate / command.turn - 1.0) if turn else 0.0)  # fmt: skip
+    return float(UNQUIET + (1.0 - UNQUIET) * max(1.0 - off / SLACK, 0.0))
 
 
 def follow(limits: np.ndarray, values: np.ndarray, speed: float = 0.1) -> np.ndarray:
