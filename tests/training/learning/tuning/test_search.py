@@ -249,7 +249,7 @@ def test_a_walk_is_worth_what_it_does_of_what_it_is_told():
 
     assert 0.95 < of(0.5) <= 1.0
     assert 0.95 < of(0.3, turn=0.4) <= 1.0  # though feet point beside the curve
-    assert 0.6 < of(1.0, acceleration=0.011) < 0.95  # it has been on its way for long
+    assert 0.6 < of(1.0, acceleration=0.016) < 0.95  # it has been on its way for long
     assert of(1.0, acceleration=0.005) == 0.6
     assert 0.0 < of(1.7) < 0.3
     assert of(0.5, step_time=4.9) == 0.0
