@@ -11,6 +11,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import pytest
 
 import poise
@@ -508,3 +509,24 @@ def test_train_trains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(["train", "--out", str(tmp_path), "--steps", "9"]) == 0
     ((config, out, resume),) = seen
     assert config.steps == 9 and out == tmp_path and resume is False
+
+
+@pytest.mark.parametrize(
+    "error",
+    [MemoryError("Unable to allocate 8 GiB"), mujoco.FatalError("Could not allocate memory")],
+)
+def test_too_little_memory_is_told_in_a_line(
+    error: Exception, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """NumPy's error and MuJoCo's; other errors of MuJoCo stay what they are."""
+
+    def full(*_: object) -> int:
+        raise error
+
+    monkeypatch.setattr(entry, "_run", full)
+    assert entry.main(["list"]) == 2
+    text = capsys.readouterr().err
+    assert text.startswith("poise: there is not enough memory: ") and text.count("\n") == 1
+    error = mujoco.FatalError("invalid name")
+    with pytest.raises(mujoco.FatalError, match="invalid name"):
+        entry.main(["list"])
