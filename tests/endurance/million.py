@@ -36,6 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
     options.add_argument("--steps", type=int, default=1_000_000)
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--only", nargs="*", choices=IDS, default=[])
+    options.add_argument("--levels", nargs="*", choices=list(SETTINGS), default=[])
     given = options.parse_args(arguments)
     print(
         "| environment | setting | steps | episodes | NaN | exceptions | outside | MiB | seconds |"
@@ -44,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     missed = [
         _run(name, setting, given.steps, np.random.default_rng(given.seed))
         for name in given.only or IDS
-        for setting in SETTINGS
+        for setting in given.levels or SETTINGS
     ]
     return 1 if any(missed) else 0
 
