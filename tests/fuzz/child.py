@@ -83,7 +83,7 @@ def _warm_up(played: Kind, tell: Tell) -> None:
     if not _warm:
         from .worlds import warm_up  # loads MuJoCo
 
-        prepare("contacts", "planner")
+        prepare("contacts", "planner", "walking")
         warm_up()
 
     @seed(0)
