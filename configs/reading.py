@@ -25,6 +25,7 @@ YAML_BYTES = 1 * MIB
 JSON_BYTES = 16 * MIB
 TABLE_BYTES = 128 * MIB  # trials of a benchmark: 40 MiB are 100,000
 CELLS = 10_000_000  # of a table
+OF_PROC = 1 * MIB  # at most, in a file that says it is empty
 
 
 def is_file(path: str | Path) -> bool:
@@ -89,10 +90,13 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
         # without O_NONBLOCK a pipe would be waited for
         number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
-            if not stat.S_ISREG(os.fstat(number).st_mode):
+            found = os.fstat(number)
+            if not stat.S_ISREG(found.st_mode):
                 raise ConfigError("cannot be read (not a regular file)", source=path)
+            # as much memory is taken as may be read; files of /proc say that they are empty
+            size = max(found.st_size, OF_PROC)
             with open(number, "rb", closefd=False) as file:
-                data = file.read(limit + 1)
+                data = file.read(min(limit, size) + 1)
         finally:
             os.close(number)
     except OSError as error:

@@ -355,3 +355,15 @@ def test_errors_are_one_line_whatever_they_hold() -> None:
         assert str(error).isprintable() and len(str(error)) < 5000
         assert str(PoiseError(part)).isprintable() and len(str(PoiseError(part))) < 5000
     assert str(ConfigError("a  b", source="c  d")) == "c  d: a  b"
+
+
+def test_no_more_memory_is_taken_than_a_file_has(tmp_path: Path) -> None:
+    """A bound far beyond this machine's memory is none for a small file, nor for one of /proc."""
+    small = tmp_path / "small"
+    small.write_bytes(b"abc")
+    assert read_bytes(small, 1 << 46) == b"abc" == read_bytes(small, 3)
+    with pytest.raises(ConfigError, match="is larger than"):
+        read_bytes(small, 2)
+    status = Path("/proc/self/status")
+    if status.exists():
+        assert b"VmRSS" in read_bytes(status, 1 << 46)
