@@ -33,6 +33,7 @@ from .menagerie import model_file, ros_file
 from .model_check import check_bodies, check_numbers, check_standing
 from .models.humanoid import humanoid_spec
 from .models.mjcf import pointing_to_scenes, read_mjcf
+from .models.mjcf_bounds import bound_cache
 from .models.urdf import read_urdf
 from .soles import Sole, build_sole, find_sole_plane, sole_geoms
 from .standing import centre_com, described_qpos, level_soles, turn_forward
@@ -298,6 +299,7 @@ def _prepare(
     """The model with motors, ground, sensors and options; its keyframes; the ground's name; what
     was changed."""
     source = str(path)
+    bound_cache()
     spec = _read(description, path, file)
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i}"

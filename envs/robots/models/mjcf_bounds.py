@@ -24,6 +24,7 @@ ASSET_BYTES = 16 * MIB  # of a file of a mesh, a texture or a height field
 PIXELS = 10_000_000  # of all textures and height fields together, and of a camera
 LISTS = {"bodies": 1000, "joints": 1000, "geoms": 5000, "keys": 1000, "sensors": 5000}
 MEMORY = 256 * MIB  # of a simulation's stack
+KEPT = 256 * MIB  # of meshes and textures, from one compilation to the next
 LONGEST = 10_000  # of what elements may reserve: user data, keyframes, dimensions of a sensor
 _RESERVED = ("nkey", "nuserdata", "nuser_actuator", "nuser_body", "nuser_cam", "nuser_geom",
              "nuser_jnt", "nuser_sensor", "nuser_site", "nuser_tendon")  # fmt: skip
@@ -121,6 +122,13 @@ class MjcfText:
 
     def _wrong(self, problem: str) -> ConfigError:
         return _wrong(problem, self._source, self._field)
+
+
+def bound_cache() -> None:
+    """Let MuJoCo keep less of the files that it has read than its own 500 MB in each process."""
+    cache = mujoco.mj_getCache()
+    if mujoco.mj_getCacheCapacity(cache) > KEPT:
+        mujoco.mj_setCacheCapacity(cache, KEPT)
 
 
 def check_spec(

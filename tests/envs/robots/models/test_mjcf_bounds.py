@@ -12,7 +12,8 @@ import pytest
 
 from poise.configs.errors import ConfigError
 from poise.envs.robots.models.mjcf import read_mjcf
-from poise.envs.robots.models.mjcf_bounds import ASSET_BYTES, MJCF_BYTES
+from poise.envs.robots.models.mjcf_bounds import ASSET_BYTES, KEPT, MJCF_BYTES
+from poise.envs.robots.robot import load_robot
 from tests.support.hangs import no_hang
 
 BODY = '<body><joint/><geom size="1"/></body>'
@@ -120,3 +121,12 @@ def test_copies_within_the_bounds_are_made(tmp_path: Path) -> None:
     path.write_text(f'<mujoco><include file="part.xml"/>{field}{copies}</mujoco>')
     model: mujoco.MjModel = read_mjcf(path, (), "robot.yaml").compile()
     assert model.nbody == 42 and model.nhfield == 1
+
+
+def test_mujoco_keeps_less_of_what_it_has_read() -> None:
+    """A bound that is lower already stays."""
+    cache = mujoco.mj_getCache()
+    for before, after in ((500_000_000, KEPT), (1000, 1000), (KEPT, KEPT)):
+        mujoco.mj_setCacheCapacity(cache, before)
+        load_robot("compact")
+        assert mujoco.mj_getCacheCapacity(cache) == after
