@@ -14,6 +14,7 @@ ENTRIES = 1000  # of a mapping: keys may be chosen so that each is compared with
 SCALAR = 100  # characters that count as one node
 DIGITS = 308  # of a number: any such whole number is a finite float
 
+MERGE, VALUE, TEXT = (f"tag:yaml.org,2002:{name}" for name in ("merge", "value", "str"))
 MANY_ENTRIES = f"a mapping of more than {ENTRIES} entries"
 
 # libyaml's parser takes a tenth of the time of Python's; not every PyYAML has it
@@ -44,10 +45,33 @@ class Loader(_Safe):
         return root
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
-        """Put what ``<<`` merges into a mapping, which stays within the bounds."""
-        super().flatten_mapping(node)
+        """Put what ``<<`` merges into a mapping, which stays within the bounds.
+
+        The mapping's own entries come last, so that they count; of a list its first mapping does.
+        PyYAML 6.0.4 goes by the identity of strings instead.
+        """
+        own, merged = [], []
+        for key, value in node.value:
+            if key.tag == MERGE:
+                for each in self._to_merge(node, value):
+                    self.flatten_mapping(each)
+                    merged += each.value
+            else:
+                if key.tag == VALUE:
+                    key.tag = TEXT
+                own.append((key, value))
+        node.value = merged + own
         if len(node.value) > ENTRIES:
             raise _error(MANY_ENTRIES, node.start_mark)
+
+    @staticmethod
+    def _to_merge(node: yaml.MappingNode, value: yaml.Node) -> list[yaml.MappingNode]:
+        """The mappings that a ``<<`` names, the one that counts most last."""
+        found: list[Any] = value.value[::-1] if isinstance(value, yaml.SequenceNode) else [value]
+        for each in found:
+            if not isinstance(each, yaml.MappingNode):
+                raise _error("what << merges must be a mapping or a list of them", node.start_mark)
+        return found
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         """The value of a node; whatever a scalar's text makes of its tag is an error with a place.
@@ -80,7 +104,7 @@ class Bounds:
 
     def check(self, stream: str | bytes) -> None:
         """Raise a MarkedYAMLError at the first place that is beyond the bounds."""
-        for event in yaml.parse(stream, Loader=_Safe):
+        for event in _events(stream):
             if isinstance(event, yaml.DocumentStartEvent):
                 self._sizes.clear()
             elif isinstance(event, yaml.CollectionStartEvent):
@@ -126,6 +150,16 @@ class Bounds:
             sizes.append(size)
             if isinstance(parent, yaml.MappingStartEvent) and len(sizes) > 2 * ENTRIES + 1:
                 raise _error(MANY_ENTRIES, parent.start_mark)
+
+
+def _events(stream: str | bytes) -> Iterator[yaml.Event]:
+    """What PyYAML's parser finds; its own bound on depth, which not every version has, is ours."""
+    try:
+        yield from yaml.parse(stream, Loader=_Safe)
+    except yaml.MarkedYAMLError as error:
+        if "nesting depth" not in str(error.problem):
+            raise
+        raise _error(f"more than {DEPTH} levels", error.problem_mark) from None
 
 
 def _mappings(root: yaml.Node | None) -> Iterator[yaml.MappingNode]:

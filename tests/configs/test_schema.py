@@ -214,6 +214,11 @@ def test_merge_keys_work_and_are_not_taken_for_repeated_keys(tmp_path: Path) -> 
     data = read_yaml(write(tmp_path / "a.yaml", text))
     assert data["b"]["deep"] == {"x": 2, "y": 1}
     assert data["c"] == {"x": 2, "y": 3}
+    text = "long: &a {name: 1}\nother: &b {name: 2, more: 3}\nc: {<<: [*a, *b]}\nd: {<<: 1}\n"
+    with pytest.raises(ConfigError, match="what << merges must be a mapping or a list of them"):
+        read_yaml(write(tmp_path / "a.yaml", text))
+    data = read_yaml(write(tmp_path / "a.yaml", text.partition("d: ")[0]))
+    assert data["c"] == {"name": 1, "more": 3}
 
 
 @pytest.mark.parametrize(

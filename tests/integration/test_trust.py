@@ -428,7 +428,8 @@ def test_links_in_a_circle_are_no_file(ground: Ground, name: str) -> None:
     """Neither what is allowed nor what a file names."""
     link = Path(name.partition(":")[0])
     link.symlink_to(link)
-    with pytest.raises(ConfigError, match="circle"):
+    named = "circle" if sys.version_info < (3, 13) else "other"  # then it is the path of no file
+    with pytest.raises(ConfigError, match=named):
         with poise.allowing(name):
             check_allowed(name.replace("circle", "other"))
     with pytest.raises(ConfigError, match="circle"):
