@@ -23,6 +23,7 @@ from .splines import piecewise, rest_spline
 
 RATE = 1.0 / 30.0  # [s] between the postures of the clips that are made here
 FEWEST = 4  # frames that a spline at rest at both ends takes
+LARGEST, UNIT = 1e4, 0.1  # [m, rad] of an entry; by which a quaternion may be off the norm 1
 MOST = 20_000
 LEVEL = 0.02  # [m] by which a sole may leave the plane of both
 ABOUT, PLANTED, COMMANDS = "about.json", "planted", "commands"
@@ -122,8 +123,13 @@ def read_robot_clip(path: str | Path) -> RobotClip:
                           source=path, field="qpos")  # fmt: skip
     if arrays["dt"].shape != (1,) or not 1e-3 <= clip.dt <= 1.0:
         raise ConfigError("must be one time from 0.001 to 1 s", source=path, field="dt")
-    if not np.isfinite(clip.qpos).all():
-        raise ConfigError("must be finite", source=path, field="qpos")
+    if not (np.abs(clip.qpos) <= LARGEST).all():
+        raise ConfigError(f"must be finite and at most {LARGEST:g}", source=path, field="qpos")
+    norms = np.linalg.norm(clip.qpos[:, 3:7], axis=1)
+    if np.any(off := np.abs(norms - 1.0) > UNIT):
+        frame = int(np.argmax(off))
+        raise ConfigError(f"the root's quaternion of frame {frame} has the norm "
+                          f"{norms[frame]:.3g}, not 1", source=path, field="qpos")  # fmt: skip
     if f"{COMMANDS}.npy" in archive.names:
         commands = read_arrays(path, (COMMANDS,))[COMMANDS]
         check_commands(commands, str(path))

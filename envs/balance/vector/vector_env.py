@@ -55,14 +55,15 @@ class BalanceVectorEnv(Copyable, VectorEnv):
         threads: int = 1,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ):
-        try:
-            self.autoreset_mode = AutoresetMode(autoreset_mode)
-        except ValueError:
+        modes = {mode.value: mode for mode in AutoresetMode}
+        if isinstance(autoreset_mode, AutoresetMode):
+            self.autoreset_mode = autoreset_mode
+        elif isinstance(autoreset_mode, str) and autoreset_mode in modes:
+            self.autoreset_mode = modes[autoreset_mode]
+        else:
             raise ConfigError(
-                f"unknown mode {shown(autoreset_mode)}",
-                field="autoreset_mode",
-                choices=[mode.value for mode in AutoresetMode],
-            ) from None
+                f"unknown mode {shown(autoreset_mode)}", field="autoreset_mode", choices=modes
+            )
         self.batch = EnvBatch(envs, whole_number(threads, 1, "threads"))
         self.envs = self.batch.envs
         first = self.envs[0]

@@ -56,6 +56,27 @@ def test_a_lifted_foot_and_a_joint_out_of_range_are_refused(standing: RobotClip)
             reference_from(replace(standing, qpos=qpos), robot, "test")
 
 
+@pytest.mark.parametrize(
+    ("entry", "value", "text"),
+    [
+        (0, 1e200, "qpos: must be finite and at most 10000"),
+        (9, np.nan, "qpos: must be finite and at most 10000"),
+        (5, 1e3, "qpos: the root's quaternion of frame 3 has the norm 1e"),
+        (3, 0.0, "qpos: the root's quaternion of frame 3 has the norm 0"),
+    ],
+)
+def test_postures_that_are_none(
+    standing: RobotClip, tmp_path: Path, entry: int, value: float, text: str
+) -> None:
+    """What a file holds beyond what a robot can be, or no rotation, is one line."""
+    qpos = standing.qpos.copy()
+    qpos[3, 3:7] = 1.0, 0.0, 0.0, 0.0
+    qpos[3, entry] = value
+    write_robot_clip(replace(standing, qpos=qpos), tmp_path / "clip.npz")
+    with pytest.raises(ConfigError, match=text):
+        read_robot_clip(tmp_path / "clip.npz")
+
+
 def test_damaged_files_are_one_line(standing: RobotClip, tmp_path: Path) -> None:
     path = tmp_path / "damaged.npz"
     with pytest.raises(ConfigError, match="must be the name of a .npz file"):

@@ -263,6 +263,7 @@ def test_wrong_arguments_are_named():
     """Mode, threads, number, seeds, mask and step before reset."""
     for wrong, field in (
         ({"autoreset_mode": "Now"}, "autoreset_mode.*NextStep"),
+        ({"autoreset_mode": np.zeros(2, [("a", float)])}, "autoreset_mode.*NextStep"),
         ({"threads": 0}, "threads.*at least 1"),
         ({"n": 0}, "num_envs.*at least 1"),
         ({"robots": 2}, "unexpected keyword argument 'robots'"),
