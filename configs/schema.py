@@ -288,9 +288,10 @@ def _build_number(kind: type, value: Any, source: str, path: str, bounds: Any) -
         raise wrong("a whole number" if kind is int else "a number")
     try:
         number = kind(value)
-    except OverflowError:
-        raise wrong("a finite number") from None
-    if not math.isfinite(number):
+        finite = math.isfinite(number)
+    except OverflowError:  # of a whole number with more than 308 digits
+        finite = False
+    if not finite:
         raise wrong("a finite number")
     if "min" in bounds and number < bounds["min"]:
         raise wrong(f"at least {bounds['min']}")

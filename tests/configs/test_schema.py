@@ -413,3 +413,17 @@ def test_a_part_may_have_a_base(tmp_path: Path) -> None:
     assert on_base(untouched, "training", "c.yaml") == untouched
     with pytest.raises(ConfigError, match=r"^c.yaml: part: base: must be a name"):
         on_base({"part": {"base": 3}}, "training", "c.yaml", parts=("part",))
+
+
+def test_whole_numbers_of_too_many_digits() -> None:
+    """They are no finite number, where a whole number is asked for as well."""
+
+    @dataclass(frozen=True)
+    class Counted:
+        count: int = 1
+        size: float = 1.0
+
+    for name in ("count", "size"):
+        with pytest.raises(ConfigError, match=f"{name}: must be a finite number"):
+            build(Counted, {name: 10**400}, "test")
+    assert build(Counted, {"count": 10**300}, "test").count == 10**300

@@ -17,6 +17,7 @@ TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 LONGEST, FASTEST = 0.72, 0.585  # [h] of a step, [hω] of a walk: further and faster, robots fall
 WALK, WALK_FAST = "walk", "walk-fast"  # controllers; the former falls above
 STEADY = 0.45  # [hω]
+BANK = 0.07  # [g] of speed times turning rate, above which robots fall
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
@@ -64,10 +65,16 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     speed = np.hypot(ahead, left)
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
-    tempo = min(FASTEST * h * omega / max(float(speed.max()), 1e-9), 1.0)
+    fastest = FASTEST * h * omega
+    tempo = min(fastest / max(float(speed.max()), 1e-9), 1.0)
+    bend, most = float(np.abs(speed * turn).max()), BANK * robot.units.gravity
+    bends = tempo * tempo * bend > most
+    tempo = np.sqrt(most / bend) if bends else tempo
     if tempo < least:
+        in_curves = f" in its curves ({most:.2f} m/s² to a side)" if bends else ""
+        bound = tempo * speed.max() if bends else fastest
         raise ConfigError(f"{run}it goes at {speed.max():.2f} m/s, and the planner of walks at "
-                          f"{FASTEST * h * omega:.2f} m/s at most, {tempo:.2f} of it (--speed "
+                          f"{bound:.2f} m/s at most{in_curves}, {tempo:.2f} of it (--speed "
                           f"{tempo:.2f} plays it so)", source=clip.name, field="speed")  # fmt: skip
     each = max(period, walk.duration / MOST_COMMANDS)
     rows = []
