@@ -231,7 +231,7 @@ class EstimatedState(StateSource, Copyable):
         super().__init__(plant.simulation)
         self.plant, self.config = plant, config
         terrain = plant.robot.terrain
-        believed = on_terrain(robot, Flat() if terrain.unseen else terrain)
+        believed = on_terrain(robot, terrain if terrain.believed() else Flat())
         self.known, self.ahead = Simulation(without_contacts(believed)), Simulation(believed)
         self.sensors: Sensors = allocate_sensors(plant.simulation)
         self.bus = self.sensors.bus

@@ -36,7 +36,6 @@ USAGE = """usage: poise COMMAND [OPTIONS]
 Keep a simulated humanoid on its feet while it is pushed. Begin with: poise demo.
 poise COMMAND --help tells of a command, poise --version which version this is.
 """
-MUJOCO_FULL = "Could not allocate memory"  # says MuJoCo
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a disk
 
 
@@ -81,10 +80,15 @@ def _stoppable(args: list[str]) -> int:
             raise PoiseError(f"{place}cannot be written ({error.strerror})") from None
         if isinstance(error, FileNotFoundError) and "temporary directory" in str(error):
             raise PoiseError("no folder takes temporary files: set TMPDIR to one") from None
-        if isinstance(error, MemoryError) or MUJOCO_FULL in str(error):
+        if isinstance(error, MemoryError) or _is_mujoco_full(error):
             raise PoiseError("there is not enough memory: fewer workers, and in a training fewer "
                              "environments (--ppo.n-envs), take less") from None  # fmt: skip
         raise
+
+
+def _is_mujoco_full(error: BaseException) -> bool:
+    """True for MuJoCo's own error of too little memory."""
+    return type(error).__name__ == "FatalError" and "allocate memory" in str(error)
 
 
 def command() -> None:
