@@ -7,6 +7,8 @@ from pathlib import Path
 from .errors import ConfigError, PoiseError
 from .reading import exists, is_folder, whole_path
 
+NAME = "PC_NAME_MAX"  # bytes of a name in a folder
+
 
 def check_out_folder(out: str | Path, field: str = "out") -> None:
     """Refuse a folder that cannot be written to; it need not exist yet.
@@ -40,6 +42,8 @@ def _check_place(out: str | Path, folder: Path) -> None:
         problem = errno.ENOTDIR
     elif not os.access(folder, os.W_OK | os.X_OK):
         problem = errno.EROFS if os.statvfs(folder).f_flag & os.ST_RDONLY else errno.EACCES
+    elif any(len(os.fsencode(part)) > os.pathconf(folder, NAME) for part in Path(out).parts):
+        problem = errno.ENAMETOOLONG
     else:
         return
     raise PoiseError(f"{out}: cannot be written ({os.strerror(problem)})")

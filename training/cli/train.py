@@ -14,6 +14,7 @@ import tyro
 from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
+from poise.configs.reading import exists
 from poise.configs.schema import build, to_dict
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.statistics.differences import difference
@@ -94,7 +95,7 @@ def run(args: Sequence[str]) -> None:
         return
     command = parse(args)
     out, allow = command.out, [*named(_peek(args).controller), *command.allow]
-    if not command.seeds and not (out / SEEDS).exists():
+    if not command.seeds and not exists(out / SEEDS):
         note = steps_note(command.settings, out, command.resume)
         best = train(command.settings, out, command.resume, allow=allow)
         if note:

@@ -247,6 +247,11 @@ def _env_seed(seed: int) -> int:
 def check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
     """The checkpoint to go on from, or None for a new run; raises ConfigError as `train`."""
     check_out_folder(out)
+    try:
+        str(out).encode()
+    except UnicodeEncodeError:
+        raise ConfigError("must be a name in UTF-8: TensorBoard takes no other", source=out,
+                          field="out") from None  # fmt: skip
     checkpoint = find_checkpoint(out / LAST)
     if not resume:
         if checkpoint is not None:

@@ -10,6 +10,7 @@ import pytest
 
 from poise.configs.errors import ConfigError
 from poise.envs.sensing.realism import load_realism
+from poise.training.cli.entry import main
 from poise.training.cli.train import gained, last_words, parse, steps_note
 from poise.training.learning.callbacks import Progress
 from tests.support.shared import finished_run, tiny_config
@@ -93,3 +94,19 @@ def test_the_progress_line_tells_the_exploring_policy_from_the_held_out_rate(
     progress._on_rollout_end()
     progress.close()
     assert "recovered in training 50%" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("x" * 300, "cannot be written (File name too long)"), ("\udcff", "must be a name in UTF-8")],
+)
+def test_a_folder_that_cannot_be_is_told_in_a_line(
+    name: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """Too long for a file system; of bytes that are no text."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["train", "--out", name, "--ppo.n-envs", "2", "--steps", "64"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("poise: ") and error.count("\n") == 1 and text in error
+    assert not list(tmp_path.iterdir())
