@@ -17,6 +17,8 @@ from poise.training.benchmarking.trials.agents import Agent
 from poise.training.benchmarking.trials.play import run_trial
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 
+from .tasks import TuningWalks
+
 if TYPE_CHECKING:  # it loads torch
     from poise.training.learning.policy import Policy
 
@@ -63,6 +65,13 @@ def play(candidate: Candidate) -> tuple[list[float], list[float]]:
             worth(agent, trial, candidate.in_place, candidate.chatter) for trial in candidate.below
         ]
     return alone, below
+
+
+def check_walks(controller: str, robot: Robot, walks: TuningWalks) -> None:
+    """Raise ConfigError for a controller that does not walk, or not as it is first told."""
+    env = ResidualBalanceEnv(robot, controller=controller_config(controller), pushes=None)
+    for trial in walks.draw(0, robot, walks.first(robot)):
+        env.reset(seed=trial.seed, options=trial.options)
 
 
 def worth(agent: Agent, trial: Trial, in_place: bool, chatter: float = 0.0) -> float:

@@ -26,7 +26,7 @@ from poise.training.running.executor import Executor
 from poise.training.running.folder_lock import FolderLock
 from poise.training.running.stopping import keeps
 
-from .candidates import Candidate, follow, play
+from .candidates import Candidate, check_walks, follow, play
 from .gains import Gains
 from .pace import Pace
 from .tasks import TuningPushes, TuningWalks
@@ -124,15 +124,18 @@ def tune(
     No generation begins that would end later than `minutes` after the first one of this call
     began, if the ones before are a measure; one is always played.
 
-    Raises ConfigError for a configuration that is not valid or names what is not allowed, `minutes`
-    that are not above 0, a folder that holds another search, or where the library `cma` is
-    missing; PoiseError when another process searches there, or a file cannot be written.
+    Raises ConfigError for a configuration that is not valid or names what is not allowed, walks
+    that the controller cannot be told where the search starts, `minutes` that are not above 0, a
+    folder that holds another search, or where the library `cma` is missing; PoiseError when another
+    process searches there, or a file cannot be written.
     """
     if minutes is not None and not minutes > 0.0:
         raise ConfigError(f"must be above 0, not {minutes}", field="minutes")
     check_out_folder(out)
     _known(config, out, resume)  # what is refused makes no folder
     gains = Gains(config.controller, config.gains, config.robot)
+    if config.walks is not None:
+        check_walks(config.controller, load_robot(config.robot), config.walks)
     if config.policy is not None:
         from poise.training.learning.policy import load_policy
 

@@ -262,6 +262,12 @@ def test_a_search_for_a_walk(tmp_path):
     assert "half walk alone at 1.0" in console.export_text()
     found = tune(walking(generations=2), tmp_path, workers=1, resume=True)
     assert found["gait"]["height"] != to_dict(controller_config("walk"))["gait"]["height"]
+    stands = {"controller": "momentum-qp", "gains": {"com.weight": [1, 2]}}
+    fast = {"walks": {"commands": [{"ahead": 9.0}]}}
+    for changed, message in ((stands, "does not walk"), (fast, "out of reach")):
+        with pytest.raises(ConfigError, match=message):
+            tune(walking(**changed), tmp_path / "none")
+    assert not (tmp_path / "none").exists()
     none, still = {"commands": []}, {**WALKS, "levels": [0.0]}
     for wrong, message in ((none, "commands: must be one"), (still, "levels: must be one")):
         with pytest.raises(ConfigError, match=message):
