@@ -14,9 +14,10 @@ from poise.envs.robots.robot import Robot
 
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
-LONGEST, FASTEST = 0.72, 0.585  # [h] of a step, [hω] of a walk: further and faster, robots fall
-WALK, WALK_FAST = "walk", "walk-fast"  # controllers; the former falls above
-STEADY = 0.45  # [hω]
+LONGEST = 0.72  # [h] of a step: further, robots fall
+WALK, WALK_FAST = "walk", "walk-fast"  # controllers
+STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by each of them: faster, robots fall
+FAST_ROBOTS = ("humanoid",)  # on which the latter's gains were searched; others fall
 BANK = 0.07  # [g] of speed times turning rate, above which robots fall
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
@@ -65,7 +66,7 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     speed = np.hypot(ahead, left)
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
-    fastest = FASTEST * h * omega
+    fastest = (FASTEST if robot.name in FAST_ROBOTS else STEADY) * h * omega
     tempo = min(fastest / max(float(speed.max()), 1e-9), 1.0)
     bend, most = float(np.abs(speed * turn).max()), BANK * robot.units.gravity
     bends = tempo * tempo * bend > most

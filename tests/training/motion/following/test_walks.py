@@ -59,6 +59,8 @@ def test_what_is_too_fast_is_slower_and_says_so() -> None:
     assert commands[-1, 0] + commands[1, 0] == pytest.approx(4.0 / 1.9 / tempo, rel=0.3)
     assert (commands[:, 4] + 0.037 < 0.35).all()  # brisk walks have quick steps
     assert find_commands(make("walk")[0], robot, 0.9).walker == "walk"
+    other = find_commands(make("walk")[0].at_speed(1.9), robot_named("compact"), 0.9)
+    assert other.walker == "walk" and other.tempo < tempo  # whose gains are of no fast walk
 
 
 def test_jumps_are_no_walks_and_runs_are_told_as_such() -> None:
