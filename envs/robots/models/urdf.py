@@ -3,6 +3,7 @@
 import os
 import sysconfig
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -46,6 +47,9 @@ def read_urdf(path: Path, source: str, srdf: Path | None = None) -> mujoco.MjSpe
     robot = _parse(path, source, FIELD)
     _set_compiler(robot)
     files = _rename_meshes(robot)
+    names = Counter(name for joint in robot.findall("joint") if (name := joint.get("name")))
+    if names and (most := names.most_common(1)[0])[1] > 1:  # MuJoCo says so much later
+        raise _wrong(f"{path} is not valid URDF: two joints are called {shown(most[0])}", source)
     try:
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(robot, encoding="unicode"))
     except Exception as error:  # of MuJoCo, of the text in the file

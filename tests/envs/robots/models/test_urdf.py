@@ -143,6 +143,11 @@ REFUSED = {
         {"change": ('<child link="left_shin"/>', '<child link="shin"/>')},
         "source.urdf: .*biped.urdf is not valid URDF: .*joint parent or child missing",
     ),
+    "two joints of one name": (
+        {"extra": part("a", "trunk", "revolute") + part("a2", "trunk", "revolute").replace(
+            "a2_joint", "a_joint")},
+        "source.urdf: .*biped.urdf is not valid URDF: two joints are called 'a_joint'",
+    ),
     "a document type": (
         {"change": ("<robot", "<!DOCTYPE robot><robot")},
         "source.urdf: .*biped.urdf has a document type",
