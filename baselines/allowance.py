@@ -132,7 +132,9 @@ def named(*controllers: object) -> list[str]:
         if isinstance(controller, (str, Path)) and not is_plugin(controller):
             controller = _file(Path(controller))
         if isinstance(controller, Mapping):
-            controller = controller.get("name") if controller.get("kind") == "outside" else None
+            kind = controller.get("kind")  # anything that a user has handed over
+            outside = isinstance(kind, str) and kind == "outside"
+            controller = controller.get("name") if outside else None
         if is_plugin(controller):
             found.append(controller)
     return found

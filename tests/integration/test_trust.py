@@ -588,3 +588,10 @@ def test_nothing_is_allowed_to_begin_with() -> None:
     assert NOTHING.names == frozenset()
     with pytest.raises(ConfigError, match=REFUSED):
         find_plugin("os:getcwd")
+
+
+@pytest.mark.parametrize("kind", [np.zeros(0), np.zeros(3), ["outside"], None, 1])
+def test_a_kind_that_is_no_text_names_no_code(kind: object) -> None:
+    """Arrays compare entry by entry."""
+    assert named({"kind": kind, "name": "trap.py:Trap"}) == []
+    assert named({"kind": "outside", "name": "trap.py:Trap"}) == ["trap.py:Trap"]
