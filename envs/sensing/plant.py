@@ -53,6 +53,8 @@ class Plant:
         self._mass = robot.mass
         self._root = robot.root_body_id
         self.simulation = Simulation(replace(robot, model=model))
+        count = len(self.simulation.arrays.surfaces) if bumpy else 0
+        self._bumps = [model.geom(f"{BUILT}{i}").id for i in range(1, count)]
 
     def become(self, drawn: DrawnRobot) -> None:
         """Change the model to the robot that was drawn; the simulation must be reset next."""
@@ -86,6 +88,5 @@ class Plant:
         model, surfaces = self.simulation.model, self.simulation.arrays.surfaces
         rng = np.random.default_rng(drawn.seed)
         heights = drawn.bumps * np.maximum(rng.uniform(-1.0, 1.0, len(surfaces) - 1), 0.0)
-        for i, height in enumerate(heights.tolist(), start=1):
-            surfaces[i, HEIGHT] = height
-            model.geom(f"{BUILT}{i}").pos[2] -= HIGHEST - (height or -HIGHEST)
+        surfaces[1:, HEIGHT] = heights
+        model.geom_pos[self._bumps, 2] -= HIGHEST - np.where(heights > 0.0, heights, -HIGHEST)

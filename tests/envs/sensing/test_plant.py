@@ -136,8 +136,10 @@ def test_bumps_are_as_high_as_drawn_and_half_of_them_are_there(bumpy):
                          for i in range(1, len(surfaces))])  # fmt: skip
         np.testing.assert_allclose(tops, np.where(surfaces[1:, 4] > 0, surfaces[1:, 4], -0.05))
         assert np.all(np.abs(surfaces[1:, :4]).reshape(-1, 2, 2).max(axis=2).max(axis=1) > 0.1)
+        assert np.all(np.hypot(*middles.T) > 0.3)
+    before = surfaces[1:, 4].copy()
     bumpy.become(drawn_of({"ground": {"bumps": [0.01, 0.03]}}, 1))
-    assert not np.array_equal(surfaces[1:, 4], found)
+    assert not np.array_equal(surfaces[1:, 4], before)
 
 
 def test_a_foot_stands_on_a_bump(bumpy):

@@ -102,12 +102,12 @@ def _as_told(command: TimedCommand, outcome: Outcome) -> float:
 
     Speeds are means of the strides, along the path: in a curve feet point beside it.
     """
-    told, turn = np.hypot(command.ahead, command.left), abs(command.turn)
+    told = np.hypot(command.ahead, command.left)
     if outcome.speed_ahead is None or outcome.speed_left is None or outcome.turn_rate is None:
         return UNQUIET  # it has taken no strides
     speed = np.hypot(outcome.speed_ahead, outcome.speed_left)
     off = max(abs(speed / told - 1.0) if told else 0.0,
-              abs(outcome.turn_rate / command.turn - 1.0) if turn else 0.0)  # fmt: skip
+              abs(outcome.turn_rate / command.turn - 1.0) if command.turn else 0.0)  # fmt: skip
     return float(UNQUIET + (1.0 - UNQUIET) * max(1.0 - off / SLACK, 0.0))
 
 
