@@ -228,7 +228,7 @@ def tune(
     resume: Switch = False,
     allow: Allow = (),
 ) -> None:
-    """Search a controller's gains by CMA-ES on seeded pushes.
+    """Search a controller's gains by CMA-ES on seeded pushes, or on walks.
 
     Args:
         out: folder to write gains.yaml (a controller) and history.jsonl to.
