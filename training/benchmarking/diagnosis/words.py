@@ -20,17 +20,26 @@ LOSSES = {
     "motion": "fell from the motion",
     "error": "the controller raised an error",
 }
+#: what a diagnosis tells together with its size
+SIZES = {"full_from": "full_time", "foothold_time": "foothold_error",
+         "capture_left": "capture_outside"}  # fmt: skip
 DIRECTIONS = ("forward", "forward left", "left", "backward left", "backward", "backward right",
               "right", "forward right")  # fmt: skip
 SIDE = re.compile(r"(^|_)(left|right|l|r)(?=_|$)")
 
 
 def diagnosis_of(line: Mapping[str, str]) -> Diagnosis:
-    """The diagnosis in a line of trials.csv; empty where older results have none."""
+    """The diagnosis in a line of trials.csv; empty where older results have none.
+
+    Raises ValueError for a number that is none, and for a cause without its time or size.
+    """
     numbers = {name for name, hint in Diagnosis.__annotations__.items() if "float" in str(hint)}
     given: dict[str, Any] = {name: line.get(name) or None for name in COLUMNS}
     for name in numbers:
         given[name] = None if given[name] is None else float(given[name])
+    for cause, size in SIZES.items():
+        if given[cause] is not None and given[size] is None:
+            raise ValueError(f"{cause} without {size}")
     return Diagnosis(**given)
 
 
@@ -38,7 +47,7 @@ def why(d: Diagnosis, fall_time: float | None = None) -> str:
     """What is known of a lost trial, in the order of time; empty of one that was recovered."""
     if d.loss is None:
         return ""
-    end = LOSSES.get(d.loss, d.loss).format(body=d.loss_body or "a body")
+    end = LOSSES.get(d.loss, d.loss).replace("{body}", d.loss_body or "a body")
     if fall_time is not None and d.loss not in ("not quiet", "off command"):
         end += f" at {fall_time:.2f} s"
     told: list[tuple[float, str]] = []

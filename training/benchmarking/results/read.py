@@ -31,6 +31,8 @@ class Record:
         impulse [N·s], direction [deg], duration [s]: of the first push; NaN without one.
         fraction: impulse over the limit of the suite; NaN where it has none.
         fall_time: [s] after the reset; NaN without a fall.
+        start: of the first push [s]; None without one.
+        why: why it was lost, in words; empty of a trial that was recovered, and of older results.
         line: all columns of trials.csv, as they are written there.
     """
 
@@ -43,18 +45,14 @@ class Record:
     duration: float
     fraction: float
     fall_time: float
+    start: float | None
+    why: str
     line: Mapping[str, str]
 
     @property
     def part(self) -> str:
         """The part of the suite."""
         return self.line["part"]
-
-    @property
-    def why(self) -> str:
-        """Why it was lost, in words; empty of a trial that was recovered, and of older results."""
-        fell = self.fall_time if math.isfinite(self.fall_time) else None
-        return why(diagnosis_of(self.line), fell)
 
     @property
     def error(self) -> str:
@@ -159,9 +157,14 @@ def _record(line: Mapping[str, str], number: int, path: Path) -> Record:
             for name in ("impulse", "direction", "duration", "limit_fraction", "fall_time")
         )
         recovered, fallen = FLAGS[line["recovered"]], FLAGS[line["fallen"]]
+        start = float(line["start"]) if line["start"] else None
+        if start is not None and not math.isfinite(start):
+            raise ValueError(f"start: must be finite, not {start}")
+        told = why(diagnosis_of(line), fall_time if math.isfinite(fall_time) else None)
+        int(line["seed"])
         return Record(
             int(line["trial"]), line["controller"], recovered, fallen, impulse, direction, duration,
-            fraction, fall_time, line,
+            fraction, fall_time, start, told, line,
         )  # fmt: skip
     except (ValueError, KeyError) as error:
         raise ConfigError(f"line {number} does not parse: {error}", source=path) from None

@@ -183,7 +183,7 @@ def _shown(case: Exhibit, films: Sequence[Film], results: Results) -> dict[str, 
     """A case for the template."""
     record = case.record
     trial = results.trial(record)
-    start = float(text) if (text := record.line.get("start")) else None
+    start = record.start
     pushes = words.push_times(trial)
     # the last time worth showing
     end = (record.fall_time if record.fallen else (start or 0.0) + 3.0) + AFTER

@@ -120,7 +120,7 @@ def film(results: Results, record: Record, times: Sequence[float], draw: bool = 
 
 def frame_times(record: Record) -> list[float]:
     """Return the times of frames, from the push to the fall, or to when it is over [s]."""
-    start = float(record.line.get("start") or 0.0)
+    start = record.start or 0.0
     end = record.fall_time if math.isfinite(record.fall_time) else start + 3.0
     return [float(t) for t in np.linspace(start, max(end, start + AFTER), FRAMES)]
 

@@ -52,6 +52,13 @@ def test_what_was_lost_says_why_and_older_results_say_nothing(tmp_path: Path) ->
     assert {record.why for record in load_results(old).records} == {""}
 
 
+def test_a_loss_of_another_name_is_told_as_it_is(tmp_path: Path) -> None:
+    """A name from a file is no format: its braces are text."""
+    folder = copied("random", tmp_path)
+    cells(loss="{0} {body.__class__}")(folder)
+    assert all(r.why.startswith("{0} {body.__class__}") for r in load_results(folder).records)
+
+
 def edit(name: str, old: str, new: str) -> Callable[[Path], None]:
     """Changes a text in a file."""
 
@@ -85,6 +92,20 @@ def summary(**changes: object) -> Callable[[Path], None]:
     return change
 
 
+def cells(**texts: str) -> Callable[[Path], None]:
+    """Changes columns of trials.csv, in every line."""
+
+    def change(folder: Path) -> None:
+        with (folder / "trials.csv").open(newline="") as file:
+            rows = [row | texts for row in csv.DictReader(file)]
+        with (folder / "trials.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+
+    return change
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -99,6 +120,13 @@ def summary(**changes: object) -> Callable[[Path], None]:
         (cut("trials.csv", 0.0), "trials.csv: lacks the columns"),
         (edit("trials.csv", ",recovered,", ",won,"), "lacks the columns recovered"),
         (edit("trials.csv", "False", "Maybe"), "does not parse"),
+        (
+            cells(full_from="zero"),
+            "line 2 does not parse: could not convert string to float: 'zero'",
+        ),
+        (cells(capture_left="0.2", capture_outside=""), "capture_left without capture_outside"),
+        (cells(start="inf"), "start: must be finite"),
+        (cells(seed="one"), "line 2 does not parse"),
         (edit("trials.csv", ",zero,", ",one,"), "'one' is not in summary.json"),
         (edit("summary.json", '"zero": {', '"other": {'), "ranking: must name all controllers"),
         (edit("settings.yaml", "zero: ", "one: "), "not those of settings.yaml"),

@@ -36,7 +36,9 @@ def record(trial: int, name: str, recovered: bool, fraction: float, **line: str)
         "trial": str(trial), "seed": "1", "impulse": str(fraction), "direction": "0", **line,
     }  # fmt: skip
     fall = math.nan if recovered else 1.0
-    return Record(trial, name, recovered, not recovered, fraction, 0.0, 0.1, fraction, fall, line)
+    start = float(line["start"]) if line["start"] else None
+    numbers = (fraction, 0.0, 0.1, fraction, fall, start)
+    return Record(trial, name, recovered, not recovered, *numbers, "", line)
 
 
 def made(results: Results, *records: Record) -> Results:
