@@ -59,6 +59,9 @@ def _run(name: str, setting: str, steps: int, rng: np.random.Generator) -> bool:
     for step in range(steps):
         if step == int(WARM * steps):
             first = memory()
+        if step and step % (steps // 10) == 0:
+            told = f"{name}, {setting}: {step:,} steps, {time.monotonic() - start:.0f} s"
+            print(told, file=sys.stderr, flush=True)
         try:
             if done:
                 kind = KINDS[count["episodes"] % len(KINDS)]

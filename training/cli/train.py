@@ -14,7 +14,7 @@ import tyro
 from poise.baselines.allowance import named
 from poise.configs.errors import ConfigError
 from poise.configs.files import resolve
-from poise.configs.reading import exists
+from poise.configs.reading import exists, is_file
 from poise.configs.schema import build, to_dict
 from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.statistics.differences import difference
@@ -228,7 +228,7 @@ def _base(args: Sequence[str]) -> str | Path:
     if known.config is not None or known.quick:
         return QUICK if known.config is None else known.config
     own = Path(known.out or ".") / "config.yaml"
-    if known.resume and own.is_file():
+    if known.resume and is_file(own):
         return own
     return DEFAULT if _is_humanoid(known.robot) else ANY_ROBOT
 

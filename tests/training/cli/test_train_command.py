@@ -97,16 +97,22 @@ def test_the_progress_line_tells_the_exploring_policy_from_the_held_out_rate(
 
 
 @pytest.mark.parametrize(
-    ("name", "text"),
-    [("x" * 300, "cannot be written (File name too long)"), ("\udcff", "must be a name in UTF-8")],
+    ("name", "more", "text"),
+    [
+        ("x" * 300, [], "cannot be written (File name too long)"),
+        ("x" * 300, ["--resume"], "cannot be written (File name too long)"),
+        ("x" * 300, ["--resume", "--seeds", "0"], "cannot be written (File name too long)"),
+        ("\udcff", [], "must be a name in UTF-8"),
+        ("\udcff", ["--resume", "--seeds", "0"], "holds no runs to resume"),
+    ],
 )
 def test_a_folder_that_cannot_be_is_told_in_a_line(
-    name: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    name: str, more: list[str], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     """Too long for a file system; of bytes that are no text."""
     monkeypatch.chdir(tmp_path)
-    assert main(["train", "--out", name, "--ppo.n-envs", "2", "--steps", "64"]) == 2
+    assert main(["train", "--out", name, "--ppo.n-envs", "2", "--steps", "64", *more]) == 2
     error = capsys.readouterr().err
     assert error.startswith("poise: ") and error.count("\n") == 1 and text in error
     assert not list(tmp_path.iterdir())
