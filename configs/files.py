@@ -68,7 +68,7 @@ def write_atomic(path: str | Path, content: str | bytes) -> None:
         PoiseError: the file cannot be written; the old content is then untouched.
     """
     path = Path(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = path.parent / f".{path.name}.{os.getpid()}.part"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(part, "wb") as file:
@@ -77,7 +77,8 @@ def write_atomic(path: str | Path, content: str | bytes) -> None:
             os.fsync(file.fileno())
         os.replace(part, path)
     except OSError as error:
-        raise PoiseError(f"{path}: cannot be written ({error.strerror})") from None
+        why = "it is a folder" if is_folder(path) else error.strerror
+        raise PoiseError(f"{path}: cannot be written ({why})") from None
     except ValueError:  # a NUL in its name
         raise PoiseError(f"{path}: cannot be written (no name of a file)") from None
     finally:

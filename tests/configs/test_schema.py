@@ -282,6 +282,17 @@ def test_write_atomic_makes_folders_and_replaces(tmp_path: Path) -> None:
     assert os.listdir(path.parent) == ["file.txt"]
 
 
+@pytest.mark.parametrize("name", ["", ".", "..", "/"])
+def test_write_atomic_replaces_no_folder(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not even where the path has no name of its own; nothing is left behind."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(PoiseError, match="cannot be written \\(it is a folder\\)"):
+        write_atomic(name, "text")
+    assert not list(tmp_path.iterdir())
+
+
 def test_write_atomic_does_not_write_into_the_old_file(tmp_path: Path) -> None:
     """The old file is replaced as a whole: another name for it keeps the old content."""
     path, other = tmp_path / "file.txt", tmp_path / "other.txt"
