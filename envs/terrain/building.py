@@ -29,7 +29,9 @@ def build_terrain(spec: mujoco.MjSpec, terrain: Terrain, ground: str) -> None:
         if surface.gradient == 0.0 and surface.height == floor:
             continue  # it is the plane's
         name = f"{BUILT}{i}"
-        box = spec.worldbody.add_geom(name=name, **_box(surface, floor))
+        half, middle, quaternion = box_below(surface, floor)
+        kind = mujoco.mjtGeom.mjGEOM_BOX
+        box = spec.worldbody.add_geom(name=name, type=kind, size=half, pos=middle, quat=quaternion)
         box.rgba = SHADES[i % len(SHADES)]
         for attribute in ALIKE:
             setattr(box, attribute, getattr(plane, attribute))
@@ -37,19 +39,19 @@ def build_terrain(spec: mujoco.MjSpec, terrain: Terrain, ground: str) -> None:
             _copy_pair(spec, pair, ground, name)
 
 
-def _box(surface: Surface, floor: float) -> dict[str, object]:
-    """A box whose upper side is the surface, and which reaches down to the floor."""
+def box_below(surface: Surface, floor: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The box whose upper side is the surface, and which reaches down to the floor.
+
+    Returns:
+        (3,) half of its lengths, (3,) its middle [m], and (4,) its orientation, w first.
+    """
     angle = np.arctan(surface.gradient)
     slant = 0.5 * (surface.x_max - surface.x_min) / np.cos(angle)
     depth = 2.0 * THICKNESS if surface.gradient else surface.height - floor + THICKNESS
     half = np.array([slant, 0.5 * (surface.y_max - surface.y_min), 0.5 * depth])
     normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
-    return {
-        "type": mujoco.mjtGeom.mjGEOM_BOX,
-        "size": half,
-        "pos": surface.middle - half[2] * normal,
-        "quat": [np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0],
-    }
+    quaternion = np.array([np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0])
+    return half, surface.middle - half[2] * normal, quaternion
 
 
 def _copy_pair(spec: mujoco.MjSpec, pair: mujoco.MjsPair, ground: str, name: str) -> None:

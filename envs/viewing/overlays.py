@@ -87,7 +87,7 @@ def push_arrows(simulation: Simulation) -> list[Mark]:
 
 
 def foothold_mark(point: np.ndarray, size: float) -> Mark:
-    """The mark of a foothold (2,) that a controller means to step on; `size` is the CoM height."""
+    """The mark of a foothold (3,) that a controller means to step on; `size` is the CoM height."""
     return _disc("foothold", point, 0.085 * size, 0.003 * size, FOOTHOLD.colour)
 
 
@@ -112,9 +112,8 @@ def draw(scene: mujoco.MjvScene, found: list[Mark]) -> None:
 
 
 def _disc(name: str, point: np.ndarray, radius: float, height: float, colour: RGB) -> Mark:
-    """A disc at `point` (3,), or (2,) at z = 0, which sticks out of the ground by `height`."""
-    start = np.append(point, 0.0)[:3]
-    return Mark(name, DISC, start, start + [0.0, 0.0, height], radius, colour)
+    """A disc at `point` (3,), which sticks out of the ground by `height`."""
+    return Mark(name, DISC, point, point + [0.0, 0.0, height], radius, colour)
 
 
 def _polygon(vertices: np.ndarray, level: float, radius: float) -> list[Mark]:

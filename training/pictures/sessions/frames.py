@@ -10,6 +10,7 @@ from poise.baselines.controller import BaseController
 from poise.envs.balance.base import BalanceEnv
 from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
+from poise.envs.terrain.terrain import Surface, height_at
 from poise.envs.viewing.contact_forces import ContactForces
 from poise.envs.viewing.overlays import Mark, foothold_mark, marks
 
@@ -24,6 +25,9 @@ VALUES = {
 }
 
 
+LEVEL = np.zeros((0, 6))  # no surfaces
+
+
 class Frame(NamedTuple):
     """A robot at one moment, world axes.
 
@@ -36,6 +40,9 @@ class Frame(NamedTuple):
         fall_time: when it fell [s]; None: it has not.
         ghost: where the bodies are if the reference motion is followed exactly; None: it has none
             that moves.
+        surfaces: (n, 6) of the ground, as `Surface`; the same array for as long as it is the same
+            ground.
+        floor: height of the plane below them [m].
     """
 
     time: float
@@ -46,6 +53,8 @@ class Frame(NamedTuple):
     values: dict[str, float]
     fall_time: float | None
     ghost: Poses | None = None
+    surfaces: np.ndarray = LEVEL
+    floor: float = 0.0
 
 
 def between(first: Frame, second: Frame, fraction: float) -> Frame:
@@ -79,22 +88,27 @@ class Observer:
         self._env, self._seen = env, seen
         self._forces = ContactForces(env.simulation)
         self._ghost: Ghost | Seen | None = None
+        self._surfaces = LEVEL
 
     def __call__(self, fall_time: float | None = None) -> Frame:
         """The frame of this moment, of a robot that fell at `fall_time` [s]."""
-        env, simulation = self._env, self._env.simulation
+        simulation = self._env.simulation
         if self._forces.simulation is not simulation:  # other conditions, another simulation
             self._forces = ContactForces(simulation)
-        data = simulation.data
+        data, arrays = simulation.data, simulation.arrays
+        if not np.array_equal(self._surfaces, arrays.surfaces):  # an episode may draw them anew
+            self._surfaces = arrays.surfaces.copy()
         return Frame(
             time=simulation.time,
             positions=data.xpos.copy(),
             quaternions=data.xquat.copy(),
             com=simulation.state.com.copy(),
-            marks=(*marks(simulation), *self._forces.marks(), *_footholds(env)),
+            marks=(*marks(simulation), *self._forces.marks(), *self._footholds()),
             values=_values(simulation),
             fall_time=fall_time,
             ghost=self._reference(simulation.time),
+            surfaces=self._surfaces,
+            floor=float(arrays.floor),
         )
 
     def _reference(self, time: float) -> Poses | None:
@@ -103,6 +117,23 @@ class Observer:
             robot, seen = self._env.robot, self._seen
             self._ghost = ghost_of(self._env) if seen is None else Seen(seen, robot)
         return None if self._ghost is None else self._ghost(time)
+
+    def _footholds(self) -> list[Mark]:
+        """Where the controller's foot is to land, while it swings."""
+        env = self._env
+        controller = getattr(env, "controller", None)
+        inner = controller.unwrapped if isinstance(controller, BaseController) else None
+        if not isinstance(inner, SteppingController) or inner.stepping().foot < 0:
+            return []
+        floor = float(env.simulation.arrays.floor)
+        point = ground_at(inner.stepping().foothold, self._surfaces, floor)
+        return [foothold_mark(point, env.robot.height_com)]
+
+
+def ground_at(point: np.ndarray, surfaces: np.ndarray, floor: float) -> np.ndarray:
+    """(3,) the ground at the x and y of `point` [m]; surfaces and floor as of a `Frame`."""
+    x, y = float(point[0]), float(point[1])
+    return np.array([x, y, height_at([Surface(*row) for row in surfaces.tolist()], floor, x, y)])
 
 
 def _values(simulation: Simulation) -> dict[str, float]:
@@ -119,13 +150,3 @@ def _values(simulation: Simulation) -> dict[str, float]:
         "torque": float(load.max()),
         "push": force,
     }
-
-
-def _footholds(env: BalanceEnv) -> list[Mark]:
-    """Where the controller's foot is to land, while it swings."""
-    controller = getattr(env, "controller", None)
-    inner = controller.unwrapped if isinstance(controller, BaseController) else None
-    if not isinstance(inner, SteppingController):
-        return []
-    step = inner.stepping()
-    return [foothold_mark(step.foothold, env.robot.height_com)] if step.foot >= 0 else []

@@ -203,6 +203,8 @@ class BrowserView:
     def _draw(self, now: float) -> None:
         self._drawn = now
         self.stage.show(self._frames())
+        if self._floor.position[2] != self.stage.floor:
+            self._floor.position = (0.0, 0.0, self.stage.floor)
         if now - self._told >= TELL:
             self._told = now
             history = self.play.history
@@ -269,7 +271,7 @@ class BrowserView:
 
     def _set_dark(self, dark: bool) -> None:
         self._dark = dark
-        set_look(self._server, dark)
+        self._floor = set_look(self._server, dark)
 
     def _picture(self, client: int) -> None:
         """In a thread of the server: it waits for the browser."""

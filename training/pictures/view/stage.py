@@ -1,16 +1,20 @@
 """The scene: ground, robots side by side, their names and marks; the camera goes with them."""
 
+import operator
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import trimesh
 import viser
 
 from poise.envs.robots.robot import Robot
+from poise.envs.terrain.building import SHADES, THICKNESS, box_below
+from poise.envs.terrain.terrain import Surface
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.overlays import Mark
 from poise.envs.viewing.quantities import REFERENCE
-from poise.training.pictures.sessions.frames import Frame
+from poise.training.pictures.sessions.frames import Frame, ground_at
 from poise.training.pictures.sessions.mouse import Pull, pull
 
 from .marks import Marks
@@ -30,6 +34,7 @@ SKY, SUN = 1.5, 1.9  # brightness: together, what faces up has its own colour
 LIGHT, DARK = (206, 209, 212), (90, 94, 100)  # lines on the ground
 BACKGROUND = {False: (255, 255, 255), True: (20, 21, 23)}  # dark → colour
 GROUND = {False: (232, 234, 236), True: (62, 66, 72)}  # dark → colour
+Triangles = tuple[np.ndarray, np.ndarray]
 Grabbed = Callable[[str, Pull], None]  # phase of the drag, what it is now
 
 
@@ -62,6 +67,8 @@ class Stage:
         self.robots = Robots(scene, ROOT, robot, count, opacity)
         self.ghosts: Robots | None = None  #: of the reference motion, where there is one
         self.marks = Marks(scene, ROOT, count)
+        self._ground: list[np.ndarray] = []  # surfaces that are drawn
+        self.boxes: list[viser.MeshHandle] = []  #: of the ground
         self._names = [
             scene.add_label(f"{ROOT}/names/{k}", name, anchor="bottom-center")
             for k, name in enumerate(names)
@@ -69,6 +76,7 @@ class Stage:
         self.pull: Pull | None = None  #: that is drawn
         self.following = True
         self._middle, self._time = np.zeros(3), np.inf
+        self.floor = 0.0  #: height at which the page's floor is seen [m]
         self.frames: Sequence[Frame] = ()  #: that are shown
         for mesh in self.robots.meshes:
             mesh.handle.on_drag("left")(self._dragged(mesh.body))
@@ -78,6 +86,7 @@ class Stage:
         """Show the robots and their marks, one frame for each."""
         self.frames = frames
         self._follow(frames)
+        self.floor = min(frame.floor for frame in frames) - float(self._middle[2])
         found: list[tuple[Mark, np.ndarray]] = [
             (mark, offset)
             for frame, offset in zip(frames, self._offsets, strict=True)
@@ -87,12 +96,31 @@ class Stage:
             found.append((self.pull.mark(self.robot), np.zeros(3)))
         with self._server.atomic():
             self._root.position = -self._middle
+            self._show_ground(frames)
             self.robots.show(frames, self._offsets)
             self._show_ghosts(frames)
             self.marks.show(found)
             for label, frame, offset in zip(self._names, frames, self._offsets, strict=True):
                 up = np.array([0.0, 0.0, NAME_AT * self.robot.height_com])
-                label.position = frame.com * [1.0, 1.0, 0.0] + up + offset
+                label.position = _below(frame) + up + offset
+
+    def _show_ground(self, frames: Sequence[Frame]) -> None:
+        """Build what each robot stands on anew where it is another; a lane is as wide as it is."""
+        ground = [frame.surfaces for frame in frames]
+        if len(ground) == len(self._ground) and all(map(operator.is_, ground, self._ground)):
+            return
+        for box in self.boxes:
+            box.remove()
+        self._ground = ground
+        half = 0.5 * LANE * self.robot.height_com if len(frames) > 1 else np.inf
+        self.boxes = [
+            self._server.scene.add_mesh_simple(
+                f"{ROOT}/ground/{k}_{shade}", *mesh, flat_shading=True,
+                color=SHADES[shade][:3], position=offset,
+            )
+            for k, (frame, offset) in enumerate(zip(frames, self._offsets, strict=True))
+            for shade, mesh in ground_meshes(frame.surfaces, frame.floor, half).items()
+        ]  # fmt: skip
 
     def _show_ghosts(self, frames: Sequence[Frame]) -> None:
         """Show where the bodies are to be, in frames that say it."""
@@ -121,8 +149,8 @@ class Stage:
         self._root.remove()
 
     def _follow(self, frames: Sequence[Frame]) -> None:
-        """Let the middle of the robots pull the scene's origin with a short delay."""
-        target = np.mean([frame.com for frame in frames], axis=0) * [1.0, 1.0, 0.0]
+        """Let the middle of the robots' ground pull the scene's origin with a short delay."""
+        target = np.mean([_below(frame) for frame in frames], axis=0)
         elapsed, self._time = frames[0].time - self._time, frames[0].time
         if not self.following:
             return
@@ -145,15 +173,49 @@ class Stage:
         return callback
 
 
-def set_look(server: viser.ViserServer, dark: bool) -> None:
-    """Ground, light and theme of the page."""
+def _below(frame: Frame) -> np.ndarray:
+    """(3,) the ground below the centre of mass [m]."""
+    return ground_at(frame.com, frame.surfaces, frame.floor)
+
+
+def ground_meshes(surfaces: np.ndarray, floor: float, half: float) -> dict[int, Triangles]:
+    """Boxes between the surfaces (n, 6) and the floor [m]: it lets through what is below it.
+
+    Args:
+        surfaces: as of `Surface`.
+        floor: height of the plane below them.
+        half: width to either side of the way beyond which nothing is drawn.
+
+    Returns:
+        vertices (n, 3) and faces (m, 3) by their number among `SHADES`.
+    """
+    boxes: dict[int, list[trimesh.Trimesh]] = {}
+    for i, row in enumerate(surfaces.tolist()):
+        surface = Surface(*row)
+        surface = surface._replace(y_min=max(surface.y_min, -half), y_max=min(surface.y_max, half))
+        is_floor = surface.gradient == 0.0 and surface.height == floor
+        if is_floor or surface.y_min >= surface.y_max:
+            continue
+        size, middle, quaternion = box_below(surface, floor + THICKNESS)
+        turned = trimesh.transformations.quaternion_matrix(quaternion)
+        turned[:3, 3] = middle
+        box = trimesh.creation.box(2.0 * size, turned)
+        boxes.setdefault(i % len(SHADES), []).append(box)
+    return {
+        shade: trimesh.util.append_faces([b.vertices for b in some], [b.faces for b in some])
+        for shade, some in boxes.items()
+    }
+
+
+def set_look(server: viser.ViserServer, dark: bool) -> viser.GridHandle:
+    """Light and theme of the page, and its floor, which is returned."""
     server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
     server.scene.configure_default_lights(False)  # they bleach the colours that tell marks apart
     server.scene.add_light_hemisphere("/light/sky", ground_color=(200, 200, 200), intensity=SKY)
     server.scene.add_light_directional(
         "/light/sun", intensity=SUN, cast_shadow=True, position=(2.5, 1.0, 5.0)
     )
-    server.scene.add_grid(
+    return server.scene.add_grid(
         "/ground", infinite_grid=True, cell_size=0.5, section_size=1.0, fade_distance=30.0,
         cell_color=DARK if dark else LIGHT, section_color=DARK if dark else LIGHT,
         plane_color=GROUND[dark], plane_opacity=0.6, shadow_opacity=0.25,

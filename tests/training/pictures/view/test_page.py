@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from PIL import Image
@@ -23,7 +24,14 @@ import viser
 
 from poise.baselines.walking.schedule import TimedCommand
 from poise.configs.errors import ConfigError
+from poise.envs.robots.robot import on_terrain
+from poise.envs.terrain.arrays import surface_arrays
+from poise.envs.terrain.bumps import Bumps
+from poise.envs.terrain.slope import Slope
+from poise.envs.terrain.stairs import Stairs
+from poise.envs.terrain.terrain import Surface, Terrain
 from poise.envs.viewing.quantities import COM, REFERENCE
+from poise.training.pictures.sessions.frames import ground_at
 from poise.training.pictures.sessions.live import Live, Play
 from poise.training.pictures.sessions.loading import load_live
 from poise.training.pictures.sessions.session import Session, load_session
@@ -32,7 +40,7 @@ from poise.training.pictures.view import browser
 from poise.training.pictures.view.browser import BrowserView
 from poise.training.pictures.view.origins import Visits
 from poise.training.pictures.view.server import check_port, greeting, serving
-from poise.training.pictures.view.stage import FIELD_OF_VIEW, LANE, first_view
+from poise.training.pictures.view.stage import FIELD_OF_VIEW, LANE, Stage, first_view, ground_meshes
 from poise.training.pictures.view.walking import Throttle
 from tests.support.browser import CHROMIUM, Browser
 from tests.support.shared import robot
@@ -523,3 +531,56 @@ def test_the_first_view_has_all_robots(count: int, aspect: float, phone: bool) -
             x, y = ray @ right / (ray @ forward), ray @ up / (ray @ forward)
             assert abs(x) < half * aspect and abs(y) < half
             assert y > -0.25 * half or not phone
+
+
+@pytest.mark.parametrize(
+    "terrain", [Stairs(rise=0.1), Stairs(down=True), Slope(angle=8.0), Bumps(count=9, lowest=0.01)]
+)
+def test_the_ground_is_what_the_robot_walks_on(terrain: Terrain) -> None:
+    """The upper corners of the model's boxes are corners of what is drawn, and nothing is higher;
+    beyond half a width nothing is drawn."""
+    stands = on_terrain(robot(), terrain)
+    model, surfaces, floor = stands.model, surface_arrays(terrain.surfaces()), terrain.floor()
+    drawn = np.concatenate([v for v, _ in ground_meshes(surfaces, floor, np.inf).values()])
+    corners = np.array([[x, y, 1.0] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
+    boxes = [g for g in range(model.ngeom) if model.geom(g).name.startswith("terrain_")]
+    assert len(boxes) == len(drawn) / 8
+    for box in boxes:
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, model.geom_quat[box])
+        tops = (corners * model.geom_size[box]) @ turn.reshape(3, 3).T + model.geom_pos[box]
+        for top in tops:
+            assert np.min(np.linalg.norm(drawn - top, axis=1)) < 1e-9
+    assert drawn[:, 2].max() <= max(terrain.height(x, y) for x, y in drawn[:, :2]) + 1e-9
+    for vertices, _ in ground_meshes(surfaces, floor, 0.2).values():
+        assert np.abs(vertices[:, 1]).max() <= 0.2
+
+
+def test_the_page_builds_the_ground_and_goes_down_with_the_robot(
+    server: viser.ViserServer, session: Session
+) -> None:
+    """Once for as long as it is the same; the page's floor is as far below as the robot's."""
+    session.reset()
+    frame = Live(session).history[0][0]
+    stage = Stage(server, robot(), ["a", "b"], lambda *_: None)
+    stage.show([frame, frame])
+    assert not stage.boxes and stage.floor == 0.0
+    surfaces = surface_arrays(Stairs(down=True).surfaces())
+    last = Stairs(down=True).surfaces()[-1]
+    below = frame._replace(surfaces=surfaces, floor=last.height, com=last.middle, time=50.0)
+    stage.show([below, below])
+    built = list(stage.boxes)
+    assert len(built) == 4 and stage.floor == pytest.approx(0.0)  # two shades for each of two
+    above = below._replace(com=np.zeros(3), time=100.0)
+    stage.show([above, above])
+    assert stage.boxes == built and stage.floor == pytest.approx(last.height)
+    stage.show([frame, frame])
+    assert not stage.boxes
+    stage.remove()
+
+
+def test_a_foothold_lies_on_the_ground() -> None:
+    """On the surface below it, and on the floor beside all of them."""
+    surfaces = surface_arrays([Surface(0.0, 1.0, -1.0, 1.0, 0.3, 0.2)])
+    assert ground_at(np.array([0.75, 0.0]), surfaces, -0.1) == pytest.approx([0.75, 0.0, 0.35])
+    assert ground_at(np.array([1.5, 0.0]), surfaces, -0.1) == pytest.approx([1.5, 0.0, -0.1])
