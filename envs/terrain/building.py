@@ -32,7 +32,7 @@ def build_terrain(spec: mujoco.MjSpec, terrain: Terrain, ground: str) -> None:
         half, middle, quaternion = box_below(surface, floor)
         kind = mujoco.mjtGeom.mjGEOM_BOX
         box = spec.worldbody.add_geom(name=name, type=kind, size=half, pos=middle, quat=quaternion)
-        box.rgba = SHADES[i % len(SHADES)]
+        box.material, box.rgba = "", SHADES[i % len(SHADES)]  # not the robot's
         for attribute in ALIKE:
             setattr(box, attribute, getattr(plane, attribute))
         for pair in pairs:

@@ -10,6 +10,7 @@ from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import on_terrain
 from poise.envs.robots.variants import coarser_robot
+from poise.envs.terrain.building import BUILT
 from poise.envs.terrain.flat import Flat
 from poise.envs.terrain.slope import Slope
 from poise.envs.terrain.stairs import Stairs
@@ -53,6 +54,15 @@ def test_rays_from_above_meet_the_surfaces(name, terrain):
             assert 3.0 - way == pytest.approx(terrain.height(x, y), abs=1e-9)
             met += 1
     assert met > 200
+
+
+@pytest.mark.parametrize("name", ["humanoid", "unitree_g1"])
+def test_surfaces_have_shades_of_their_own(name):
+    """By turns, and not the material that a robot's description gives all of its geoms."""
+    model = on_terrain(robot_named(name), Stairs()).model
+    boxes = [g for g in range(model.ngeom) if model.geom(g).name.startswith(BUILT)]
+    assert boxes and np.all(model.geom_matid[boxes] == -1)
+    assert np.all(model.geom_rgba[boxes[0], :3] != model.geom_rgba[boxes[1], :3])
 
 
 def test_level_ground_is_the_model_itself():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,9 @@ def test_a_walk_over_stairs_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     told = capsys.readouterr().out.splitlines()
     assert "terrain: passed 2 of 2, touched edges 0 times" in told
     assert not any(line.startswith("the last two strides") for line in told)
+    args = ["walk", "--terrain", "{kind: bumps, count: 9}", "--duration", "2"]
+    assert main(args) == 0  # which have no order to be passed in
+    assert re.search(r"^terrain: touched edges \d+ times$", capsys.readouterr().out, re.M)
 
 
 @pytest.mark.parametrize(
