@@ -61,8 +61,8 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     """The text names what was asked for and what there is."""
     with pytest.raises(
         ConfigError,
-        match="momentum-qp, .*residual-walk, residual-whole-g1, residual-whole-g1-field, "
-        "guard-falcon-g1, guard-g1, zero",
+        match="momentum-qp, .*residual-walk, residual-walk-field, residual-whole-g1, "
+        "residual-whole-g1-field, guard-falcon-g1, guard-g1, zero",
     ) as error:
         load_agent(name, robot)
     assert name in str(error.value)
@@ -93,10 +93,12 @@ def test_a_packaged_policy_is_known_by_its_folder(
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
     names = ["ppo-position", "ppo-torque", "residual", "residual-lqr-lip", "residual-pd"]
     names += ["residual-step", "residual-torque"]
-    others = ["residual-walk", "residual-whole-g1", "residual-whole-g1-field"]
+    others = [
+        f"residual-{name}{level}" for name in ("walk", "whole-g1") for level in ("", "-field")
+    ]
     assert packaged("policies") == [*names, *others]
     assert default_controllers()[-7:] == tuple(names)
-    assert default_controllers("unitree_g1")[-2:] == tuple(others[1:])
+    assert default_controllers("unitree_g1")[-2:] == tuple(others[2:])
     guards = packaged("guards")
     with pytest.raises(ConfigError, match=", ".join([*names, *others, *guards, "zero"])):
         load_agent("residual-abe07", robot)
