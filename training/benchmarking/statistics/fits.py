@@ -15,6 +15,7 @@ from scipy.special import expit
 PRIOR_SCALE = 0.05
 LOG_9 = float(np.log(9.0))  # logit of 0.9
 MAX_ITERATIONS = 60
+RIDGE = 1e-9  # of the curvature of a trial's weight
 TOLERANCE = 1e-10  # of the Newton decrement, in units of log-likelihood
 
 Bound = Literal["lower", "upper"]
@@ -141,19 +142,21 @@ def _newton(
         residual, curvature = w * (recovered - p), w * p * (1 - p)
         g_a = residual.sum(axis=1)
         g_b = -(residual @ x) + 1 / bi - 1
-        h_aa, h_ab = curvature.sum(axis=1), -(curvature @ x)
-        h_bb = curvature @ x**2 + 1 / bi**2
-        # a few trials that are recovered the more the harder they are saturate the curve
-        h_aa = h_aa + (h_aa * h_bb - h_ab**2 <= 0.0)
-        det = h_aa * h_bb - h_ab**2
-        step_a, step_b = (h_bb * g_a - h_ab * g_b) / det, (h_aa * g_b - h_ab * g_a) / det
+        # Eliminated around the curvature's centre: the determinant of the plain form cancels where
+        # few trials bend the curve. What is added is for curves that are saturated everywhere.
+        added = RIDGE * w.sum(axis=1)
+        h_aa = curvature.sum(axis=1) + added
+        at = curvature @ x / h_aa
+        h_bb = (curvature * (x - at[:, None]) ** 2).sum(axis=1) + added * at**2 + 1 / bi**2
+        step_b = (g_b + at * g_a) / h_bb
+        step_a = g_a / h_aa + at * step_b
         decrement = g_a * step_a + g_b * step_b
 
         length = np.minimum(1.0, 0.9 * bi / np.maximum(-step_b, 1e-300))  # keeps b > 0
         for _ in range(MAX_ITERATIONS):
             new_a, new_b = ai + length * step_a, bi + length * step_b
             new = objective(new_a, new_b, w)
-            worse = new < value[active] + 1e-4 * length * decrement - TOLERANCE
+            worse = ~(new >= value[active] + 1e-4 * length * decrement - TOLERANCE)
             if not worse.any():
                 break
             length[worse] /= 2

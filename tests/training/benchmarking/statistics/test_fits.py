@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.special import expit
 
+from poise.training.benchmarking.statistics import fits
 from poise.training.benchmarking.statistics.fits import (
     PRIOR_SCALE,
     check_trials,
@@ -192,3 +193,21 @@ def test_checked_trials_are_float_and_bool():
     """Lists of int become the arrays that the fit works on."""
     impulse, recovered = check_trials([1, 2], [0, 1])
     assert impulse.dtype == float and recovered.dtype == bool
+
+
+def test_few_recoveries_are_fitted_in_every_resample() -> None:
+    """The gradient vanishes, in units of one trial: where a trial or two bend the whole curve, and
+    where harder pushes are recovered more often than weak ones."""
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        n = int(rng.integers(8, 25))
+        x = rng.uniform(-19.0, 20.0, n)
+        recovered = np.isin(np.arange(n), rng.choice(n, int(rng.integers(1, 4)), replace=False))
+        weights = rng.multinomial(n, np.full(n, 1.0 / n), 100).astype(float)
+        mixed = (weights * recovered).any(axis=1) & (weights * ~recovered).any(axis=1)
+        w = weights[mixed]
+        with np.errstate(all="raise", under="ignore"):
+            a, b = fits._newton(x, recovered, w)
+        residual = w * (recovered - expit(a[:, None] - b[:, None] * x))
+        assert np.abs(residual.sum(axis=1)).max() < 1e-4
+        assert np.abs(b * (1.0 / b - 1.0 - residual @ x)).max() < 1e-3
