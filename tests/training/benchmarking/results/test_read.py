@@ -175,8 +175,7 @@ def test_intervals_may_be_open() -> None:
 @pytest.mark.parametrize(
     ("name", "rated", "page"),
     [
-        ("leaderboard", "mix", None),
-        ("leaderboard-residual-torque", "mix", None),
+        ("leaderboard", "mix", "leaderboard.md"),
         *(
             (robot, "mix", f"leaderboard-{robot}.md")
             for robot in ("unitree_g1", "unitree_h1", "booster_t1")
