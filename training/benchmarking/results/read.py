@@ -161,7 +161,7 @@ def _record(line: Mapping[str, str], number: int, path: Path) -> Record:
         if start is not None and not math.isfinite(start):
             raise ValueError(f"start: must be finite, not {start}")
         told = why(diagnosis_of(line), fall_time if math.isfinite(fall_time) else None)
-        int(line["seed"])
+        int(line["seed"])  # a report tells it
         return Record(
             int(line["trial"]), line["controller"], recovered, fallen, impulse, direction, duration,
             fraction, fall_time, start, told, line,
