@@ -403,7 +403,7 @@ def test_list_names_what_is_packaged(capsys: pytest.CaptureFixture[str]) -> None
     assert (torque["robot"], torque["j50"], torque["on"]) == ("humanoid", 38.2, "feedback-step")
     assert main(["list"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert "residual-torque humanoid 38.1 targets, steps feedback-step the default" in shown
+    assert "residual-torque humanoid 38.2 targets, steps feedback-step the default" in shown
 
 
 def test_j50_of_the_list_is_that_of_the_leaderboards() -> None:
