@@ -20,6 +20,7 @@ LOSSES = {
     "motion": "fell from the motion",
     "error": "the controller raised an error",
 }
+NUMBERS = {name for name, hint in Diagnosis.__annotations__.items() if "float" in str(hint)}
 #: what a diagnosis tells together with its size
 SIZES = {"full_from": "full_time", "foothold_time": "foothold_error",
          "capture_left": "capture_outside"}  # fmt: skip
@@ -33,9 +34,8 @@ def diagnosis_of(line: Mapping[str, str]) -> Diagnosis:
 
     Raises ValueError for a number that is none, and for a cause without its time or size.
     """
-    numbers = {name for name, hint in Diagnosis.__annotations__.items() if "float" in str(hint)}
     given: dict[str, Any] = {name: line.get(name) or None for name in COLUMNS}
-    for name in numbers:
+    for name in NUMBERS:
         given[name] = None if given[name] is None else float(given[name])
     for cause, size in SIZES.items():
         if given[cause] is not None and given[size] is None:
