@@ -41,6 +41,7 @@ class StateArrays(Block):
     momentum: np.ndarray  # (6,)
     A: np.ndarray  # (6, nv)
     A_bias: np.ndarray  # (6,)
+    load: np.ndarray  # (3,) that is believed to last: force f_z, moments n_x, n_y about the CoM
     J: np.ndarray  # (6 nc, nv)
     Jdot_v: np.ndarray  # (6 nc,)
     J_v: np.ndarray  # (6 nc,)
@@ -82,6 +83,7 @@ def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
         momentum=zeros(6),
         A=zeros((6, nv)),
         A_bias=zeros(6),
+        load=zeros(3),
         J=zeros((6 * nc, nv)),
         Jdot_v=zeros(6 * nc),
         J_v=zeros(6 * nc),

@@ -25,7 +25,7 @@ from poise.envs.robots.robot import Robot, on_terrain
 from poise.envs.terrain.flat import Flat
 
 from .drawn import DrawnRobot
-from .external_force import ExternalForce, allocate_force, begin_force, observe_force
+from .external_force import ExternalForce, allocate_force, bear_load, begin_force, observe_force
 from .inekf import (
     ATTITUDE,
     ENCODER,
@@ -67,7 +67,7 @@ from .realism import Realism
 from .source import StateSource
 
 POSITIVE = {"above": 0.0}
-SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED = range(7)  # entries of `Belief.steps`
+SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED, LOADED = range(8)  # entries of `Belief.steps`
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 #: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
@@ -89,6 +89,9 @@ class EstimatorConfig:
             the known robot with what its motors were asked for, `none` not at all; `auto` is
             `rollout` while motors run servos, whose accelerations nobody promises, else `promised`.
         external_force: Whether a rollout is pushed on by the force that nothing else explains.
+        load: Whether a load that lasts is learned and borne: a payload, masses and centres of mass
+            that are other than known. Where the controller brings an estimator it is not.
+        load_time: Time in which a load is learned [s].
         filtered: Whether joint velocities are filtered.
         joint_acceleration: Acceleration of joints that nobody knows of, step to step [rad/s²].
         turn_acceleration: Angular acceleration of the root that nobody knows of [rad/s²].
@@ -103,6 +106,8 @@ class EstimatorConfig:
     kind: Literal["auto", "odometry", "inekf", "exact"] = "auto"
     predictor: Literal["auto", "promised", "rollout", "none"] = "auto"
     external_force: bool = True
+    load: bool = True
+    load_time: float = field(default=2.0, metadata=POSITIVE)
     filtered: bool = True
     joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
     turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
@@ -115,7 +120,7 @@ class EstimatorConfig:
 
 
 #: of a controller that brings an estimator of its own: what is measured, as late and as noisy
-RAW = EstimatorConfig("odometry", predictor="none", filtered=False)
+RAW = EstimatorConfig("odometry", predictor="none", load=False, filtered=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +135,7 @@ class Belief(Block):
     state: StateArrays
     rollout: Rollout
     force: ExternalForce
-    steps: np.ndarray  # (7,) int: physics steps, see SENSE and its like
+    steps: np.ndarray  # (8,) int: physics steps, see SENSE and its like
     axes: np.ndarray  # (3, 3) of the root, led on
     q: np.ndarray  # (nj,) likewise
     v: np.ndarray  # (nv,)
@@ -162,7 +167,7 @@ def believe(b: Belief):
         if b.steps[INVARIANT]:
             for a in range(3):
                 b.v[3 + a] -= b.invariant.gyro_bias[a]
-    if b.steps[PUSHED]:
+    if b.steps[PUSHED] or b.steps[LOADED]:
         _write_state(b, row)
         observe_force(b.force, b.robot, b.state, r, known, b.steps[EXACT] > 0)
     ahead = b.steps[HORIZON] - b.steps[SENSE] + now - known  # at an episode's start less is late
@@ -179,6 +184,8 @@ def believe(b: Belief):
     _write_state(b, row)
     if not b.steps[EXACT]:
         _stand_on_ground(b)
+    if b.steps[LOADED]:
+        bear_load(b.force, b.robot, b.state)
 
 
 @compiled
@@ -249,7 +256,7 @@ class EstimatedState(StateSource, Copyable):
         self.belief = Belief(
             rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
             make_rollout(self.ahead, self.motors), allocate_force(),
-            zeros(7, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
+            zeros(8, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
         self.drive = Program.of([(drive_motors, self.motors)])
         self.sense = Program.of([(measure, self.sensors)])
@@ -271,9 +278,10 @@ class EstimatedState(StateSource, Copyable):
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
         pushed = c.external_force and horizon > 0 and SIMULATES[c.predictor] > 0
         self.belief.steps[:] = (
-            drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf", pushed
+            drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf", pushed,
+            c.load,
         )  # fmt: skip
-        begin_force(self.belief.force)
+        begin_force(self.belief.force, c.load_time)
         self._begin_odometry()
         self._begin_invariant()
         self.update()

@@ -5,7 +5,8 @@ The momentum of all bodies changes by the ground, by gravity, and by what else t
     Ṗ = f_ground + m g + f,    L̇ = n_ground + n
 
 P and L are about the centre of mass, and the ground's wrench is measured. A push lasts for many
-times what a state is late by, so that f and n of now are those that act until torques do.
+times what a state is late by, so that f and n of now are those that act until torques do. What
+lasts for longer is a load: the robot is heavier than it is known to be, or elsewhere.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from poise.envs.compiled.block import Block
 from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.vectors import copy_into
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
 from poise.envs.physics.kinematics import StateArrays
@@ -26,6 +28,10 @@ SMOOTHING = 0.5  # of a new wrench in its low-pass, where sensors err
 CLEAR = 3.0  # deviations of the noise, below which there is no force
 LEARNING = 25  # ticks of an episode that tell the noise alone
 MEMORY = 1.0  # [s] in which the noise is forgotten
+QUICK = 0.04  # [s] over which a wrench is averaged before it counts for a load
+START = 0.2  # [s] in which a load is learned at first
+CLIP, MOST = 0.05, 0.4  # of the weight: by which the mean is off at most, and what a load may be
+ARM = 0.2  # [h] at which such a part of the weight makes a moment
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +42,9 @@ class ExternalForce(Block):
     smooth: np.ndarray  # (6,) low-passed
     noise: np.ndarray  # (2,) mean squares of its force and of its moment
     momentum: np.ndarray  # (6,) at the physics step `seen`
+    mean: np.ndarray  # (6,) over `QUICK`
+    load: np.ndarray  # (3,) what of it lasts: f_z, n_x, n_y
+    time: np.ndarray  # (1,) in which that is learned [s]
     seen: np.ndarray  # (1,) int; -1 before the first one
     ticks: np.ndarray  # (1,) int: wrenches until now
 
@@ -43,12 +52,16 @@ class ExternalForce(Block):
 def allocate_force() -> ExternalForce:
     """No force."""
     zeros, count = guarded_zeros, np.int64
-    return ExternalForce(zeros(6), zeros(6), zeros(2), zeros(6), zeros(1, count), zeros(1, count))
+    return ExternalForce(
+        zeros(6), zeros(6), zeros(2), zeros(6), zeros(6), zeros(3), zeros(1), zeros(1, count),
+        zeros(1, count),
+    )  # fmt: skip
 
 
-def begin_force(e: ExternalForce) -> None:
-    """Start an episode, in which nothing was seen yet."""
-    for array in (e.wrench, e.smooth, e.noise, e.ticks):
+def begin_force(e: ExternalForce, load_time: float) -> None:
+    """Start an episode, in which nothing was seen yet; a load is learned in `load_time` [s]."""
+    e.time[0] = load_time
+    for array in (e.wrench, e.smooth, e.noise, e.mean, e.load, e.ticks):
         array[:] = 0
     e.seen[0] = -1
 
@@ -70,8 +83,14 @@ def observe_force(
             e.wrench[a] = (s.momentum[a] - e.momentum[a]) / dt
         e.wrench[2] += robot.mass * robot.gravity
         _take_ground(e, s, r, now, min(steps, n))
+        _learn_load(e, robot, dt)
+        e.ticks[0] += 1
         if not exact:
+            for a in range(3):
+                e.wrench[2 + a] -= e.load[a]
             _weigh(e, dt)
+            for a in range(3):
+                e.wrench[2 + a] += e.load[a]
     for a in range(6):
         e.momentum[a] = s.momentum[a]
     e.seen[0] = now
@@ -106,7 +125,6 @@ def _weigh(e: ExternalForce, dt: float):
     σ² is the mean square of what has been seen, of which what is above CLEAR σ counts as that: the
     errors of a robot that steps grow at once, and are not to be taken for a push.
     """
-    e.ticks[0] += 1
     rate = max(1.0 / e.ticks[0], dt / MEMORY)
     for part in range(2):
         square, most = 0.0, CLEAR * CLEAR * e.noise[part]
@@ -119,3 +137,57 @@ def _weigh(e: ExternalForce, dt: float):
         e.noise[part] += rate * (square - e.noise[part])
         for a in range(3 * part, 3 * part + 3):
             e.wrench[a] = weight * e.smooth[a]
+
+
+@compiled
+def _learn_load(e: ExternalForce, robot: RobotArrays, dt: float):
+    """Let the load follow the mean wrench in `time`, or in the time since the start:
+
+        load ← load + dt/T clip(mean − load, ± CLIP)
+
+    so that a push, which is over soon, counts little.
+    """
+    weight = robot.mass * robot.gravity
+    gentle, rate = dt / (QUICK + dt), dt / max(min(e.ticks[0] * dt, e.time[0]), START)
+    for a in range(6):
+        e.mean[a] += gentle * (e.wrench[a] - e.mean[a])
+    for a in range(3):
+        unit = weight if a == 0 else ARM * weight * robot.height_com
+        error = min(max(e.mean[2 + a] - e.load[a], -CLIP * unit), CLIP * unit)
+        e.load[a] = min(max(e.load[a] + rate * error, -MOST * unit), MOST * unit)
+
+
+@compiled
+def bear_load(e: ExternalForce, robot: RobotArrays, s: StateArrays):
+    """Write the load into the dynamics of `s`: h, A_bias, and where the centre of mass is.
+
+    At rest the CoP lies below c + δ, δ = [n_y, −n_x]/(m g − f_z), and what `s` has of the CoM is
+    about that point then.
+    """
+    f, mx, my = e.load[0], e.load[1], e.load[2]
+    copy_into(e.load, s.load)
+    weight, R = robot.mass * robot.gravity - f, s.root_axes
+    dx, dy = my / weight, -mx / weight
+    s.A_bias[2] -= f
+    s.A_bias[3] -= mx
+    s.A_bias[4] -= my
+    _move_moments(s.A_bias, dx, dy)
+    _move_moments(s.momentum, dx, dy)
+    for j in range(s.A.shape[1]):
+        _move_moments(s.A[:, j], dx, dy)
+    mx += (s.com[1] - s.qpos[1]) * f
+    my -= (s.com[0] - s.qpos[0]) * f
+    s.h[2] -= f
+    for a in range(3):
+        s.h[3 + a] -= R[0, a] * mx + R[1, a] * my
+    for point in (s.com, s.capture_point):
+        point[0] += dx
+        point[1] += dy
+
+
+@compiled
+def _move_moments(wrench: np.ndarray, dx: float, dy: float):
+    """Tell a wrench (6,), or a momentum, about a point that is beside the old one by dx, dy."""
+    wrench[3] -= dy * wrench[2]
+    wrench[4] += dx * wrench[2]
+    wrench[5] -= dx * wrench[1] - dy * wrench[0]

@@ -183,7 +183,7 @@ def double_support_tick(t: CaptureTick) -> None:
         return_to_motion(t)
     t.on_both.limited[0] = 0
     if m.clock[0] < g.load_time:
-        weight = t.robot.mass * t.robot.gravity
+        weight = t.robot.mass * t.robot.gravity - t.state.load[0]
         limit_load(t, weight * (FIRST_LOAD + m.clock[0] / g.load_time))
     m.clock[0] += g.period
     solve_contacts(t, t.on_both)
