@@ -57,6 +57,11 @@ class DrawnRobot:
         biases = self.encoder_bias, self.gyro_bias, self.accelerometer_bias, self.tilt_bias
         return any(self.noise.values()) or self.backlash > 0.0 or any(b.any() for b in biases)
 
+    @property
+    def loaded(self) -> bool:
+        """True where the body is not as the model has it."""
+        return bool(self.payload or self.com_shift.any() or (self.mass_factor != 1.0).any())
+
     def summary(self, timestep: float) -> dict[str, float]:
         """The numbers that tell most of it, for `info` and tables: SI units, degrees."""
         told = {

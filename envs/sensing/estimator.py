@@ -25,7 +25,14 @@ from poise.envs.robots.robot import Robot, on_terrain
 from poise.envs.terrain.flat import Flat
 
 from .drawn import DrawnRobot
-from .external_force import ExternalForce, allocate_force, bear_load, begin_force, observe_force
+from .external_force import (
+    ExternalForce,
+    allocate_force,
+    bear_load,
+    begin_force,
+    keep_load,
+    observe_force,
+)
 from .inekf import (
     ATTITUDE,
     ENCODER,
@@ -67,7 +74,9 @@ from .realism import Realism
 from .source import StateSource
 
 POSITIVE = {"above": 0.0}
-SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED, LOADED = range(8)  # entries of `Belief.steps`
+SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED, LOADED = range(
+    8
+)  # entries of `Belief.steps`
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 #: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
@@ -89,8 +98,8 @@ class EstimatorConfig:
             the known robot with what its motors were asked for, `none` not at all; `auto` is
             `rollout` while motors run servos, whose accelerations nobody promises, else `promised`.
         external_force: Whether a rollout is pushed on by the force that nothing else explains.
-        load: Whether a load that lasts is learned and borne: a payload, masses and centres of mass
-            that are other than known. Where the controller brings an estimator it is not.
+        load: Whether a load that lasts is learned and borne, where sensors err or bodies are drawn:
+            a payload, masses and centres of mass that are other than known.
         load_time: Time in which a load is learned [s].
         filtered: Whether joint velocities are filtered.
         joint_acceleration: Acceleration of joints that nobody knows of, step to step [rad/s²].
@@ -170,6 +179,8 @@ def believe(b: Belief):
     if b.steps[PUSHED] or b.steps[LOADED]:
         _write_state(b, row)
         observe_force(b.force, b.robot, b.state, r, known, b.steps[EXACT] > 0)
+        if not b.steps[PUSHED]:
+            keep_load(b.force)
     ahead = b.steps[HORIZON] - b.steps[SENSE] + now - known  # at an episode's start less is late
     if b.steps[HORIZON] > 0 and b.steps[SIMULATED] + b.rollout.motors.bus.servoed[0] > 1:
         roll_out(
@@ -277,11 +288,12 @@ class EstimatedState(StateSource, Copyable):
         horizon = max(drawn.sense + acting, 0) if predicted else 0
         exact = c.kind == "exact" or (c.kind == "auto" and not drawn.measured)
         pushed = c.external_force and horizon > 0 and SIMULATES[c.predictor] > 0
+        loaded = c.load and (drawn.measured or drawn.loaded)
         self.belief.steps[:] = (
             drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf", pushed,
-            c.load,
+            loaded,
         )  # fmt: skip
-        begin_force(self.belief.force, c.load_time)
+        begin_force(self.belief.force, c.load_time if loaded else 0.0)
         self._begin_odometry()
         self._begin_invariant()
         self.update()

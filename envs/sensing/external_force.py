@@ -59,7 +59,10 @@ def allocate_force() -> ExternalForce:
 
 
 def begin_force(e: ExternalForce, load_time: float) -> None:
-    """Start an episode, in which nothing was seen yet; a load is learned in `load_time` [s]."""
+    """Start an episode, in which nothing was seen yet.
+
+    A load is learned in `load_time` [s], or not at all if that is 0.
+    """
     e.time[0] = load_time
     for array in (e.wrench, e.smooth, e.noise, e.mean, e.load, e.ticks):
         array[:] = 0
@@ -83,7 +86,8 @@ def observe_force(
             e.wrench[a] = (s.momentum[a] - e.momentum[a]) / dt
         e.wrench[2] += robot.mass * robot.gravity
         _take_ground(e, s, r, now, min(steps, n))
-        _learn_load(e, robot, dt)
+        if e.time[0] > 0.0:
+            _learn_load(e, robot, dt)
         e.ticks[0] += 1
         if not exact:
             for a in range(3):
@@ -94,6 +98,14 @@ def observe_force(
     for a in range(6):
         e.momentum[a] = s.momentum[a]
     e.seen[0] = now
+
+
+@compiled
+def keep_load(e: ExternalForce):
+    """Let the load be all that is known of the wrench."""
+    e.wrench[:] = 0.0
+    for a in range(3):
+        e.wrench[2 + a] = e.load[a]
 
 
 @compiled
