@@ -185,9 +185,9 @@ def desired_cop(
 def desired_angular_rate(
     state: RobotState, targets: Targets, p: QPParameters, cop_vel: np.ndarray
 ) -> np.ndarray:
-    """L̇_des = (p_des − c) × (Ṗ_des − m g) − k_L L [N·m]."""
-    gravity = np.array([0.0, 0.0, -state.robot.gravity])
-    ground_force = desired_linear_rate(state, targets, p) - state.mass * gravity
+    """L̇_des = (p_des − c) × (Ṗ_des − m g − f) − k_L L [N·m], f the force of a load."""
+    weight = np.array([0.0, 0.0, state.load[0] - state.mass * state.robot.gravity])
+    ground_force = desired_linear_rate(state, targets, p) - weight
     arm = desired_cop(state, targets, p, cop_vel) - state.com
     return np.cross(arm, ground_force) - p.angular_damping * state.angular_momentum
 

@@ -100,10 +100,16 @@ class RobotState(Copyable):
         return _frozen(self.arrays.A_bias)
 
     @property
+    def load(self) -> np.ndarray:
+        """(3,) force f_z [N] and moments n_x, n_y about the known CoM [N·m] that are believed to
+        last, beside gravity and ground; h, A_bias and the CoM have them in already."""
+        return _frozen(self.arrays.load)
+
+    @property
     def Adot_v(self) -> np.ndarray:
         """(6,) Ȧ v, the part of [Ṗ; L̇] that does not come from accelerations."""
         bias = self.arrays.A_bias.copy()
-        bias[2] -= self.robot.mass * self.robot.gravity
+        bias[2] -= self.robot.mass * self.robot.gravity - self.arrays.load[0]
         return bias
 
     @property

@@ -74,9 +74,8 @@ from .realism import Realism
 from .source import StateSource
 
 POSITIVE = {"above": 0.0}
-SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED, LOADED = range(
-    8
-)  # entries of `Belief.steps`
+#: entries of `Belief.steps`
+SENSE, EARLIER, HORIZON, EXACT, SIMULATED, INVARIANT, PUSHED, LOADED = range(8)
 START_SPEED = 0.1  # [m/s] of a robot that is thought to rest
 #: `Belief.steps[SIMULATED]`, to which a running servo adds one: two is a simulation
 SIMULATES = {"none": 0, "promised": 0, "auto": 1, "rollout": 2}
@@ -294,6 +293,7 @@ class EstimatedState(StateSource, Copyable):
             loaded,
         )  # fmt: skip
         begin_force(self.belief.force, c.load_time if loaded else 0.0)
+        self.state_arrays.load[:] = 0.0
         self._begin_odometry()
         self._begin_invariant()
         self.update()

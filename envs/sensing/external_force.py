@@ -42,8 +42,8 @@ class ExternalForce(Block):
     smooth: np.ndarray  # (6,) low-passed
     noise: np.ndarray  # (2,) mean squares of its force and of its moment
     momentum: np.ndarray  # (6,) at the physics step `seen`
-    mean: np.ndarray  # (6,) over `QUICK`
-    load: np.ndarray  # (3,) what of it lasts: f_z, n_x, n_y
+    mean: np.ndarray  # (3,) f_z, n_x, n_y over `QUICK`
+    load: np.ndarray  # (3,) what of them lasts
     time: np.ndarray  # (1,) in which that is learned [s]
     seen: np.ndarray  # (1,) int; -1 before the first one
     ticks: np.ndarray  # (1,) int: wrenches until now
@@ -53,7 +53,7 @@ def allocate_force() -> ExternalForce:
     """No force."""
     zeros, count = guarded_zeros, np.int64
     return ExternalForce(
-        zeros(6), zeros(6), zeros(2), zeros(6), zeros(6), zeros(3), zeros(1), zeros(1, count),
+        zeros(6), zeros(6), zeros(2), zeros(6), zeros(3), zeros(3), zeros(1), zeros(1, count),
         zeros(1, count),
     )  # fmt: skip
 
@@ -161,11 +161,10 @@ def _learn_load(e: ExternalForce, robot: RobotArrays, dt: float):
     """
     weight = robot.mass * robot.gravity
     gentle, rate = dt / (QUICK + dt), dt / max(min(e.ticks[0] * dt, e.time[0]), START)
-    for a in range(6):
-        e.mean[a] += gentle * (e.wrench[a] - e.mean[a])
     for a in range(3):
         unit = weight if a == 0 else ARM * weight * robot.height_com
-        error = min(max(e.mean[2 + a] - e.load[a], -CLIP * unit), CLIP * unit)
+        e.mean[a] += gentle * (e.wrench[2 + a] - e.mean[a])
+        error = min(max(e.mean[a] - e.load[a], -CLIP * unit), CLIP * unit)
         e.load[a] = min(max(e.load[a] + rate * error, -MOST * unit), MOST * unit)
 
 

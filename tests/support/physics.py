@@ -19,6 +19,7 @@ from poise.envs.physics.pushes.push import Push
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 from poise.envs.robots.robot import Robot, fingerprint, load_robot
+from poise.envs.sensing.external_force import allocate_force, bear_load
 
 robot_named = functools.cache(load_robot)
 
@@ -104,18 +105,28 @@ def controller(robot: Robot, **config) -> MomentumQP:
 
 @functools.cache
 def recovery(
-    name: str = "humanoid", root: str = "hard", specific: float = 0.28, every: int = 6
+    name: str = "humanoid",
+    root: str = "hard",
+    specific: float = 0.28,
+    every: int = 6,
+    load: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> tuple[Tick, ...]:
-    """Ticks along push recoveries in four directions, 0.4 s each, from contact lost to at rest."""
+    """Ticks along push recoveries in four directions, 0.4 s each, from contact lost to at rest.
+
+    The robot is believed to bear a `load`, see `RobotState`.
+    """
     robot = robot_named(name)
     qp = controller(robot, root=root)
     simulation = Simulation(robot)
-    ticks = []
+    ticks, force = [], allocate_force()
+    force.load[:] = load
     for direction in (0.0, 90.0, 180.0, 250.0):
         state = simulation.reset(pushes=[push(robot, specific, direction)])
         targets = Targets.standing(robot, state)
         qp.reset(state)
         for k in range(100):
+            if any(load):
+                bear_load(force, simulation.arrays, simulation.state_arrays)
             failures = qp.failures
             torques = qp.torques(state, targets)
             if k % every == 3:

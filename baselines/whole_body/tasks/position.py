@@ -58,7 +58,7 @@ def fill_position(t: TaskTick[PositionBlock]):
             for j in range(len(s.qvel)):
                 rows.A[a, j] -= s.A[a, j] / o.mass
     if o.about_com:
-        rows.b[2] -= o.gravity
+        rows.b[2] -= o.gravity - s.load[0] / o.mass
     x, y = placed(ox, oy, cos, sin, reference[0, 0], reference[0, 1])
     vx, vy = placed(0.0, 0.0, cos, sin, reference[1, 0], reference[1, 1])
     ax, ay = placed(0.0, 0.0, cos, sin, reference[2, 0], reference[2, 1])
