@@ -292,7 +292,12 @@ class EstimatedState(StateSource, Copyable):
             drawn.sense, earlier, horizon, exact, SIMULATES[c.predictor], c.kind == "inekf", pushed,
             loaded,
         )  # fmt: skip
-        begin_force(self.belief.force, c.load_time if loaded else 0.0)
+        self._begin_estimate()
+
+    def _begin_estimate(self) -> None:
+        """Set out from what was measured before the episode."""
+        loaded = self.belief.steps[LOADED] > 0
+        begin_force(self.belief.force, self.config.load_time if loaded else 0.0)
         self.state_arrays.load[:] = 0.0
         self._begin_odometry()
         self._begin_invariant()

@@ -98,9 +98,7 @@ class MeasuredState(EstimatedState):
         for i in range(-RING, 0):
             self.measure(self.start[max(len(self.start) + i, 0)])
         rings.count[0] = 1
-        self._begin_odometry()
-        self._begin_invariant()
-        self.update()
+        self._begin_estimate()
 
     def measure(self, m: Measurement) -> None:
         """Take the measurement of the next physics step."""
