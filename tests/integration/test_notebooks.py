@@ -8,9 +8,16 @@ from pathlib import Path
 import pytest
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "examples/notebooks").glob("*.ipynb"))
+LONG = {"own_policy", "read_result"}  # half a minute of a processor: weekly
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=[pytest.mark.weekly] * (path.stem in LONG))
+        for path in NOTEBOOKS
+    ],
+)
 def test_a_notebook_runs(path, tmp_path):
     """Its cells in a process without a file, as a notebook's is; none is committed with outputs."""
     cells = [c for c in json.loads(path.read_text())["cells"] if c["cell_type"] == "code"]
