@@ -22,6 +22,7 @@ from poise.baselines.whole_body.tick import go_on_from
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import find_nearest
 from poise.envs.compiled.maths.vectors import along, copy_into, turned
+from poise.envs.physics.kinematics import borne_weight
 
 from .planner.blocks import Gait, WalkTick
 from .planner.dcm import gait_offset, transfer_point
@@ -120,7 +121,7 @@ def transfer_cop(t: WalkTick, p: np.ndarray) -> bool:
 def limit_loads(t: WalkTick, fraction: float) -> None:
     """Let the load go to the foot that has landed, and leave the other one."""
     c = t.walk
-    weight, new = c.robot.mass * c.robot.gravity - c.state.load[0], c.memory.foot[0]
+    weight, new = borne_weight(c.robot, c.state), c.memory.foot[0]
     c.on_both.load_limits[new] = weight * (FIRST_LOAD + LOADED * fraction)
     c.on_both.load_limits[1 - new] = weight * max(UNLOADED * (1.0 - fraction), LEAST_LOAD)
     c.on_both.limited[0] = 1

@@ -6,7 +6,7 @@ from poise.baselines.controller import TargetArrays
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import cross, turn_error
 from poise.envs.physics.arrays import RobotArrays
-from poise.envs.physics.kinematics import StateArrays
+from poise.envs.physics.kinematics import StateArrays, borne_weight
 
 from .parameters import QPParameters
 from .workspace import Workspace
@@ -56,7 +56,7 @@ def desired_momentum_rate(
         )
         force[a] = ws.momentum_rate[a]
         arm[a] = -s.com[a]
-    force[2] += robot.mass * robot.gravity - s.load[0]
+    force[2] += borne_weight(robot, s)
     arm[2] += s.origin[2]
     T = p.cop_horizon
     for a in range(2):
@@ -147,7 +147,7 @@ def build_objective(
     for a in range(3):
         ws.momentum_weights[a], ws.momentum_weights[3 + a] = p.com_weight[a], p.angular_weight[a]
         ws.wrench_des[a], ws.wrench_des[3 + a] = ws.momentum_rate[a], ws.momentum_rate[3 + a]
-    ws.wrench_des[2] += robot.mass * robot.gravity - s.load[0]
+    ws.wrench_des[2] += borne_weight(robot, s)
     for r in range(s.J.shape[0]):
         ws.force_weights[r] = p.force_weight if r % 6 < 3 else p.moment_weight
     for a in range(ws.tau0.shape[0]):

@@ -112,6 +112,12 @@ def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
 
 
 @compiled
+def borne_weight(robot: RobotArrays, s: StateArrays) -> float:
+    """The force that the ground gives at rest, with the load [N]."""
+    return robot.mass * robot.gravity - s.load[0]
+
+
+@compiled
 def update_state(robot: RobotArrays, views: SimViews, s: StateArrays):
     """Fill `s` from the simulation, whose position and velocity stages are current."""
     _dynamics(robot, views, s)

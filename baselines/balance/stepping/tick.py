@@ -10,6 +10,7 @@ from poise.baselines.whole_body.tick import ContactTick
 from poise.envs.compiled.calls import call
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import copy_into
+from poise.envs.physics.kinematics import borne_weight
 
 from .planning.blocks import BEST_OFFSET, BEST_TIME, BEST_X, BEST_Y, CaptureTick
 from .planning.cop_region import distance_beyond, double_support_region, single_support_region
@@ -183,7 +184,7 @@ def double_support_tick(t: CaptureTick) -> None:
         return_to_motion(t)
     t.on_both.limited[0] = 0
     if m.clock[0] < g.load_time:
-        weight = t.robot.mass * t.robot.gravity - t.state.load[0]
+        weight = borne_weight(t.robot, t.state)
         limit_load(t, weight * (FIRST_LOAD + m.clock[0] / g.load_time))
     m.clock[0] += g.period
     solve_contacts(t, t.on_both)
