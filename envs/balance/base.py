@@ -16,6 +16,7 @@ from poise.envs.compiled.block import Block
 from poise.envs.compiled.calls import CompiledStep, Program, run
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.pushes.push import PushInfo, push_info
 from poise.envs.physics.simulation import Simulation, World
 from poise.envs.robots.mirror import Mirror, mirror_robot
@@ -94,10 +95,12 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             self.config.fall, self.robot.height_com, self.max_steps, self.quiet_steps
         )
         self.action_names = self._action_names()
-        self._newest = self._observation_terms()
+        self._newest, self._privileged = self._observation_terms(), self._privileged_terms()
+        seen = frames(self._newest, self.config.observation.history)
         #: of which the observation is made
-        self.terms = frames(self._newest, self.config.observation.history)
+        self.terms = [*seen, *(replace(t, name=f"true_{t.name}") for t in self._privileged)]
         size = sum(term.size for term in self.terms)
+        self._seen = sum(term.size for term in seen)  # of these entries the policy sees
         sizes = len(REWARD_TERMS), len(self.robot.soles), self.robot.model.nu
         self.episode = allocate_episode(len(self.action_names), size, *sizes)
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
@@ -150,22 +153,38 @@ class BalanceEnv(SensedRobot, RenderedEnv):
 
     def _observation_terms(self) -> list[Term]:
         """The terms that `config.observation` chooses of `known_terms`, for this robot."""
-        chosen = self.config.observation
-        names = {
+        chosen, names = self.config.observation, self._entry_names()
+        return [kind.of(names) for kind in self.known_terms.choose(chosen.terms, chosen.extra)]
+
+    def _privileged_terms(self) -> list[Term]:
+        """The terms that `config.observation.privileged` chooses of those of any environment."""
+        chosen, names = self.config.observation.privileged, self._entry_names()
+        known = TERMS.choose(chosen, field="privileged") if chosen else []
+        return [kind.of(names) for kind in known]
+
+    def _entry_names(self) -> dict[str, tuple[str, ...]]:
+        return {
             "joints": self.robot.joint_names,
             "motors": self.robot.motor_names,
             "feet": tuple(sole.name for sole in self.robot.soles),
             "actions": self.action_names,
         }
-        return [kind.of(names) for kind in self.known_terms.choose(chosen.terms, chosen.extra)]
 
     def _view(self, kind: type[Block], out: np.ndarray) -> Block:
         """The block of a term that fills `out`, of the `kind` that its kernel works on."""
-        source, world = self.state_source, self.simulation.world()
+        source = self.state_source
+        return self._view_of(source.arrays, source.state_arrays, out)
+
+    def _true_view(self, kind: type[Block], out: np.ndarray) -> Block:
+        """The block of a term that fills `out` from the true robot's state."""
+        return self._view_of(self.simulation.arrays, self.simulation.state_arrays, out)
+
+    def _view_of(self, robot: RobotArrays, state: StateArrays, out: np.ndarray) -> View:
+        world = self.simulation.world()
         q_ref, v_ref = self._references()
         return View(
-            robot=source.arrays,
-            state=source.state_arrays,
+            robot=robot,
+            state=state,
             scales=self.scales,
             q_ref=q_ref,
             v_ref=v_ref,
@@ -188,8 +207,11 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         world = self.simulation.world()
         if self._end is None or self._end_of is not world:
             e = self.episode
-            observe = observer(self._newest, e.observation, e.steps, self._view)
-            self._end = StepEnd(self._judge(), Program.of(()), observe)
+            seen, true = e.observation[: self._seen], e.observation[self._seen :]
+            calls = observer(self._newest, seen, e.steps, self._view)
+            if self._privileged:
+                calls += observer(self._privileged, true, e.steps, self._true_view)
+            self._end = StepEnd(self._judge(), Program.of(()), Program.of(calls))
             self._end_of = world
         return self._end
 

@@ -34,11 +34,14 @@ class ObservationConfig:
         extra: Terms of the observation that come after those.
         history: Policy steps that the observation shows, all terms of a step side by side, the
             oldest first.
+        privileged: Terms of this step that come last, of the true robot in its true state: for a
+            critic that sees more than the policy [Pinto18].
     """
 
     terms: tuple[str, ...] | None = None
     extra: tuple[str, ...] = ()
     history: int = field(default=1, metadata={"min": 1, "max": 100, "omit": "default"})
+    privileged: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ class RobotArrays(Block):
 
 @dataclass(frozen=True, eq=False)
 class SimViews(Block):
-    """Views into one `MjData`; two addresses for the C functions."""
+    """Views into one `MjData` and its model; two addresses for the C functions."""
 
     model_address: int
     data_address: int
@@ -80,6 +80,7 @@ class SimViews(Block):
     qfrc_constraint: np.ndarray
     M: np.ndarray
     sensordata: np.ndarray
+    geom_friction: np.ndarray  # (ngeom, 3) of its model; the ground's come first
     warnings: np.ndarray  # (13,) int: each second one counts a kind of `mujoco.mjtWarning`
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -135,7 +136,8 @@ def robot_arrays(robot: Robot) -> RobotArrays:
 
 def sim_views(model: mujoco.MjModel, data: mujoco.MjData) -> SimViews:
     """Views into `data` under their MuJoCo names."""
-    named = {field.name: getattr(data, field.name) for field in fields(SimViews)[2:-1]}
+    named = {field.name: getattr(data, field.name) for field in fields(SimViews)[2:-2]}
+    named["geom_friction"] = model.geom_friction
     counts = data.warning.number  # with something else between any two
     every = as_strided(counts, (2 * len(counts) - 1,), (counts.strides[0] // 2,))
     views = SimViews(model._address, data._address, **named, warnings=every)

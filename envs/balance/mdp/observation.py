@@ -9,7 +9,6 @@ import numpy as np
 from poise.configs.errors import ConfigError, shown
 from poise.configs.texts import plain
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.calls import Program
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays
@@ -154,17 +153,22 @@ class Terms(dict[str, TermKind]):
 
         return decorate
 
-    def choose(self, names: Sequence[str] | None, extra: Sequence[str] = ()) -> list[TermKind]:
+    def choose(
+        self, names: Sequence[str] | None, extra: Sequence[str] = (), *, field: str = "terms"
+    ) -> list[TermKind]:
         """The terms of these `names`, by default all that are on by default; then the `extra` ones.
+
+        `field` of an observation's configuration is where the names stand.
 
         Raises ConfigError for a name that is unknown, or comes twice.
         """
         if names is None:
             names = [name for name, kind in self.items() if kind.default]
-        for field, given in (("observation.terms", names), ("observation.extra", extra)):
+        for place, given in ((field, names), ("extra", extra)):
             for name in given:
                 if name not in self:
-                    raise ConfigError(f"unknown term {shown(name)}", field=field, choices=self)
+                    raise ConfigError(f"unknown term {shown(name)}", field=f"observation.{place}",
+                                      choices=self)  # fmt: skip
         chosen = [*names, *extra]
         for name in chosen:
             if chosen.count(name) > 1:
@@ -235,8 +239,8 @@ def observer(
     out: np.ndarray,
     steps: np.ndarray,
     view: Callable[[type[Block], np.ndarray], Block],
-) -> Program:
-    """The program that fills the end of `out` (no,) with `terms`; before them lie older frames.
+) -> list[tuple[Callable[..., None], Block]]:
+    """What fills the end of `out` (no,) with `terms`; before them lie older frames.
 
     `steps` (1,) are the policy steps since the reset; `view(kind, out)` makes the terms' blocks.
     """
@@ -248,7 +252,7 @@ def observer(
         assert term.kernel is not None  # those of actions are not observed
         calls.append((term.kernel, view(term.view, out[first : first + term.size])))
         first += term.size
-    return Program.of([*calls, (clip, whole)])
+    return [*calls, (clip, whole)]
 
 
 def mirror_terms(terms: Iterable[Term], parts: Mapping[str, Mirror]) -> Mirror:

@@ -119,6 +119,16 @@ def last_action(v: View):
         v.out[a] = v.action[a]
 
 
+@TERMS.add(("mass",), "0.1 m", "mass over what is known of it, minus 1", "number", default=False)
+def mass(v: View):
+    v.out[0] = 10.0 * (v.robot.mass * v.robot.gravity / v.scales.weight - 1.0)
+
+
+@TERMS.add(("mu",), "1", "friction of the ground: a teacher's privilege", "number", default=False)
+def friction(v: View):
+    v.out[0] = v.views.geom_friction[0, 0]
+
+
 @TERMS.add(SPACE, "m g", "force that pushes now: a teacher's privilege", "vector", default=False)
 def push(v: View):
     now = v.clock[0] * v.robot.timestep
