@@ -1,6 +1,6 @@
 """The base of all environments: a pushed robot, its observation, reward, fall and record."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -95,12 +95,14 @@ class BalanceEnv(SensedRobot, RenderedEnv):
             self.config.fall, self.robot.height_com, self.max_steps, self.quiet_steps
         )
         self.action_names = self._action_names()
-        self._newest, self._privileged = self._observation_terms(), self._privileged_terms()
+        self._newest = self._observation_terms()
+        self._privileged = self.terms_by_name(self.config.observation.privileged)
         seen = frames(self._newest, self.config.observation.history)
         #: of which the observation is made
         self.terms = [*seen, *(replace(t, name=f"true_{t.name}") for t in self._privileged)]
         size = sum(term.size for term in self.terms)
-        self._seen = sum(term.size for term in seen)  # of these entries the policy sees
+        #: entries of the observation that a policy sees; the others are privileged
+        self.seen = sum(term.size for term in seen)
         sizes = len(REWARD_TERMS), len(self.robot.soles), self.robot.model.nu
         self.episode = allocate_episode(len(self.action_names), size, *sizes)
         self.observation_space = spaces.Box(-10.0, 10.0, (size,), np.float32)
@@ -156,11 +158,13 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         chosen, names = self.config.observation, self._entry_names()
         return [kind.of(names) for kind in self.known_terms.choose(chosen.terms, chosen.extra)]
 
-    def _privileged_terms(self) -> list[Term]:
-        """The terms that `config.observation.privileged` chooses of those of any environment."""
-        chosen, names = self.config.observation.privileged, self._entry_names()
-        known = TERMS.choose(chosen, field="privileged") if chosen else []
-        return [kind.of(names) for kind in known]
+    def terms_by_name(self, chosen: Sequence[str]) -> list[Term]:
+        """Terms of this robot that every environment has, as `observation.privileged` names them.
+
+        Raises ConfigError for a name that is unknown, or comes twice.
+        """
+        names = self._entry_names()
+        return [kind.of(names) for kind in TERMS.choose(chosen, field="privileged")]
 
     def _entry_names(self) -> dict[str, tuple[str, ...]]:
         return {
@@ -207,7 +211,7 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         world = self.simulation.world()
         if self._end is None or self._end_of is not world:
             e = self.episode
-            seen, true = e.observation[: self._seen], e.observation[self._seen :]
+            seen, true = e.observation[: self.seen], e.observation[self.seen :]
             calls = observer(self._newest, seen, e.steps, self._view)
             if self._privileged:
                 calls += observer(self._privileged, true, e.steps, self._true_view)

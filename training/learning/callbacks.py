@@ -110,7 +110,7 @@ class Checkpoints(BaseCallback):
         evaluation = self.config.evaluation
         pushes = evaluation.pushes or self.config.env.pushes
         count = min(evaluation.trials, 32)
-        first = self.config.make_env(self.robot, pushes=pushes)
+        first = self.config.make_training_env(self.robot, pushes=pushes)
         self._batch = EnvBatch(self.config.replicate(first, count), self.config.threads)
         if self.num_timesteps == 0:
             self._evaluate()  # the controller alone: what the policy must beat

@@ -39,6 +39,7 @@ from .policy_files import (
 
 #: made anew by `PPO.load`, or of the running process alone
 LEFT_OUT = ("ep_info_buffer", "ep_success_buffer", "lr_schedule")
+FEW = 1e5  # observations: a few rollouts
 
 
 def save_checkpoint(
@@ -79,27 +80,33 @@ def plain(model: PPO) -> PPO:
 
 
 def restore(
-    folder: Path, model: PPO, normalize: VecNormalize, fingerprint: str, wider: bool = False
+    folder: Path,
+    model: PPO,
+    normalize: VecNormalize,
+    fingerprint: str,
+    newest: int | None = None,
 ) -> dict[str, Any]:
     """Load weights, optimizer and statistics into `model` and `normalize`; returns the state.
 
-    With `wider` the network of `model` may be larger than the stored one; its optimizer then
-    begins anew. Raises ConfigError naming the file that cannot be read or is for another robot
-    than the one with this `fingerprint`.
+    With `newest` the network of `model` may be larger than the stored one, whose observation is the
+    part before that entry; the optimizer then begins anew. Raises ConfigError naming the file that
+    cannot be read or is for another robot than the one with this `fingerprint`.
     """
     state = read_state(folder / STATE)
     check_robot(state, fingerprint, folder / STATE)
     parameters = read_parameters(folder / POLICY)
     with parsing(folder / POLICY):
-        if not (wider and _load_into_wider(parameters["policy"], model)):
+        if newest is None or not _load_into_wider(parameters["policy"], model, newest):
             model.set_parameters(parameters, exact_match=True, device="cpu")
-    _restore_statistics(folder / STATISTICS, normalize)
+    _restore_statistics(folder / STATISTICS, normalize, newest)
     return state
 
 
-def _restore_statistics(path: Path, normalize: VecNormalize) -> None:
+def _restore_statistics(path: Path, normalize: VecNormalize, newest: int | None) -> None:
     of = {"obs": normalize.obs_rms, "ret": normalize.ret_rms}
     found = read_statistics(path, [f"{prefix}_{name}" for prefix in of for name in MOMENTS])
+    if newest is not None:
+        _spread(found, len(normalize.obs_rms.mean), newest)
     for key, value in found.items():
         prefix, name = key.split("_")
         if value.shape != np.shape(getattr(of[prefix], name)):
@@ -107,12 +114,27 @@ def _restore_statistics(path: Path, normalize: VecNormalize) -> None:
         setattr(of[prefix], name, value[()])
 
 
-def _load_into_wider(stored: Mapping[str, Tensor], model: PPO) -> bool:
+def _spread(found: dict[str, np.ndarray], size: int, newest: int) -> None:
+    """Take the moments of a frame for each that lies before `newest`, and 0 and 1 for the rest.
+
+    Those of the rest have to be learned: the observations that they are of count for few.
+    """
+    frame = len(found["obs_mean"])
+    if frame == size or frame == 0 or newest % frame:
+        return
+    for name, rest in (("obs_mean", 0.0), ("obs_var", 1.0)):
+        wide = np.full(size, rest)
+        wide[:newest] = np.tile(found[name], newest // frame)
+        found[name] = wide
+    found["obs_count"] = np.minimum(found["obs_count"], FEW)
+
+
+def _load_into_wider(stored: Mapping[str, Tensor], model: PPO, newest: int) -> bool:
     """Load the weights if the network of `model` is another one than the stored; else False."""
     own = model.policy.state_dict()
     if {n: w.shape for n, w in stored.items()} == {n: w.shape for n, w in own.items()}:
         return False
-    model.policy.load_state_dict(widened(stored, own))
+    model.policy.load_state_dict(widened(stored, own, newest))
     return True
 
 
@@ -129,12 +151,13 @@ def statistics(normalize: VecNormalize) -> dict[str, np.ndarray]:
 
 
 def widened(
-    small: Mapping[str, torch.Tensor], large: Mapping[str, torch.Tensor]
+    small: Mapping[str, torch.Tensor], large: Mapping[str, torch.Tensor], end: int | None = None
 ) -> dict[str, torch.Tensor]:
     """Weights of the network `large` with which it computes what `small` does.
 
     Weights W (out, in) and biases (out,) of both, of as many layers. The units that are new keep
     what comes in as initialised in `large`; nothing goes out of them yet: their columns are zero.
+    What `small` is given lies in the input of `large` before `end`; None: at its start.
 
     Raises:
         ValueError: other layers, or a layer of `small` that is larger.
@@ -146,8 +169,11 @@ def widened(
         new = large[name].clone()
         if old.dim() != new.dim() or any(o > n for o, n in zip(old.shape, new.shape, strict=True)):
             raise ValueError(f"{name} has shape {tuple(old.shape)}, not {tuple(new.shape)} or less")
+        place = [slice(length) for length in old.shape]
         if old.dim() == 2:
             new[: old.shape[0]] = 0.0
-        new[tuple(slice(length) for length in old.shape)] = old
+            if end is not None and name.endswith("0.weight"):  # of a first layer
+                place[1] = slice(end - old.shape[1], end)
+        new[tuple(place)] = old
         weights[name] = new
     return weights

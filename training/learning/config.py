@@ -1,6 +1,6 @@
 """Everything that decides a training run; written beside its results."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -212,12 +212,18 @@ class TrainConfig:
     curriculum: Curriculum = field(default_factory=Curriculum)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
+    def make_training_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
+        """As `make_env`, with the terms that the critic alone sees: `observation.privileged`."""
+        return self.make_env(robot, **{"observation": self.env.observation, **overrides})
+
     def make_env(self, robot: Robot | None = None, **overrides: Any) -> BalanceEnv:
         """The environment of this run; `overrides` replace its arguments or fields of `env`.
 
-        A loaded `robot` spares loading it again. Raises ConfigError for a controller from outside
-        that the user has not allowed, see `allowing`.
+        A loaded `robot` spares loading it again. What the critic alone sees is left out. Raises
+        ConfigError for a controller from outside that the user has not allowed, see `allowing`.
         """
+        if self.env.observation.privileged and "observation" not in overrides:
+            overrides["observation"] = replace(self.env.observation, privileged=())
         if self.action == "torque":
             return TorqueBalanceEnv(robot or self.robot, self.env, **overrides)
         if self.action == "position":

@@ -199,7 +199,9 @@ def _read_policy(path: Path, robot: Robot | None) -> Policy:
         check_robot(state, robot.fingerprint, path / STATE)
     check_controller(state, config, path / STATE)
     env = config.make_env(robot)
-    inputs, outputs = env.observation_space.shape[0], env.action_space.shape[0]
+    seen, outputs = env.observation_space.shape[0], env.action_space.shape[0]
+    hidden = env.terms_by_name(config.env.observation.privileged)  # seen by the critic alone
+    inputs = seen + sum(term.size for term in hidden)
     for name, what, size, expected in (
         (STATISTICS, "observations", len(mean), inputs),
         (POLICY, "observations", layers[0][0].shape[0], inputs),
@@ -210,6 +212,7 @@ def _read_policy(path: Path, robot: Robot | None) -> Policy:
                 f"is for {size} {what}, the environment has {expected}", source=path / name
             )
     mirrors = env.mirrors() if config.ppo.symmetric else None
+    mean, var, layers[0] = mean[:seen], var[:seen], (layers[0][0][:seen], layers[0][1])
     return Policy(config, layers, mean, var, clip, epsilon, state, mirrors)
 
 

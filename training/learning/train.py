@@ -92,9 +92,9 @@ def train(
         stack.enter_context(FolderLock(out))
         checkpoint = check_folder(config, out, resume)  # another run may have ended since
         if isinstance(start, Path):
-            restore(start, model, normalize, robot.fingerprint, wider=True)
+            restore(start, model, normalize, robot.fingerprint, _seen(normalize))
         elif start is not None:
-            import_policy(start, config.make_env(robot), model, normalize)
+            import_policy(start, config.make_training_env(robot), model, normalize)
         if checkpoint is not None:
             state = restore(checkpoint, model, normalize, robot.fingerprint)
             check_controller(state, config, checkpoint / STATE)
@@ -170,6 +170,8 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         device="cpu",
         stats_window_size=500,
     )
+    if config.env.observation.privileged:
+        blind_actor(model.policy, _seen(env))
     if ppo.actor_rate < 1.0:
         slow_actor(model.policy, ppo.actor_rate)
     if ppo.noise_correlation > 0.0 or ppo.noise_until is not None:
@@ -180,6 +182,28 @@ def make_model(config: TrainConfig, env: VecNormalize) -> PPO:
         head.weight.zero_()
         head.bias.zero_()
     return model
+
+
+def _seen(env: VecNormalize) -> int:
+    """Entries of the observation that the actor sees."""
+    return int(env.get_attr("seen", indices=0)[0])
+
+
+def blind_actor(policy: ActorCriticPolicy, seen: int) -> None:
+    """Let the actor see the first `seen` entries of an observation alone, the critic all.
+
+    The actor's weights of the others are zero, and stay so.
+    """
+
+    def hide(layers: torch.nn.Module, given: tuple[torch.Tensor]) -> torch.Tensor:
+        features = given[0].clone()
+        features[..., seen:] = 0.0
+        return features
+
+    layers = policy.mlp_extractor.policy_net
+    layers.register_forward_pre_hook(hide)
+    with torch.no_grad():
+        layers[0].weight[:, seen:] = 0.0
 
 
 def slow_actor(policy: ActorCriticPolicy, rate: float) -> None:
@@ -208,7 +232,7 @@ def _training_envs(config: TrainConfig, robot: Robot | None = None) -> VecNormal
     robot = robot or load_robot(config.robot)
     if config.physics_step is not None:
         robot = coarser_robot(robot, config.physics_step)
-    env = config.make_env(robot)
+    env = config.make_training_env(robot)
     check_pushes(config, env)
     moments: Any = MirroredMeanStd(env.mirrors()[0]) if config.ppo.symmetric else None
     vec = ThreadedVecEnv(config.replicate(env, config.ppo.n_envs), config.threads)

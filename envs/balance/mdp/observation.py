@@ -173,7 +173,7 @@ class Terms(dict[str, TermKind]):
         for name in chosen:
             if chosen.count(name) > 1:
                 raise ConfigError(f"{shown(name)} comes twice", field="observation")
-        if not chosen:
+        if not chosen and field == "terms":
             raise ConfigError("needs at least one term", field="observation.terms", choices=self)
         return [self[name] for name in chosen]
 
