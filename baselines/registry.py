@@ -80,6 +80,33 @@ def controller_config(controller: str | Path | Mapping[str, object]) -> Controll
     return config
 
 
+def where_uncertain(config: object, source: str = "controller") -> CaptureStepConfig | None:
+    """The configuration that takes the place of this one where state and robot are uncertain.
+
+    None where it stays. Raises ConfigError for one that does not exist, is of another kind, or is
+    to be replaced itself.
+    """
+    name = config.uncertain if isinstance(config, CaptureStepConfig) else None
+    if name is None:
+        return None
+    try:
+        path = resolve("controllers", name)
+    except ConfigError as error:
+        raise ConfigError(
+            error.message, source=source, field="uncertain", choices=error.choices
+        ) from None
+    data = read_yaml(path)
+    other = _build({**data, "uncertain": None}, str(path))
+    wrong = ""
+    if data.get("uncertain") is not None:
+        wrong = f"has an 'uncertain' of its own: {shown(data['uncertain'])}"
+    elif type(other) is not type(config):
+        wrong = f"is of kind {other.kind!r}, not {config.kind!r}"
+    if wrong:
+        raise ConfigError(f"{shown(name)} {wrong}", source=source, field="uncertain")
+    return other
+
+
 def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
     """`controller_config` where only a momentum QP will do; raises ConfigError for others."""
     config = _described(name_or_path)
@@ -151,7 +178,10 @@ def _build(data: dict[str, object], source: str) -> ControllerConfig:
     `step_qp` one of the momentum QP.
     """
     bases = RIVALS if data.get("kind") == "policy-file" else "controllers"
+    given = "uncertain" in data
     data = on_base(data, bases, source, parts=("qp", "step_qp"))
+    if not given:
+        data.pop("uncertain", None)
     kind = data.get("kind", "momentum-qp")
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigError(
@@ -162,4 +192,6 @@ def _build(data: dict[str, object], source: str) -> ControllerConfig:
     inner = data.get("qp")
     if isinstance(inner, str):
         data = {**data, "qp": read_yaml(resolve("controllers", inner))}
-    return build(KINDS[kind][0], data, source)
+    config = build(KINDS[kind][0], data, source)
+    where_uncertain(config, source)
+    return config

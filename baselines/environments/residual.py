@@ -12,11 +12,12 @@ from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.reference_motion import ReferenceMotion, told
 from poise.baselines.balance.references.targets import motion_arrays
 from poise.baselines.balance.references.tempo import TIME, Pace, Tempo
-from poise.baselines.controller import Controller, Targets
+from poise.baselines.controller import Controller, Targets, as_base_controller
 from poise.baselines.registry import (
     ControllerConfig,
     load_controller,
     performing_controllers,
+    where_uncertain,
 )
 from poise.baselines.warmup import prepare
 from poise.configs.errors import ConfigError
@@ -47,7 +48,8 @@ class ResidualBalanceEnv(ControlledEnv):
 
     Action: Box(−1, 1, (4,)), in the heading frame (origin at the middle of the soles, x forward, y
     left), held for one policy step (`policy_period`, 20 ms) while the QP runs at its own period.
-    Zero is the controller alone, bit for bit.
+    Zero is the controller alone, bit for bit. Where sensors err or bodies are drawn, the one that
+    the controller's `uncertain` names takes its place.
 
     | index | name | 1 adds | to |
     | --- | --- | --- | --- |
@@ -120,7 +122,8 @@ class ResidualBalanceEnv(ControlledEnv):
         self._residual = make_residual(self.residual, lag, period, momentum, limit)
         self._offsets = self._residual.offsets
         with allowing(named(controller)):  # the user hands it over, not a file
-            self.controller = load_controller(controller, self.robot)
+            self.controller = self._known = load_controller(controller, self.robot)
+        self._stand_in: Controller | None = None  # where state and robot are uncertain
         self.tempo = build(Tempo, {} if tempo is None else to_dict(tempo), "tempo")
         self.motion = load_motion(motion, self.robot)
         self.targets = Targets.standing(self.robot, self.simulation.state)
@@ -167,9 +170,10 @@ class ResidualBalanceEnv(ControlledEnv):
 
         Raises ConfigError for a controller that cannot be made anew: its memory cannot be shared.
         """
+        given = self._known if self._controller is self._stand_in else self._controller
         return {
             **super().arguments(),
-            "controller": self._base.another(),
+            "controller": as_base_controller(given, self.robot).another(),
             "motion": self.motion,
             "residual": self.residual,
             "smoothing": self.smoothing,
@@ -199,7 +203,21 @@ class ResidualBalanceEnv(ControlledEnv):
     def _references(self) -> tuple[np.ndarray, np.ndarray]:
         return self._targets.q_ref, self._targets.v_ref
 
+    def _suit_level(self) -> None:
+        """Let the controller be the one for this level of realism, see `where_uncertain`."""
+        if self._controller not in (self._known, self._stand_in):
+            return  # a user has put another one in its place
+        wanted = self._known
+        if self.realism.uncertain:
+            if self._stand_in is None:
+                other = where_uncertain(getattr(wanted, "config", None))
+                self._stand_in = load_controller(other or wanted, self.robot)
+            wanted = self._stand_in
+        if wanted is not self._controller:
+            self.controller = wanted
+
     def _begin(self, options: Mapping[str, Any]) -> None:
+        self._suit_level()
         if self._handed[0] is not self._base.unwrapped or self._handed[1] is not self._motion:
             self._hand_over_motion()
             self._unbind()

@@ -167,6 +167,12 @@ class Realism:
         return replace(self, name=IDEAL) == Realism()
 
     @property
+    def uncertain(self) -> bool:
+        """True where sensors err or bodies are drawn: both state and robot are estimates."""
+        exact = self.sensors == SensorErrors() and self.body == BodyErrors()
+        return not exact or bool(np.any(self.motors.backlash))
+
+    @property
     def bumpy(self) -> bool:
         """True where there may be bumps, of which the model must be built."""
         return bool(np.any(self.ground.bumps))

@@ -10,11 +10,13 @@ import hashlib
 import io
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
 from poise.baselines.registry import controller_config
 from poise.configs.archives import Archive, read_archive, read_arrays
 from poise.configs.errors import ConfigError, shown
@@ -80,10 +82,17 @@ def check_controller(state: dict[str, object], config: TrainConfig, path: Path) 
 
 
 def controller_fingerprint(config: TrainConfig) -> str:
-    """Hash of the configuration of the controller below the policy; empty if there is none."""
+    """Hash of the configuration of the controller below the policy; empty if there is none.
+
+    Which other one takes its place where state and robot are uncertain does not count: the gains
+    that are learned on stay as they are.
+    """
     if config.action in ("torque", "position"):
         return ""
-    return hashlib.sha256(to_yaml(controller_config(config.controller)).encode()).hexdigest()
+    below = controller_config(config.controller)
+    if isinstance(below, CaptureStepConfig):
+        below = replace(below, uncertain=None)
+    return hashlib.sha256(to_yaml(below).encode()).hexdigest()
 
 
 def read_state(path: Path) -> dict[str, Any]:

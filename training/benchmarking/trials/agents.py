@@ -23,7 +23,12 @@ from poise.baselines.environments.whole import ResidualWholeEnv
 from poise.baselines.plugins import PluginConfig, find_plugin, make_plugin, plugin_config
 from poise.baselines.policy_files.config import PolicyFileConfig
 from poise.baselines.policy_files.reading import is_policy
-from poise.baselines.registry import ControllerConfig, controller_config, walking_controllers
+from poise.baselines.registry import (
+    ControllerConfig,
+    controller_config,
+    walking_controllers,
+    where_uncertain,
+)
 from poise.baselines.walking.config import WalkConfig
 from poise.baselines.walking.simbicon import SimbiconConfig
 from poise.configs.errors import ConfigError, shown
@@ -86,7 +91,7 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
         return _outside_policy(name, robot, overrides)
     config = controller_config(name)
     env = ResidualBalanceEnv(robot, controller=config, **overrides)
-    return _idle(name, env, to_yaml(_wherever(config)))
+    return _idle(name, env, to_yaml(_wherever(config)) + _stand_in(config))
 
 
 def check_walks(name: str, agent: Agent, source: str) -> None:
@@ -127,6 +132,12 @@ def check_follows(name: str, agent: Agent, source: str) -> None:
         )  # fmt: skip
 
 
+def _stand_in(config: ControllerConfig) -> str:
+    """What takes the place of a controller where state and robot are uncertain, if anything."""
+    other = where_uncertain(config)
+    return "" if other is None else to_yaml(other)
+
+
 def _wherever(config: ControllerConfig) -> ControllerConfig:
     """The same for a policy's files in any folder: their digest tells them apart."""
     if isinstance(config, PolicyFileConfig):
@@ -156,6 +167,8 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
         )
     world = {k: v for k, v in to_dict(policy.config).items() if k not in TRAINING}
     below = controller_fingerprint(policy.config)
+    if below:
+        below += _stand_in(controller_config(policy.config.controller))
     content = _hash(to_yaml(world).encode(), below.encode(), *policy.content())
     return Agent(name, env, policy.act, content, timesteps=policy.state["timesteps"])
 

@@ -50,6 +50,7 @@ class Gains:
 
     def __init__(self, controller: str, ranges: Mapping[str, tuple[float, float]], robot: str):
         self.start = to_dict(controller_config(controller))
+        self.start.pop("uncertain", None)  # it is this controller's gains that are searched
         self.gains: list[Gain] = []
         body, numbers = load_robot(robot), _numbers(self.start)
         for path, (low, high) in ranges.items():

@@ -183,6 +183,9 @@ class CaptureStepConfig:
     """Feet in place by `qp`; steps by `step_qp` and `swing` where the feet cannot hold."""
 
     kind: Literal["capture-step"] = "capture-step"
+    # The controller that takes its place at levels of realism whose sensors err or whose bodies are
+    # drawn; a `base` does not hand it on.
+    uncertain: str | None = field(default=None, metadata={"omit": "default"})
     # The first step begins when ξ's distance outside the CoP region of both soles, plus
     # `momentum_gain` · ω L/(m g), is above `step_margin`; L is the angular momentum in the sense of
     # the fall: hips that turn the trunk already have given what they can.
