@@ -86,25 +86,23 @@ def where_uncertain(config: object, source: str = "controller") -> CaptureStepCo
     None where it stays. Raises ConfigError for one that does not exist, is of another kind, or is
     to be replaced itself.
     """
-    name = config.uncertain if isinstance(config, CaptureStepConfig) else None
-    if name is None:
+    if not isinstance(config, CaptureStepConfig) or config.uncertain is None:
         return None
     try:
-        path = resolve("controllers", name)
+        path = resolve("controllers", config.uncertain)
     except ConfigError as error:
         raise ConfigError(
             error.message, source=source, field="uncertain", choices=error.choices
         ) from None
     data = read_yaml(path)
-    other = _build({**data, "uncertain": None}, str(path))
-    wrong = ""
-    if data.get("uncertain") is not None:
-        wrong = f"has an 'uncertain' of its own: {shown(data['uncertain'])}"
-    elif type(other) is not type(config):
-        wrong = f"is of kind {other.kind!r}, not {config.kind!r}"
-    if wrong:
-        raise ConfigError(f"{shown(name)} {wrong}", source=source, field="uncertain")
-    return other
+    further = data.pop("uncertain", None)
+    other = _build(data, str(path))
+    if further is None and isinstance(other, CaptureStepConfig) and type(other) is type(config):
+        return other
+    wrong = f"is of kind {other.kind!r}, not {config.kind!r}"
+    if further is not None:
+        wrong = f"has an 'uncertain' of its own: {shown(further)}"
+    raise ConfigError(f"{shown(config.uncertain)} {wrong}", source=source, field="uncertain")
 
 
 def momentum_qp_config(name_or_path: str | Path) -> MomentumQPConfig:
@@ -192,6 +190,6 @@ def _build(data: dict[str, object], source: str) -> ControllerConfig:
     inner = data.get("qp")
     if isinstance(inner, str):
         data = {**data, "qp": read_yaml(resolve("controllers", inner))}
-    config = build(KINDS[kind][0], data, source)
+    config: ControllerConfig = build(KINDS[kind][0], data, source)
     where_uncertain(config, source)
     return config

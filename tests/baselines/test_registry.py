@@ -2,7 +2,7 @@
 
 import pytest
 
-from poise.baselines.registry import controller_config, load_controller
+from poise.baselines.registry import controller_config, load_controller, where_uncertain
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
@@ -41,4 +41,35 @@ def test_a_base_that_is_none_is_refused(tmp_path, base):
     path = tmp_path / "mine.yaml"
     path.write_text(f"base: {base}\n")
     with pytest.raises(ConfigError, match="momentum-qp"):
+        controller_config(path)
+
+
+def test_what_takes_its_place_is_not_handed_on(tmp_path):
+    """A file on `walk` is its own gains at every level, unless it names another controller."""
+    assert where_uncertain(controller_config("walk")) == controller_config("walk-field")
+    path = tmp_path / "mine.yaml"
+    path.write_text("base: walk\n")
+    assert where_uncertain(controller_config(path)) is None
+    assert where_uncertain(controller_config("momentum-qp")) is None
+    path.write_text("base: walk\nuncertain: walk-fast\n")
+    assert where_uncertain(controller_config(path)) == controller_config("walk-fast")
+
+
+@pytest.mark.parametrize(
+    ("named", "error"),
+    [
+        ("nonsense", r"mine.yaml: uncertain: no such name: 'nonsense'.*walk-field"),
+        (
+            "momentum-qp",
+            r"mine.yaml: uncertain: 'momentum-qp' is of kind 'momentum-qp', not 'walk'",
+        ),
+        ("walk", r"mine.yaml: uncertain: 'walk' has an 'uncertain' of its own: 'walk-field'"),
+        ("3", r"mine.yaml: uncertain: must be text"),
+    ],
+)
+def test_what_cannot_take_its_place_is_refused(tmp_path, named, error):
+    """As soon as the file is read, whatever the level."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(f"base: walk-field\nuncertain: {named}\n")
+    with pytest.raises(ConfigError, match=error):
         controller_config(path)

@@ -103,10 +103,10 @@ def restore(
 
 
 def _restore_statistics(path: Path, normalize: VecNormalize, newest: int | None) -> None:
-    of = {"obs": normalize.obs_rms, "ret": normalize.ret_rms}
+    of: dict[str, Any] = {"obs": normalize.obs_rms, "ret": normalize.ret_rms}
     found = read_statistics(path, [f"{prefix}_{name}" for prefix in of for name in MOMENTS])
     if newest is not None:
-        _spread(found, len(normalize.obs_rms.mean), newest)
+        _spread(found, len(of["obs"].mean), newest)
     for key, value in found.items():
         prefix, name = key.split("_")
         if value.shape != np.shape(getattr(of[prefix], name)):

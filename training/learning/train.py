@@ -202,8 +202,9 @@ def blind_actor(policy: ActorCriticPolicy, seen: int) -> None:
 
     layers = policy.mlp_extractor.policy_net
     layers.register_forward_pre_hook(hide)
+    first: Any = next(layers.children())
     with torch.no_grad():
-        layers[0].weight[:, seen:] = 0.0
+        first.weight[:, seen:] = 0.0
 
 
 def slow_actor(policy: ActorCriticPolicy, rate: float) -> None:

@@ -6,9 +6,11 @@ import pytest
 
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
+from poise.baselines.registry import load_controller
 from poise.baselines.walking.planner.command import GaitCommand
 from poise.baselines.walking.schedule import CommandSampler
 from poise.configs.errors import ConfigError
+from poise.envs.sensing.realism import load_realism
 from tests.support.shared import robot
 
 FAST = {"ahead": 0.4}
@@ -187,3 +189,29 @@ def test_commands_are_drawn_by_the_environments_own_generator():
     assert env.command_sampler == CommandSampler((0.2, 0.6), turn=(-0.2, 0.2), interval=(0.1, 0.2))
     assert len(np.unique(env._timetable.commands[:8, 0])) == 8
     many.close()
+
+
+def test_where_state_and_robot_are_uncertain_another_one_walks():
+    """`walk` there is `walk-field` bit for bit, in a copy too; late, and after, it is itself.
+
+    A controller that a user has put in stays.
+    """
+    env = ResidualBalanceEnv(robot(), controller="walk", **SHORT)
+    field = ResidualBalanceEnv(robot(), controller="walk-field", realism="field", **SHORT)
+
+    def end(env, level):
+        env.realism = load_realism(level)
+        env.reset(seed=4, options={"command": FAST})
+        play(env, 1.0)
+        return env.simulation.data.qpos.copy()
+
+    itself, late = end(env, "ideal"), end(env, "late")
+    other = end(field, "field")
+    np.testing.assert_array_equal(end(env, "field"), other)
+    np.testing.assert_array_equal(end(type(env)(**env.arguments()), "field"), other)
+    np.testing.assert_array_equal(end(env, "ideal"), itself)
+    np.testing.assert_array_equal(end(env, "late"), late)
+    assert np.abs(itself - late).max() > 1e-6 and np.abs(end(field, "ideal") - itself).max() > 1e-3
+    mine = env.controller = load_controller("walk-fast", robot())
+    end(env, "field")
+    assert env.controller is mine

@@ -15,7 +15,7 @@ from poise.envs.balance.mdp.observation import (
 )
 from poise.envs.balance.mdp.terms import TERMS
 from poise.envs.balance.torque import TorqueBalanceEnv
-from poise.envs.compiled.calls import run
+from poise.envs.compiled.calls import Program, run
 from tests.support.shared import generic_state, robot
 
 
@@ -51,7 +51,7 @@ def observed(simulation, q_ref, v_ref, action, names=None):
             out=out,
         )
 
-    run(observer(terms, whole, np.zeros(1, dtype=np.int64), view))
+    run(Program.of(observer(terms, whole, np.zeros(1, dtype=np.int64), view)))
     ends = np.cumsum([term.size for term in terms])
     return dict(zip([term.name for term in terms], np.split(whole, ends[:-1]), strict=True))
 
@@ -196,9 +196,45 @@ def test_an_observation_of_several_steps():
     np.testing.assert_array_equal(seen(whole), expected)
 
 
+def test_privileged_terms_are_of_the_true_robot():
+    """They come last, of this step alone; what is believed comes first, with its history."""
+    names = ["com", "com_vel", "mass", "friction", "push"]
+    chosen = {"terms": ["com", "com_vel"], "history": 2, "privileged": names}
+    env = TorqueBalanceEnv(robot(), realism="field", observation=chosen)
+    blind = TorqueBalanceEnv(
+        robot(), realism="field", observation={"terms": ["com", "com_vel"], "history": 2}
+    )
+    push = {"force": 60.0, "direction": 30.0, "start": 0.0, "duration": 0.5, "body": "torso"}
+    options = {"push": push, "realism": {"body": {"scale": 0.1}, "ground": {"friction": 0.45}}}
+    seen, _ = blind.reset(seed=2, options=options)
+    whole, _ = env.reset(seed=2, options=options)
+    assert [t.name for t in env.terms[-5:]] == [f"true_{name}" for name in names]
+    assert env.seen == len(seen) == 10 and len(whole) == 10 + 2 + 3 + 1 + 1 + 3
+    np.testing.assert_array_equal(whole[:10], seen)
+    for _ in range(4):
+        action = np.full(env.action_space.shape, 0.05)
+        np.testing.assert_array_equal(env.step(action)[0][:10], blind.step(action)[0])
+    true = env.episode.observation[10:]
+    s, scale = env.simulation.state, env.scales
+    along = np.array([[s.heading[0], s.heading[1]], [-s.heading[1], s.heading[0]]])
+    com = along @ (s.com - s.origin)[:2] / [scale.support_x, scale.support_y]
+    velocity = [*(along @ s.com_vel[:2]), s.com_vel[2]] / np.float64(scale.velocity)
+    np.testing.assert_allclose(true[:2], com, atol=1e-12)
+    np.testing.assert_allclose(true[2:5], velocity, atol=1e-12)
+    assert np.abs(true[:2] - env.episode.observation[5:7]).max() > 1e-3  # it is not the belief
+    mass = sum(env.simulation.model.body_mass) / sum(robot().model.body_mass)
+    np.testing.assert_allclose(true[5], 10.0 * (mass - 1.0), atol=1e-9)
+    assert true[5] > 0.5 and true[6] == 0.45
+    force = [60.0 * np.cos(np.pi / 6.0), 60.0 * np.sin(np.pi / 6.0), 0.0]  # where it began
+    np.testing.assert_allclose(true[7:], force / np.float64(scale.weight), atol=2e-3)
+    np.testing.assert_allclose(np.linalg.norm(true[7:]), 60.0 / scale.weight, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("chosen", "error"),
     [
+        ({"privileged": ["mas"]}, r"observation.privileged: unknown term 'mas'.*friction"),
+        ({"privileged": ["com", "com"]}, r"observation: 'com' comes twice"),
         ({"history": 0}, r"observation.history: must be at least 1"),
         ({"terms": ["com", "comm"]}, r"observation.terms: unknown term 'comm'.*com_height"),
         ({"extra": ["push me"]}, r"observation.extra: unknown term 'push me'"),
@@ -235,7 +271,7 @@ def test_a_term_is_one_function():
             world.views, world.clock, world.pushes, out,
         )  # fmt: skip
 
-    run(observer([term], out, np.zeros(1, dtype=np.int64), view))
+    run(Program.of(observer([term], out, np.zeros(1, dtype=np.int64), view)))
     assert out.tolist() == [9.0, 10.0]  # clipped
     assert mirror_terms([term], {}).sign.tolist() == [1.0, 1.0]
 

@@ -109,6 +109,13 @@ def test_gains_are_put_in_their_places():
     assert data == to_dict(controller_config("momentum-qp"))
 
 
+def test_what_is_searched_plays_at_every_level():
+    """Nothing takes the place of a candidate: its gains would count for nothing there."""
+    assert controller_config("walk").uncertain is not None
+    data = Gains("walk", {"step_margin": (0.0, 0.05)}, "humanoid").at(np.array([0.5]))
+    assert "uncertain" not in data and controller_config(data).uncertain is None
+
+
 def test_the_candidate_is_what_plays():
     """Another configuration, another outcome: without torque the same push is a fall."""
     data = to_dict(controller_config("momentum-qp"))
