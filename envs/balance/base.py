@@ -21,6 +21,8 @@ from poise.envs.physics.pushes.push import PushInfo, push_info
 from poise.envs.physics.simulation import Simulation, World
 from poise.envs.robots.mirror import Mirror, mirror_robot
 from poise.envs.robots.robot import Robot, load_robot, on_terrain
+from poise.envs.sensing.estimator import EstimatedState
+from poise.envs.sensing.measurement import allocate_rings
 from poise.envs.sensing.sensed import SensedRobot
 from poise.envs.viewing.camera import Camera
 from poise.envs.viewing.rendered import RenderedEnv
@@ -42,6 +44,7 @@ from .episode import (
     make_judge,
 )
 from .mdp.docstrings import filled
+from .mdp.measured import MeasuredView
 from .mdp.observation import Term, Terms, View, frames, mirror_terms, observer, scales
 from .mdp.reward import REWARD_TERMS
 from .mdp.termination import episode_limits
@@ -164,7 +167,8 @@ class BalanceEnv(SensedRobot, RenderedEnv):
         Raises ConfigError for a name that is unknown, or comes twice.
         """
         names = self._entry_names()
-        return [kind.of(names) for kind in TERMS.choose(chosen, field="privileged")]
+        true = Terms({name: kind for name, kind in TERMS.items() if kind.view is View})
+        return [kind.of(names) for kind in true.choose(chosen, field="privileged")]
 
     def _entry_names(self) -> dict[str, tuple[str, ...]]:
         return {
@@ -177,7 +181,12 @@ class BalanceEnv(SensedRobot, RenderedEnv):
     def _view(self, kind: type[Block], out: np.ndarray) -> Block:
         """The block of a term that fills `out`, of the `kind` that its kernel works on."""
         source = self.state_source
-        return self._view_of(source.arrays, source.state_arrays, out)
+        view = self._view_of(source.arrays, source.state_arrays, out)
+        if kind is not MeasuredView:
+            return view
+        if isinstance(source, EstimatedState):
+            return MeasuredView(view, source.sensors.rings, source.belief.steps, False)
+        return MeasuredView(view, allocate_rings(self.simulation), guarded_zeros(1, int), True)
 
     def _true_view(self, kind: type[Block], out: np.ndarray) -> Block:
         """The block of a term that fills `out` from the true robot's state."""

@@ -50,7 +50,16 @@ from .inekf import (
     follow_invariant,
 )
 from .inekf import ROLL as FOOT_ROLL
-from .measurement import DRIFT_TIME, RING, Rings, Sensors, allocate_sensors, begin_sensors, measure
+from .measurement import (
+    DRIFT_TIME,
+    RING,
+    Rings,
+    Sensors,
+    allocate_sensors,
+    arrived,
+    begin_sensors,
+    measure,
+)
 from .motors import allocate_motors, begin_motors, drive_motors
 from .odometry import (
     BB,
@@ -153,11 +162,11 @@ class Belief(Block):
 @compiled
 def believe(b: Belief):
     """The state that the known robot would have, from what has been measured until now."""
-    r, o, n = b.rings, b.odometry, b.rings.q.shape[0]
+    r, o = b.rings, b.odometry
     now = r.count[0] - 1
     keep_promises(o.promises, now)
     known = max(now - b.steps[SENSE], 0)
-    row = (r.next[0] - 1 - min(b.steps[SENSE], n - 1) + n) % n
+    row = arrived(r, b.steps[SENSE])
     if b.steps[EXACT]:
         copy_into(r.truth_qpos[row, :3], b.position)
         axes_of(r.truth_qpos[row, 3:7], b.axes)

@@ -70,11 +70,18 @@ class Sensors(Block):
     bus: MotorBus  # has what the encoders read now: motors have it at once
 
 
-def allocate_sensors(simulation: Simulation) -> Sensors:
-    """Sensors that have measured nothing."""
+@compiled
+def arrived(r: Rings, late: int) -> int:
+    """The row of the newest measurement that is known, `late` physics steps after it was taken."""
+    n = r.q.shape[0]
+    return (r.next[0] - 1 - min(late, n - 1) + n) % n
+
+
+def allocate_rings(simulation: Simulation) -> Rings:
+    """Measurements, none yet."""
     nv, nc = simulation.model.nv, len(simulation.robot.soles)
     zeros, nj = guarded_zeros, simulation.model.nv - 6
-    rings = Rings(
+    return Rings(
         next=zeros(1, np.int64),
         count=zeros(1, np.int64),
         attitude=zeros((RING, 3, 3)),
@@ -87,10 +94,15 @@ def allocate_sensors(simulation: Simulation) -> Sensors:
         truth_qpos=zeros((RING, nv + 1)),
         truth_qvel=zeros((RING, nv)),
     )
+
+
+def allocate_sensors(simulation: Simulation) -> Sensors:
+    """Sensors that have measured nothing."""
+    zeros, nj = guarded_zeros, simulation.model.nv - 6
     return Sensors(
         robot=simulation.arrays,
         views=simulation.views,
-        rings=rings,
+        rings=allocate_rings(simulation),
         seed=zeros(1, np.uint64),
         noise=zeros(8),
         encoder_bias=zeros(nj),

@@ -12,6 +12,7 @@ from poise.envs.compiled.maths.vectors import along
 from poise.envs.physics.kinematics import StateArrays
 from poise.envs.physics.pushes.table import DURATION, FORCE, HALF_SINE, KIND, PROFILE, PUSH, START
 
+from .measured import MEASURED_TERMS
 from .observation import GROUND, SPACE, Terms, View
 
 TERMS = Terms()  #: by name
@@ -142,3 +143,6 @@ def push(v: View):
                 v.out[a] += fraction * row[FORCE + a]
     put_local(v.state, v.out[0], v.out[1], v.scales.weight, v.out)
     v.out[2] /= v.scales.weight
+
+
+TERMS.update(MEASURED_TERMS)

@@ -230,9 +230,51 @@ def test_privileged_terms_are_of_the_true_robot():
     np.testing.assert_allclose(np.linalg.norm(true[7:]), 60.0 / scale.weight, atol=1e-12)
 
 
+MEASURED = ["measured_gravity", "measured_rate", "measured_joint_pos", "measured_joint_vel"]
+BELIEVED = ["gravity", "root_rate", "joint_pos", "joint_vel"]
+
+
+def test_measurements_are_late_and_what_is_believed_is_not():
+    """Exact sensors that are 8 ms late tell what was true two ticks before, whatever leads on."""
+    level = {"latency": {"sense": 0.008}}
+    env = TorqueBalanceEnv(robot(), realism=level, observation={"terms": MEASURED})
+    ideal = TorqueBalanceEnv(robot(), observation={"terms": MEASURED + BELIEVED})
+    nj = len(robot().joint_names)
+    before, _ = ideal.reset(seed=5)
+    np.testing.assert_array_equal(before[: 6 + 2 * nj], before[6 + 2 * nj :])
+    env.reset(seed=5)
+    data, steps, rows = env.simulation.data, [], env.state_source.sensors.rings
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        env.step(rng.uniform(-0.2, 0.2, env.action_space.shape))
+        now = (rows.next[0] - 1) % len(rows.q)
+        np.testing.assert_array_equal(rows.q[now], data.qpos[7:])
+        then = rows.q[now - 4], rows.dq[now - 4], rows.gyro[now - 4], rows.attitude[now - 4]
+        steps.append(np.abs(then[1] - data.qvel[6:]).max())
+        omega = env.scales.omega
+        expected = [-then[3][2], then[2] / omega, then[0] - env._references()[0],
+                    then[1] / (3.0 * omega)]  # fmt: skip
+        np.testing.assert_allclose(env.episode.observation, np.concatenate(expected), atol=1e-12)
+    assert min(steps) > 0.01  # what is late is not what is true now
+
+
+def test_measurements_are_as_noisy_as_sensors():
+    """In `field` joint velocities are off by 0.2 rad/s from what was true when they were taken."""
+    env = TorqueBalanceEnv(robot(), realism="field", observation={"terms": MEASURED + BELIEVED})
+    env.reset(seed=6, options={"push": []})
+    errors, nj, rings = [], len(robot().joint_names), env.state_source.sensors.rings
+    for _ in range(10):
+        seen = env.step(np.zeros(env.action_space.shape))[0] * 3.0 * env.scales.omega
+        row = (rings.next[0] - 1 - env.drawn.sense) % len(rings.q)
+        errors.append(seen[6 + nj : 6 + 2 * nj] - rings.truth_qvel[row, 6:])
+        assert np.abs(seen[6 + nj : 6 + 2 * nj] - seen[-nj:]).max() > 0.1  # of what is believed
+    assert 0.17 < np.std(errors) < 0.23 and abs(np.mean(errors)) < 0.05
+
+
 @pytest.mark.parametrize(
     ("chosen", "error"),
     [
+        ({"privileged": ["measured_rate"]}, r"privileged: unknown term 'measured_rate'.*root_rate"),
         ({"privileged": ["mas"]}, r"observation.privileged: unknown term 'mas'.*friction"),
         ({"privileged": ["com", "com"]}, r"observation: 'com' comes twice"),
         ({"history": 0}, r"observation.history: must be at least 1"),
