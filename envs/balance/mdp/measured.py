@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from poise.envs.compiled.block import Block
-from poise.envs.compiled.jit import compiled
 from poise.envs.sensing.measurement import Rings, arrived
 
 from .observation import SPACE, Terms, View
