@@ -33,30 +33,30 @@ FLOORS = """
  6 baselines/motion/graphs, baselines/motion/graphs/matching
  6 baselines/motion/retargeting/inverse_kinematics, envs/physics
  7 baselines/controller, baselines/whole_body/contacts, baselines/whole_body/limits
- 7 baselines/whole_body/tasks, envs/balance/mdp, envs/sensing, envs/viewing
- 8 baselines/balance/references, baselines/plugins, baselines/walking/models
- 8 baselines/whole_body, envs/balance
- 9 baselines/balance/in_place, baselines/balance/stepping/planning, baselines/motion/feasibility
- 9 baselines/motion/retargeting, baselines/policy_files, envs/balance/vector
-10 baselines/balance/stepping, baselines/motion/space_time/constraints
-10 baselines/motion/synthesis, envs
-11 baselines/motion/performing, baselines/motion/space_time, baselines/walking/planner
-12 baselines/walking
-13 baselines/registry
-14 baselines/environments
-15 baselines, baselines/environments/guard, training/benchmarking/diagnosis
-15 training/deploy/policy_check, training/learning
-15 training/motion/tracking
-16 training/benchmarking/trials, training/learning/seeds, training/motion
-17 training/benchmarking/suites, training/deploy/robot_check/standing, training/deploy/standalone
-17 training/learning/tuning, training/motion/following, training/pictures/figures
-18 training/benchmarking/metrics, training/deploy/qp_set, training/deploy/robot_check
-19 training/benchmarking/evaluation
-20 training/benchmarking/results, training/motion/gaits
-21 training/deploy/export, training/pictures/report, training/pictures/sessions
-22 training, training/pictures/motion_report, training/pictures/view
-23 training/cli/motion
-24 training/cli
+ 7 baselines/whole_body/tasks, envs/sensing, envs/viewing
+ 8 envs/balance/mdp
+ 9 baselines/balance/references, baselines/plugins, baselines/walking/models, baselines/whole_body
+ 9 envs/balance
+10 baselines/balance/in_place, baselines/balance/stepping/planning, baselines/motion/feasibility
+10 baselines/motion/retargeting, baselines/policy_files, envs/balance/vector
+11 baselines/balance/stepping, baselines/motion/space_time/constraints, baselines/motion/synthesis
+11 envs
+12 baselines/motion/performing, baselines/motion/space_time, baselines/walking/planner
+13 baselines/walking
+14 baselines/registry
+15 baselines/environments
+16 baselines, baselines/environments/guard, training/benchmarking/diagnosis
+16 training/deploy/policy_check, training/learning, training/motion/tracking
+17 training/benchmarking/trials, training/learning/seeds, training/motion
+18 training/benchmarking/suites, training/deploy/robot_check/standing, training/deploy/standalone
+18 training/learning/tuning, training/motion/following, training/pictures/figures
+19 training/benchmarking/metrics, training/deploy/qp_set, training/deploy/robot_check
+20 training/benchmarking/evaluation
+21 training/benchmarking/results, training/motion/gaits
+22 training/deploy/export, training/pictures/report, training/pictures/sessions
+23 training, training/pictures/motion_report, training/pictures/view
+24 training/cli/motion
+25 training/cli
 """
 FLOOR = {
     room: int(line.split()[0])
