@@ -60,10 +60,10 @@ if TYPE_CHECKING:
     from poise.envs.physics.pushes.sampler import PushSampler
     from poise.envs.physics.simulation import Simulation
     from poise.envs.physics.state import RobotState
+    from poise.envs.physics.state_source import StateSource
     from poise.envs.robots.robot import Robot, load_robot, on_terrain
     from poise.envs.sensing.estimator import EstimatedState, EstimatorConfig
     from poise.envs.sensing.realism import Realism
-    from poise.envs.sensing.source import StateSource
     from poise.envs.terrain.terrain import Terrain, make_terrain
     from poise.envs.viewing.camera import Camera
     from poise.envs.viewing.gl import choose_gl_backend

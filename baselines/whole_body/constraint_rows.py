@@ -81,9 +81,14 @@ def point_cones(state: RobotState, points: Sequence[ContactRows]) -> Bounds:
 
 
 def sole_cones(state: RobotState, p: QPParameters) -> Bounds:
-    """cone · w ≤ 0 in each sole's own axes (see `wrench_cone`)."""
+    """cone · w ≤ 0 in each sole's own axes (see `wrench_cone`), for the friction that is believed.
+
+    A cone of s times the friction has the same wrenches with f_x, f_y and n_z s times as large.
+    """
+    narrower = np.ones(6)
+    narrower[[0, 1, 5]] = 1.0 / state.friction
     cones = [
-        cone @ block_diag(axes.T, axes.T)
+        (cone * narrower) @ block_diag(axes.T, axes.T)
         for cone, axes in zip(p.cone, state.sole_axes, strict=True)
     ]
     C = _after(len(state.qvel), block_diag(*cones))

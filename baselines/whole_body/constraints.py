@@ -25,13 +25,19 @@ def build_constraints(
 
 @compiled
 def _sole_cones(s: StateArrays, p: QPParameters, ws: Workspace):
-    """Fill cone · w ≤ 0 in each sole's own axes."""
+    """Fill cone · w ≤ 0 in each sole's own axes, for the friction that is believed.
+
+    With less of it forces along the sole and moments about its normal count for more.
+    """
     nc, rows = p.cone.shape[0], p.cone.shape[1]
+    narrower = 1.0 / s.friction[0]
     for i in range(nc):
         axes, first = s.sole_axes[i], i * rows
         for a in range(6):
             r, c = 6 * i + a // 3 * 3, a % 3  # of the force or the moment; the sole's axis
             x, y, z = axes[0, c], axes[1, c], axes[2, c]
+            if a < 2 or a == 5:
+                x, y, z = narrower * x, narrower * y, narrower * z
             ws.local0[a] = x * ws.w0[r] + y * ws.w0[r + 1] + z * ws.w0[r + 2]
             for j in range(ws.local.shape[1]):
                 ws.local[a, j] = x * ws.E[r, j] + y * ws.E[r + 1, j] + z * ws.E[r + 2, j]

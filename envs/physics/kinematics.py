@@ -42,6 +42,7 @@ class StateArrays(Block):
     A: np.ndarray  # (6, nv)
     A_bias: np.ndarray  # (6,)
     load: np.ndarray  # (3,) that is believed to last: force f_z, moments n_x, n_y about the CoM
+    friction: np.ndarray  # (1,) of the ground that is believed, over the model's
     J: np.ndarray  # (6 nc, nv)
     Jdot_v: np.ndarray  # (6 nc,)
     J_v: np.ndarray  # (6 nc,)
@@ -71,7 +72,8 @@ class StateArrays(Block):
 def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
     """Zeroed storage for `nv` degrees of freedom, `nc` soles and `nb` bodies, the world's too."""
     zeros = guarded_zeros
-    qpos, qvel = zeros(nv + 1), zeros(nv)
+    qpos, qvel, friction = zeros(nv + 1), zeros(nv), zeros(1)
+    friction[0] = 1.0
     return StateArrays(
         qpos=qpos,
         qvel=qvel,
@@ -84,6 +86,7 @@ def allocate_state(nv: int, nc: int, nb: int) -> StateArrays:
         A=zeros((6, nv)),
         A_bias=zeros(6),
         load=zeros(3),
+        friction=friction,
         J=zeros((6 * nc, nv)),
         Jdot_v=zeros(6 * nc),
         J_v=zeros(6 * nc),

@@ -106,6 +106,11 @@ class RobotState(Copyable):
         return _frozen(self.arrays.load)
 
     @property
+    def friction(self) -> float:
+        """Friction of the ground that is believed, over that of the model: cones are so narrow."""
+        return float(self.arrays.friction[0])
+
+    @property
     def Adot_v(self) -> np.ndarray:
         """(6,) Ȧ v, the part of [Ṗ; L̇] that does not come from accelerations."""
         bias = self.arrays.A_bias.copy()

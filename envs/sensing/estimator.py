@@ -21,6 +21,7 @@ from poise.envs.compiled.mujoco_calls import mj_step1
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, update_state
 from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.state_source import StateSource
 from poise.envs.robots.robot import Robot, on_terrain
 from poise.envs.terrain.flat import Flat
 
@@ -33,6 +34,7 @@ from .external_force import (
     keep_load,
     observe_force,
 )
+from .friction import SlidingFriction, allocate_friction, begin_friction, learn_friction
 from .inekf import (
     ATTITUDE,
     ENCODER,
@@ -80,7 +82,6 @@ from .odometry import (
 from .plant import Plant
 from .prediction import Rollout, allocate_promises, keep_promises, make_rollout, predict, roll_out
 from .realism import Realism
-from .source import StateSource
 
 POSITIVE = {"above": 0.0}
 #: entries of `Belief.steps`
@@ -109,6 +110,8 @@ class EstimatorConfig:
         load: Whether a load that lasts is learned and borne, where sensors err or bodies are drawn:
             a payload, masses and centres of mass that are other than known.
         load_time: Time in which a load is learned [s].
+        slide_speed: Speed from which soles are taken to slide, and then tell how much friction a QP
+            may count on [m/s]; 0: never.
         filtered: Whether joint velocities are filtered.
         joint_acceleration: Acceleration of joints that nobody knows of, step to step [rad/s²].
         turn_acceleration: Angular acceleration of the root that nobody knows of [rad/s²].
@@ -125,6 +128,7 @@ class EstimatorConfig:
     external_force: bool = True
     load: bool = True
     load_time: float = field(default=2.0, metadata=POSITIVE)
+    slide_speed: float = field(default=0.25, metadata={"min": 0.0})
     filtered: bool = True
     joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
     turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
@@ -137,7 +141,7 @@ class EstimatorConfig:
 
 
 #: of a controller that brings an estimator of its own: what is measured, as late and as noisy
-RAW = EstimatorConfig("odometry", predictor="none", load=False, filtered=False)
+RAW = EstimatorConfig("odometry", predictor="none", load=False, slide_speed=0.0, filtered=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +156,7 @@ class Belief(Block):
     state: StateArrays
     rollout: Rollout
     force: ExternalForce
+    friction: SlidingFriction
     steps: np.ndarray  # (8,) int: physics steps, see SENSE and its like
     axes: np.ndarray  # (3, 3) of the root, led on
     q: np.ndarray  # (nj,) likewise
@@ -203,6 +208,7 @@ def believe(b: Belief):
     _write_state(b, row)
     if not b.steps[EXACT]:
         _stand_on_ground(b)
+    learn_friction(b.friction, b.robot, b.state, r, row)
     if b.steps[LOADED]:
         bear_load(b.force, b.robot, b.state)
 
@@ -275,6 +281,7 @@ class EstimatedState(StateSource, Copyable):
         self.belief = Belief(
             rings, self.odometry, self.invariant, self.arrays, self.known.views, self.state_arrays,
             make_rollout(self.ahead, self.motors), allocate_force(),
+            allocate_friction(robot),
             zeros(8, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
         self.drive = Program.of([(drive_motors, self.motors)])
@@ -308,6 +315,7 @@ class EstimatedState(StateSource, Copyable):
         loaded = self.belief.steps[LOADED] > 0
         begin_force(self.belief.force, self.config.load_time if loaded else 0.0)
         self.state_arrays.load[:] = 0.0
+        begin_friction(self.belief.friction, self.state_arrays, self.config.slide_speed)
         self._begin_odometry()
         self._begin_invariant()
         self.update()

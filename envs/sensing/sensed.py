@@ -8,13 +8,13 @@ import numpy as np
 
 from poise.configs.errors import ConfigError
 from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.state_source import StateSource
 from poise.envs.robots.robot import Robot
 
 from .drawn import DrawnRobot, draw_robot
 from .estimator import RAW, EstimatedState, EstimatorConfig, check_latency
 from .plant import Plant
 from .realism import Realism, overlaid
-from .source import StateSource
 
 
 class SensedRobot:

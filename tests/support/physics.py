@@ -110,14 +110,17 @@ def recovery(
     specific: float = 0.28,
     every: int = 6,
     load: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    friction: float = 1.0,
 ) -> tuple[Tick, ...]:
     """Ticks along push recoveries in four directions, 0.4 s each, from contact lost to at rest.
 
-    The robot is believed to bear a `load`, see `RobotState`.
+    The robot is believed to bear a `load`, and to stand on so much of its `friction`, see
+    `RobotState`.
     """
     robot = robot_named(name)
     qp = controller(robot, root=root)
     simulation = Simulation(robot)
+    simulation.state_arrays.friction[0] = friction
     ticks, force = [], allocate_force()
     force.load[:] = load
     for direction in (0.0, 90.0, 180.0, 250.0):

@@ -1,11 +1,14 @@
 """Rows of the readable QP's dynamics, contacts and limits, against the simulator."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
 from poise.baselines.whole_body.constraint_rows import joint_limits, root_dynamics, sole_cones
 from poise.baselines.whole_body.constraints import braking_bounds
+from poise.baselines.whole_body.contacts.wrench_cone import robot_cones
 from poise.baselines.whole_body.formulation import torques_of
 from poise.envs.physics.simulation import Simulation
 from tests.support.physics import (
@@ -82,6 +85,31 @@ def test_cones_are_given_in_the_axes_of_the_soles(robot):
             force = np.cos(tilt) * axes[:, 2] + np.sin(tilt) * axes[:, 0]
             x[nv + 6 * i : nv + 6 * i + 3] = force
             assert bool((cones.C @ x).max() <= 1e-12) is inside
+
+
+@pytest.mark.parametrize("share", [0.3, 0.55, 1.0])
+def test_cones_of_less_friction_are_those_of_soles_that_have_it(robot, share):
+    """Any wrench is inside the cones of a believed share of friction or of neither."""
+    simulation = Simulation(robot)
+    state = simulation.reset(*random_state(robot, np.random.default_rng(8)))
+    p = controller(robot).parameters
+    simulation.state_arrays.friction[0] = share
+    narrow = sole_cones(state, p).C
+    simulation.state_arrays.friction[0] = 1.0
+    contact = controller(robot).config.contact
+    own = robot_cones(robot, share * contact.friction_share, contact.polygon_share)
+    given = sole_cones(state, replace(p, cone=own)).C
+    nv, rng, inside = len(state.qvel), np.random.default_rng(9), 0
+    for _ in range(2000):
+        x = np.zeros(nv + 12)
+        for i, axes in enumerate(state.sole_axes):
+            force = axes @ [*rng.uniform(-0.3, 0.3, 2), 1.0]
+            moment = axes @ (rng.uniform(-1.0, 1.0, 3) * [0.05, 0.08, 0.02])
+            x[nv + 6 * i : nv + 6 * i + 6] = [*force, *moment]
+        both = (narrow @ x).max(), (given @ x).max()
+        assert (both[0] <= 0.0) == (both[1] <= 0.0) or min(np.abs(both)) < 1e-9
+        inside += both[0] <= 0.0
+    assert 20 < inside < 1900
 
 
 def test_joint_limits_are_the_compiled_ones(tick, robot):

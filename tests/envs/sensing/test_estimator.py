@@ -6,8 +6,8 @@ import pytest
 from poise.configs.errors import ConfigError
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.physics.simulation import Simulation
+from poise.envs.physics.state_source import StateSource
 from poise.envs.sensing.estimator import EstimatedState
-from poise.envs.sensing.source import StateSource
 from tests.support.sensing import PLAIN, drawn_of, estimated, start
 from tests.support.shared import robot
 

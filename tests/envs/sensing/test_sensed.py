@@ -12,9 +12,9 @@ from poise.envs.balance.servos import drive
 from poise.envs.balance.torque import TorqueBalanceEnv
 from poise.envs.balance.vector.batch import replicate
 from poise.envs.balance.vector.vector_env import BalanceVectorEnv
+from poise.envs.physics.state_source import StateSource
 from poise.envs.sensing.estimator import EstimatedState
 from poise.envs.sensing.realism import Realism, load_realism
-from poise.envs.sensing.source import StateSource
 from tests.support.sensing import PLAIN
 from tests.support.shared import robot
 

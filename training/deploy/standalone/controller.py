@@ -20,9 +20,9 @@ from poise.envs.balance.position import PositionBalanceEnv
 from poise.envs.balance.servos import drive
 from poise.envs.compiled.calls import run
 from poise.envs.physics.kinematics import update_state
+from poise.envs.physics.state_source import StateSource
 from poise.envs.robots.robot import Robot, load_robot
 from poise.envs.sensing.realism import Realism, load_realism
-from poise.envs.sensing.source import StateSource
 from poise.training.benchmarking.trials.agents import Agent, load_agent
 
 from .readings import Readings

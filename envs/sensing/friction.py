@@ -1,0 +1,97 @@
+"""Friction of the ground, as sliding soles tell it.
+
+A sole that slides bears as much along the ground as friction lets it, so the ratio of what it bears
+along and across is the friction [Caron15]. Before it slides nobody knows more than the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.physics.arrays import RobotArrays
+from poise.envs.physics.kinematics import StateArrays
+from poise.envs.robots.ground import contact_friction
+from poise.envs.robots.robot import Robot
+
+from .measurement import Rings
+
+STEP = 0.02  # of the model's friction, by which a tick changes what is believed, after the first
+BEARS = 0.2  # of the weight, that they bear at least
+LEAST = 0.3  # of the friction of the model, that is believed in at least
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingFriction(Block):
+    """What soles have told while they slid."""
+
+    known: float  # friction of the model
+    speed: np.ndarray  # (1,) from which a sole is taken to slide [m/s]; 0: never
+    last: np.ndarray  # (1,) ratio of the tick before, if soles slid in it, else 0
+    told: np.ndarray  # (1,) int: 1 once soles have told something
+
+
+def allocate_friction(robot: Robot) -> SlidingFriction:
+    """The friction of a robot's soles on its ground."""
+    geoms = [geom for sole in robot.soles for geom in sole.geom_ids]
+    known = contact_friction(robot.model, robot.ground_geom_id, geoms)
+    return SlidingFriction(known, guarded_zeros(1), guarded_zeros(1), guarded_zeros(1, np.int64))
+
+
+def begin_friction(f: SlidingFriction, s: StateArrays, speed: float) -> None:
+    """Start an episode, in which nothing has slid; see `SlidingFriction.speed`."""
+    f.speed[0], f.last[0], f.told[0] = speed, 0.0, 0
+    s.friction[0] = 1.0
+
+
+@compiled
+def learn_friction(f: SlidingFriction, robot: RobotArrays, s: StateArrays, rings: Rings, row: int):
+    """Let `s.friction` follow what sliding soles tell, over the model's friction:
+
+        μ = (|f_x| + |f_y|)/f_z,
+
+    the mean of two ticks in a row. f, the force of the ground that was measured last, is told in
+    the axes of a sole that slides: as in the cone of the QP. What is told first is believed, then
+    each tick counts little: one that pivots bears less, and one that lands anything.
+    """
+    slides = sliding_sole(s, f.speed[0]) if f.speed[0] > 0.0 else -1
+    force, R, axes = rings.wrench[row], s.root_axes, s.sole_axes[slides]
+    x, y, z = 0.0, 0.0, 0.0
+    for a in range(3):
+        world = R[a, 0] * force[0] + R[a, 1] * force[1] + R[a, 2] * force[2]
+        x, y, z = x + axes[a, 0] * world, y + axes[a, 1] * world, z + axes[a, 2] * world
+    if slides < 0 or z < BEARS * robot.mass * robot.gravity:
+        f.last[0] = 0.0
+        return
+    ratio, last = (abs(x) + abs(y)) / z, f.last[0]
+    f.last[0] = ratio
+    if last > 0.0:
+        told, step = 0.5 * (last + ratio) / f.known, 1.0 if f.told[0] == 0 else STEP
+        change = min(max(told - s.friction[0], -step), step)
+        s.friction[0] = min(max(s.friction[0] + change, LEAST), 1.0)
+        f.told[0] = 1
+
+
+@compiled
+def sliding_sole(s: StateArrays, speed: float) -> int:
+    """A sole that touches the ground, if all that do are faster than `speed`; else −1.
+
+    Of a single one the velocity at the CoP counts: one that rolls over an edge does not slide.
+    """
+    feet, last = 0, -1
+    for i in range(s.contacts.shape[0]):
+        if s.contacts[i] > 0.5:
+            feet, last = feet + 1, i
+    for i in range(s.contacts.shape[0]):
+        if s.contacts[i] > 0.5:
+            x, y, turn = s.J_v[6 * i], s.J_v[6 * i + 1], s.J_v[6 * i + 5]
+            if feet == 1:
+                x -= turn * (s.cop[1] - s.sole_point[i, 1])
+                y += turn * (s.cop[0] - s.sole_point[i, 0])
+            if x * x + y * y <= speed * speed:
+                return -1
+    return last
