@@ -292,6 +292,12 @@ class RealismLevel(LevelRate, total=False):
     energy_median: Number
 
 
+class ScenarioFigures(Counts):
+    """Trials of a scenario."""
+
+    scenario: str
+
+
 class Fractions(TypedDict, total=False):
     """The fraction of the limit at which half of the random pushes are recovered."""
 
@@ -331,6 +337,7 @@ class Entry(Played, Counts, EnvelopeFigures, Fractions, total=False):
     motions: list[MotionLevel]
     levels: list[RealismLevel]
     in_motion: list[InMotion]
+    scenarios: list[ScenarioFigures]
 
 
 class Paired(TypedDict, total=False):
