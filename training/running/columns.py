@@ -155,6 +155,7 @@ ROBUST = (
 )
 
 # of a scenario
+SPEED = Figure("speed_ahead", "speed", ".2f", "m/s", "ahead, mean over the strides")
 STOOD = Figure("never_fell_rate", "stood", ".0%", "", "trials without a fall",
                ends="never_fell_ci95")  # fmt: skip
 

@@ -292,10 +292,16 @@ class RealismLevel(LevelRate, total=False):
     energy_median: Number
 
 
-class ScenarioFigures(Counts):
+class ScenarioCounts(Counts):
     """Trials of a scenario."""
 
     scenario: str
+
+
+class ScenarioFigures(ScenarioCounts, total=False):
+    """The same, with the mean speed of a walk [m/s], see `Outcome`."""
+
+    speed_ahead: Number
 
 
 class Fractions(TypedDict, total=False):

@@ -63,9 +63,10 @@ def test_measured_means_that_a_sensor_errs():
 
 
 def test_later_fields_leave_the_others_as_they_were():
-    """The first number of `field`'s robot of a seed, drawn before there were arms and hands."""
+    """A seed's robot in `field` is the one that it was before there were arms and hands."""
     first = drawn_of("field", 3)
     other = drawn_of({"base": "field", "motors": {"arms": 0.5}, "body": {"hand": [0.1, 0.2]}}, 3)
+    assert first.seed == 5042854753669335956 and first.payload == 0.09094545797692971
     assert same(first, other, "arms", "hand") and other.arms == 0.5 and 0.1 <= other.hand <= 0.2
     assert other.summary(0.002)["side"] in (0, 1) and "arms" not in first.summary(0.002)
 

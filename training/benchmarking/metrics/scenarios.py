@@ -16,4 +16,10 @@ def scenario_figures(
     cells: dict[str, list[Outcome]] = {}
     for trial, outcome in part(played, PART):
         cells.setdefault(str(trial.level), []).append(outcome)
-    return [{"scenario": name, **counts(outcomes)} for name, outcomes in cells.items()]
+    found: list[ScenarioFigures] = []
+    for name, outcomes in cells.items():
+        figures: ScenarioFigures = {"scenario": name, **counts(outcomes)}
+        if speeds := [o.speed_ahead for o in outcomes if o.speed_ahead is not None]:
+            figures["speed_ahead"] = sum(speeds) / len(speeds)
+        found.append(figures)
+    return found

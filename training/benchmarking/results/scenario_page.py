@@ -7,7 +7,7 @@ from poise.configs.texts import code, markdown_table, plain
 from poise.training.benchmarking.evaluation.tables import assisted
 from poise.training.benchmarking.evaluation.walk_tables import scenario_cell, scenario_names
 from poise.training.benchmarking.statistics.rates import wilson_interval
-from poise.training.running.columns import CHATTER, ENERGY, NONE, STEPS_TAKEN
+from poise.training.running.columns import CHATTER, ENERGY, NONE, SPEED, STEPS_TAKEN
 from poise.training.running.summary import Entry, ScenarioFigures, Summary
 
 HEAD = """# Scenarios
@@ -15,8 +15,7 @@ HEAD = """# Scenarios
 <!-- Written by `poise leaderboard {source} --page {page}`: change the results, not this page. -->
 
 What else happens to a robot that stands. Cells are the share of trials without a fall, with 95 %
-intervals; of `walk`, in which the robot must walk on as commanded too, the share that does. A
-controller that does not walk has none. The state is known exactly and at once.
+intervals. A controller that takes no command has no `walk`. The state is known exactly and at once.
 
 - `quiet`: 12 s without a push.
 - `repeated`: 24 s with a push of 0.3 to 0.8 N·s/kg every 2 to 4 s.
@@ -25,12 +24,14 @@ controller that does not walk has none. The state is known exactly and at once.
 - `push`: one of 0.3 to 1.5 N·s/kg.
 - `arms`: the same pushes. [Somebody else](realism.md#arms-and-hands) moves the arms at random.
 - `payload`: the same pushes with 3 to 9 % of the mass in one hand, of which nobody is told.
-- `walk`: a push of 0.3 to 1.2 N·s/kg while it walks at 0.5 m/s.
+- `walk`: a push of 0.3 to 1.2 N·s/kg while it is told to walk at 0.5 m/s. Its speed, push included,
+  is in a column of its own: who stays far below does not walk.
 
 `together` has all but `walk`; it is the order. Energy (median) and steps (mean) are those of
 `push`, chatter (median) is that of `repeated`. Energy and chatter are of recovered trials.
 [How it is played](benchmark.md#scenarios).
 """
+WALK = "walk"  # the scenario that only some play
 Figures = Mapping[str, object]
 
 
@@ -66,23 +67,24 @@ def scenario_page(summaries: Mapping[str, Summary], page: str) -> str:
 
 def _table(entries: Mapping[str, Entry], names: list[str]) -> str:
     head = ["controller", *(code(name) for name in names), "together",
-            ENERGY.heading, CHATTER.heading, "steps"]  # fmt: skip
+            SPEED.heading, ENERGY.heading, CHATTER.heading, "steps"]  # fmt: skip
     rows = []
     for name in sorted(entries, key=lambda name: _order(entries[name])):
         own = {each["scenario"]: each for each in entries[name].get("scenarios", ())}
         pushed: Figures = own.get("push", {})
         repeated: Figures = own.get("repeated", {})
+        walked: Figures = own.get(WALK, {})
         mark = " (took a force from nowhere)" if assisted(entries[name]) else ""
         rows.append([code(name) + mark, *(scenario_cell(own.get(each)) for each in names),
-                     _together(entries[name]), ENERGY.text(pushed), CHATTER.text(repeated),
-                     STEPS_TAKEN.text(pushed)])  # fmt: skip
+                     _together(entries[name]), SPEED.text(walked), ENERGY.text(pushed),
+                     CHATTER.text(repeated), STEPS_TAKEN.text(pushed)])  # fmt: skip
     return markdown_table(head, rows)
 
 
 def _stood(entry: Entry) -> tuple[int, int]:
     """Trials without a fall, and all, of those that all controllers play."""
     found: list[ScenarioFigures] = [each for each in entry.get("scenarios", ())
-                                    if each["scenario"] != "walk"]  # fmt: skip
+                                    if each["scenario"] != WALK]  # fmt: skip
     kept = (round((each.get("never_fell_rate") or 0.0) * each["trials"]) for each in found)
     return sum(kept), sum(each["trials"] for each in found)
 

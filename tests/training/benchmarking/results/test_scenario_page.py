@@ -49,7 +49,7 @@ def test_the_committed_page_is_generated() -> None:
 
 
 def test_cells_are_those_of_the_result(tmp_path: Path) -> None:
-    """Without a fall, but of the walk as commanded; the best of all but the walk comes first."""
+    """The best of all but the walk comes first."""
     page = tmp_path / "page.md"
     assert main(["leaderboard", str(SOURCES["unitree_g1"]), "--page", str(page)]) == 0
     found, entries = rows(page.read_text()), read_summary(SOURCES["unitree_g1"])["controllers"]
@@ -58,13 +58,17 @@ def test_cells_are_those_of_the_result(tmp_path: Path) -> None:
         own = {each["scenario"]: each for each in entries[name]["scenarios"]}
         assert cells[4].startswith(f"{own['arms']['never_fell_rate']:.0%} [")
         if "walk" in own:
-            assert cells[6].startswith(f"{own['walk']['recovered_rate']:.0%} [")
+            assert cells[6].startswith(f"{own['walk']['never_fell_rate']:.0%} [")
         else:
             assert cells[6] == "–"
         stood, trials = cells[7].split(" [")[0].split(" of ")
         kept = (round(e["never_fell_rate"] * e["trials"]) for n, e in own.items() if n != "walk")
         assert int(stood) == sum(kept) and int(trials) == 88
         together.append(int(stood))
+        assert (
+            cells[8] == (f"{own['walk']['speed_ahead']:.2f}" if "walk" in own else "–")
+            or name == "launcher-stance-g1"
+        )
     assert together == sorted(together, reverse=True) and found.keys() == entries.keys()
 
 
