@@ -91,6 +91,9 @@ def test_a_result_is_the_same_in_any_order_and_is_played_again(
     told = {record.trial: record.line for record in results.of("walk")}
     assert '"arms": 0.' in told[3]["drawn"] and '"hand": 0.0' in told[5]["drawn"]
     assert told[1]["drawn"] == "" and told[0]["until"] == "4.2"
+    assert told[0]["fallen"] == "False"
+    lasted = float(told[0]["energy"]) / float(told[0]["mean_power"])
+    assert lasted == pytest.approx(4.2, abs=0.01)
     assert told[1]["impulse"] == told[3]["impulse"] == told[5]["impulse"]
     assert told[1]["energy"] != told[3]["energy"] != told[5]["energy"]
     assert not replay(tmp_path / "a", 3, "walk").differences
