@@ -27,6 +27,9 @@ class DrawnRobot:
         friction, softness: of the ground, or None: as in the model.
         slope: (2,) tangent of the ground's fall along x and y.
         bumps: height of the highest bump [m].
+        arms: part of their reach within which somebody else moves the arms; 0: nobody does.
+        hand: load in a hand, over the robot's mass; `side` of it: 0 left, 1 right.
+        arms_seed: of the postures of the arms.
     """
 
     sense: int
@@ -50,6 +53,10 @@ class DrawnRobot:
     slope: np.ndarray
     seed: int  #: of the noise within the episode
     bumps: float = 0.0
+    arms: float = 0.0
+    hand: float = 0.0
+    side: int = 0
+    arms_seed: int = 0
 
     @property
     def measured(self) -> bool:
@@ -60,7 +67,8 @@ class DrawnRobot:
     @property
     def loaded(self) -> bool:
         """True where the body is not as the model has it."""
-        return bool(self.payload or self.com_shift.any() or (self.mass_factor != 1.0).any())
+        other = self.payload or self.hand or self.com_shift.any()
+        return bool(other or (self.mass_factor != 1.0).any())
 
     def summary(self, timestep: float) -> dict[str, float]:
         """The numbers that tell most of it, for `info` and tables: SI units, degrees."""
@@ -76,11 +84,13 @@ class DrawnRobot:
         for name in ("friction", "softness"):
             if (value := getattr(self, name)) is not None:
                 told[name] = value
-        if self.bumps:
-            told["bumps"] = self.bumps
+        told |= {name: getattr(self, name) for name in LATER if getattr(self, name)}
+        if self.hand:
+            told["side"] = self.side
         return {name: round(value, 6) for name, value in told.items()}
 
 
+LATER = ("bumps", "arms", "hand")  # fields that are told where they are not 0
 NOISES = (
     *("encoder_noise", "velocity_noise", "gyro_noise", "accelerometer_noise"),
     *("tilt_drift", "force_noise", "cop_noise"),
@@ -139,4 +149,8 @@ def draw_robot(level: Realism, robot: Robot, rng: np.random.Generator) -> DrawnR
         slope=np.tan(np.radians(number(ground.slope))) * direction(2),
         seed=int(rng.integers(2**63)),
         bumps=number(ground.bumps),
+        arms=number(motors.arms),
+        hand=number(body.hand),
+        side=int(rng.integers(2)),
+        arms_seed=int(rng.integers(2**63)),
     )

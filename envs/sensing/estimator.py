@@ -18,6 +18,7 @@ from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.vectors import axes_of, copy_into, quaternion_of
 from poise.envs.compiled.memory import guarded_zeros
 from poise.envs.compiled.mujoco_calls import mj_step1
+from poise.envs.physics.arms import allocate_arms, begin_arms, move_arms
 from poise.envs.physics.arrays import RobotArrays, SimViews
 from poise.envs.physics.kinematics import StateArrays, update_state
 from poise.envs.physics.simulation import Simulation
@@ -268,6 +269,7 @@ class EstimatedState(StateSource, Copyable):
         self.sensors: Sensors = allocate_sensors(plant.simulation)
         self.bus = self.sensors.bus
         self.motors = allocate_motors(plant.simulation, self.bus)
+        self.arms = allocate_arms(plant.simulation, robot)
         self.known.state_arrays = replace(
             self.known.state_arrays, motor_q=self.bus.q, motor_dq=self.bus.dq
         )
@@ -284,7 +286,7 @@ class EstimatedState(StateSource, Copyable):
             allocate_friction(robot),
             zeros(8, np.int64), zeros((3, 3)), zeros(nv - 6), zeros(nv), zeros(3),
         )  # fmt: skip
-        self.drive = Program.of([(drive_motors, self.motors)])
+        self.drive = Program.of([(drive_motors, self.motors), (move_arms, self.arms)])
         self.sense = Program.of([(measure, self.sensors)])
         self.estimate = Program.of([(believe, self.belief)])
 
@@ -295,6 +297,7 @@ class EstimatedState(StateSource, Copyable):
         """
         self.drawn = drawn
         begin_motors(self.motors, drawn, holding)
+        begin_arms(self.arms, drawn.arms, drawn.arms_seed)
         begin_sensors(self.sensors, drawn, self.simulation.model)
         dt, c = self.arrays.timestep, self.config
         predicted = c.predictor != "none"

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from poise.configs.errors import ConfigError
+from poise.envs.physics.arms import check_arms, find_arms
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import Robot, on_terrain
@@ -15,6 +16,7 @@ from poise.envs.terrain.building import BUILT
 from poise.envs.terrain.bumps import Bumps
 
 from .drawn import DrawnRobot
+from .realism import Realism
 
 #: what an episode changes of a model
 CHANGED = (
@@ -48,6 +50,7 @@ class Plant:
         self._gravity = float(np.linalg.norm(model.opt.gravity))
         self._scratch = mujoco.MjData(model)
         self._loaded = model.body(push_bodies(robot)[0]).id
+        self._hands = [arm.hand for arm in find_arms(robot)]
         self._limit = np.zeros(model.nv)
         self._limit[robot.motor_dofs] = robot.torque_limit
         self._mass = robot.mass
@@ -65,6 +68,8 @@ class Plant:
         model.body_inertia[:] *= drawn.mass_factor[:, None]
         model.body_mass[self._loaded] += drawn.payload * self._mass
         model.body_ipos[self._loaded] += drawn.com_shift
+        if drawn.hand:
+            model.body_mass[self._hands[drawn.side]] += drawn.hand * self._mass
         model.dof_frictionloss[6:] += drawn.joint_friction * self._limit[6:]
         if drawn.friction is not None:
             model.geom_friction[:, 0] = drawn.friction
@@ -90,3 +95,10 @@ class Plant:
         heights = drawn.bumps * np.maximum(rng.uniform(-1.0, 1.0, len(surfaces) - 1), 0.0)
         surfaces[1:, HEIGHT] = heights
         model.geom_pos[self._bumps, 2] -= HIGHEST - np.where(heights > 0.0, heights, -HIGHEST)
+
+
+def check_limbs(level: Realism, robot: Robot) -> None:
+    """Raise ConfigError where a level moves or loads arms, and the robot has none."""
+    for field, spread in (("motors.arms", level.motors.arms), ("body.hand", level.body.hand)):
+        if np.any(spread):
+            check_arms(robot, level.name, field)

@@ -60,6 +60,8 @@ class MotorErrors(RealismPart):
         no_load_speed: Speed at which a motor has no torque left, which falls from half of it on
             [rad/s]; 0: never.
         backlash: Play between a joint and its encoder [rad].
+        arms: Part of the way from the standing posture to the limits of the arms' joints, within
+            which somebody else moves them at random; what they are asked for is not done.
     """
 
     lag: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.1})
@@ -67,6 +69,7 @@ class MotorErrors(RealismPart):
     friction: Spread = field(default=0.0, metadata={"min": 0.0, "max": 1.0})
     no_load_speed: Spread = field(default=0.0, metadata={"min": 0.0})
     backlash: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.2})
+    arms: Spread = field(default=0.0, metadata={"min": 0.0, "max": 1.0, "omit": "default"})
 
 
 @dataclass(frozen=True)
@@ -111,12 +114,14 @@ class BodyErrors(RealismPart):
         mass: Range ± of each body's mass around that of the model.
         scale: Fraction by which all masses are larger.
         payload: Load on the pushed body, over the robot's mass.
+        hand: Load in one hand, over the robot's mass; which one, each episode draws.
     """
 
     com: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.5})
     mass: Spread = field(default=0.0, metadata={"min": 0.0, "max": 0.9})
     scale: Spread = field(default=0.0, metadata={"min": -0.9, "max": 10.0})
     payload: Spread = field(default=0.0, metadata={"min": 0.0, "max": 10.0})
+    hand: Spread = field(default=0.0, metadata={"min": 0.0, "max": 10.0, "omit": "default"})
 
 
 @dataclass(frozen=True)

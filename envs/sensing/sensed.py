@@ -13,7 +13,7 @@ from poise.envs.robots.robot import Robot
 
 from .drawn import DrawnRobot, draw_robot
 from .estimator import RAW, EstimatedState, EstimatorConfig, check_latency
-from .plant import Plant
+from .plant import Plant, check_limbs
 from .realism import Realism, overlaid
 
 
@@ -47,14 +47,15 @@ class SensedRobot:
     def realism(self) -> Realism:
         """What the robot of an episode is drawn from; may be replaced between episodes.
 
-        Raises ConfigError for delays that are longer than what can be led on, and for bumps on a
-        terrain.
+        Raises ConfigError for delays that are longer than what can be led on, for bumps on a
+        terrain, and for what arms do of a robot that has none.
         """
         return self._realism
 
     @realism.setter
     def realism(self, level: Realism) -> None:
         check_latency(level, self.robot.model.opt.timestep)
+        check_limbs(level, self.robot)
         source = self._state_source
         if level.ideal:
             if isinstance(source, EstimatedState):
@@ -130,6 +131,7 @@ class SensedRobot:
             return
         level = overlaid(self.realism, given, "reset: realism") if asked else self.realism
         check_latency(level, self.robot.model.opt.timestep)
+        check_limbs(level, self.robot)
         if level.bumpy and not source.plant.bumpy:
             raise ConfigError("the environment's realism has no bumps, so that none are built",
                               source="reset: realism", field="ground.bumps")  # fmt: skip

@@ -48,14 +48,14 @@ def leaderboard(
     *,
     page: Path | None = None,
 ) -> None:
-    """Write the leaderboard page from benchmarks' results, or that of walks from results of walks.
+    """Write the leaderboard page from benchmarks' results, or that of walks, or of scenarios.
 
     Args:
         results: summary.json of poise benchmark, or of poise evaluate with a suite of walks such
             as walkers, or the folder that holds it. Controllers of later results are added, or
             take the place of earlier ones of their name.
-        page: the Markdown file to write; docs/leaderboard.md, or docs/walking-leaderboard.md for
-            walks, if not given.
+        page: the Markdown file to write; docs/leaderboard.md, docs/walking-leaderboard.md for
+            walks, or docs/scenarios.md for scenarios, if not given.
     """
     from poise.training.benchmarking.results.leaderboard import write_leaderboard
 

@@ -154,12 +154,19 @@ ROBUST = (
     TICK,
 )
 
+# of a scenario
+SPEED = Figure("speed_ahead", "speed", ".2f", "m/s", "ahead, mean over the strides")
+STOOD = Figure("never_fell_rate", "stood", ".0%", "", "trials without a fall",
+               ends="never_fell_ci95")  # fmt: skip
+
 # of training seeds taken together
 OVER_SEEDS = (
     replace(J50_MEAN, words="", ends=""),
     Figure("eta", "η", ".2f"),
     Figure("recovered", "recovered", ".1%"),
 )
+
+ENERGY = Figure("energy_median", "energy", ".0f", "J", "of trials without a fall")
 
 # of a controller at a level of realism
 J50_KEPT = Figure("j50_kept", "J50 kept", ".2f", words="over that of the first level",
@@ -170,7 +177,7 @@ AT_LEVEL = (
     RECOVERED,
     Figure("stood", "stood", ".0f", words="unpushed, without a fall", of="unpushed"),
     CHATTER,
-    Figure("energy_median", "energy", ".0f", "J", "of trials without a fall"),
+    ENERGY,
 )  # fmt: skip
 
 # of a cause of lost trials

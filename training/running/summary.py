@@ -292,6 +292,18 @@ class RealismLevel(LevelRate, total=False):
     energy_median: Number
 
 
+class ScenarioCounts(Counts):
+    """Trials of a scenario."""
+
+    scenario: str
+
+
+class ScenarioFigures(ScenarioCounts, total=False):
+    """The same, with the mean speed of a walk [m/s], see `Outcome`."""
+
+    speed_ahead: Number
+
+
 class Fractions(TypedDict, total=False):
     """The fraction of the limit at which half of the random pushes are recovered."""
 
@@ -331,6 +343,7 @@ class Entry(Played, Counts, EnvelopeFigures, Fractions, total=False):
     motions: list[MotionLevel]
     levels: list[RealismLevel]
     in_motion: list[InMotion]
+    scenarios: list[ScenarioFigures]
 
 
 class Paired(TypedDict, total=False):

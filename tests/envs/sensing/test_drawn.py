@@ -62,6 +62,15 @@ def test_measured_means_that_a_sensor_errs():
     assert set(NOISES) <= {sensor.name for sensor in fields(SensorErrors)}
 
 
+def test_later_fields_leave_the_others_as_they_were():
+    """A seed's robot in `field` is the one that it was before there were arms and hands."""
+    first = drawn_of("field", 3)
+    other = drawn_of({"base": "field", "motors": {"arms": 0.5}, "body": {"hand": [0.1, 0.2]}}, 3)
+    assert first.seed == 5042854753669335956 and first.payload == 0.09094545797692971
+    assert same(first, other, "arms", "hand") and other.arms == 0.5 and 0.1 <= other.hand <= 0.2
+    assert other.summary(0.002)["side"] in (0, 1) and "arms" not in first.summary(0.002)
+
+
 def test_the_summary_is_in_units():
     """Seconds and degrees; what the robot has of its own is not told."""
     level = {"latency": {"sense": 0.006}, "ground": {"slope": 2.0}, "body": {"com": 0.02}}

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from poise.configs.errors import ConfigError
+from poise.envs.balance.position import PositionBalanceEnv
+from poise.envs.physics.arms import find_arms
 from poise.envs.physics.pushes.sampler import push_bodies
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import on_terrain
@@ -159,3 +161,40 @@ def test_a_foot_stands_on_a_bump(bumpy):
 def test_bumps_need_level_ground():
     with pytest.raises(ConfigError, match="realism: ground.bumps: only on level ground"):
         Plant(on_terrain(robot(), Bumps()), bumpy=True)
+
+
+def test_a_load_is_in_the_hand_that_was_drawn():
+    """In the hand that was drawn alone; it weighs on the root, and pulls to its side."""
+    sides, moments = set(), {}
+    for seed in range(8):
+        plant = Plant(robot())
+        drawn = drawn_of({"body": {"hand": 0.05}}, seed)
+        plant.become(drawn)
+        hand = find_arms(robot())[drawn.side].hand
+        added = plant.simulation.model.body_mass - robot().model.body_mass
+        assert added[hand] == pytest.approx(0.05 * robot().mass) and np.count_nonzero(added) == 1
+        if drawn.side in sides:
+            continue
+        sides.add(drawn.side)
+        simulation = plant.simulation
+        model, data = simulation.model, simulation.data
+        data.qpos[:] = robot().standing_qpos
+        data.qvel[:] = 0.0
+        mujoco.mj_inverse(model, data)  # at rest: the force that must come from outside
+        bare = mujoco.MjData(robot().model)
+        bare.qpos[:] = robot().standing_qpos
+        mujoco.mj_inverse(robot().model, bare)
+        more = data.qfrc_bias[:6] - bare.qfrc_bias[:6]
+        np.testing.assert_allclose(more[2], 0.05 * robot().units.force, rtol=1e-9)
+        moments[drawn.side] = more[3]
+    assert sides == {0, 1} and moments[0] > 0.1 and moments[1] == pytest.approx(-moments[0])
+
+
+def test_the_ground_bears_the_load_of_a_hand():
+    """Standing by servos for 2 s: the soles' force is the weight of robot and load."""
+    env = PositionBalanceEnv(robot(), realism={"body": {"hand": 0.05}}, pushes=None)
+    env.reset(seed=1, options={"noise": 0.0})
+    for _ in range(100):
+        env.step_without_info(np.zeros(len(env.action_names)))
+    force = env.data.qfrc_constraint[2]
+    assert force == pytest.approx(1.05 * robot().units.force, rel=0.01)

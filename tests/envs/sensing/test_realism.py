@@ -11,7 +11,8 @@ from poise.envs.sensing.realism import Realism, load_realism, overlaid
 def test_levels_by_name_file_and_mapping(tmp_path):
     """A base gives the fields that are not given; nothing at all is ideal."""
     assert set(packaged("realism")) == {
-        *("ideal", "lab", "field", "late", "late-underrated", "late-overrated")
+        *("ideal", "lab", "field", "late", "late-underrated", "late-overrated"),
+        *("arms", "hand-load"),
     }
     assert load_realism(None) == load_realism("ideal") == Realism() and Realism().ideal
     lab = load_realism("lab")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from itertools import combinations, pairwise
@@ -30,6 +30,7 @@ from poise.training.benchmarking.suites.plan import Plan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.agents import (
     Agent,
+    can_walk,
     check_follows,
     check_may_walk,
     check_walks,
@@ -120,8 +121,8 @@ class Run:
             motions=self.repertoire.digests,
         )
 
-    def _plan(self, seed: int, names: Sequence[str]) -> Plan:
-        return Plan(self.suite, self.limits, seed, names, self.repertoire.durations)
+    def _plan(self, seed: int, names: Sequence[str], standing: Collection[str] = ()) -> Plan:
+        return Plan(self.suite, self.limits, seed, names, self.repertoire.durations, standing)
 
     def play(self, plots: bool = False, timed: bool = False) -> Summary:
         """Play what is missing and write the result; returns the summary."""
@@ -134,7 +135,8 @@ class Run:
             self.repertoire.write(self.out)
             names = tuple(folder.settings.controllers)
             agents = {name: self.agents[name] for name in names}
-            plan = self._plan(self.settings.seed, names)
+            standing = [name for name, agent in agents.items() if not can_walk(agent)]
+            plan = self._plan(self.settings.seed, names, standing if self.suite.scenarios else ())
             _warm_up(agents.values())
             self._play(folder, plan)
             played: dict[str, Played] = {
@@ -224,7 +226,12 @@ class Run:
             return sorted(jobs, key=lambda job: job.trial.number)
 
         def stages() -> Iterator[list[Job]]:
-            yield missing((name, trial) for trial in plan.first for name in plan.names)
+            yield missing(
+                (name, trial)
+                for trial in plan.first
+                for name in plan.names
+                if plan.plays(name, trial)
+            )
             second = plan.second(folder.finished)
             yield missing((name, trial) for name, trials in second.items() for trial in trials)
 

@@ -1,4 +1,4 @@
-"""Tables of walks, motions and levels: by command, by the phase of a push, by motion, by level."""
+"""Tables of walks, motions, levels and scenarios: by command, by phase, by motion, by name."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,10 +16,11 @@ from poise.training.running.columns import (
     NONE,
     PERFORMED,
     STEPS,
+    STOOD,
     TRIED,
     known,
 )
-from poise.training.running.summary import Summary
+from poise.training.running.summary import ScenarioFigures, Summary
 from poise.training.running.tables import figure_table, text_table
 
 ALL = "all"  # motions of a suite
@@ -88,3 +89,28 @@ def level_tables(summary: Summary) -> Iterator[Table]:
     ]
     if figures := known(AT_LEVEL, [level for _, level in rows]):
         yield figure_table("at levels of realism", ["controller", "level"], figures, rows)
+
+
+def scenario_names(summary: Summary) -> list[str]:
+    """The scenarios that any controller has played, in the order of the suite."""
+    entries = summary["controllers"].values()
+    most = max(([each["scenario"] for each in entry.get("scenarios", ())] for entry in entries),
+               key=len, default=[])  # fmt: skip
+    others = (each["scenario"] for entry in entries for each in entry.get("scenarios", ()))
+    return list(dict.fromkeys([*most, *others]))
+
+
+def scenario_cell(found: ScenarioFigures | None) -> str:
+    """The share of a scenario's trials without a fall."""
+    return NONE if found is None else STOOD.text(found)
+
+
+def scenario_tables(summary: Summary) -> Iterator[Table]:
+    """One of all controllers and scenarios, if the suite has any."""
+    if names := scenario_names(summary):
+        rows = []
+        for controller in summary["ranking"]:
+            found = summary["controllers"][controller].get("scenarios", ())
+            own = {each["scenario"]: each for each in found}
+            rows.append([controller, *(scenario_cell(own.get(name)) for name in names)])
+        yield text_table("without a fall", ["controller"], names, rows)

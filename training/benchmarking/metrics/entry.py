@@ -39,6 +39,7 @@ from .played import (
     sectors,
     won,
 )
+from .scenarios import scenario_figures
 from .walking import phase_figures, walk_levels
 
 
@@ -61,6 +62,8 @@ def controller_entry(played: Played, plan: Plan, steps: NStepLimit | None = None
         entry["walks"] = walks
     if motions := motion_levels(played):
         entry["motions"], entry["in_motion"] = motions, in_motion(played)
+    if scenarios := scenario_figures(played, counts):
+        entry["scenarios"] = scenarios
     if random := part(played, "random"):
         entry.update(_fractions(random, plan.limits))
     if factors := factor_figures(part(played, "factors"), plan.standard):

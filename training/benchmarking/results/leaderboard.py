@@ -27,10 +27,12 @@ from poise.training.running.columns import (
 from poise.training.running.files import SUMMARY
 from poise.training.running.summary import Entry, Summary
 
+from .scenario_page import is_of_scenarios, scenario_page
 from .summary import read_summary
 from .walking_leaderboard import is_of_walks, walking_leaderboard
 
 PAGE, WALKING_PAGE = Path("docs/leaderboard.md"), Path("docs/walking-leaderboard.md")
+SCENARIO_PAGE = Path("docs/scenarios.md")
 HEAD = """# Leaderboard{of}
 
 <!-- Written by `poise leaderboard {source}`: change the result, not this page. -->
@@ -60,21 +62,28 @@ SAME: Final = (
 def write_leaderboard(sources: Sequence[str | Path], page: str | Path | None = None) -> Path:
     """Write the page from files summary.json that have J50s, or folders that hold one; returns it.
 
-    Results of a suite that walks make the page of walks, and results of both kinds none. Without a
-    `page` it is `PAGE` or `WALKING_PAGE`. Raises ConfigError for another file, or of another
-    suite, seed, robot or reference than the first; PoiseError when the page cannot be written.
+    Results of a suite that walks make the page of walks, those of scenarios theirs, and results of
+    two kinds none. Without a `page` it is the kind's own. Raises ConfigError for another file, or
+    of another suite, seed, robot or reference than the first; PoiseError when the page cannot be
+    written.
     """
     summaries = {}
     for source in sources:
         path = Path(source)
         path = path / SUMMARY if is_folder(path) else path
         summaries[str(source)] = read_summary(path)
-    walks = {source: is_of_walks(summary) for source, summary in summaries.items()}
-    for source, of_walks in walks.items():
-        if of_walks != next(iter(walks.values())):
-            raise ConfigError("is not of walks as the first is, or the other way round",
+    kinds = {source: (is_of_walks(summary), is_of_scenarios(summary))
+             for source, summary in summaries.items()}  # fmt: skip
+    walks, scenarios = next(iter(kinds.values()))
+    for source, kind in kinds.items():
+        if kind != (walks, scenarios):
+            of = "scenarios" if kind[1] != scenarios else "walks"
+            raise ConfigError(f"is not of {of} as the first is, or the other way round",
                               source=source, field="suite")  # fmt: skip
-    if all(walks.values()):
+    if scenarios:
+        page = Path(page or SCENARIO_PAGE)
+        write_atomic(page, scenario_page(summaries, str(page)))
+    elif walks:
         page = Path(page or WALKING_PAGE)
         write_atomic(page, walking_leaderboard(summaries))
     else:

@@ -18,6 +18,7 @@ from poise.training.running.summary import Summary
 
 from .summary import read_summary
 
+LATER = (*DIAGNOSIS_COLUMNS, "until")  # columns that older results lack
 FLAGS = {"True": True, "False": False}
 
 
@@ -62,7 +63,7 @@ class Record:
     @cached_property
     def met(self) -> tuple[str, ...]:
         """Equal for two controllers that met the same: trials of one number may differ."""
-        return tuple(self.line[name] for name in CASE_COLUMNS if name != "controller")
+        return tuple(self.line.get(name, "") for name in CASE_COLUMNS if name != "controller")
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ def load_results(folder: str | Path) -> Results:
 def _records(path: Path) -> tuple[Record, ...]:
     columns, lines = read_table(path, ": run the same command again, it writes the file anew "
                                 "without playing a trial")  # fmt: skip
-    lacking = [name for name in COLUMNS if name not in (*columns, *DIAGNOSIS_COLUMNS)]
+    lacking = [name for name in COLUMNS if name not in (*columns, *LATER)]
     if lacking:
         raise ConfigError(f"lacks the columns {', '.join(lacking)}", source=path)
     return tuple(_record(line, number, path) for number, line in enumerate(lines, 2))

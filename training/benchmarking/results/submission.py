@@ -18,7 +18,7 @@ from .read import Results, load_results
 PACKED = (SETTINGS, TRIALS, SUMMARY)
 MANIFEST = "submission.json"
 MOST_BYTES = 256 * 2**20  # of a file
-SUITES = ("standard", "standard-wide", "wide-grid", "walkers", "realistic")
+SUITES = ("standard", "standard-wide", "wide-grid", "walkers", "realistic", "scenarios")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of every member: the same result gives the same bytes
 
 

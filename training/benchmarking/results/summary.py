@@ -45,6 +45,8 @@ def read_summary(path: str | Path) -> Summary:
         for factor in entry.get("factors", ()):
             for level in factor["levels"]:
                 _check_rate(level, path, f"controllers.{name}.factors")
+        for each in entry.get("scenarios", ()):
+            _check_rate(each, path, f"controllers.{name}.scenarios")
         for at in entry.get("levels", ()):
             _check_rate(at, path, f"controllers.{name}.levels")
             _check_together(at, LEVEL, path, f"controllers.{name}.levels")

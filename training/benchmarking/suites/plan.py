@@ -1,11 +1,12 @@
 """All trials of a suite for a robot, as far as they are known."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from poise.envs.sensing.realism import IDEAL
+from poise.envs.sensing.plant import check_limbs
+from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome, Trial
 
@@ -35,7 +36,8 @@ class Plan:
         limits: what pushes are measured by.
         names: of the controllers.
         motions: name → duration [s] of the motions that are performed.
-        first: trials of the first stage, which all controllers play.
+        standing: of `names` those that do not walk, and play no scenario in which one does.
+        first: trials of the first stage, which all controllers play but for that.
         standard: factor → level of the standard case, as text; empty without factors.
         count: trials of all stages and controllers.
     """
@@ -47,8 +49,10 @@ class Plan:
         seed: int,
         names: Sequence[str],
         motions: Mapping[str, float] | None = None,
+        standing: Collection[str] = (),
     ):
         self.suite, self.limits, self.names = suite, limits, tuple(names)
+        self._standing = frozenset(standing)
         self._draw = Draw(suite, limits, seed, motions)
         self.standard = standard_levels(self._draw) if suite.factors else {}
         self._parts: list[_Planned] = []
@@ -66,7 +70,14 @@ class Plan:
                     number += following - drawn
                 drawn = following
         self.first = [trial for planned in self._parts for trial in planned.first]
-        self.count = number * len(self.names)
+        walked = sum(bool(trial.commands) for trial in self.first)
+        self.count = number * len(self.names) - walked * len(self._standing)
+        for real in dict.fromkeys(trial.conditions.realism for trial in self.first):
+            check_limbs(load_realism(real), limits.robot)
+
+    def plays(self, name: str, trial: Trial) -> bool:
+        """Whether the controller of this name plays a trial of the first stage."""
+        return name not in self._standing or not trial.commands
 
     def _at(self, level: str | None, shift: int, trials: list[Trial]) -> list[Trial]:
         """The trials at a level; None: the suite's, where they have none of their own."""
@@ -88,7 +99,11 @@ class Plan:
         chosen: dict[str, list[Trial]] = {name: [] for name in self.names}
         for part, level, first, number, shift in self._parts:
             recovered = {
-                name: [finished[name, trial.number].recovered for trial in first]
+                name: [
+                    finished[name, trial.number].recovered
+                    for trial in first
+                    if self.plays(name, trial)
+                ]
                 for name in self.names
             }
             for name, trials in part.second(self._draw, number, first, recovered).items():
@@ -98,8 +113,12 @@ class Plan:
     def trials(self, finished: Finished) -> dict[str, list[Trial]]:
         """controller → all its trials, by number."""
         second = self.second(finished)
-        return {name: sorted([*self.first, *second[name]], key=lambda trial: trial.number)
-                for name in self.names}  # fmt: skip
+        first = {name: [trial for trial in self.first if self.plays(name, trial)]
+                 for name in self.names}  # fmt: skip
+        return {
+            name: sorted([*first[name], *second[name]], key=lambda trial: trial.number)
+            for name in self.names
+        }
 
 
 def at_level(part: str, level: str) -> str:

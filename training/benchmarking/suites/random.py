@@ -32,11 +32,11 @@ class Random(Part):
     def __post_init__(self) -> None:
         if self.pushes.count != (1, 1):
             raise ValueError("pushes: a trial has exactly one push, and it is a force")
-        _check_forces(self.pushes)
+        check_forces(self.pushes)
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
         limits = draw.limits
-        sampler = _measured(replace(self.pushes, bodies=self.pushes.bodies or draw.bodies), limits)
+        sampler = measured(replace(self.pushes, bodies=self.pushes.bodies or draw.bodies), limits)
         trials = []
         for here in range(number, number + self.trials):
             rng = generator(draw.seed, here)
@@ -69,13 +69,13 @@ class Sequence(Part):
     def __post_init__(self) -> None:
         if self.pushes.count[0] < 2:
             raise ValueError("pushes: a trial has at least two, and they are forces")
-        _check_forces(self.pushes)
+        check_forces(self.pushes)
         check_rising(self.later, "later")
 
     def first(self, draw: Draw, number: int) -> list[Trial]:
         limits = draw.limits
         bodies = self.pushes.bodies or draw.bodies[:1]
-        sampler, trials = _measured(replace(self.pushes, bodies=bodies), limits), []
+        sampler, trials = measured(replace(self.pushes, bodies=bodies), limits), []
         for here in range(number, number + self.trials):
             rng = generator(draw.seed, here)
             drawn = sampler.sample(rng, limits.robot, limits.margin, limits.table)
@@ -96,14 +96,15 @@ class Quiet(Part):
         return [draw.trial(k, (), part="quiet") for k in range(number, number + self.trials)]
 
 
-def _measured(sampler: PushSampler, limits: PushLimits) -> PushSampler:
-    """The sampler, by the ankle limit where no J50 of the robot was measured."""
+def measured(sampler: PushSampler, limits: PushLimits) -> PushSampler:
+    """Return the sampler, by the ankle limit where no J50 of the robot was measured."""
     if sampler.unit == "controller_fraction" and limits.table is None:
         return replace(sampler, unit="ankle_fraction")
     return sampler
 
 
-def _check_forces(pushes: PushSampler) -> None:
+def check_forces(pushes: PushSampler) -> None:
+    """Raise ValueError for pushes that are no forces, or not in every trial."""
     if pushes.no_push or pushes.unit == "delta_v":
         raise ValueError("pushes: they are forces, in every trial")
     if pushes.limit_table is not None:

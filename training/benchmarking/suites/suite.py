@@ -18,6 +18,7 @@ from .draw import Part, Standard
 from .factors import Factors, Mix
 from .motions import Motions
 from .random import Quiet, Random, Sequence
+from .scenarios import Scenarios
 from .walking import WALKING, Gait, Terrains, Velocity, Walk, WalkKick, WalkPush, WalkRepeated
 
 
@@ -45,6 +46,7 @@ class Suite(Standard):
     walk_repeated: WalkRepeated | None = field(default=None, metadata={"omit": "default"})
     terrains: Terrains | None = field(default=None, metadata={"omit": "default"})
     motions: Motions | None = field(default=None, metadata={"omit": "default"})
+    scenarios: Scenarios | None = field(default=None, metadata={"omit": "default"})
     levels: tuple[str, ...] = field(default=(), metadata={"omit": "default"})
 
     def __post_init__(self) -> None:
@@ -54,6 +56,10 @@ class Suite(Standard):
             raise ValueError("walk_push: J50 is that of a walk or of standing, not of both")
         if self.motions is not None and len(self.parts) > 1:
             raise ValueError("motions: must be the only part: what a fall is, depends on them")
+        if self.scenarios is not None and (len(self.parts) > 1 or self.levels):
+            raise ValueError("scenarios: must be the only part, each of them at its own level")
+        if self.scenarios is not None and self.scenarios.duration > self.duration:
+            raise ValueError(f"duration: a scenario lasts {self.scenarios.duration:g} s")
         stems = [Path(level).stem for level in (self.realism, *self.levels)]
         for stem in stems:
             if stems.count(stem) > 1:

@@ -96,9 +96,13 @@ def load_agent(name: str, robot: Robot, **overrides: Any) -> Agent:
 
 def check_walks(name: str, agent: Agent, source: str) -> None:
     """Raise ConfigError unless the controller of an agent walks; `source` is what asks for it."""
-    env = agent.env
-    if not isinstance(env, ResidualBalanceEnv) or env.command is None:
+    if not can_walk(agent):
         raise does_not_walk(name, source)
+
+
+def can_walk(agent: Agent) -> bool:
+    """Whether the controller of an agent takes commands of a walk."""
+    return isinstance(agent.env, ResidualBalanceEnv) and agent.env.command is not None
 
 
 def check_may_walk(name: str, source: str) -> ControllerConfig | None:

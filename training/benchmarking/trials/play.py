@@ -41,6 +41,8 @@ class SteppedTrial:
 
     def __init__(self, agent: Agent, trial: Trial):
         self._agent, self.done, env = agent, False, agent.env
+        until, period = trial.until, env.config.policy_period
+        self._steps = env.max_steps if until is None else round(until / period)
         self._observation, _ = env.reset(seed=trial.seed, options=trial.options)
         if agent.begin is not None:
             agent.begin()
@@ -53,7 +55,7 @@ class SteppedTrial:
         env, action = self._agent.env, self._agent.act(self._observation)
         _, terminated, truncated = env.step_without_info(action)
         self._observation = env.episode.observation.astype(np.float32)
-        self.done = terminated or truncated
+        self.done = terminated or truncated or env.steps >= self._steps
         if self.tracking is not None:
             self.tracking.update()
             self.done |= self.tracking.ended

@@ -24,7 +24,7 @@ CONDITION_COLUMNS = tuple(Conditions.__dataclass_fields__)
 CASE_COLUMNS = (
     *("trial", "controller", "seed", "stage", "part", "factor", "level"),
     *(*PUSH_COLUMNS, *CONDITION_COLUMNS, "limit_fraction", "later", "commands", "kicks", "terrain"),
-    *("motion", "share"),
+    *("motion", "share", "until"),
 )
 OUTCOME_COLUMNS = tuple(
     "stepped" if name == "foot_displaced" else name for name in Outcome.__dataclass_fields__
@@ -56,6 +56,7 @@ def trial_row(trial: Trial, controller: str, outcome: Outcome) -> dict[str, Cell
         "terrain": None if trial.terrain is None else json.dumps(to_dict(trial.terrain)),
         "motion": trial.motion,
         "share": trial.share,
+        "until": trial.until,
         **outcome_cells(outcome),
     }
 
@@ -110,6 +111,7 @@ def read_trial(line: Mapping[str, str], path: Path) -> Trial:
             else None,
             motion=line["motion"] or None,
             share=_number(line["share"]),
+            until=_number(line.get("until", "")),
         )
     except (ValueError, TypeError) as error:
         raise ConfigError(f"trial {line['trial']} does not parse: {error}", source=path) from None

@@ -51,6 +51,7 @@ class Trial:
         terrain: that it is played on; None: that of the environment.
         motion: that is performed, by its name in the suite; None: that of the environment.
         share: of the controller's J50 that the push is.
+        until: when it ends [s]; None: when those of its suite do.
     """
 
     number: int
@@ -67,6 +68,7 @@ class Trial:
     terrain: Terrain | None = None
     motion: str | None = None
     share: float | None = None
+    until: float | None = None
 
     @property
     def command(self) -> TimedCommand | None:

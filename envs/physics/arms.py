@@ -1,0 +1,143 @@
+"""The arms of a robot, and somebody else who moves them: nothing that a controller asks is done."""
+
+from dataclasses import dataclass
+from itertools import chain
+
+import mujoco
+import numpy as np
+
+from poise.configs.errors import ConfigError
+from poise.envs.compiled.block import Block
+from poise.envs.compiled.jit import compiled
+from poise.envs.compiled.maths.easing import eased
+from poise.envs.compiled.maths.noise import uniform
+from poise.envs.compiled.memory import guarded_zeros
+from poise.envs.robots.description import match_names
+from poise.envs.robots.robot import Robot
+
+from .arrays import RobotArrays, SimViews
+from .simulation import Simulation
+
+ROLES = ("shoulder_pitch_left", "shoulder_pitch_right")
+RATE = 15.0  # [rad/s] natural frequency of the servos that move the arms
+PERIOD = 1.0  # [s] from one posture of the arms to the next
+
+
+@dataclass(frozen=True)
+class Arm:
+    """The joints (of robot.joint_names) from a shoulder on, and the body of the last one."""
+
+    joints: tuple[int, ...]
+    hand: int
+
+
+def find_arms(robot: Robot) -> tuple[Arm, ...]:
+    """The left and the right arm: all that the body with a role's first joint carries.
+
+    None for a robot whose description does not say which joints pitch its shoulders.
+    """
+    model, roles, names = robot.model, robot.description.roles, list(robot.joint_names)
+    if not all(role in roles for role in ROLES):
+        return ()
+    arms = []
+    for role in ROLES:
+        said = match_names(roles[role], names, robot.name, f"roles.{role}")
+        shoulder = int(model.joint(min(said, key=names.index)).bodyid[0])
+        joints = [j for j in range(1, model.njnt) if _carries(model, shoulder, j)]
+        deep = max(joints, key=lambda joint: _depth(model, int(model.jnt_bodyid[joint])))
+        arms.append(Arm(tuple(j - 1 for j in joints), int(model.jnt_bodyid[deep])))
+    return tuple(arms)
+
+
+def check_arms(robot: Robot, source: str, field: str) -> None:
+    """Raise ConfigError for a robot of which no arms are known, where `field` needs some."""
+    if not find_arms(robot):
+        raise ConfigError(f"the robot {robot.name} has no arms: its description has not the roles "
+                          f"{' and '.join(ROLES)}", source=source, field=field,
+                          choices=robot.description.roles or ("no roles",))  # fmt: skip
+
+
+def _carries(model: mujoco.MjModel, shoulder: int, joint: int) -> bool:
+    body = int(model.jnt_bodyid[joint])
+    while body not in (0, shoulder):
+        body = int(model.body_parentid[body])
+    return body == shoulder
+
+
+def _depth(model: mujoco.MjModel, body: int) -> int:
+    return 0 if body == 0 else 1 + _depth(model, int(model.body_parentid[body]))
+
+
+@dataclass(frozen=True, eq=False)
+class MovedArms(Block):
+    """Servos of somebody else on the motors of both arms (n)."""
+
+    robot: RobotArrays
+    views: SimViews
+    motors: np.ndarray  # (n,) int: of the arms
+    moved: np.ndarray  # (1,) int: 1 where somebody moves them
+    step: np.ndarray  # (1,) int: physics steps since the reset
+    period: int  # physics steps from one posture to the next
+    seed: np.ndarray  # (1,) uint64, see `uniform`
+    stand: np.ndarray  # (n,) standing posture [rad]
+    reach: np.ndarray  # (n, 2) the way from there to the joint's limits [rad]
+    part: np.ndarray  # (1,) of that way
+    last: np.ndarray  # (n,) posture that is left [rad]
+    goal: np.ndarray  # (n,) posture that is next [rad]
+    inertia: np.ndarray  # (n,) of each joint, standing [kg·m²]
+
+
+def allocate_arms(simulation: Simulation, robot: Robot) -> MovedArms:
+    """The arms of the robot that is known, which nobody else moves yet."""
+    joints = set(chain.from_iterable(arm.joints for arm in find_arms(robot)))
+    motors = [i for i, dof in enumerate(robot.motor_dofs) if dof - 6 in joints]
+    dofs = robot.motor_dofs[motors]
+    stand, zeros = robot.standing_qpos[dofs + 1], guarded_zeros
+    span = robot.joint_range[dofs - 6] - stand[:, None]
+    inertia = np.diag(Simulation(robot).state.M)[dofs]
+    return MovedArms(
+        robot=simulation.arrays,
+        views=simulation.views,
+        motors=np.array(motors, dtype=np.int64),
+        moved=zeros(1, np.int64),
+        step=zeros(1, np.int64),
+        period=round(PERIOD / simulation.arrays.timestep),
+        seed=zeros(1, np.uint64),
+        stand=stand,
+        reach=np.clip(span, -np.pi, np.pi),
+        part=zeros(1),
+        last=zeros(len(motors)),
+        goal=zeros(len(motors)),
+        inertia=inertia,
+    )
+
+
+def begin_arms(a: MovedArms, part: float, seed: int) -> None:
+    """Start an episode from the standing posture, in which `part` is 0 where nobody moves them."""
+    a.part[0], a.moved[0], a.step[0] = part, int(part > 0.0), 0
+    a.seed[0], a.goal[:] = seed, a.stand
+
+
+@compiled
+def move_arms(a: MovedArms):
+    """Replace the torques that act on the arms' motors by those of somebody else.
+
+    Once a period a posture is drawn within `part` of the way to each joint's limits, and reached
+    with the least jerk: τ = I ω² (q* − q) − 2 I ω q̇, within the motor's limit. `views.ctrl` stays
+    what the controller asks for.
+    """
+    if not a.moved[0]:
+        return
+    within = a.step[0] % a.period
+    a.step[0] += 1
+    for k in range(a.motors.shape[0]):
+        if within == 0:
+            a.last[k] = a.goal[k]
+            way = a.reach[k, 0] + uniform(a.seed) * (a.reach[k, 1] - a.reach[k, 0])
+            a.goal[k] = a.stand[k] + a.part[0] * way
+        i = a.motors[k]
+        dof, most = a.robot.motor_dofs[i], a.robot.torque_limit[i]
+        target = a.last[k] + (a.goal[k] - a.last[k]) * eased(within / a.period)
+        torque = RATE * RATE * (target - a.views.qpos[dof + 1]) - 2.0 * RATE * a.views.qvel[dof]
+        torque = min(max(a.inertia[k] * torque, -most), most)
+        a.views.qfrc_applied[dof] = torque - a.views.ctrl[i]
