@@ -1,6 +1,7 @@
 """Motions are performed: errors are small where the robot stands, and falls are counted."""
 
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -43,8 +44,8 @@ def test_a_motion_in_field_is_off_by_what_sensors_are_off_and_does_not_fall() ->
 
 def test_a_row_of_levels_has_falls_and_means_of_those_that_stay_up() -> None:
     figures = {"placement_error": np.nan, "interruptions": np.nan, "walked": np.nan}
-    up, down = (
-        SimpleNamespace(fallen=fallen, body_error=error, sole_slide=2e-3, **figures)
+    up, down = (  # Any: of `Followed` it has what is read
+        cast(Any, SimpleNamespace)(fallen=fallen, body_error=error, sole_slide=2e-3, **figures)
         for fallen, error in ((False, 0.03), (True, 0.9))
     )
     assert row_of([up, down]) == ["1 of 2", "30.0", "2.0", "", ""]
