@@ -1,6 +1,7 @@
 """Motions are performed: errors are small where the robot stands, and falls are counted."""
 
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from poise.configs.errors import ConfigError
 from poise.training.benchmarking.trials.push_limits import load_limits
 from poise.training.motion.following.fastest import fastest
 from poise.training.motion.following.follow import follow
+from tests.performance.motions_in_field import row_of
 from tests.support.captures import make
 from tests.support.physics import robot_named
 
@@ -27,6 +29,31 @@ def test_a_packaged_clip_is_followed() -> None:
     assert not trial.fallen and trial.solver_failures == 0
     assert 0.0 < np.degrees(trial.joint_rms) < 3.0
     assert 0.0 < trial.body_error < 0.02 and trial.body_error_root < 0.02
+
+
+def test_a_motion_in_field_is_off_by_what_sensors_are_off_and_does_not_fall() -> None:
+    """Its errors are the true robot's: centimetres, where an exact state leaves millimetres."""
+    robot = robot_named("humanoid")
+    ideal, field = (
+        follow("bow", robot=robot, starts=3, seed=25, realism=level) for level in (None, "field")
+    )
+    assert not any(trial.fallen for trial in [*ideal, *field])
+    assert max(trial.body_error for trial in ideal) < 6e-3
+    assert 1e-2 < np.mean([trial.body_error for trial in field]) < 6e-2
+
+
+def test_a_row_of_levels_has_falls_and_means_of_those_that_stay_up() -> None:
+    figures = {"placement_error": np.nan, "interruptions": np.nan, "walked": np.nan}
+    up, down = (  # Any: of `Followed` it has what is read
+        cast(Any, SimpleNamespace)(fallen=fallen, body_error=error, sole_slide=2e-3, **figures)
+        for fallen, error in ((False, 0.03), (True, 0.9))
+    )
+    assert row_of([up, down]) == ["1 of 2", "30.0", "2.0", "", ""]
+    up.walked, up.placement_error = 0.97, 4e-3
+    assert row_of([up, down]) == ["1 of 2", "", "", "", "97"]
+    up.walked, up.interruptions = np.nan, 1.0
+    assert row_of([up, down]) == ["1 of 2", "30.0", "4.0", "1.0", ""]
+    assert row_of([down]) == ["1 of 1", "", "", "", ""]
 
 
 def test_a_hard_push_is_a_fall_and_standing_is_none() -> None:
