@@ -6,13 +6,14 @@ from typing import Any, Literal
 
 from poise.baselines.balance.references.motion import load_motion
 from poise.baselines.balance.references.tempo import Tempo
+from poise.baselines.balance.stepping.planning.config import CaptureStepConfig
 from poise.baselines.environments.hand_over import HandOverConfig
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import ResidualScales, StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.baselines.environments.walking import ResidualWalkEnv
 from poise.baselines.environments.whole import ResidualWholeEnv
-from poise.baselines.registry import controller_config
+from poise.baselines.registry import ControllerConfig, controller_config
 from poise.baselines.walking.schedule import CommandSampler
 from poise.configs.files import resolve
 from poise.configs.schema import build, on_base, read_yaml
@@ -230,7 +231,7 @@ class TrainConfig:
             arguments = {"servos": self.servos, **overrides}
             return PositionBalanceEnv(robot or self.robot, self.env, **arguments)
         if "controller" not in overrides:  # an environment takes a name for what the user says
-            overrides["controller"] = controller_config(self.controller)
+            overrides["controller"] = self.controller_below()
         kinds: dict[str, tuple[type[ResidualBalanceEnv], dict[str, Any]]] = {
             "residual": (ResidualBalanceEnv, {"residual": self.residual}),
             "step": (ResidualStepEnv, {"residual": self.step_residual}),
@@ -241,6 +242,13 @@ class TrainConfig:
         common = {"motion": (*self.motions, self.motion)[0], "tempo": self.tempo,
                   "smoothing": self.smoothing, "gate": self.gate}  # fmt: skip
         return kind(robot or self.robot, self.env, **{**common, **own, **overrides})
+
+    def controller_below(self) -> ControllerConfig:
+        """The controller below; what was learned where it is uncertain was learned on its gains."""
+        config = controller_config(self.controller)
+        if self.env.realism.uncertain and isinstance(config, CaptureStepConfig):
+            return replace(config, uncertain=None)
+        return config
 
     def replicate(self, env: BalanceEnv, count: int) -> list[BalanceEnv]:
         """`env` and more like it, `count` in all; with `motions` they perform these in turn.

@@ -172,7 +172,7 @@ def _policy(name: str, robot: Robot, overrides: dict[str, object]) -> Agent:
     world = {k: v for k, v in to_dict(policy.config).items() if k not in TRAINING}
     below = controller_fingerprint(policy.config)
     if below:
-        below += _stand_in(controller_config(policy.config.controller))
+        below += _stand_in(policy.config.controller_below())
     content = _hash(to_yaml(world).encode(), below.encode(), *policy.content())
     return Agent(name, env, policy.act, content, timesteps=policy.state["timesteps"])
 
