@@ -15,6 +15,7 @@ import yaml
 from stable_baselines3.common.evaluation import evaluate_policy
 
 import poise
+from poise.baselines.registry import controller_config
 from poise.configs.errors import ConfigError, PoiseWarning
 from poise.configs.files import resolve
 from poise.envs import load_robot, replicate
@@ -147,6 +148,16 @@ def test_an_environment_is_made_from_a_policy_or_a_configuration():
         assert env.config.duration == 0.1 and env.controller is not None
     with pytest.raises(ConfigError, match="no such folder, and no packaged policy"):
         poise.make_env("residul")
+
+
+def test_what_was_learned_in_field_stays_on_its_gains():
+    """There another controller takes the place of `walk` alone, and under an ideal policy."""
+    walk, field = controller_config("walk"), controller_config("walk-field")
+    for name, below in (("residual-walk", field), ("residual-walk-field", walk)):
+        env = poise.make_env(name, realism="field")
+        env.reset(seed=0)
+        assert env.controller.config.gait == below.gait, name
+    assert walk.gait != field.gait
 
 
 def test_a_run_folder_means_its_best():
