@@ -205,7 +205,7 @@ class ResidualBalanceEnv(ControlledEnv):
 
     def _suit_level(self) -> None:
         """Let the controller be the one for this level of realism, see `where_uncertain`."""
-        if self._controller not in (self._known, self._stand_in):
+        if not any(self._controller is own for own in (self._known, self._stand_in)):
             return  # a user has put another one in its place
         wanted = self._known
         if self.realism.uncertain:

@@ -172,7 +172,9 @@ def widened(
         place = [slice(length) for length in old.shape]
         if old.dim() == 2:
             new[: old.shape[0]] = 0.0
-            if end is not None and name.endswith("0.weight"):  # of a first layer
+            if end is not None and name.split(".")[-2] == "0":  # of a first layer
+                if old.shape[1] > end:
+                    raise ValueError(f"{name} sees {old.shape[1]} numbers, not {end} or less")
                 place[1] = slice(end - old.shape[1], end)
         new[tuple(place)] = old
         weights[name] = new

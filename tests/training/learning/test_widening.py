@@ -26,6 +26,16 @@ def test_the_larger_network_computes_the_same(widths):
     torch.testing.assert_close(large(given), small(given), rtol=0.0, atol=1e-6)
 
 
+def test_what_it_is_given_may_lie_anywhere():
+    """The small network sees the part of a longer input before an entry, and nothing else."""
+    small, large = network(5, 7, 2, seed=0), network(16, 12, 2, seed=1)
+    large.load_state_dict(widened(small.state_dict(), large.state_dict(), 11))
+    given = torch.randn(40, 16)
+    torch.testing.assert_close(large(given), small(given[:, 6:11]), rtol=0.0, atol=1e-6)
+    with pytest.raises(ValueError, match=r"0\.weight sees 5 numbers, not 4 or less"):
+        widened(small.state_dict(), large.state_dict(), 4)
+
+
 def test_new_units_can_learn():
     """What comes into them is not zero, and what goes out of them has a slope."""
     small, large = network(5, 7, 2, seed=0), network(5, 12, 2, seed=1)
