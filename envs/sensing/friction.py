@@ -20,6 +20,7 @@ from poise.envs.robots.robot import Robot
 
 from .measurement import Rings
 
+PIVOTS = 1.25  # sliding soles pivot as well: they bear four fifths of what they could
 STEP = 0.02  # of the model's friction, by which a tick changes what is believed, after the first
 BEARS = 0.2  # of the weight, that they bear at least
 LEAST = 0.3  # of the friction of the model, that is believed in at least
@@ -52,11 +53,11 @@ def begin_friction(f: SlidingFriction, s: StateArrays, speed: float) -> None:
 def learn_friction(f: SlidingFriction, robot: RobotArrays, s: StateArrays, rings: Rings, row: int):
     """Let `s.friction` follow what sliding soles tell, over the model's friction:
 
-        μ = (|f_x| + |f_y|)/f_z,
+        μ = PIVOTS (|f_x| + |f_y|)/f_z,
 
     the mean of two ticks in a row. f, the force of the ground that was measured last, is told in
     the axes of a sole that slides: as in the cone of the QP. What is told first is believed, then
-    each tick counts little: one that pivots bears less, and one that lands anything.
+    each tick counts little: one that lands bears anything.
     """
     slides = sliding_sole(s, f.speed[0]) if f.speed[0] > 0.0 else -1
     force, R, axes = rings.wrench[row], s.root_axes, s.sole_axes[slides]
@@ -70,7 +71,8 @@ def learn_friction(f: SlidingFriction, robot: RobotArrays, s: StateArrays, rings
     ratio, last = (abs(x) + abs(y)) / z, f.last[0]
     f.last[0] = ratio
     if last > 0.0:
-        told, step = 0.5 * (last + ratio) / f.known, 1.0 if f.told[0] == 0 else STEP
+        told = 0.5 * PIVOTS * (last + ratio) / f.known
+        step = 1.0 if f.told[0] == 0 else STEP
         change = min(max(told - s.friction[0], -step), step)
         s.friction[0] = min(max(s.friction[0] + change, LEAST), 1.0)
         f.told[0] = 1
