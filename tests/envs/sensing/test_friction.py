@@ -48,11 +48,11 @@ def test_nothing_is_learned_before_a_sole_slides():
     """Unpushed, on ice, in `field`; and every episode begins with what the model has."""
     slippery = {"base": "field", **SLIPPERY}
     assert believed(after_a_push(slippery, push=[])) == 1.0
-    env = after_a_push(slippery)
+    env = after_a_push(SLIPPERY)
     assert believed(env) < 0.9
     env.reset(seed=3, options={"push": []})
     assert believed(env) == 1.0
-    assert believed(after_a_push(slippery, slide_speed=0.0)) == 1.0
+    assert believed(after_a_push(SLIPPERY, slide_speed=0.0)) == 1.0
 
 
 def test_a_sole_that_rolls_over_an_edge_does_not_slide():
