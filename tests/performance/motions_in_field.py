@@ -43,7 +43,7 @@ MOTIONS: dict[str, tuple[str, ...]] = {
     "step_in_place": ("motion-step",),
     "humanoid_walk": ("motion-step",),
     "semakin04": ("motion-step",),
-    "circle": ("walk", "walk-field"),
+    "circle": ("walk",),
 }
 LEVELS = ("ideal", "lab", "field")
 

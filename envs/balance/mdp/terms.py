@@ -120,9 +120,9 @@ def last_action(v: View):
         v.out[a] = v.action[a]
 
 
-@TERMS.add(("mass",), "0.1 m", "mass over what is known of it, minus 1", "number", default=False)
+@TERMS.add(("mass",), "1", "mass over what is known of it, minus 1", "number", default=False)
 def mass(v: View):
-    v.out[0] = 10.0 * (v.robot.mass * v.robot.gravity / v.scales.weight - 1.0)
+    v.out[0] = v.robot.mass * v.robot.gravity / v.scales.weight - 1.0
 
 
 @TERMS.add(("mu",), "1", "friction of the ground: a teacher's privilege", "number", default=False)

@@ -203,7 +203,7 @@ def test_a_payload_is_borne():
     falls = []
     for load in (False, True):
         env = ResidualStepEnv(
-            robot(), controller="walk", duration=7.0, pushes=None,
+            robot(), controller={"base": "walk"}, duration=7.0, pushes=None,
             realism={"body": {"payload": 0.1}}, estimator={"load": load},
         )  # fmt: skip
         fallen = 0

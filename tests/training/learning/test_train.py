@@ -405,7 +405,7 @@ def test_bad_configurations_are_refused(section, named):
 def test_a_level_that_is_not_there_is_refused_before_anything_is_written(tmp_path):
     """One error with field and choices, no folder; seeds likewise."""
     config = tiny_config(curriculum=Curriculum(levels=("field", "lat")))
-    named = "^curriculum.levels: no such name: 'lat', did you mean late.*choices: field, ideal"
+    named = "^curriculum.levels: no such name: 'lat', did you mean late.*choices: arms, field"
     with pytest.raises(ConfigError, match=named):
         train(config, tmp_path / "run")
     with pytest.raises(ConfigError, match=named):
