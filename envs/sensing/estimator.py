@@ -129,7 +129,7 @@ class EstimatorConfig:
     external_force: bool = True
     load: bool = True
     load_time: float = field(default=2.0, metadata=POSITIVE)
-    slide_speed: float = field(default=0.25, metadata={"min": 0.0})
+    slide_speed: float = field(default=0.4, metadata={"min": 0.0})
     filtered: bool = True
     joint_acceleration: float = field(default=12.0, metadata=POSITIVE)
     turn_acceleration: float = field(default=5.0, metadata=POSITIVE)
