@@ -87,14 +87,15 @@ class MovedArms(Block):
     inertia: np.ndarray  # (n,) of each joint, standing [kg·m²]
 
 
-def allocate_arms(simulation: Simulation, robot: Robot) -> MovedArms:
-    """The arms of the robot that is known, which nobody else moves yet."""
+def allocate_arms(simulation: Simulation, known: Simulation) -> MovedArms:
+    """The arms of the robot that is `known`, standing, which nobody else moves yet."""
+    robot = known.robot
     joints = set(chain.from_iterable(arm.joints for arm in find_arms(robot)))
     motors = [i for i, dof in enumerate(robot.motor_dofs) if dof - 6 in joints]
     dofs = robot.motor_dofs[motors]
     stand, zeros = robot.standing_qpos[dofs + 1], guarded_zeros
     span = robot.joint_range[dofs - 6] - stand[:, None]
-    inertia = np.diag(Simulation(robot).state.M)[dofs]
+    inertia = np.diag(known.state.M)[dofs]
     return MovedArms(
         robot=simulation.arrays,
         views=simulation.views,

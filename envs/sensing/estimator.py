@@ -269,7 +269,7 @@ class EstimatedState(StateSource, Copyable):
         self.sensors: Sensors = allocate_sensors(plant.simulation)
         self.bus = self.sensors.bus
         self.motors = allocate_motors(plant.simulation, self.bus)
-        self.arms = allocate_arms(plant.simulation, robot)
+        self.arms = allocate_arms(plant.simulation, self.known)
         self.known.state_arrays = replace(
             self.known.state_arrays, motor_q=self.bus.q, motor_dq=self.bus.dq
         )
