@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from poise.baselines.balance.references.legs import nominal_feet
 from poise.baselines.balance.stepping.planning.guidance import copy_reference, guide_com
 from poise.baselines.environments.residual import ResidualBalanceEnv
 from poise.baselines.environments.scales import StepScales
 from poise.baselines.environments.stepping import ResidualStepEnv
 from poise.configs.errors import ConfigError
 from poise.envs.balance.vector.batch import EnvBatch, replicate
+from poise.envs.compiled.maths.vectors import turn
 from poise.envs.sensing.realism import Realism, load_realism
 from tests.support import planned
 from tests.support.sensing import PLAIN
@@ -20,6 +22,7 @@ from tests.support.shared import robot
 
 PUSH = {"impulse": 24.0, "direction": 20.0, "start": 0.1, "body": "torso"}
 ALL = StepScales(height=0.05, lean=0.2, momentum=0.05, trigger=0.03)
+DRAWN = {"body": {"mass": 0.001}}
 
 
 @pytest.fixture(scope="module")
@@ -254,3 +257,18 @@ def test_footholds_move_whatever_plans_them(controller):
         assert env.controller.steps >= 1
         ends.append(env.simulation.data.qpos.copy())
     assert not np.array_equal(ends[0], ends[1]) and not np.array_equal(ends[1], ends[2])
+
+
+@pytest.mark.parametrize(("level", "away"), [("ideal", (0.0, 0.06)), (DRAWN, (0.1, 1.0))])
+def test_feet_go_home_where_the_robot_is_known_alone(level, away):
+    """After the same push: where bodies are drawn `feedback-step` stays in the stance that caught
+    the fall, by another one's gains. `away` [m] is the range of a foot from its nominal place."""
+    env = ResidualBalanceEnv(
+        robot(), controller="feedback-step", realism=load_realism(level), duration=6.0
+    )
+    play(env)
+    assert env.controller.steps >= 1 and not env.fallen
+    state, feet = env.simulation.state, nominal_feet(robot())
+    apart = turn(state.heading_yaw).T @ (state.sole_points[0] - state.sole_points[1])[:2]
+    distance = float(np.linalg.norm(apart - (feet[0] - feet[1])[:2]))
+    assert away[0] <= distance <= away[1]
