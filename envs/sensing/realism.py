@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from poise.configs.errors import ConfigError, shown
 from poise.configs.files import resolve
+from poise.configs.reading import is_file
 from poise.configs.schema import build, on_base, overlay, read_yaml, to_dict
 
 Spread = float | tuple[float, float]  # a number, or a range that an episode draws from
@@ -223,7 +225,8 @@ def overlaid(level: Realism, given: object, source: str) -> Realism:
 def load_realism(given: str | Path | Mapping | Realism | None, source: str = "realism") -> Realism:
     """A level by a packaged name, a .yaml file, or a mapping of its fields.
 
-    A file or a mapping may be on another level, which its `base` names.
+    A file or a mapping may be on another level, which its `base` names. Names that `+` joins,
+    `field+arms`, are one level, each of them with the last word on the fields that it has.
 
     Raises ConfigError naming the file, the field and the choices.
     """
@@ -231,10 +234,13 @@ def load_realism(given: str | Path | Mapping | Realism | None, source: str = "re
         return Realism()
     if isinstance(given, Realism):
         return given
-    if isinstance(given, (str, Path)):
+    if isinstance(given, str) and len(names := level_names(given)) > 1:
+        levels = [load_realism(name) for name in names]  # each says what is wrong with it
+        data, source = reduce(overlay, (_fields(name) for name in names)), given
+        data["name"] = "+".join(level.name for level in levels)
+    elif isinstance(given, (str, Path)):
         path = resolve("realism", given)
-        data, source = read_yaml(path), str(path)
-        data = {"name": path.stem, **data}
+        data, source = {"name": path.stem, **read_yaml(path)}, str(path)
     elif isinstance(given, Mapping):
         data = {str(key): to_dict(value) for key, value in given.items()}
         if "base" in data and "name" not in data:
@@ -246,3 +252,14 @@ def load_realism(given: str | Path | Mapping | Realism | None, source: str = "re
             field=source, choices=PARTS,
         )  # fmt: skip
     return build(Realism, on_base(data, "realism", source), source)
+
+
+def level_names(given: str) -> list[str]:
+    """The names of levels in one of the form `field+arms`; a file may have a plus in its name."""
+    return [given] if is_file(given) else given.split("+")
+
+
+def _fields(name: str) -> dict[str, Any]:
+    """What the file of a level says, and those that it is on."""
+    path = resolve("realism", name)
+    return on_base(read_yaml(path), "realism", path)

@@ -424,7 +424,13 @@ class RobotFigures(TypedDict):
     ankle_limit: list[tuple[float, float]]
 
 
-class Summary(Circumstances):
+class PlayedAt(TypedDict, total=False):
+    """The level of realism of a suite, where that is not ideal."""
+
+    realism: str
+
+
+class Summary(Circumstances, PlayedAt):
     """summary.json."""
 
     format: int

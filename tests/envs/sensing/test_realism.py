@@ -1,5 +1,7 @@
 """envs/sensing/realism.py: levels from names, files and mappings."""
 
+from dataclasses import replace
+
 import pytest
 
 from poise.configs.errors import ConfigError
@@ -34,6 +36,25 @@ def test_fields_are_laid_over_a_level():
     other = overlaid(lab, {"ground": {"slope": 3.0}, "motors": {"lag": 0.0}}, "here")
     assert other.ground.slope == 3.0 and other.motors.lag == 0.0
     assert other.ground.friction == lab.ground.friction and other.sensors == lab.sensors
+
+
+def test_joined_levels_are_one(tmp_path):
+    """The later one has the last word on the fields that it has; a plus may be in a file's name."""
+    both = load_realism("field+arms")
+    field, arms = load_realism("field"), load_realism("arms")
+    assert both == replace(
+        field, name="field+arms", motors=replace(field.motors, arms=arms.motors.arms)
+    )
+    odd = tmp_path / "a+b.yaml"
+    odd.write_text("latency: {sense: 0.05}")
+    assert load_realism(str(odd)).latency.sense == 0.05
+    later = tmp_path / "later.yaml"
+    later.write_text("latency: {sense: 0.001}")
+    assert load_realism(f"late+{later}").latency.sense == 0.001
+    assert load_realism(f"{later}+late").latency.sense == 0.02
+    for wrong in ("field+arm", "+field", "field+"):
+        with pytest.raises(ConfigError, match="no such name"):
+            load_realism(wrong)
 
 
 def test_a_level_is_scaled():

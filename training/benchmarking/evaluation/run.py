@@ -19,7 +19,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.outputs import check_out_folder
 from poise.configs.schema import to_dict
 from poise.envs.robots.robot import Robot, load_robot
-from poise.envs.sensing.realism import load_realism
+from poise.envs.sensing.realism import IDEAL, load_realism
 from poise.training.benchmarking.metrics.entry import controller_entry, robot_figures
 from poise.training.benchmarking.metrics.motions import suite_repertoire, suite_stage
 from poise.training.benchmarking.metrics.pairs import pair_figures
@@ -197,6 +197,8 @@ class Run:
             "seeds": seed_groups(tuple(played), entries),
             **circumstances(self.started, self.executor.workers, self.executor.backend),
         }  # fmt: skip
+        if suite.realism != IDEAL:
+            whole["realism"] = suite.realism
         return plain(whole)
 
     def _announce(self, folder: ResultFolder) -> None:

@@ -1,9 +1,10 @@
-"""The page of scenarios, a table for each robot, generated from committed files summary.json."""
+"""The page of scenarios, a table for each robot and level, from committed files summary.json."""
 
 from collections.abc import Mapping
 
 from poise.configs.errors import ConfigError
 from poise.configs.texts import code, markdown_table, plain
+from poise.envs.sensing.realism import IDEAL
 from poise.training.benchmarking.evaluation.tables import assisted
 from poise.training.benchmarking.evaluation.walk_tables import scenario_cell, scenario_names
 from poise.training.benchmarking.statistics.rates import wilson_interval
@@ -15,7 +16,8 @@ HEAD = """# Scenarios
 <!-- Written by `poise leaderboard {source} --page {page}`: change the results, not this page. -->
 
 What else happens to a robot that stands. Cells are the share of trials without a fall, with 95 %
-intervals. A controller that takes no command has no `walk`. The state is known exactly and at once.
+intervals. A controller that takes no command has no `walk`. The state is known exactly and at once
+where no [level](realism.md#levels) is named.
 
 - `quiet`: 12 s without a push.
 - `repeated`: 24 s with a push of 0.3 to 0.8 N·s/kg every 2 to 4 s.
@@ -43,12 +45,13 @@ def is_of_scenarios(summary: Summary) -> bool:
 def scenario_page(summaries: Mapping[str, Summary], page: str) -> str:
     """The page as Markdown; `summaries` by where they come from, `page` where it is written.
 
-    A controller of a later result of a robot takes the place of an earlier one of its name. Raises
-    ConfigError for results of another suite or seed, and for controllers of other scenarios.
+    A controller of a later result of a robot and a level takes the place of an earlier one of its
+    name. Raises ConfigError for results of another suite or seed, and for controllers of other
+    scenarios.
     """
     (first, summary), *_ = summaries.items()
     names = scenario_names(summary)
-    robots: dict[str, dict[str, Entry]] = {}
+    tables: dict[tuple[str, str], dict[str, Entry]] = {}
     for source, other in summaries.items():
         for key, own, theirs in (("suite", summary["suite"], other["suite"]),
                                  ("seed", summary["seed"], other["seed"])):  # fmt: skip
@@ -58,10 +61,12 @@ def scenario_page(summaries: Mapping[str, Summary], page: str) -> str:
             if not {each["scenario"] for each in entry.get("scenarios", ())} <= set(names):
                 raise ConfigError(f"has other scenarios than {first}", source=source,
                                   field=f"controllers.{name}")  # fmt: skip
-        robots.setdefault(other["robot"]["name"], {}).update(other["controllers"])
+        of = other["robot"]["name"], other.get("realism", IDEAL)
+        tables.setdefault(of, {}).update(other["controllers"])
     text = HEAD.format(source=plain(" ".join(summaries)), page=plain(page))
-    for robot, entries in robots.items():
-        text += f"\n## {code(robot)}\n\n" + _table(entries, names)
+    for (robot, level), entries in tables.items():
+        at = "" if level == IDEAL else f", {code(level)}"
+        text += f"\n## {code(robot)}{at}\n\n" + _table(entries, names)
     return text + "\n" + "".join(_played(*each) for each in summaries.items())
 
 

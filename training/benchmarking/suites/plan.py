@@ -12,6 +12,7 @@ from poise.training.benchmarking.trials.trial import Outcome, Trial
 
 from .draw import Draw, Part
 from .factors import standard_levels
+from .scenarios import PART as SCENARIOS
 from .suite import Suite
 
 LEVEL = "@"  # between the name of a part and the level that it is played at again
@@ -80,19 +81,27 @@ class Plan:
         return name not in self._standing or not trial.commands
 
     def _at(self, level: str | None, shift: int, trials: list[Trial]) -> list[Trial]:
-        """The trials at a level; None: the suite's, where they have none of their own."""
+        """The trials at a level; None: the suite's, where they have none of their own.
+
+        A scenario's own level has the last word in the suite's.
+        """
         real = self.suite.realism if level is None else level
-        return [
-            replace(
-                trial,
-                number=trial.number + shift,
-                part=trial.part if level is None else at_level(trial.part, level),
-                conditions=trial.conditions
-                if real == IDEAL or (level is None and trial.conditions.realism is not None)
-                else replace(trial.conditions, realism=real),
+        found = []
+        for trial in trials:
+            own = at = trial.conditions.realism
+            if real != IDEAL and (own is None or level is not None):
+                at = real
+            elif real != IDEAL and trial.part == SCENARIOS:
+                at = f"{real}+{own}"
+            found.append(
+                replace(
+                    trial,
+                    number=trial.number + shift,
+                    part=trial.part if level is None else at_level(trial.part, level),
+                    conditions=replace(trial.conditions, realism=at),
+                )
             )
-            for trial in trials
-        ]
+        return found
 
     def second(self, finished: Finished) -> dict[str, list[Trial]]:
         """controller → its trials of the second stage; `finished` must hold all of the first."""

@@ -10,6 +10,7 @@ from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder
 from poise.configs.texts import check_shown
+from poise.envs.sensing.realism import IDEAL, level_names
 
 NO_CONTROL = "zero"
 
@@ -25,10 +26,12 @@ def check_names(
     """Raise ConfigError, which lists what there is, for a name of nothing; see `check_name`."""
     if motion is not None and Path(motion).suffix == ".npz":  # a robot's motion
         motion = None
-    given = {"robots": robot, "suites": suite, "motions": motion, "realism": realism}
+    given = {"robots": robot, "suites": suite, "motions": motion}
     for kind, name in given.items():
         if name is not None:
             resolve(kind, name)
+    for name in level_names(realism or IDEAL):
+        resolve("realism", name)
     for name in controllers:
         check_name(name)
 

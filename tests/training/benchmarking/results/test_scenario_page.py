@@ -84,6 +84,14 @@ def test_a_later_result_takes_the_place_of_an_earlier_one(tmp_path: Path) -> Non
     assert found["walk-off-g1"][0].startswith("25% [") and len(found) > 10
 
 
+def test_each_level_has_a_table_of_its_own(tmp_path: Path) -> None:
+    later = changed(tmp_path / "later.json", lambda data: data.update(realism="field"))
+    sources = [SOURCES["unitree_g1"], later]
+    text = write_leaderboard(sources, tmp_path / "page.md").read_text()
+    known, in_field = text.split("\n## `unitree_g1`, `field`\n")
+    assert rows(known) == rows(in_field) and "\n## `unitree_g1`\n" in known
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import yaml
 
 from poise.configs.errors import ConfigError
 from poise.envs.robots.robot import load_robot
+from poise.envs.sensing.realism import load_realism
 from poise.training.benchmarking.evaluation.evaluate import evaluate
 from poise.training.benchmarking.results.read import load_results
 from poise.training.benchmarking.results.replay import replay
@@ -17,6 +19,7 @@ from poise.training.benchmarking.suites.plan import Plan
 from poise.training.benchmarking.suites.suite import load_suite
 from poise.training.benchmarking.trials.push_limits import PushLimits
 from poise.training.benchmarking.trials.trial import Outcome
+from poise.training.benchmarking.trials.variants import level_of
 from poise.training.cli.entry import main
 from tests.support.evaluations import InProcess, write_suite
 from tests.support.shared import robot
@@ -57,6 +60,20 @@ def test_equal_pushes_meet_arms_and_loads() -> None:
         first, second = trial.pushes
         assert 0.15 <= second.start - first.start - first.duration <= 0.4
         assert second.impulse < first.impulse
+
+
+def test_a_level_of_the_suite_has_the_scenarios_own_on_top() -> None:
+    """The same trials, in `field` besides; whose level is none but `field` say so."""
+    suite = replace(load_suite("scenarios"), realism="field")
+    there = Plan(suite, PushLimits(robot()), 3, ("a", "b")).first
+    on_top = {"arms": "field+arms", "payload": "field+hand-load"}
+    for one, other in zip(planned().first, there, strict=True):
+        assert other.conditions.realism == on_top.get(str(other.level), "field")
+        level = level_of(other.conditions)
+        assert level.latency == load_realism("field").latency
+        assert level.motors.arms == level_of(one.conditions).motors.arms
+        assert level.body.hand == level_of(one.conditions).body.hand
+        assert (one.seed, one.pushes, one.until) == (other.seed, other.pushes, other.until)
 
 
 def test_who_does_not_walk_plays_the_others() -> None:
