@@ -10,6 +10,7 @@ import os
 import pickle
 import signal
 import sys
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import mujoco
@@ -53,6 +54,15 @@ def ways(name: str) -> list[str]:
         return ["copy", "twice"]
     ours = KINDS[name][1].__name__ != "play_loop" and name != "wrapped"
     return [way for way in WAYS if ours or way != "copy"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def left_behind() -> Iterator[None]:
+    """What imports and other tests have left is not searched for garbage again for every kind."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 class Played(NamedTuple):
