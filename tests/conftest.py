@@ -45,6 +45,12 @@ def can_render() -> None:
         pytest.skip(problem)
 
 
+@pytest.fixture
+def few_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Videos of which nobody says the rate have five frames a second: drawing takes its time."""
+    monkeypatch.setattr("poise.training.pictures.figures.video.RATE", 5.0)
+
+
 def pytest_sessionstart(session):
     """Compile the kernels in a process of their own, so that this one and its children agree."""
     from poise.baselines.warmup import prepare

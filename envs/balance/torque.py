@@ -1,9 +1,6 @@
 """`poise/TorqueBalance-v0`: the action is the joints' torques."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,9 +9,8 @@ from poise.envs.compiled.calls import CompiledStep, Program, address_of, run
 from poise.envs.compiled.jit import compiled
 from poise.envs.physics.simulation import World, simulate
 from poise.envs.robots.mirror import Mirror
-from poise.envs.robots.robot import Robot
 
-from .base import BalanceEnv, EnvConfig
+from .base import BalanceEnv
 from .episode import EpisodeArrays, StepEnd, end_step, record_tick
 
 
@@ -90,16 +86,6 @@ class TorqueBalanceEnv(MotorBalanceEnv):
 
     Version history: v0, first release.
     """
-
-    def __init__(
-        self,
-        robot: str | Path | Robot = "humanoid",
-        config: EnvConfig | str | Path | Mapping | None = None,
-        *,
-        render_mode: str | None = None,
-        **overrides: Any,
-    ):
-        super().__init__(robot, config, render_mode=render_mode, **overrides)
 
     def _make_step(self, world: World) -> CompiledStep:
         block = TorqueStep(

@@ -26,8 +26,6 @@ from poise.envs.balance.vector.vector_env import BalanceVectorEnv
 from poise.envs.physics.simulation import Simulation
 from poise.envs.physics.state import RobotState
 from poise.envs.sensing.estimator import EstimatedState
-from poise.training.learning.policy import load_policy
-from poise.training.learning.vec_env import ThreadedVecEnv
 from tests.support.limits import described as limits_described
 from tests.support.sensing import estimated
 from tests.support.shared import robot
@@ -155,9 +153,17 @@ def _vector(kind: type[BalanceEnv]) -> Any:
 
 
 def _threaded() -> Any:
+    from poise.training.learning.vec_env import ThreadedVecEnv  # it loads torch
+
     many = ThreadedVecEnv(_several(ResidualBalanceEnv), 2)
     many.seed(3)
     return _begin_many(many, many.reset)
+
+
+def _policy() -> Any:
+    from poise.training.learning.policy import load_policy  # it loads torch
+
+    return load_policy()
 
 
 def _batch() -> Any:
@@ -205,7 +211,7 @@ KINDS: dict[str, tuple[Callable[[], Any], Callable[[Any], list[Any]]]] = {
     "state source": (_source, play_source),
     "robot": (robot, play_robot),
     "state": (_state, play_state),
-    "policy": (load_policy, play_policy),
+    "policy": (_policy, play_policy),
 }
 
 

@@ -48,9 +48,6 @@ class JacobianTranspose(BaseController):
         self.arrays = robot_arrays(robot)
         self.stiffness, self.damping = joint_gains(self.arrays, self.config.posture)
 
-    def reset(self, state: RobotState | None = None) -> None:
-        """Nothing is remembered."""
-
     def virtual_wrench(self, state: RobotState, targets: Targets) -> np.ndarray:
         """(6,) [F; N] about the CoM, what the ground is to press with."""
         c, units = self.config, self.arrays.units

@@ -61,9 +61,6 @@ class PD(BaseController):
         self.arrays = robot_arrays(robot)
         self.stiffness, self.damping = joint_gains(self.arrays, self.config.gains)
 
-    def reset(self, state: RobotState | None = None) -> None:
-        """Nothing is remembered."""
-
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         tau = self.stiffness * (targets.q_ref - state.q)
         tau += self.damping * (targets.v_ref - state.qvel[6:])
@@ -82,16 +79,13 @@ SOLE_COMPLIANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class StablePDConfig:
+class StablePDConfig(PDConfig):
     """`stable-pd`: the gains of `pd`, implicit."""
 
-    kind: Literal["stable-pd"] = "stable-pd"
-    period: float = field(default=0.004, metadata={"above": 0.0, "max": 0.05})  # [s]
-    gains: PDGains = field(default_factory=PDGains)
-    feedforward: bool = True
+    kind: Literal["stable-pd"] = "stable-pd"  # type: ignore[assignment]
 
 
-class StablePD(BaseController):
+class StablePD(PD):
     """τ = τ_hold + K (q_ref − q − Δt v) + D (v_ref − v − Δt v̇), soles at rest.
 
     v̇ solves, with K and D on the joints only,
@@ -103,14 +97,7 @@ class StablePD(BaseController):
     """
 
     def __init__(self, robot: Robot, config: StablePDConfig | None = None):
-        self.robot = robot
-        self.config = config or StablePDConfig()
-        self.period = self.config.period
-        self.arrays = robot_arrays(robot)
-        self.stiffness, self.damping = joint_gains(self.arrays, self.config.gains)
-
-    def reset(self, state: RobotState | None = None) -> None:
-        """Nothing is remembered."""
+        super().__init__(robot, config or StablePDConfig())
 
     def torques(self, state: RobotState, targets: Targets) -> np.ndarray:
         v = state.qvel[6:]

@@ -9,6 +9,8 @@ import numpy as np
 from .check import Feasibility
 from .curve import Boundary, Curve
 
+CALM = 1e-9  # [m/s², rad/s²] below which an acceleration is the rounding of a posture that is held
+
 
 class End(NamedTuple):
     """One side of a join: joints of its frames (m, nj) and the state next to the join."""
@@ -18,6 +20,11 @@ class End(NamedTuple):
     boundary: Boundary
     region: np.ndarray  # (k, 2) where the motors can bear the weight
     own: Feasibility  # of the motion about the join, whether it is played or not
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether it has no acceleration, so that `calm` is no other end."""
+        return bool(np.abs(self.boundary.acceleration).max() < CALM)
 
     @property
     def calm(self) -> End:

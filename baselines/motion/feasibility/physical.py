@@ -210,7 +210,8 @@ def way_between(
 def direct_way(shaper: Shaper, a: End, b: End, time_price: float) -> Attempt:
     """The cheapest way from one end to the other, without the clips' accelerations if need be."""
     direct = cheapest(shaper, a, b, time_price)
-    if direct.qpos is None:  # a clip may be about to do what leads to nothing
+    if direct.qpos is None and not (a.is_calm and b.is_calm):
+        # a clip may be about to do what leads to nothing
         calm = cheapest(shaper, a.calm, b.calm, time_price)
         direct = calm if calm.qpos is not None else direct
     return direct

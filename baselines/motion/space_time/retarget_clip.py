@@ -37,7 +37,7 @@ from .walked import find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
-CROSSOVER = 2.0  # [Hz] what is asked faster than this is smoothed
+CROSSOVER = 2.0  # f [Hz], what is asked of the body faster than this is smoothed away
 
 
 class RetargetedClip(NamedTuple):
@@ -80,7 +80,6 @@ def retarget_clip(
     smooth: float = SMOOTH,
     lead: float = LEAD,
     planted: bool = False,
-    crossover: float = CROSSOVER,
     kinematic: bool | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> RetargetedClip:
@@ -100,7 +99,7 @@ def retarget_clip(
         try:
             made = performable(
                 clip, robot, solver=solver, constraints=constraints, smooth=smooth, lead=lead,
-                planted=planted, crossover=crossover, progress=progress,
+                planted=planted, progress=progress,
             )  # fmt: skip
             reference_from(made.clip, robot, clip.name)
             if asked or made.stride * made.tempo >= ENOUGH:
@@ -135,7 +134,6 @@ def performable(
     smooth: float = SMOOTH,
     lead: float = LEAD,
     planted: bool = False,
-    crossover: float = CROSSOVER,
     progress: Callable[[str], None] | None = None,
 ) -> RetargetedClip:
     """The postures in which a robot does what a clip shows, as `retarget` says, by a solver:
@@ -157,7 +155,6 @@ def performable(
         smooth: low-pass on what the clip asks for [Hz].
         lead: time from standing into the clip, and back [s].
         planted: take the feet as planted though they move in the clip.
-        crossover: f, what is asked of the body faster than this is smoothed away [Hz].
         progress: is told a line after every quadratic program.
 
     Raises:
@@ -167,8 +164,6 @@ def performable(
     """
     if solver is not None and solver not in get_args(Solver):
         raise ConfigError(f"no such solver: {solver!r}", field="solver", choices=get_args(Solver))
-    if not 0.1 <= crossover <= 100.0:
-        raise ConfigError(f"must be from 0.1 to 100, not {crossover:g}", field="crossover")
     if isinstance(constraints, (str, Path)):
         source: str | Path | None = constraints
         wanted = read_constraints(constraints)
@@ -196,7 +191,7 @@ def performable(
     stance, asked = standing_stance(scene), Asked(scene, targets, wanted)
     spent, begun = made.time_per_frame, time.thread_time()
     if chosen == "spacetime":
-        optimise(Problem(scene, asked, stance, wanted, crossover),
+        optimise(Problem(scene, asked, stance, wanted, CROSSOVER),
                  None if progress is None else lambda i, cost: progress(
                      f"program {i}: tasks {cost.tasks:.3f}, third derivative {cost.rough:.3f}, "
                      f"constraints {cost.lacking:.3f}"))  # fmt: skip

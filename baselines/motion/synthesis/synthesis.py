@@ -1,6 +1,6 @@
 """A script and a graph become one clip, with a record of every choice."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from itertools import pairwise
 from typing import Any
@@ -28,9 +28,6 @@ from .plan import PHYSICAL, Plan, Played, played_lead
 from .robot_joins import RobotJoins
 from .stage import LONGEST, Stage
 
-Join = Callable[[Clip, Clip, float], Clip]
-Check = Callable[[Transition], str]
-
 
 class Synthesis:
     """The way from a script to a clip.
@@ -39,8 +36,6 @@ class Synthesis:
         graph: clips and transitions.
         clips: name → clip, of all that the graph has.
         kind: of transitions that the script leaves open.
-        joins: kind → how two clips are joined; those that need no robot by default.
-        check: says why a transition cannot be made, or nothing; see `best_paths`.
         robot_joins: of the robot whose clips they are, for transitions of the kind `physical`. Of
             these the ones of the best path are made first; what the robot cannot do is gone round,
             or by standing where there is no other way.
@@ -52,17 +47,14 @@ class Synthesis:
         graph: MotionGraph,
         clips: Mapping[str, Clip],
         kind: str = "insert",
-        joins: Mapping[str, Join] = JOINS,
-        check: Check | None = None,
         robot_joins: RobotJoins | None = None,
         others: Iterable[str] = (),
     ):
-        self.kinds = (*joins, *([PHYSICAL] if robot_joins else []))
+        self.kinds = (*JOINS, *([PHYSICAL] if robot_joins else []))
         if kind not in self.kinds:
             raise ConfigError(f"no transition {shown(kind)} here", field="kind", choices=self.kinds)
         self.stage = Stage(graph, dict(clips), others)
-        self.kind, self.joins, self.check = kind, joins, check
-        self.robot_joins = robot_joins
+        self.kind, self.robot_joins = kind, robot_joins
 
     def plan(self, script: Script, k: int = 1) -> Plan:
         """The k best paths; what the script makes of clips becomes part of the stage.
@@ -157,7 +149,7 @@ class Synthesis:
         """Ways of which every transition can be made; by standing if there is no other one."""
         graph = self.stage.graph
         if self.kind != PHYSICAL:
-            return best_paths(graph, task, k, self.check)
+            return best_paths(graph, task, k)
         try:
             return best_paths(graph, task, k, lambda t: self._refusal(t, through=False))
         except ConfigError:
@@ -166,9 +158,8 @@ class Synthesis:
     def _refusal(self, transition: Transition, through: bool) -> str:
         """Why a physical transition cannot be made, or nothing."""
         assert self.robot_joins is not None  # or there is no such kind
-        said = self.check(transition) if self.check is not None else ""
         before, after = (self.stage.clips[name] for name in (transition.before, transition.after))
-        return said or self.robot_joins.refusal(before, after, transition, through)
+        return self.robot_joins.refusal(before, after, transition, through)
 
     def _places(self, state: StateName | None, script: Script) -> dict[Place, float]:
         if state is None:
@@ -223,7 +214,7 @@ class Synthesis:
     ) -> tuple[Clip, dict[str, Any] | None]:
         """What has been made so far, a transition and the clip that follows."""
         if kind != PHYSICAL:
-            return self.joins[kind](last, part, transition.duration), None
+            return JOINS[kind](last, part, transition.duration), None
         assert self.robot_joins is not None
         clips = self.stage.clips
         way = self.robot_joins.way(clips[transition.before], clips[transition.after], transition)

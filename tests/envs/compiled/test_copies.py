@@ -10,7 +10,8 @@ import os
 import pickle
 import signal
 import sys
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -55,36 +56,69 @@ def ways(name: str) -> list[str]:
     return [way for way in WAYS if ours or way != "copy"]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def left_behind() -> Iterator[None]:
+    """What imports and other tests have left is not searched for garbage again for every kind."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
+
+
+class Played(NamedTuple):
+    """One of a kind and its copies, made in the midst of its work and gone on with.
+
+    Attributes:
+        data: it, pickled then.
+        expected: how the original goes on.
+        seen: way of copying → how the copy goes on.
+        apart: way of copying → whether arrays overlap as in the original, and none of its own.
+    """
+
+    data: bytes
+    expected: str
+    seen: dict[str, str]
+    apart: dict[str, bool]
+
+
 @functools.cache
-def begun(name: str) -> tuple[bytes, str]:
-    """One of this kind, pickled when it was new, and how the original goes on."""
+def played(name: str) -> Played:
+    """Copies are played before the original, after it, and when it is gone."""
     it = KINDS[name][0]()
     data = pickle.dumps(it)
-    return data, outcome(name, it)
+    twins = {way: WAYS[way](it) for way in ways(name)}
+    mine = arrays_in(it)
+    apart = {way: is_apart(mine, twin) for way, twin in twins.items() if way != "copy"}
+    first, *others = twins
+    seen = {first: outcome(name, twins[first])}
+    expected = outcome(name, it)
+    del it, mine
+    gc.collect()
+    seen |= {way: outcome(name, twins[way]) for way in others}
+    return Played(data, expected, seen, apart)
 
 
 @pytest.mark.parametrize("name", KINDS)
 def test_a_copy_goes_on_like_the_original(name):
     """To the last bit, when the original has gone on or is gone; and it does not move it."""
-    it = KINDS[name][0]()
-    twins = {way: WAYS[way](it) for way in ways(name)}
-    first, *others = twins
-    seen = {first: outcome(name, twins[first])}
-    expected = outcome(name, it)  # after the first of its copies
+    _, expected, seen, _ = played(name)
     assert "Error" not in expected, expected
-    del it
-    gc.collect()
-    seen |= {way: outcome(name, twins[way]) for way in others}
-    assert seen == dict.fromkeys(seen, expected)
+    assert seen == dict.fromkeys(ways(name), expected)
 
 
-def arrays_in(it: Any, path: str = "", known: dict[int, str] | None = None) -> dict[str, Any]:
+@pytest.mark.parametrize("name", KINDS)
+def test_what_shares_memory_shares_it_in_the_copy(name):
+    """The same arrays overlap in the same way, and none overlaps one of the original."""
+    apart = played(name).apart
+    assert apart and apart == dict.fromkeys(apart, True)
+
+
+def arrays_in(it: Any, path: str = "", known: dict[int, Any] | None = None) -> dict[str, Any]:
     """Every array, MuJoCo's too, by where it is found first."""
     known = {} if known is None else known
     if id(it) in known or isinstance(it, (type, str, bytes, int, float)):
         return {}
-    known[id(it)] = path
-    arrays_in.keep.append(it)  # ids stay taken
+    known[id(it)] = it  # its id stays taken meanwhile
     if isinstance(it, np.ndarray) and not it.dtype.hasobject:
         return {path: it} if it.size else {}
     if isinstance(it, mujoco.MjData):
@@ -100,9 +134,6 @@ def arrays_in(it: Any, path: str = "", known: dict[int, str] | None = None) -> d
     for key, each in parts.items():
         found |= arrays_in(each, path + key, known)
     return found
-
-
-arrays_in.keep = []
 
 
 def memory(array: np.ndarray) -> tuple[int, int]:
@@ -126,24 +157,20 @@ def sharing(arrays: dict[str, np.ndarray]) -> set[tuple[str, str, int]]:
     return pairs
 
 
-@pytest.mark.parametrize("name", KINDS)
-def test_what_shares_memory_shares_it_in_the_copy(name):
-    """The same arrays overlap in the same way, and none overlaps one of the original."""
-    it = KINDS[name][0]()
-    mine = arrays_in(it)
-    for way in ("deepcopy", "pickle"):
-        twin = WAYS[way](it)
-        theirs = arrays_in(twin)
-        theirs = {path: array for path, array in theirs.items() if path in mine}
-        assert len(theirs) > 0.9 * len(mine)
-        known = {path: array for path, array in mine.items() if path in theirs}
-        assert sharing(theirs) == sharing(known)
-        both = [("ours", array) for array in mine.values()]
-        both += [("theirs", array) for array in theirs.values()]
-        spans, last, whose = sorted((*memory(a), who) for who, a in both), 0, ""
-        for start, end, who in spans:
-            assert start >= last or who == whose
-            last, whose = max(last, end), who
+def is_apart(mine: dict[str, Any], twin: Any) -> bool:
+    """Whether the arrays of a copy overlap as the original's, and none of these."""
+    theirs = {path: array for path, array in arrays_in(twin).items() if path in mine}
+    assert len(theirs) > 0.9 * len(mine)
+    if sharing(theirs) != sharing({path: mine[path] for path in theirs}):
+        return False
+    spans = [(*memory(array), False) for array in mine.values()]
+    spans += [(*memory(array), True) for array in theirs.values()]
+    last, whose = 0, False
+    for start, end, copied in sorted(spans):
+        if start < last and copied != whose:
+            return False
+        last, whose = max(last, end), copied
+    return True
 
 
 def play_all(data: dict[str, bytes], connection: Any) -> None:
@@ -155,7 +182,7 @@ def test_pickles_go_on_alike_in_a_spawned_process():
     """Where all addresses are others."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    data = {name: begun(name)[0] for name in KINDS}
+    data = {name: played(name).data for name in KINDS}
     worker = context.Process(target=play_all, args=(data, theirs), daemon=True)
     worker.start()
     theirs.close()
@@ -163,7 +190,7 @@ def test_pickles_go_on_alike_in_a_spawned_process():
     seen = ours.recv()
     worker.join(PATIENCE)
     assert worker.exitcode == 0
-    assert seen == {name: begun(name)[1] for name in KINDS}
+    assert seen == {name: played(name).expected for name in KINDS}
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
@@ -183,7 +210,7 @@ def test_a_forked_process_goes_on_alike():
     assert ours.poll(PATIENCE)
     assert ours.recv() == seen
     assert os.waitpid(child, 0)[1] == 0
-    assert seen == {name: begun(name)[1] for name in names}
+    assert seen == {name: played(name).expected for name in names}
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -111,7 +111,7 @@ def test_one_process_compiles_and_the_others_wait_and_read(tmp_path: Path) -> No
 @pytest.mark.weekly
 def test_the_process_that_compiles_goes_on_with_the_bits_of_those_that_read(tmp_path: Path) -> None:
     """Every quantity of a tick, whose kernel calls others that do not fit into it."""
-    code = "from tests.envs.compiled.test_copies import begun; print(begun('state')[1])"
+    code = "from tests.envs.compiled.test_copies import played; print(played('state').expected)"
     seen = [
         subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True,

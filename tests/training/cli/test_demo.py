@@ -39,7 +39,7 @@ def run(out: Path, full: bool = False) -> list[str]:
     return text.getvalue().rstrip().splitlines()
 
 
-def test_a_table_two_plots_and_a_video(can_render: None, tmp_path: Path) -> None:
+def test_a_table_two_plots_and_a_video(can_render: None, few_frames: None, tmp_path: Path) -> None:
     """The video shows the hardest push that the best controller recovers, of all side by side; the
     command that is printed makes it again."""
     folder = tmp_path / "my demo"

@@ -72,7 +72,9 @@ def test_of_lost_trials(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert [played(command) for command in shown] == [0, 0, 0]
 
 
-def test_of_the_report(here: Path, can_render: None, capsys: pytest.CaptureFixture[str]) -> None:
+def test_of_the_report(
+    here: Path, can_render: None, few_frames: None, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A film of each of the worst trials."""
     args = ["my file.yaml", "--suite", "suite.yaml", "--trials", "1", "--out", "my out"]
     assert main(["evaluate", *args, "--allow", "mine.py:StifferAnkles"]) == 0

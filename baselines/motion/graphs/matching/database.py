@@ -31,38 +31,27 @@ class MatchingDatabase:
     the end of their clip are played, but not gone to.
 
     Args:
-        clips: resampled to `dt`.
+        clips: resampled to `RATE`.
         weights: group → w ≥ 0 instead of the default, see `features.groups`.
-        ahead: times [s] of the features of the future.
-        dt: time between frames [s].
 
     Raises:
         ConfigError: no clips, clips of several skeletons or too short to be gone to, unknown
-            groups, weights below 0, times that are not above 0.
+            groups, weights below 0.
     """
 
-    def __init__(
-        self,
-        clips: Sequence[Clip],
-        *,
-        weights: Mapping[str, float] | None = None,
-        ahead: tuple[float, ...] = AHEAD,
-        dt: float = RATE,
-    ):
-        if not ahead or not all(0.0 < time < np.inf for time in ahead):
-            raise ConfigError(f"must be times above 0, not {ahead}", field="ahead")
-        self.clips, self.ahead = tuple(clip.resampled(dt) for clip in clips), tuple(ahead)
+    def __init__(self, clips: Sequence[Clip], *, weights: Mapping[str, float] | None = None):
+        self.clips, self.ahead = tuple(clip.resampled(RATE) for clip in clips), AHEAD
         _check_skeletons(self.clips)
-        tables = [clip_features(clip, self.ahead) for clip in self.clips]
+        tables = [clip_features(clip) for clip in self.clips]
         raw = np.concatenate(tables)
-        self.mean, self.scale = raw.mean(axis=0), _scales(raw, weights or {}, self.ahead)
+        self.mean, self.scale = raw.mean(axis=0), _scales(raw, weights or {})
         self.starts = np.cumsum([0, *(len(table) for table in tables)])
         self.values = self.normalised(raw)
-        last = round(max(self.ahead) / dt)
+        last = round(max(AHEAD) / RATE)
         frames = [np.arange(a, b - last) for a, b in pairwise(self.starts)]
         self.entries = np.concatenate(frames)
         if not len(self.entries):
-            raise ConfigError(f"no clip is longer than {max(self.ahead):g} s", field="clips")
+            raise ConfigError(f"no clip is longer than {max(AHEAD):g} s", field="clips")
         self.search = NearestPoint(self.values[self.entries])
 
     def normalised(self, features: np.ndarray) -> np.ndarray:
@@ -83,21 +72,21 @@ class MatchingDatabase:
         """(n,) the posture of a frame with another future: for every time ahead x, y [m] and
         (cos, sin) of the turn, in its facing frame."""
         columns = self.values[self.starts[clip] + frame].copy()
-        count = len(self.ahead) * sum(group.size for group in FUTURE)
+        count = len(AHEAD) * sum(group.size for group in FUTURE)
         columns[-count:] = (future - self.mean[-count:]) * self.scale[-count:]
         return columns
 
 
-def _scales(raw: np.ndarray, weights: Mapping[str, float], ahead: tuple[float, ...]) -> np.ndarray:
+def _scales(raw: np.ndarray, weights: Mapping[str, float]) -> np.ndarray:
     """(n,) w/σ of every column; a group that never changes counts nothing."""
-    known = {group.name for group in groups(ahead)}
+    known = {group.name for group in groups()}
     for name, weight in weights.items():
         if name not in known:
             raise ConfigError(f"no such features: {name!r}", field="weights", choices=sorted(known))
         if not 0.0 <= weight < np.inf:
             raise ConfigError(f"must be at least 0, not {weight:g}", field=f"weights.{name}")
     scales, begin = np.empty(raw.shape[1]), 0
-    for group in groups(ahead):
+    for group in groups():
         columns = slice(begin, begin + group.size)
         deviation = float(raw[:, columns].std(axis=0).mean())
         weight = weights.get(group.name, group.weight)

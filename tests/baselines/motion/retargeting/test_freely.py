@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import mujoco
 import numpy as np
@@ -12,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from poise.baselines.balance.references.footing import root_turns, sole_poses
 from poise.baselines.balance.references.robot_clip import (
+    RobotClip,
     read_robot_clip,
     reference_from,
     write_robot_clip,
@@ -20,7 +23,7 @@ from poise.baselines.motion.clips.axes import axes_of
 from poise.baselines.motion.clips.bvh import read_bvh, write_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts, over_ground
-from poise.baselines.motion.retargeting.retarget import retarget_freely
+from poise.baselines.motion.retargeting.retarget import Retargeted, retarget_freely
 from poise.baselines.motion.space_time.retarget_clip import retarget_clip
 from poise.configs.errors import ConfigError
 from tests.support.captures import CAPTURES, make
@@ -30,18 +33,25 @@ EXTRA = Path(__file__).parents[5] / "shared" / "motions" / "extra"
 UNITS = (1.0, 0.01, 0.0254)
 
 
-def written(name: str, folder: Path) -> tuple[Clip, np.ndarray]:
+@functools.cache
+def written(name: str) -> tuple[Clip, np.ndarray]:
     """A made capture as it is read from a file, and its contacts."""
     clip, truth = make(name)
-    path = folder / f"{name}.bvh"
-    write_bvh(clip, path, axes_of("y", "z", UNITS[len(name) % 3]))
-    return read_bvh(path).clip, truth
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"{name}.bvh"
+        write_bvh(clip, path, axes_of("y", "z", UNITS[len(name) % 3]))
+        return read_bvh(path).clip, truth
 
 
-def check_soles(name: str, clip: Clip) -> None:
+@functools.cache
+def freely(name: str) -> Retargeted:
+    """A made capture on the robot."""
+    return retarget_freely(written(name)[0], robot_named("humanoid"))
+
+
+def check_soles(name: str, made: RobotClip) -> None:
     """Planted soles rest within 1 cm and at 1 cm/s at most, and nothing is in the floor."""
     robot = robot_named("humanoid")
-    made = retarget_freely(clip, robot).clip
     assert made.planted is not None
     _, places, turns = sole_poses(robot, made.qpos)
     for foot in range(2):
@@ -62,11 +72,11 @@ def check_soles(name: str, clip: Clip) -> None:
 
 
 @pytest.mark.parametrize("name", CAPTURES)
-def test_made_captures(name: str, tmp_path: Path) -> None:
+def test_made_captures(name: str) -> None:
     """Contacts agree in 95 % of the frames, and soles rest where they are planted."""
-    clip, truth = written(name, tmp_path)
+    clip, truth = written(name)
     assert np.mean(measure_contacts(clip).planted == truth) > 0.95
-    check_soles(name, clip)
+    check_soles(name, freely(name).clip)
 
 
 @pytest.mark.parametrize("name", ["cmu02_jump", "cmu_12_01_walk", "cmu_jumping_jacks",
@@ -76,7 +86,7 @@ def test_captures_of_others(name: str) -> None:
     if not path.is_file():
         pytest.skip(f"{path} is not here")
     clip = read_bvh(path).clip
-    check_soles(name, clip)
+    check_soles(name, retarget_freely(clip, robot_named("humanoid")).clip)
     flies = not measure_contacts(clip).planted.any(axis=1).all()
     assert flies == ("jump" in name)
 
@@ -103,10 +113,9 @@ def test_contacts_agree_with_those_marked_by_hand(name: str) -> None:
     assert np.mean(found == marked) > 0.95
 
 
-def test_the_heading_and_the_way_go_with_the_clip(tmp_path: Path) -> None:
+def test_the_heading_and_the_way_go_with_the_clip() -> None:
     """A circle of 6.6 rad, its way the legs' ratio as long."""
-    robot, (clip, _) = robot_named("humanoid"), written("circle", tmp_path)
-    made = retarget_freely(clip, robot)
+    (clip, _), made = written("circle"), freely("circle")
     w, x, y, z = made.clip.qpos[:, 3:7].T
     yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
     assert yaw[-1] - yaw[0] == pytest.approx(np.ptp(np.unwrap(clip.facing())), abs=0.1)
@@ -115,8 +124,8 @@ def test_the_heading_and_the_way_go_with_the_clip(tmp_path: Path) -> None:
     assert made.stride == 1.0
 
 
-def test_a_leap_leaves_the_ground_when_the_clip_does(tmp_path: Path) -> None:
-    robot, (clip, truth) = robot_named("humanoid"), written("jump", tmp_path)
+def test_a_leap_leaves_the_ground_when_the_clip_does() -> None:
+    robot, (clip, truth) = robot_named("humanoid"), written("jump")
     made = retarget_clip(clip, robot, kinematic=True).clip
     assert made.planted is not None
     flight = np.flatnonzero(~made.planted.any(axis=1)) * made.dt
@@ -126,7 +135,7 @@ def test_a_leap_leaves_the_ground_when_the_clip_does(tmp_path: Path) -> None:
 
 
 def test_a_run_is_seen_but_not_performed(tmp_path: Path) -> None:
-    robot, (clip, _) = robot_named("humanoid"), written("run", tmp_path)
+    robot, (clip, _) = robot_named("humanoid"), written("run")
     made = retarget_clip(clip, robot).clip
     assert made.planted is not None
     write_robot_clip(made, tmp_path / "run.npz")
@@ -138,8 +147,8 @@ def test_a_run_is_seen_but_not_performed(tmp_path: Path) -> None:
         retarget_clip(clip, robot, kinematic=False)
 
 
-def test_a_walk_on_a_treadmill_goes_on(tmp_path: Path) -> None:
-    clip, truth = written("walk", tmp_path)
+def test_a_walk_on_a_treadmill_goes_on() -> None:
+    clip, truth = written("walk")
     still = replace(clip, root=clip.root - clip.times[:, None] * [1.2, 0.0, 0.0])
     assert over_ground(still).root == pytest.approx(clip.root, abs=0.05)
     assert over_ground(clip) is clip
@@ -147,7 +156,7 @@ def test_a_walk_on_a_treadmill_goes_on(tmp_path: Path) -> None:
 
 
 def test_a_rest_pose_before_the_clip_is_left_out(tmp_path: Path) -> None:
-    clip, _ = written("walk", tmp_path)
+    clip, _ = written("walk")
     rest = np.zeros_like(clip.rotations[:1])
     rest[..., 0] = 1.0
     longer = replace(clip, root=np.concatenate([np.zeros((1, 3)), clip.root]),

@@ -118,8 +118,6 @@ def test_bad_arguments() -> None:
     robot = robot_named("humanoid")
     with pytest.raises(ConfigError, match=r"solver: .*\(choices: frame, spacetime, grid\)"):
         retarget_clip(clip(), robot, solver="magic")
-    with pytest.raises(ConfigError, match="crossover: must be from 0.1 to 100, not 0"):
-        retarget_clip(clip(), robot, crossover=0.0)
     many = [Height(point="pelvis", least=0.1)] * 10
     with pytest.raises(ConfigError, match="at most 9 constraints can hold at one time, not 10"):
         retarget_clip(clip(), robot, solver="grid", constraints=many, lead=LEAD)

@@ -212,18 +212,6 @@ def test_without_a_way_the_reason_is_told() -> None:
         Synthesis(none, clips()).make(parse("squat -> punch", "try.motion"))
 
 
-def test_a_refused_transition_is_gone_round() -> None:
-    """The check is asked of the best path alone, and what it refuses is not played."""
-    asked = []
-
-    def check(transition) -> str:
-        asked.append(transition)
-        return "too fast" if transition.before == "humanoid_squat" and len(asked) < 4 else ""
-
-    made, _ = make("squat -> punch", check=check)
-    assert 1 < len(asked) < 12 and made.duration > 8.0
-
-
 def test_the_strong_part_goes_on_for_ever() -> None:
     assert set(strong_clips(graph())) <= set(NAMES)
     lonely = replace(graph(), transitions=tuple(

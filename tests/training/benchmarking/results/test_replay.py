@@ -55,7 +55,7 @@ def test_a_plot_over_time_is_written(folder: Path, tmp_path: Path) -> None:
     assert (tmp_path / "trial.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.usefixtures("can_render")
+@pytest.mark.usefixtures("can_render", "few_frames")
 def test_a_video_is_written(folder: Path, tmp_path: Path) -> None:
     """The trial as an MP4."""
     replay(folder / "out", 2, "zero", video=tmp_path / "trial.mp4")

@@ -16,6 +16,7 @@ from poise.envs.compiled.maths.pendulum import ankle_limit
 from poise.envs.physics.simulation import Simulation
 from poise.envs.robots.robot import load_robot
 from poise.training.cli.entry import main
+from poise.training.deploy.robot_check import check as module
 from poise.training.deploy.robot_check.check import RobotCheck, check_robot
 from poise.training.deploy.robot_check.faults import find_faults
 from poise.training.deploy.robot_check.tables import print_check
@@ -28,6 +29,13 @@ from tests.support.small_urdf import INERTIAL, write_urdf
 def check(tmp_path_factory: pytest.TempPathFactory) -> RobotCheck:
     """Of a robot with nothing wrong."""
     return check_robot(write_urdf(tmp_path_factory.mktemp("robot"), armature={"*": 0.01}))
+
+
+@pytest.fixture
+def no_controllers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No controller is tried on the robot, which is most of a check: for what figures show."""
+    nobody = {family: Uses((), {}) for family in (IN_PLACE, STEPPING)}
+    monkeypatch.setattr(module, "controllers_for", lambda _: nobody)
 
 
 def kinds(check: RobotCheck) -> list[tuple[str, bool]]:
@@ -70,6 +78,7 @@ def test_margins_are_the_support_polygon_s(check: RobotCheck, tmp_path: Path) ->
     assert check.posture.com == pytest.approx(state.com[:2], abs=1e-9)
 
 
+@pytest.mark.usefixtures("no_controllers")
 def test_posture_against_the_model_s(tmp_path: Path) -> None:
     """What differs most from the keyframes and from the zero posture; what levelling changed."""
     legs = " ".join(["0.4 0.7 -0.35 0"] * 2)
@@ -85,6 +94,7 @@ def test_posture_against_the_model_s(tmp_path: Path) -> None:
     assert hip.joint.endswith("_hip") and hip.amount == pytest.approx(20 + 22.918, abs=1.0)
 
 
+@pytest.mark.usefixtures("no_controllers")
 def test_a_body_in_another_is_warned_of(tmp_path: Path) -> None:
     """By its shape: meshes collide with their hulls."""
     straight = {"joints": {"*_hip": 0, "*_knee": 5, "*_ankle": -5}}
@@ -98,6 +108,7 @@ def test_a_body_in_another_is_warned_of(tmp_path: Path) -> None:
     assert "convex hulls" in text["overlapping meshes"]
 
 
+@pytest.mark.usefixtures("no_controllers")
 def test_straight_knees_and_a_foot_without_roll_are_warned_of(tmp_path: Path) -> None:
     """For stepping; the joints and the feet are named."""
     leg = LEG.replace('<joint name="{side}_ankle_roll" axis="1 0 0" range="-30 30"/>', "")
@@ -112,6 +123,7 @@ def test_straight_knees_and_a_foot_without_roll_are_warned_of(tmp_path: Path) ->
     assert ("one foot", True) in kinds(found)
 
 
+@pytest.mark.usefixtures("no_controllers")
 def test_a_sole_that_rocks_is_warned_of(tmp_path: Path) -> None:
     """Of three pairs of balls one behind the other, the middle one hangs 1 mm lower."""
 
@@ -212,6 +224,7 @@ def texts(check: RobotCheck) -> dict[str, str]:
     return {fault.kind: fault.text for fault in check.faults}
 
 
+@pytest.mark.usefixtures("no_controllers")
 def test_joints_that_are_too_light_are_warned_of_before_they_fall(tmp_path: Path) -> None:
     """Feet of 15 g on motors of 60 N·m, as in URDF files; armature by pattern mends it."""
     limb = INERTIAL.format(z=-0.1, mass=2.0, i=0.01)
@@ -233,11 +246,13 @@ def test_joints_that_are_too_light_are_warned_of_before_they_fall(tmp_path: Path
     assert mended.rest.chatter < 2.0 and mended.rest.foot_drift < 0.001
 
 
+@pytest.mark.usefixtures("no_controllers")
 def test_motors_without_rotors_are_warned_of(tmp_path: Path) -> None:
     found = texts(check_robot(write_urdf(tmp_path)))
     assert found["no armature"].startswith("10 of 10 motors") and set(found) == {"no armature"}
 
 
+@pytest.mark.usefixtures("no_controllers")
 def test_friction_flags_and_scenery_that_are_not_what_they_seem(tmp_path: Path) -> None:
     """MuJoCo takes the larger friction; limits are off; there is a wall."""
     floor = '<geom name="floor" type="plane" size="9 9 1" friction="0.2"/>'
@@ -255,6 +270,7 @@ def test_friction_flags_and_scenery_that_are_not_what_they_seem(tmp_path: Path) 
     assert "gravity: turned on" in text["changed"] and found.dynamics.friction == 1.0
 
 
+@pytest.mark.usefixtures("no_controllers")
 def test_a_com_near_an_edge_is_warned_of(tmp_path: Path) -> None:
     """And goes to the middle by one word."""
     joints = {"*_hip": -4, "*_knee": 40, "*_ankle": -36}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +30,7 @@ SPEEDS = {"walk": (1.2, 0, 0), "walk-curve": (0.9, 0, 0.6), "circle": (0.7, 0, 0
           "turn-in-place": (0, 0, 0.8), "backwards": (-0.6, 0.1, 0)}  # fmt: skip
 
 
+@functools.cache
 def walking(name: str) -> RobotClip:
     """A made clip as the planner is to walk it, though `motion-step` could step it."""
     clip, robot = make(name)[0], robot_named(HUMANOID)

@@ -76,9 +76,6 @@ def test_weights_choose_what_counts(clips: list[Clip]) -> None:
     ("change", "words"),
     [
         ({"clips": []}, ["clips", "at least one"]),
-        ({"ahead": ()}, ["ahead"]),
-        ({"ahead": (0.5, -1.0)}, ["ahead"]),
-        ({"ahead": (60.0,)}, ["no clip is longer than 60 s"]),
         ({"weights": {"hands": 1.0}}, ["'hands'", "limbs", "place@0.5"]),
         ({"weights": {"limbs": -1.0}}, ["weights.limbs"]),
     ],
@@ -87,6 +84,11 @@ def test_errors_name_what_is_wrong(clips: list[Clip], change: dict, words: list[
     with pytest.raises(ConfigError) as caught:
         MatchingDatabase(**{"clips": clips, **change})
     assert all(word in str(caught.value) for word in words), caught.value
+
+
+def test_clips_that_end_before_the_future_are_refused(clips: list[Clip]) -> None:
+    with pytest.raises(ConfigError, match="no clip is longer than 1 s"):
+        MatchingDatabase([clips[0].cut(0.0, 0.5)])
 
 
 def test_clips_of_two_skeletons_are_refused(clips: list[Clip]) -> None:
