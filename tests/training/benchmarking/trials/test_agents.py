@@ -62,7 +62,7 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     with pytest.raises(
         ConfigError,
         match="momentum-qp, .*residual-walk, residual-walk-field, residual-whole-g1, "
-        "residual-whole-g1-arms, residual-whole-g1-field, guard-falcon-g1, guard-g1, zero",
+        "residual-whole-g1-field, guard-falcon-g1, guard-g1, zero",
     ) as error:
         load_agent(name, robot)
     assert name in str(error.value)
@@ -92,12 +92,12 @@ def test_a_packaged_policy_is_known_by_its_folder(
     assert agent.fingerprint != load_agent("residual", robot).fingerprint
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
     names = ["ppo-position", "ppo-torque", "residual", "residual-lqr-lip", "residual-pd"]
-    names += ["residual-step", "residual-torque"]
+    names += ["residual-step", "residual-torque", "residual-torque-field"]
     others = ["residual-walk", "residual-walk-field"]
-    others += [f"residual-whole-g1{where}" for where in ("", "-arms", "-field")]
+    others += [f"residual-whole-g1{where}" for where in ("", "-field")]
     assert packaged("policies") == [*names, *others]
-    assert default_controllers()[-7:] == tuple(names)
-    assert default_controllers("unitree_g1")[-3:] == tuple(others[2:])
+    assert default_controllers()[-8:] == tuple(names)
+    assert default_controllers("unitree_g1")[-2:] == tuple(others[2:])
     guards = packaged("guards")
     with pytest.raises(ConfigError, match=", ".join([*names, *others, *guards, "zero"])):
         load_agent("residual-abe07", robot)
@@ -132,7 +132,6 @@ def test_packaged_policies_are_named_by_their_controller(name: str) -> None:
         others = {"torque": "ppo-torque", "step": steps, "whole": "residual-whole-g1"}
         others |= {"walk": "residual-walk", "position": "ppo-position"}
         level = "" if found.env.realism.ideal else f"-{found.env.realism.name}"
-        level = "-arms" if "arms" in found.curriculum.levels else level
         assert name == f"{others[found.action]}{level}"
     else:
         on_baseline = found.controller == "momentum-qp"
