@@ -3,9 +3,15 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
-from poise.baselines.balance.references.reference_motion import COLUMNS, MOST_COMMANDS, faster
+from poise.baselines.balance.references.reference_motion import (
+    COLUMNS,
+    MOST_COMMANDS,
+    STEADY,
+    faster,
+)
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts, over_ground
@@ -16,9 +22,9 @@ FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, t
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 LONGEST = 0.72  # [h] of a step: further, robots fall
 WALK, WALK_FAST = "walk", "walk-fast"  # controllers
-STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by each of them: faster, robots fall
+FASTEST = 0.585  # [hω] of a walk by the latter, and `STEADY` by the former: faster, robots fall
 FAST_ROBOTS = ("humanoid",)  # on which the latter's gains were searched; others fall
-BANK = 0.07  # [g] of speed times turning rate, above which robots fall
+BANK = 0.087  # [g] of speed times turning rate, above which robots fall
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
@@ -57,11 +63,10 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     walk = over_ground(clip).faced().resampled(RATE)
     size = 2 * max(round(period / RATE), 1) + 1
     facing = _mean(np.unwrap(walk.facing()), size)
-    way = _mean(scale * walk.root[:, :2], size)
-    velocity, turn = np.gradient(way, RATE, axis=0), np.gradient(facing, RATE)
+    velocity, turn = np.gradient(scale * walk.root[:, :2], RATE, axis=0), np.gradient(facing, RATE)
     cos, sin = np.cos(facing), np.sin(facing)
-    ahead = cos * velocity[:, 0] + sin * velocity[:, 1]
-    left = cos * velocity[:, 1] - sin * velocity[:, 0]
+    ahead = np.gradient(_mean(_gone(cos * velocity[:, 0] + sin * velocity[:, 1]), size), RATE)
+    left = np.gradient(_mean(_gone(cos * velocity[:, 1] - sin * velocity[:, 0]), size), RATE)
     h, omega = robot.height_com, robot.omega
     speed = np.hypot(ahead, left)
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
@@ -109,6 +114,11 @@ def _run(clip: Clip, planted: np.ndarray) -> str:
     if planted[max(first - round(TOGETHER / clip.dt), 0) : first].any(axis=0).all():
         raise ConfigError(says, source=clip.name, field="contacts")
     return f"{says}, so that it would be walked; "
+
+
+def _gone(velocity: np.ndarray) -> np.ndarray:
+    """The way gone at a velocity along a heading (F,), since a way in the world bends with it."""
+    return np.asarray(RATE * cumulative_trapezoid(velocity, initial=0.0))
 
 
 def _mean(values: np.ndarray, size: int) -> np.ndarray:

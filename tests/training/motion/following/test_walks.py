@@ -51,6 +51,36 @@ def test_the_planner_is_told_the_clip_s_speed_turn_and_steps(name: str) -> None:
         assert commands[:, 4] + 0.037 == pytest.approx(period, abs=0.045)  # with both feet down
 
 
+@pytest.mark.parametrize("name", ["circle", "run-curve"])
+def test_a_curve_is_told_as_one_from_begin_to_end(name: str) -> None:
+    """A course that goes on straight beyond its ends would lead aside there, and chords are short."""
+    robot, (ahead, turn) = (
+        robot_named(HUMANOID),
+        {"circle": (0.7, 0.95), "run-curve": (2.4, 0.8)}[name],
+    )
+    commands, tempo, _ = find_commands(make(name)[0], robot, 0.9)
+    assert commands[:, 1] == pytest.approx(tempo * 0.9 * ahead, rel=0.01)
+    assert commands[:, 2] == pytest.approx(0.0, abs=0.01)
+    assert commands[:, 3] == pytest.approx(tempo * turn, rel=0.01)
+
+
+def test_a_fast_curve_is_turned_into_and_out_of_slowly() -> None:
+    robot = robot_named(HUMANOID)
+    made = retarget_clip(make("run-curve")[0], robot)
+    assert made.walker == "walk-fast" and made.tempo == pytest.approx(0.7, abs=0.005)
+    reference = reference_from(made.clip, robot, "run-curve")
+    commands, (begin, end) = reference.commands, reference.shown
+    assert commands is not None and end - begin == pytest.approx(2.5 / made.tempo, rel=0.02)
+    starts, turns = commands[:, 0], commands[:, 3]
+    clip = (starts >= begin - 1e-9) & (starts < end - 1e-9)
+    assert turns[0] == 0.0 and (np.diff(starts) > 0.0).all()
+    assert turns[clip] == pytest.approx(0.8 * made.tempo, rel=0.01)
+    assert np.abs(np.diff(turns)[:-1] / np.diff(starts)[1:]).max() < 0.17  # rad/s²
+    assert (commands[starts > end - 1e-9, 1] == 0.0).all()
+    again = reference.at_speed(2.0)
+    assert again.shown == pytest.approx((0.5 * begin, 0.5 * end))
+
+
 def test_what_is_too_fast_is_slower_and_says_so() -> None:
     robot = robot_named(HUMANOID)
     commands, tempo, walker = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
