@@ -21,8 +21,6 @@ START, AHEAD, LEFT, TURN, STEP_TIME, COLUMNS = 0, 1, 2, 3, 4, 5
 MOST_COMMANDS = 200  # rows
 SHIFT, END = 0.7, 1.5  # [s] in which the weight shifts to the first foot; and to stand at the end
 RAMP, TURN_RAMP = 0.03, 0.08  # [g], [ω²] by which a planner gets to what it is told
-STEADY = 0.45  # [hω] above which a walk is fast: it is slower to get there, and to turn
-FAST_RAMP, FAST_TURN_RAMP, EACH = 0.0227, 0.012, 0.25  # [g], [ω²]; [s] between two commands then
 
 
 class MotionSample(NamedTuple):
@@ -51,7 +49,7 @@ class ReferenceMotion(Copyable):
     Columns of `coeffs` (k, 4, nj+6): joint positions, CoM offset (3), root rotation φ (3); see
     `splines.piecewise` for the layout and `splines.evaluate` for the compiled evaluation. With
     `commands` (n, 5), of the columns START to STEP_TIME, it is what trunk and arms do while the
-    robot walks as it is told, and in the times `shown` its clip is what it is told.
+    robot walks as it is told.
     """
 
     name: str
@@ -60,7 +58,6 @@ class ReferenceMotion(Copyable):
     loop: bool
     footing: Footing | None = None  # None: both soles stay planted
     commands: np.ndarray | None = None  # None: it does not walk
-    shown: tuple[float, float] = (0.0, 0.0)  # [s]
 
     @property
     def duration(self) -> float:
@@ -78,9 +75,7 @@ class ReferenceMotion(Copyable):
         coeffs = self.coeffs * powers[:, None]
         footing = None if self.footing is None else self.footing.at_speed(factor)
         told = None if self.commands is None else faster(self.commands, factor)
-        begin, end = self.shown
-        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop, footing, told,
-                               (begin / factor, end / factor))  # fmt: skip
+        return ReferenceMotion(self.name, self.knots / factor, coeffs, self.loop, footing, told)
 
     def sample(self, t: float) -> MotionSample:
         """The reference at time t [s]."""
@@ -102,17 +97,14 @@ def check_commands(commands: np.ndarray, source: str) -> None:
 
 def whole_walk(
     robot: Robot, qpos: np.ndarray, dt: float, commands: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
-    """The joints (n, nj) [rad] of a walk from standing to standing, its commands (m, 5), and when
-    the clip `qpos` (F, nq) begins and ends in it [s].
+) -> tuple[np.ndarray, np.ndarray]:
+    """The joints (n, nj) [rad] of a walk from standing to standing, and its commands (m, 5).
 
     Legs are those of standing: the planner moves them. The robot gets to the first command before
-    the clip, and the last row is zero. A fast walk turns slowly before and after the clip: planners
-    sum up what steps are off, and where a turn ends at once that sum leads them aside.
+    the clip `qpos` (F, nq) begins, which is the second row, and the last row is zero, at its end.
     """
-    ramps = [_ramp(robot, row) for row in commands[[0, -1]]]
-    first = max(round((SHIFT + max(ramps[0])) / dt), 1)
-    last = max(round((max(ramps[1]) + END) / dt), 1)
+    before, after = (SHIFT + _ramp(robot, row) for row in commands[[0, -1]])
+    first, last = (max(round(time / dt), 1) for time in (before, after + END))
     joints, rest = qpos[:, 7:].copy(), robot.standing_qpos[7:]
     legs = PlantedLegs(robot).legs
     joints[:, legs] = rest[legs]
@@ -121,34 +113,17 @@ def whole_walk(
     joints = np.concatenate([
         rest + way * (joints[0] - rest), joints, joints[-1] + back * (rest - joints[-1])
     ])  # fmt: skip
-    told, (begins, ends) = commands.copy(), (first * dt, (first + len(qpos) - 1) * dt)
-    told[:, START] += begins
+    told = commands.copy()
+    told[:, START] += first * dt
     begin, end = commands[:1].copy(), np.zeros((1, COLUMNS))
-    into, out = (_turning(row, time) for row, (_, time) in
-                 zip(commands[[0, -1]], ramps, strict=True))  # fmt: skip
-    if len(into):
-        begin[0, TURN], into[:, START] = 0.0, begins - EACH * np.arange(len(into), 0, -1)
-    out = out[::-1] * [1.0, 0.0, 0.0, 1.0, 1.0]
-    out[:, START] = ends + EACH * np.arange(len(out))
-    begin[0, START], end[0, START] = min(SHIFT, 0.5 * first * dt), ends + EACH * len(out)
-    return joints, np.concatenate([begin, into, told, out, end]), (begins, ends)
+    begin[0, START], end[0, START] = min(SHIFT, 0.5 * first * dt), (first + len(qpos) - 1) * dt
+    return joints, np.concatenate([begin, told, end])
 
 
-def _ramp(robot: Robot, row: np.ndarray) -> tuple[float, float]:
-    """Times from standing to a command, and of a slow turn to it [s]; 0 where none is needed."""
-    speed, turn = float(np.hypot(row[AHEAD], row[LEFT])), abs(float(row[TURN]))
-    g, rate = robot.units.gravity, robot.omega**2
-    if speed <= STEADY * robot.height_com * robot.omega:
-        return max(speed / (RAMP * g), turn / (TURN_RAMP * rate)), 0.0
-    return speed / (FAST_RAMP * g), turn / (FAST_TURN_RAMP * rate)
-
-
-def _turning(row: np.ndarray, time: float) -> np.ndarray:
-    """Commands (n, 5), `EACH` long, whose turn rises to that of `row` in a time [s]."""
-    shares = np.arange(1, int(time / EACH)) * EACH / max(time, EACH)
-    rows = np.repeat(row[None], len(shares), axis=0)
-    rows[:, TURN] *= shares
-    return rows
+def _ramp(robot: Robot, row: np.ndarray) -> float:
+    """Time from standing to a command [s]."""
+    speed = float(np.hypot(row[AHEAD], row[LEFT])) / (RAMP * robot.units.gravity)
+    return max(speed, abs(float(row[TURN])) / (TURN_RAMP * robot.omega**2))
 
 
 def faster(commands: np.ndarray, factor: float) -> np.ndarray:

@@ -169,9 +169,9 @@ def reference_from(
     if clip.about.unperformed:
         raise ConfigError(f"can be seen, but not performed: {clip.about.unperformed}",
                           source=source, field="motion")  # fmt: skip
-    joints, dt, commands, shown = clip.qpos[:, 7:], clip.dt, clip.commands, (0.0, 0.0)
+    joints, dt, commands = clip.qpos[:, 7:], clip.dt, clip.commands
     if commands is not None:
-        joints, commands, shown = whole_walk(robot, clip.qpos, dt, commands)
+        joints, commands = whole_walk(robot, clip.qpos, dt, commands)
     elif clip.planted is not None:
         return stepped_reference(
             clip.about.name, robot, clip.qpos, clip.dt, clip.planted, source
@@ -187,7 +187,7 @@ def reference_from(
     spline = rest_spline if rest else make_interp_spline  # the latter without a knot near ends
     splines = [spline(times, values) for values in (joints, com, root)]
     knots, coeffs = piecewise(splines)
-    return ReferenceMotion(clip.about.name, knots, coeffs, False, None, commands, shown)
+    return ReferenceMotion(clip.about.name, knots, coeffs, loop=False, commands=commands)
 
 
 def check_robot(clip: RobotClip, robot: Robot, source: str) -> None:

@@ -6,12 +6,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
-from poise.baselines.balance.references.reference_motion import (
-    COLUMNS,
-    MOST_COMMANDS,
-    STEADY,
-    faster,
-)
+from poise.baselines.balance.references.reference_motion import COLUMNS, MOST_COMMANDS, faster
 from poise.baselines.balance.references.robot_clip import RATE
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.contacts import measure_contacts, over_ground
@@ -22,9 +17,9 @@ FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, t
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 LONGEST = 0.72  # [h] of a step: further, robots fall
 WALK, WALK_FAST = "walk", "walk-fast"  # controllers
-FASTEST = 0.585  # [hω] of a walk by the latter, and `STEADY` by the former: faster, robots fall
+STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by each of them: faster, robots fall
 FAST_ROBOTS = ("humanoid",)  # on which the latter's gains were searched; others fall
-BANK = 0.087  # [g] of speed times turning rate, above which robots fall
+BANK = 0.07  # [g] of speed times turning rate, above which robots fall
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most

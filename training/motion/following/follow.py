@@ -110,7 +110,7 @@ def follow(
         push = Push(push_bodies(body)[0], start, PUSH_TIME, size, direction)
         pushes = (push,) if size else ()
         trial = Trial(k, seed + k, pushes, motion=reference.name)
-        course = Course(reference, None if watch is None else watch(trial))
+        course = Course(reference.commands, None if watch is None else watch(trial))
         followed = _followed(run_trial(agent, trial, course), trial)
         walked, turned = course.shares()
         trials.append(replace(followed, walked=walked, turned=turned))
@@ -122,27 +122,26 @@ def follow(
 class Course:
     """Where a robot walks while it is told to: to be called as a `Watch`, and to call another."""
 
-    def __init__(self, motion: ReferenceMotion, other: Watch | None = None):
-        self._motion, self._other = motion, other
+    def __init__(self, commands: np.ndarray | None, other: Watch | None = None):
+        self._told, self._other = commands, other
         self._gone: list[tuple[float, float, float]] = []
 
     def __call__(self, env: BalanceEnv) -> object:
-        (begin, end), state = self._motion.shown, env.simulation.state
-        if begin < end and begin <= env.simulation.time <= end:
+        told, state = self._told, env.simulation.state
+        if told is not None and told[1, START] <= env.simulation.time <= told[-1, START]:
             heading = np.arctan2(state.heading[1], state.heading[0])
             self._gone.append((*state.com[:2], heading))
         return None if self._other is None else self._other(env)
 
     def shares(self) -> tuple[float, float]:
         """`walked` and `turned` of `Followed`."""
-        told = self._motion.commands
-        if told is None or len(self._gone) < 2:
+        if self._told is None or len(self._gone) < 2:
             return np.nan, np.nan
-        gone, starts = np.array(self._gone), np.clip(told[:, START], *self._motion.shown)
+        gone, told = np.array(self._gone), self._told[1:]
         yaw = np.unwrap(gone[:, 2])
         axes = np.column_stack([np.cos(yaw), np.sin(yaw)])[1:]
         way = float((np.diff(gone[:, :2], axis=0) * axes).sum())
-        asked = np.diff(starts) @ told[:-1, [AHEAD, TURN]]
+        asked = np.diff(told[:, START]) @ told[:-1, [AHEAD, TURN]]
         done = np.array([way, yaw[-1] - yaw[0]])
         shares = np.where(np.abs(asked) > LITTLE, done / np.where(asked == 0.0, 1.0, asked), np.nan)
         return float(shares[0]), float(shares[1])
