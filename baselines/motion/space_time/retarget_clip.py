@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from poise.baselines.balance.references.robot_clip import RATE, RobotClip, reference_from
 from poise.baselines.motion.clips.bvh import read_bvh
 from poise.baselines.motion.clips.clip import Clip
 from poise.baselines.motion.clips.library import find_bvh
+from poise.baselines.motion.clips.skeleton import SIDES
 from poise.baselines.motion.retargeting.limbs import find_limbs
 from poise.baselines.motion.retargeting.retarget import (
     ENOUGH,
@@ -37,6 +39,7 @@ from .walked import find_commands
 
 Solver = Literal["frame", "spacetime", "grid"]
 UNPERFORMED = ("feet", "heading", "contacts", "qpos")  # fields of errors that say so
+COMES_DOWN, CLIMB = 1.5, 0.2  # [s] in which a foot is down; [legs] that the ground rises at least
 CROSSOVER = 2.0  # f [Hz], what is asked of the body faster than this is smoothed away
 
 
@@ -107,7 +110,7 @@ def retarget_clip(
             reason = (f"{made.bound}; with {made.stride:.2f} of its way at {made.tempo:.2f} of its "
                       "tempo it can be done (--steps)")  # fmt: skip
         except ConfigError as error:
-            reason = error.message
+            reason = _climb(clip) or error.message
             if asked or error.field not in UNPERFORMED:
                 raise
     free, tempo, walker = retarget_freely(clip, robot, smooth=smooth), 1.0, ""
@@ -122,7 +125,20 @@ def retarget_clip(
             if error.field == "speed":
                 seen = replace(seen, about=replace(seen.about, unperformed=error.message))
     scene = _scene(robot, find_limbs(robot), seen.qpos, 0.0, seen.planted)
-    return _stepped(free._replace(clip=seen), scene)._replace(tempo=tempo, walker=walker)
+    made = _stepped(free._replace(clip=seen), scene)
+    return made._replace(tempo=tempo, walker=walker, stride=1.0 if walker else made.stride)
+
+
+def _climb(clip: Clip) -> str:
+    """What says that the feet of a clip do not come down to one level, within `COMES_DOWN`; empty
+    where they do."""
+    ankles = [clip.skeleton.joint(f"ankle_{side}", clip.name) for side in SIDES]
+    lowest = clip.places()[:, ankles, 2].min(axis=1)
+    size = 2 * int(0.5 * COMES_DOWN / clip.dt) + 1
+    rise = float(np.ptp(minimum_filter1d(lowest, size, mode="nearest")))
+    if rise < CLIMB * clip.skeleton.leg_length:
+        return ""
+    return f"its feet go up or down by {rise:.2f} m, and it can be performed on level ground alone"
 
 
 def performable(

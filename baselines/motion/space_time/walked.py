@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from poise.baselines.balance.references.reference_motion import COLUMNS, MOST_COMMANDS, faster
@@ -57,11 +58,10 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     walk = over_ground(clip).faced().resampled(RATE)
     size = 2 * max(round(period / RATE), 1) + 1
     facing = _mean(np.unwrap(walk.facing()), size)
-    way = _mean(scale * walk.root[:, :2], size)
-    velocity, turn = np.gradient(way, RATE, axis=0), np.gradient(facing, RATE)
+    velocity, turn = np.gradient(scale * walk.root[:, :2], RATE, axis=0), np.gradient(facing, RATE)
     cos, sin = np.cos(facing), np.sin(facing)
-    ahead = cos * velocity[:, 0] + sin * velocity[:, 1]
-    left = cos * velocity[:, 1] - sin * velocity[:, 0]
+    ahead = np.gradient(_mean(_gone(cos * velocity[:, 0] + sin * velocity[:, 1]), size), RATE)
+    left = np.gradient(_mean(_gone(cos * velocity[:, 1] - sin * velocity[:, 0]), size), RATE)
     h, omega = robot.height_com, robot.omega
     speed = np.hypot(ahead, left)
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
@@ -109,6 +109,11 @@ def _run(clip: Clip, planted: np.ndarray) -> str:
     if planted[max(first - round(TOGETHER / clip.dt), 0) : first].any(axis=0).all():
         raise ConfigError(says, source=clip.name, field="contacts")
     return f"{says}, so that it would be walked; "
+
+
+def _gone(velocity: np.ndarray) -> np.ndarray:
+    """The way gone at a velocity along a heading (F,), since a way in the world bends with it."""
+    return np.asarray(RATE * cumulative_trapezoid(velocity, initial=0.0))
 
 
 def _mean(values: np.ndarray, size: int) -> np.ndarray:

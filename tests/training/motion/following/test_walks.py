@@ -53,6 +53,35 @@ def test_the_planner_is_told_the_clip_s_speed_turn_and_steps(name: str) -> None:
         assert commands[:, 4] + 0.037 == pytest.approx(period, abs=0.045)  # with both feet down
 
 
+@pytest.mark.parametrize("name", ["circle", "run-curve"])
+def test_a_curve_is_told_as_one_from_begin_to_end(name: str) -> None:
+    """A course that goes on straight beyond its ends leads aside there, and chords are short."""
+    robot = robot_named(HUMANOID)
+    ahead, turn = {"circle": (0.7, 0.95), "run-curve": (2.4, 0.8)}[name]
+    commands, tempo, _ = find_commands(make(name)[0], robot, 0.9)
+    assert commands[:, 1] == pytest.approx(tempo * 0.9 * ahead, rel=0.01)
+    assert commands[:, 2] == pytest.approx(0.0, abs=0.01)
+    assert commands[:, 3] == pytest.approx(tempo * turn, rel=0.01)
+
+
+def test_what_goes_up_is_refused_for_that() -> None:
+    clip = make("walk")[0].at_speed(0.7)
+    stairs = replace(clip, root=clip.root + 0.25 * clip.root[:, :1] * [0.0, 0.0, 1.0])
+    made = retarget_clip(stairs, robot_named(HUMANOID))
+    assert re.match(r"its feet go up or down by 1\.\d\d m", made.clip.about.unperformed)
+
+
+def test_the_way_of_a_clip_that_is_walked_is_what_the_planner_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Though feet are led less far where the clip is only shown."""
+    free = retarget_freely(make("circle")[0], robot_named(HUMANOID))._replace(stride=0.5)
+    where = "poise.baselines.motion.space_time.retarget_clip.retarget_freely"
+    monkeypatch.setattr(where, lambda *_, **__: free)
+    made = retarget_clip(make("circle")[0], robot_named(HUMANOID))
+    assert made.walker == "walk" and made.stride == 1.0
+
+
 def test_what_is_too_fast_is_slower_and_says_so() -> None:
     robot = robot_named(HUMANOID)
     commands, tempo, walker = find_commands(make("walk")[0].at_speed(1.9), robot, 0.9)
