@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -407,17 +408,20 @@ def test_list_names_what_is_packaged(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_j50_of_the_list_is_that_of_the_leaderboards() -> None:
-    """Those in docs/results."""
-    results = Path(__file__).parents[3] / "docs/results"
-    if not results.is_dir():
+    """Of a controller that was played again the later one, which its page has."""
+    docs = Path(__file__).parents[3] / "docs"
+    if not docs.is_dir():
         pytest.skip("not a checkout")
-    kinds = [path for path in results.glob("*.json") if not path.name.startswith(("walk", "scen"))]
-    found = [json.loads(path.read_text()) for path in kinds]
     scores = json.loads((packaged_folder(".") / FIGURES).read_text())["j50"]
-    for result in found:
-        for name, measured in result["controllers"].items():
-            if (told := scores[result["robot"]["name"]].get(name)) is not None:
-                assert told == pytest.approx(measured["j50_mean"], abs=0.3), name
+    for page in docs.glob("leaderboard*.md"):
+        measured: dict[str, float] = {}
+        for source in re.findall(r"docs/results/\S+?\.json", page.read_text().splitlines()[2]):
+            result = json.loads((docs.parent / source).read_text())
+            measured |= {name: own["j50_mean"] for name, own in result["controllers"].items()}
+        assert measured
+        for name, told in scores[result["robot"]["name"]].items():
+            if name in measured:
+                assert told == pytest.approx(measured[name], abs=0.3), name
 
 
 def test_without_arguments_the_commands_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
