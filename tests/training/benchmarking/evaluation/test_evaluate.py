@@ -17,6 +17,7 @@ from poise.configs.errors import ConfigError
 from poise.training.benchmarking.evaluation import run as evaluation
 from poise.training.benchmarking.evaluation.evaluate import evaluate, measured_limits
 from poise.training.benchmarking.results.read import load_results
+from poise.training.benchmarking.results.summary import read_summary
 from poise.training.benchmarking.trials.table import CASE_COLUMNS
 from poise.training.running.executor import Executor
 from poise.training.running.provenance import Circumstances
@@ -79,7 +80,7 @@ def test_the_summary_has_what_readers_rely_on(tmp_path: Path, in_process: type[I
     console = Console(file=text, width=140)
     evaluate(BOTH, write_suite(tmp_path, ENVELOPE), out=out, seed=2, console=console)
     summary = json.loads((out / "summary.json").read_text())
-    assert set(Summary.__annotations__) | set(Circumstances.__annotations__) == set(summary)
+    assert set(summary) == Summary.__required_keys__ > Circumstances.__required_keys__
     for entry in summary["controllers"].values():
         assert {
             "trials", "recovered", "recovered_rate", "recovered_ci95", "solver_failures",
@@ -96,6 +97,13 @@ def test_the_summary_has_what_readers_rely_on(tmp_path: Path, in_process: type[I
         assert (out / name).read_bytes().startswith(b"\x89PNG")
         assert str(out / name) in text.getvalue()
     assert "mean J50 [N·s]" in text.getvalue() and "zero against momentum-qp" in text.getvalue()
+
+
+def test_the_summary_tells_a_level(tmp_path: Path, in_process: type[InProcess]) -> None:
+    suite = write_suite(tmp_path, RANDOM)
+    evaluate(["zero"], suite, out=tmp_path / "out", trials=1, realism="late+arms")
+    summary = read_summary(tmp_path / "out/summary.json")
+    assert summary["realism"] == "late+arms"
 
 
 def test_a_stopped_evaluation_ends_as_if_it_had_not_been(
