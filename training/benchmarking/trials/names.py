@@ -10,7 +10,7 @@ from poise.configs.errors import ConfigError, meant, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.reading import is_file, is_folder
 from poise.configs.texts import check_shown
-from poise.envs.sensing.realism import IDEAL, level_names
+from poise.envs.sensing.realism import level_names
 
 NO_CONTROL = "zero"
 
@@ -30,7 +30,7 @@ def check_names(
     for kind, name in given.items():
         if name is not None:
             resolve(kind, name)
-    for name in level_names(realism or IDEAL):
+    for name in () if realism is None else level_names(realism):
         resolve("realism", name)
     for name in controllers:
         check_name(name)
