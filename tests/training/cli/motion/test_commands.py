@@ -116,6 +116,7 @@ def test_steps_are_joined_and_put_together(
         (["info", "nothing"], "clip: no such name: 'nothing'; give a path to a .bvh file, a"),
         (["info", "nothing.bvh"], "clip: no such file: 'nothing.bvh'"),
         (["follow", "squat ->"], 'script: line 1, column 9: after "->" a motion is missing'),
+        (["follow", "squat -> jump"], "script: line 1, column 10: no motion 'jump' (choices:"),
         (["follow", "kick"], "motion: the feet of 'kick' leave the ground"),
         (["check", "kick", "--qp"], "kick: qp: is not for motions with steps"),
         (
