@@ -31,6 +31,7 @@ from poise.configs.errors import ConfigError, shown
 from poise.configs.files import packaged, resolve
 from poise.configs.schema import build, on_base, read_yaml
 from poise.envs.robots.robot import Robot
+from poise.envs.sensing.realism import Realism
 
 from .allowance import is_plugin
 from .controller import Controller
@@ -78,6 +79,13 @@ def controller_config(controller: str | Path | Mapping[str, object]) -> Controll
     if isinstance(config, PluginConfig):  # with the hash of what is there now
         return plugin_config(config.name, config.arguments)
     return config
+
+
+def is_replaced(config: object, level: Realism) -> bool:
+    """Whether another controller takes the place of this one at a level, see `where_uncertain`."""
+    if not isinstance(config, CaptureStepConfig) or config.uncertain is None:
+        return False
+    return level.uncertain and level.misplaced >= config.uncertain_from
 
 
 def where_uncertain(config: object, source: str = "controller") -> CaptureStepConfig | None:
@@ -176,10 +184,9 @@ def _build(data: dict[str, object], source: str) -> ControllerConfig:
     `step_qp` one of the momentum QP.
     """
     bases = RIVALS if data.get("kind") == "policy-file" else "controllers"
-    given = "uncertain" in data
+    not_given = {"uncertain", "uncertain_from"} - data.keys()
     data = on_base(data, bases, source, parts=("qp", "step_qp"))
-    if not given:
-        data.pop("uncertain", None)
+    data = {name: value for name, value in data.items() if name not in not_given}
     kind = data.get("kind", "momentum-qp")
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigError(

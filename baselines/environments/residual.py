@@ -15,6 +15,7 @@ from poise.baselines.balance.references.tempo import TIME, Pace, Tempo
 from poise.baselines.controller import Controller, Targets, as_base_controller
 from poise.baselines.registry import (
     ControllerConfig,
+    is_replaced,
     load_controller,
     performing_controllers,
     where_uncertain,
@@ -208,10 +209,10 @@ class ResidualBalanceEnv(ControlledEnv):
         if not any(self._controller is own for own in (self._known, self._stand_in)):
             return  # a user has put another one in its place
         wanted = self._known
-        if self.realism.uncertain:
+        config = getattr(wanted, "config", None)
+        if is_replaced(config, self.realism):
             if self._stand_in is None:
-                other = where_uncertain(getattr(wanted, "config", None))
-                self._stand_in = load_controller(other or wanted, self.robot)
+                self._stand_in = load_controller(where_uncertain(config) or wanted, self.robot)
             wanted = self._stand_in
         if wanted is not self._controller:
             self.controller = wanted

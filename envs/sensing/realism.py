@@ -180,6 +180,15 @@ class Realism:
         return not exact or bool(np.any(self.motors.backlash))
 
     @property
+    def misplaced(self) -> float:
+        """What no filter takes out of legs' attitude: b_encoder + backlash + b_tilt at most [rad].
+
+        Times the leg's length it is how far beside itself a sole is believed.
+        """
+        biases = self.sensors.encoder_bias, self.motors.backlash, self.sensors.tilt_bias
+        return sum(float(np.max(np.abs(bias))) for bias in biases)
+
+    @property
     def bumpy(self) -> bool:
         """True where there may be bumps, of which the model must be built."""
         return bool(np.any(self.ground.bumps))

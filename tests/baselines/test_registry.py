@@ -2,11 +2,17 @@
 
 import pytest
 
-from poise.baselines.registry import controller_config, load_controller, where_uncertain
+from poise.baselines.registry import (
+    controller_config,
+    is_replaced,
+    load_controller,
+    where_uncertain,
+)
 from poise.baselines.whole_body.gains import MomentumQPConfig
 from poise.configs.errors import ConfigError
 from poise.configs.files import packaged
 from poise.configs.schema import to_dict
+from poise.envs.sensing.realism import load_realism
 from tests.support.shared import robot
 
 
@@ -53,6 +59,36 @@ def test_what_takes_its_place_is_not_handed_on(tmp_path):
     assert where_uncertain(controller_config("momentum-qp")) is None
     path.write_text("base: walk\nuncertain: walk-fast\n")
     assert where_uncertain(controller_config(path)) == controller_config("walk-fast")
+
+
+@pytest.mark.parametrize(
+    ("level", "replaced"),
+    [
+        ("ideal", ()),
+        ("late", ()),
+        ("lab", ("walk",)),
+        ("field", ("walk", "feedback-step")),
+        ({"body": {"payload": 0.1}}, ("walk",)),
+        ({"sensors": {"tilt_bias": [0.0, 0.015], "encoder_bias": 0.004}}, ("walk",)),
+        (
+            {"sensors": {"tilt_bias": 0.01, "encoder_bias": 0.006}, "motors": {"backlash": 0.005}},
+            ("walk", "feedback-step"),
+        ),
+    ],
+)
+def test_it_takes_its_place_from_some_error_of_the_legs_on(level, replaced):
+    """`walk` at any error of sensors and bodies, `feedback-step` from 0.02 rad on."""
+    for name in ("walk", "feedback-step"):
+        assert is_replaced(controller_config(name), load_realism(level)) is (name in replaced)
+
+
+def test_from_where_on_is_not_handed_on(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("base: feedback-step\nuncertain: feedback-step-field\n")
+    assert controller_config("feedback-step").uncertain_from == 0.02
+    assert controller_config(path).uncertain_from == 0.0
+    path.write_text("base: feedback-step\n")
+    assert controller_config(path).uncertain_from == 0.0
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ def controller_fingerprint(config: TrainConfig) -> str:
         return ""
     below = controller_config(config.controller)
     if isinstance(below, CaptureStepConfig):
-        below = replace(below, uncertain=None)
+        below = replace(below, uncertain=None, uncertain_from=0.0)
     return hashlib.sha256(to_yaml(below).encode()).hexdigest()
 
 

@@ -50,7 +50,8 @@ class Gains:
 
     def __init__(self, controller: str, ranges: Mapping[str, tuple[float, float]], robot: str):
         self.start = to_dict(controller_config(controller))
-        self.start.pop("uncertain", None)  # it is this controller's gains that are searched
+        for stand_in in ("uncertain", "uncertain_from"):  # this controller's gains are searched
+            self.start.pop(stand_in, None)
         self.gains: list[Gain] = []
         body, numbers = load_robot(robot), _numbers(self.start)
         for path, (low, high) in ranges.items():

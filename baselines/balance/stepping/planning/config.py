@@ -184,8 +184,9 @@ class CaptureStepConfig:
 
     kind: Literal["capture-step"] = "capture-step"
     # The controller that takes its place at levels of realism whose sensors err or whose bodies are
-    # drawn; a `base` does not hand it on.
+    # drawn, if joints and IMU may err by `uncertain_from` [rad]; a `base` hands neither on.
     uncertain: str | None = field(default=None, metadata={"omit": "default"})
+    uncertain_from: float = field(default=0.0, metadata={"min": 0.0, "omit": "default"})
     # The first step begins when ξ's distance outside the CoP region of both soles, plus
     # `momentum_gain` · ω L/(m g), is above `step_margin`; L is the angular momentum in the sense of
     # the fall: hips that turn the trunk already have given what they can.
