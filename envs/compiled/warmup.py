@@ -9,8 +9,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
@@ -75,7 +75,10 @@ def _compile_apart(module: str, parts: Sequence[str]) -> bool:
     try:
         for first in range(count):
             share = tuple(parts[first::count])
-            code = f"{_WATCH}from {__name__} import compile_here; compile_here({module!r}, {share})"
+            code = (
+                f"{_WATCH}import {module} as functions; from {__name__} import compile_here; "
+                f"compile_here(functions, {share})"
+            )
             jobs.append(
                 subprocess.Popen(  # -P: no modules from the current folder
                     [sys.executable, "-P", "-c", code],
@@ -92,15 +95,14 @@ def _compile_apart(module: str, parts: Sequence[str]) -> bool:
             job.stdin.close()
 
 
-def compile_here(module: str, parts: Sequence[str]) -> None:
+def compile_here(module: ModuleType, parts: Sequence[str]) -> None:
     """This process compiles these parts, one after the other, and ends soon after."""
     begin()
-    functions = import_module(module)
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)  # looking for garbage of Numba's takes a tenth of the time
     for part in parts:
-        getattr(functions, part)()
-        end(module, part)
+        getattr(module, part)()
+        end(module.__name__, part)
 
 
 def begin() -> None:
