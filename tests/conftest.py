@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes.util
 import functools
+import gc
 import os
 import sys
 
@@ -19,6 +20,8 @@ sys.dont_write_bytecode = False
 if sys.platform == "linux":
     off_screen = "osmesa" if ctypes.util.find_library("OSMesa") else "egl"
     os.environ.setdefault("MUJOCO_GL", off_screen)
+
+gc.disable()  # until all is collected, or what stays would be searched for garbage again and again
 
 import poise.envs  # noqa: E402, F401 - before any test imports MuJoCo: it sees to OSMesa
 
@@ -51,9 +54,17 @@ def few_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("poise.training.pictures.figures.video.RATE", 5.0)
 
 
+#: parts of `environments/kernels.py`, in such an order that two processes have as much to do
+KERNELS = ("planner", "contacts", "walking", "sensing", "whole", "performing", "rows")
+
+
 def pytest_sessionstart(session):
-    """Compile the kernels in a process of their own, so that this one and its children agree."""
+    """Compile the kernels in processes of their own, so that this one and its children agree."""
     from poise.baselines.warmup import prepare
 
-    prepare("contacts", "planner")
-    prepare("walking", "performing", "whole", "rows")  # once, and not in each of xdist's processes
+    prepare(*KERNELS)  # once, and not in each of xdist's processes
+
+
+def pytest_collection_finish(session):
+    """Tests have the collector of garbage as anybody has."""
+    gc.enable()

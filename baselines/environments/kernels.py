@@ -153,3 +153,8 @@ def performing() -> None:
     tick = controller.around(controller.blocks(state, controller.resting(state)), targets)
     address_of(perform_tick, tick)
     env.bind(tick, NO_KERNEL)
+
+
+def sensing() -> None:
+    """Sensors, motors and what is believed of the state, where they are not ideal."""
+    ResidualBalanceEnv(realism="lab", duration=0.1).reset(seed=0)

@@ -4,10 +4,13 @@ Several at once are done sooner than one, and a user is told once that this take
 """
 
 import contextlib
+import gc
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 
 from poise.configs.errors import PoiseError
 from poise.configs.files import write_atomic
@@ -22,8 +25,9 @@ _tried: set[str] = set()  # parts that this process has had compiled, or could n
 def fill_cache(module: str, *groups: Sequence[str]) -> None:
     """Compile what is missing: each group is a list of functions of `module`, its parts.
 
-    The parts of a group are compiled at the same time, in a process each, and use the kernels of
-    the groups before it. Where no cache can be written, nothing happens.
+    The parts of a group are compiled at the same time, and use the kernels of the groups before
+    it. Each processor has a process, which takes every so many-th part of the group in turn: those
+    that take longest should stand first. Where no cache can be written, nothing happens.
     """
     if _compiling or jit.CACHE is None:
         return
@@ -65,12 +69,15 @@ threading.Thread(target=watch, daemon=True).start()
 
 def _compile_apart(module: str, parts: Sequence[str]) -> bool:
     """Return whether all processes finished without an error; Ctrl-C reaches this one alone."""
+    usable = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))
+    count = min(len(parts), len(usable(0)))
     jobs: list[subprocess.Popen] = []
     try:
-        for part in parts:
+        for first in range(count):
+            share = tuple(parts[first::count])
             code = (
-                f"{_WATCH}from {__name__} import begin, end; begin();"
-                f"from {module} import {part}; {part}(); end({module!r}, {part!r})"
+                f"{_WATCH}import {module} as functions; from {__name__} import compile_here; "
+                f"compile_here(functions, {share})"
             )
             jobs.append(
                 subprocess.Popen(  # -P: no modules from the current folder
@@ -86,6 +93,16 @@ def _compile_apart(module: str, parts: Sequence[str]) -> bool:
             job.wait()
             assert job.stdin is not None  # a pipe
             job.stdin.close()
+
+
+def compile_here(module: ModuleType, parts: Sequence[str]) -> None:
+    """This process compiles these parts, one after the other, and ends soon after."""
+    begin()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 100)  # looking for garbage of Numba's takes a tenth of the time
+    for part in parts:
+        getattr(module, part)()
+        end(module.__name__, part)
 
 
 def begin() -> None:

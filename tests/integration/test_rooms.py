@@ -98,25 +98,28 @@ def modules() -> dict[str, str]:
     return {f"poise.{name}": path for name, path in names.items()}
 
 
-def imports(path: str, *, late: bool = True) -> Iterator[tuple[str, str]]:
+@cache
+def imports(path: str, *, late: bool = True) -> tuple[tuple[str, str], ...]:
     """(module, name) of everything that a file imports; with `late` also inside of functions."""
     package = ".".join(["poise", *path.split("/")[:-1]])
     tree = sources()[path]
     inside = {
         id(node)
         for function in ast.walk(tree)
-        if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
+        if not late and isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
         for node in ast.walk(function)
     }
+    found: list[tuple[str, str]] = []
     for node in ast.walk(tree):
-        if not late and id(node) in inside:
+        if id(node) in inside:
             continue
         if isinstance(node, ast.Import):
-            yield from ((alias.name, "") for alias in node.names)
+            found += [(alias.name, "") for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             relative = "." * node.level + (node.module or "")
             base = importlib.util.resolve_name(relative, package) if node.level else relative
-            yield from ((base, alias.name) for alias in node.names)
+            found += [(base, alias.name) for alias in node.names]
+    return tuple(found)
 
 
 def imported_files(path: str) -> Iterator[tuple[str, str]]:

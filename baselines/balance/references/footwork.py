@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+import scipy  # loads its parts when they are first asked for
 from scipy.linalg import solve_banded
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
 from scipy.spatial.transform import Rotation
 
 from poise.configs.errors import ConfigError
@@ -205,10 +205,10 @@ def _smoothed(turns: np.ndarray, width: float) -> np.ndarray:
     """Turns (F, 3) as large as they were at their peaks, without their corners."""
     size = 2 * int(width) + 1
     wide = np.where(
-        np.abs(low := minimum_filter1d(turns, size, axis=0))
-        > np.abs(high := maximum_filter1d(turns, size, axis=0)), low, high,
+        np.abs(low := scipy.ndimage.minimum_filter1d(turns, size, axis=0))
+        > np.abs(high := scipy.ndimage.maximum_filter1d(turns, size, axis=0)), low, high,
     )  # fmt: skip
-    return np.asarray(gaussian_filter1d(wide, width, axis=0))
+    return np.asarray(scipy.ndimage.gaussian_filter1d(wide, width, axis=0))
 
 
 def _led(com: np.ndarray, frames: int) -> np.ndarray:

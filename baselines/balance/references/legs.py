@@ -146,7 +146,10 @@ def foot_signs(robot: Robot) -> np.ndarray:
     return np.array([sign, -sign])
 
 
-def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+AnkleLimits = tuple[np.ndarray, np.ndarray, np.ndarray]  # as `ankle_limits` returns them
+
+
+def ankle_limits(robot: Robot, sole: int) -> AnkleLimits:
     """N (k, 2), o (k,), b (k,): |N p − o| ≤ b/λ for a CoP p [m, sole frame] under a load of λ m g.
 
     One row for each motor joint of the foot itself: the moment of a vertical force about its axis
@@ -162,9 +165,10 @@ def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.nd
     weight = robot.units.force
     normals, offsets, bounds = [], [], []
     for joint in range(model.njnt):
-        dof = model.jnt_dofadr[joint]
-        motor = np.flatnonzero(np.asarray(robot.motor_dofs) == dof)
-        if model.jnt_bodyid[joint] != body or len(motor) == 0:
+        if model.jnt_bodyid[joint] != body:
+            continue
+        motor = np.flatnonzero(robot.motor_dofs == model.jnt_dofadr[joint])
+        if len(motor) == 0:
             continue
         axis, anchor = data.xaxis[joint], data.xanchor[joint]
         # (axis × (point + R p − anchor))_z, affine in p
@@ -174,13 +178,16 @@ def ankle_limits(robot: Robot, sole: int) -> tuple[np.ndarray, np.ndarray, np.nd
     return np.reshape(normals, (-1, 2)), np.array(offsets), np.array(bounds)
 
 
-def bearing_polygon(robot: Robot, sole: int, load: float, fraction: float) -> np.ndarray:
+def bearing_polygon(
+    robot: Robot, sole: int, load: float, fraction: float, limits: AnkleLimits | None = None
+) -> np.ndarray:
     """(k, 2) where a sole under a `load` [m g] can have its CoP, in its own frame [m].
 
-    Only `fraction` of the polygon and of the ankles' torques counts.
+    Only `fraction` of the polygon and of the ankles' torques counts. `limits` are those of
+    `ankle_limits`, for whoever asks about many loads.
     """
     polygon = fraction * robot.soles[sole].polygon
-    for normal, offset, bound in zip(*ankle_limits(robot, sole), strict=True):
+    for normal, offset, bound in zip(*(limits or ankle_limits(robot, sole)), strict=True):
         room = fraction * bound / max(load, 1e-3)
         polygon = clipped(polygon, normal, offset + room)
         polygon = clipped(polygon, -normal, room - offset)

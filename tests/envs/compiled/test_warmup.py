@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -60,3 +62,44 @@ def test_a_record_that_says_nothing_counts_for_nothing(asked, record: str | None
         warmup._record(MODULE, "solver").write_text(record)
     warmup.fill_cache(MODULE, ("solver",))
     assert asked == [["solver"]]
+
+
+@pytest.mark.parametrize(
+    ("processors", "shares"),
+    [(1, ["abcde"]), (2, ["ace", "bd"]), (8, ["a", "b", "c", "d", "e"])],
+)
+def test_each_processor_has_a_process(
+    processors: int, shares: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every part is compiled once, in the order of the group."""
+    started: list[str] = []
+
+    class Process:
+        stdin = io.BytesIO()
+
+        def __init__(self, command: list[str], **_: object):
+            started.append(command[-1].rpartition("; ")[2])
+
+        def wait(self) -> int:
+            return 0
+
+        kill = wait
+
+    monkeypatch.setattr(warmup.subprocess, "Popen", Process)
+    monkeypatch.setattr(warmup.os, "sched_getaffinity", lambda _: set(range(processors)), False)
+    assert warmup._compile_apart("module", tuple("abcde"))
+    assert started == [f"compile_here(functions, {tuple(share)})" for share in shares]
+
+
+def test_a_part_is_noted_when_it_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that ends in the middle of its second part has the first one noted."""
+    done: list[str] = []
+    module = ModuleType("parts")
+    module.first = lambda: done.append("compiled")
+    module.second = lambda: done.append(1 / 0)
+    monkeypatch.setattr(warmup, "end", lambda module, part: done.append(f"{module}.{part}"))
+    for name in ("begin", "gc.freeze", "gc.set_threshold"):
+        monkeypatch.setattr(f"{warmup.__name__}.{name}", lambda *_: None)
+    with pytest.raises(ZeroDivisionError):
+        warmup.compile_here(module, ("first", "second"))
+    assert done == ["compiled", "parts.first"]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from poise.baselines.balance.references.legs import bearing_polygon, nominal_feet
+from poise.baselines.balance.references.legs import ankle_limits, bearing_polygon, nominal_feet
 from poise.envs.compiled.copies import Copyable
 from poise.envs.compiled.jit import compiled
 from poise.envs.compiled.maths.polygons import convex_hull, stacked
@@ -111,6 +111,7 @@ class CopRegion(Copyable):
 
     def __init__(self, robot: Robot, fraction: float = 0.95):
         self.robot, self._fraction = robot, fraction
+        self._limits = [ankle_limits(robot, i) for i in range(len(robot.soles))]
         self.alone = [self._under(i, 1.0) for i in range(len(robot.soles))]
         self.middle = [polygon.mean(axis=0) for polygon in self.alone]
         if len(robot.soles) == 2:
@@ -126,7 +127,7 @@ class CopRegion(Copyable):
             )
 
     def _under(self, sole: int, load: float) -> np.ndarray:
-        return bearing_polygon(self.robot, sole, load, self._fraction)
+        return bearing_polygon(self.robot, sole, load, self._fraction, self._limits[sole])
 
     def _sum(self, load: float) -> np.ndarray:
         first, second = load * self._under(0, load), (1.0 - load) * self._under(1, 1.0 - load)

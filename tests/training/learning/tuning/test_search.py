@@ -22,6 +22,7 @@ from poise.training.learning.tuning.candidates import Candidate, follow, play, w
 from poise.training.learning.tuning.gains import Gains
 from poise.training.learning.tuning.search import GAINS, HISTORY, TuneConfig, tune, tune_config
 from poise.training.learning.tuning.tasks import TuningPushes, TuningWalks
+from tests.support.evaluations import InProcess
 from tests.support.rivals import KNOWN, allowed, network
 from tests.support.shared import robot
 
@@ -36,6 +37,13 @@ def small(**changes):
         "population": 4,
     }
     return TuneConfig(**{**settings, **changes})
+
+
+@pytest.fixture
+def in_process(monkeypatch):
+    """Candidates are played in this process."""
+    monkeypatch.setattr("poise.training.learning.tuning.search.Executor", InProcess)
+    InProcess.played, InProcess.stop_after = 0, None
 
 
 @pytest.fixture(scope="module")
@@ -152,11 +160,13 @@ def test_ranges_the_wrong_way_round():
             build(TuneConfig, {**data, "gains": gains}, "file")
 
 
-def test_a_search_resumes_as_if_nothing_had_happened(tmp_path):
+def test_a_search_resumes_as_if_nothing_had_happened(tmp_path, monkeypatch):
     """Two generations and one more are three, bit for bit, with any number of workers."""
     once, twice = tmp_path / "once", tmp_path / "twice"
-    found = tune(small(), once, workers=1)
     tune(small(generations=2), twice, workers=2)
+    monkeypatch.setattr("poise.training.learning.tuning.search.Executor", InProcess)
+    monkeypatch.setattr(InProcess, "stop_after", None)
+    found = tune(small(), once)
     with pytest.raises(ConfigError, match="--resume"):
         tune(small(), twice)
     with pytest.raises(ConfigError) as error:
@@ -198,7 +208,7 @@ def test_a_range_reaches_to_where_the_search_starts(tmp_path):
     assert gains.at(np.zeros(1))["com"]["stiffness"] == pytest.approx(0.2)
 
 
-def test_a_search_ends_when_its_minutes_are_over(tmp_path, capsys):
+def test_a_search_ends_when_its_minutes_are_over(tmp_path, capsys, in_process):
     """One generation is played, then none that would end late; the rest by `resume`."""
     tune(small(), tmp_path / "short", workers=1, minutes=1e-6, console=Console())
     said = capsys.readouterr().out
@@ -262,7 +272,7 @@ def test_a_walk_is_worth_what_it_does_of_what_it_is_told():
     assert of(0.5, step_time=4.9) == 0.0
 
 
-def test_a_search_for_a_walk(tmp_path):
+def test_a_search_for_a_walk(tmp_path, in_process):
     """It is told as pushes are, and goes on from its file."""
     console = Console(record=True, width=200)
     tune(walking(), tmp_path, workers=1, console=console)
