@@ -401,10 +401,10 @@ def test_list_names_what_is_packaged(capsys: pytest.CaptureFixture[str]) -> None
         assert [entry["name"] for entry in told[kind]] == packaged(kind)
         assert all(each["about"] for each in told[kind]) or kind == "limits", kind
     (torque,) = [entry for entry in told["policies"] if entry["name"] == "residual-torque"]
-    assert (torque["robot"], torque["j50"], torque["on"]) == ("humanoid", 38.2, "feedback-step")
+    assert (torque["robot"], torque["j50"], torque["on"]) == ("humanoid", 38.1, "feedback-step")
     assert main(["list"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert "residual-torque humanoid 38.2 targets, steps feedback-step the default" in shown
+    assert "residual-torque humanoid 38.1 targets, steps feedback-step the default" in shown
 
 
 def test_j50_of_the_list_is_that_of_the_leaderboards() -> None:
