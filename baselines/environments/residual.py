@@ -212,7 +212,9 @@ class ResidualBalanceEnv(ControlledEnv):
         config = getattr(wanted, "config", None)
         if is_replaced(config, self.realism):
             if self._stand_in is None:
-                self._stand_in = load_controller(where_uncertain(config) or wanted, self.robot)
+                other = where_uncertain(config)
+                assert other is not None  # as it is replaced
+                self._stand_in = load_controller(other, self.robot)
             wanted = self._stand_in
         if wanted is not self._controller:
             self.controller = wanted

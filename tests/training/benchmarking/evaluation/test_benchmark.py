@@ -34,7 +34,6 @@ from poise.training.benchmarking.trials.trial import Conditions, Trial
 from poise.training.benchmarking.trials.variants import AgentVariants
 from poise.training.cli.entry import main
 from poise.training.learning.policy import load_policy
-from poise.training.pictures.report import page
 from tests.support.benchmarks_small import TRIALS, InProcessExecutor, play_in_process, write_small
 from tests.support.shared import robot
 
@@ -223,7 +222,6 @@ def test_a_controller_that_raises_costs_its_trial_alone(
 ) -> None:
     """The trial is recorded with seed and error, the others go on, the exit code is 1."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(page, "can_draw", lambda: "no pictures in this test")
     (tmp_path / "flaky.py").write_text(FLAKY)
     suite = write_small(tmp_path)
     command = ["benchmark", "--suite", str(suite), "--out", "out", "--controllers"]

@@ -272,7 +272,7 @@ def test_a_walk_is_worth_what_it_does_of_what_it_is_told():
     assert of(0.5, step_time=4.9) == 0.0
 
 
-def test_a_search_for_a_walk(tmp_path, in_process):
+def test_a_search_for_a_walk(tmp_path):
     """It is told as pushes are, and goes on from its file."""
     console = Console(record=True, width=200)
     tune(walking(), tmp_path, workers=1, console=console)
