@@ -56,7 +56,8 @@ class RetargetedClip(NamedTuple):
         stride: by which steps are shorter than the legs' scale has them; 1 without steps.
         begins: when the clip begins in the motion [s].
         tempo: how many times as fast as the clip it is.
-        walker: the packaged controller that performs it by walking; empty where none is needed.
+        walker: the packaged controller or policy that performs it by walking; empty where none is
+            needed.
         flight: share of the time that the clip is in the air.
         bound: as of `Retargeted`.
     """

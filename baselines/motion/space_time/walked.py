@@ -16,10 +16,10 @@ from poise.envs.robots.robot import Robot
 FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, toes are unclear
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 LONGEST = 0.72  # [h] of a step: further, robots fall
-WALK, WALK_FAST = "walk", "walk-fast"  # controllers
-STEADY, FASTEST = 0.45, 0.585  # [hω] of a walk by each of them: faster, robots fall
-FAST_ROBOTS = ("humanoid",)  # on which the latter's gains were searched; others fall
-BANK = 0.07  # [g] of speed times turning rate, above which robots fall
+WALK, WALK_FAST = "walk", "residual-walk-fast"  # a controller, a policy
+STEADY, FASTEST = 0.45, 0.66  # [hω] of a walk by each of them: faster, robots fall
+FAST_ROBOTS = ("humanoid",)  # on which the latter was trained; others fall
+BANK = 0.09  # [g] of speed times turning rate, above which robots fall
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
@@ -30,7 +30,7 @@ BOTH = 0.13  # [1/ω] that planners stand on both feet between two swings
 
 class Walked(NamedTuple):
     """Commands (n, 5) in the clip's time, how many times as fast as the clip that is, and the
-    packaged controller that walks so."""
+    packaged controller or policy that walks so."""
 
     commands: np.ndarray
     tempo: float
