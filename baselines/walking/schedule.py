@@ -16,6 +16,7 @@ from poise.envs.physics.pushes.sampler import Range
 from .planner.command import ENTRIES, GaitCommand
 
 MOST_COMMANDS = 256  # of an episode
+AXES = ("ahead", "left", "turn")  # which one number may fix
 SOON = 1e-9  # [s] by which times may round
 
 
@@ -39,12 +40,14 @@ class CommandSampler:
         turn: Range of the commanded turning rate to the left [rad/s].
         interval: Range of the time after which another command is drawn [s]; None: one holds
             throughout.
+        stand: Fraction of the commands that are to stand.
     """
 
     ahead: Range = (0.5, 0.5)
     left: Range = (0.0, 0.0)
     turn: Range = (0.0, 0.0)
     interval: Range | None = field(default=None, metadata={"above": 0.0})
+    stand: float = field(default=0.0, metadata={"min": 0.0, "max": 1.0, "omit": "default"})
 
     def __post_init__(self) -> None:
         for name in ("ahead", "left", "turn", "interval"):
@@ -69,6 +72,8 @@ class CommandSampler:
 
     def _draw(self, rng: np.random.Generator, start: float) -> TimedCommand:
         ahead, left, turn = (float(rng.uniform(*r)) for r in (self.ahead, self.left, self.turn))
+        if self.stand > 0.0 and rng.random() < self.stand:
+            return TimedCommand(0.0, 0.0, 0.0, start)
         return TimedCommand(ahead, left, turn, start)
 
 
@@ -92,7 +97,7 @@ def command_sampler(value: object) -> CommandSampler:
     data = {str(key): to_dict(entry) for key, entry in value.items()}
     alone = (int, float)
     ranges = {
-        key: [entry, entry] if isinstance(entry, alone) and key != "interval" else entry
+        key: [entry, entry] if isinstance(entry, alone) and key in AXES else entry
         for key, entry in data.items()
     }
     return build(CommandSampler, ranges, "command")

@@ -78,6 +78,18 @@ def test_commands_are_drawn_from_the_ranges():
     assert len(sampler.sample(np.random.default_rng(4), 1e6)) == MOST_COMMANDS
 
 
+def test_a_fraction_of_the_commands_is_to_stand():
+    rng = np.random.default_rng(4)
+    sampler = command_sampler({"ahead": [0.2, 0.8], "interval": [2.0, 5.0], "stand": 0.3})
+    ahead = [command.ahead for command in sampler.sample(rng, 1e6)]
+    assert 0.2 < ahead.count(0.0) / len(ahead) < 0.4
+    assert all(value == 0.0 or 0.2 <= value <= 0.8 for value in ahead)
+    always = command_sampler({"ahead": 0.5, "turn": 0.2, "stand": 1.0}).sample(rng, 9.0)
+    assert always == (TimedCommand(),)
+    with pytest.raises(ConfigError, match=r"command: stand: must be at most 1"):
+        command_sampler({"stand": 1.5})
+
+
 def test_a_command_comes_at_its_time():
     """The latest whose time has come; an empty timetable leaves what was set by hand."""
     clock, command = np.zeros(1, dtype=np.int64), np.zeros(3)
