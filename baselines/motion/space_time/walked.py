@@ -17,9 +17,10 @@ FLIGHT = 0.05  # [s] without a foot on the ground: longer is no walk; shorter, t
 TOGETHER = 0.15  # [s] before a jump, in which both feet stand
 LONGEST = 0.72  # [h] of a step: further, robots fall
 WALK, WALK_FAST = "walk", "residual-walk-fast"  # a controller, a policy
-STEADY, FASTEST = 0.45, 0.66  # [hω] of a walk by each of them: faster, robots fall
+STEADY, FASTEST = 0.45, 0.645  # [hω] of a walk by each of them: faster, robots fall
 FAST_ROBOTS = ("humanoid",)  # on which the latter was trained; others fall
-BANK = 0.09  # [g] of speed times turning rate, above which robots fall
+ASIDE, SPIN = 0.25, 0.19  # of the speed ahead to a side, [ω] of turning, to which it was trained
+BANK, BANK_FAST = 0.07, 0.09  # [g] of speed times turning rate, above which robots fall
 BRISK, QUICK = 0.4, 1.2  # [hω] from which steps last [1/ω] at most: longer ones, and robots fall
 LEAST, LEAST_TURN = 0.05, 0.1  # [hω], [rad/s]: slower is no walk
 BEND, MOST_TURN = 0.065, 0.45  # [hω], [rad] by which velocity and heading turn in a step, at most
@@ -39,7 +40,7 @@ class Walked(NamedTuple):
 
 def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) -> Walked:
     """The velocity along the heading [m/s], the turning rate [rad/s] and the time of a swing [s] of
-    a clip, step by step.
+    a clip, step by step; a time of 0 is that of the walker's gait.
 
     Both are means over two steps, times `scale`, the ratio of the legs. Where the clip is too fast
     for legs to follow, all is slower. Where it bends too sharply, steps are shorter and quicker. A
@@ -66,14 +67,19 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
     speed = np.hypot(ahead, left)
     if speed.max() < LEAST * h * omega and np.abs(turn).max() < LEAST_TURN:
         raise ConfigError("its feet step, but go nowhere", source=clip.name, field="feet")
-    fastest = (FASTEST if robot.name in FAST_ROBOTS else STEADY) * h * omega
+    brisk = speed > STEADY * h * omega
+    fast = robot.name in FAST_ROBOTS and bool(brisk.any())
+    fast = fast and bool((np.abs(left) <= ASIDE * ahead)[brisk].all())
+    fastest = (FASTEST if fast else STEADY) * h * omega
     tempo = min(fastest / max(float(speed.max()), 1e-9), 1.0)
-    bend, most = float(np.abs(speed * turn).max()), BANK * robot.units.gravity
-    bends = tempo * tempo * bend > most
-    tempo = np.sqrt(most / bend) if bends else tempo
+    bend = float(np.abs(speed * turn).max())
+    most = (BANK_FAST if fast else BANK) * robot.units.gravity
+    tempo = min(tempo, np.sqrt(most / max(bend, 1e-9)))
+    if fast:
+        tempo = min(tempo, SPIN * omega / max(float(np.abs(turn).max()), 1e-9))
     if tempo < least:
-        in_curves = f" in its curves ({most:.2f} m/s² to a side)" if bends else ""
-        bound = tempo * speed.max() if bends else fastest
+        bound = tempo * speed.max()
+        in_curves = " in curves like its own" if bound < 0.999 * fastest else ""
         raise ConfigError(f"{run}it goes at {speed.max():.2f} m/s, and the planner of walks at "
                           f"{bound:.2f} m/s at most{in_curves}, {tempo:.2f} of it (--speed "
                           f"{tempo:.2f} plays it so)", source=clip.name, field="speed")  # fmt: skip
@@ -85,15 +91,22 @@ def find_commands(clip: Clip, robot: Robot, scale: float, least: float = 0.0) ->
         row[:] = start, ahead[own].mean(), left[own].mean(), turn[own].mean(), period
         rows.append(row)
     commands = faster(np.array(rows), tempo)
+    if fast:
+        commands[:, 4] = 0.0  # it was trained at its gait's own
+        return Walked(commands, tempo, WALK_FAST)
+    commands[:, 4] = _swings(commands, h, omega)
+    return Walked(commands, tempo, WALK)
+
+
+def _swings(commands: np.ndarray, h: float, omega: float) -> np.ndarray:
+    """(n,) the clip's times of a swing [s], quicker where steps would be too long or bend much."""
     going = np.hypot(commands[:, 1], commands[:, 2])
     turning = np.maximum(np.abs(commands[:, 3]), 1e-9)
     limits = [LONGEST * h / np.maximum(going, 1e-9), MOST_TURN / turning,
               BEND * h * omega / np.maximum(going * turning, 1e-9),
               np.where(going > BRISK * h * omega, QUICK / omega, np.inf)]  # fmt: skip
     swing = np.minimum(commands[:, 4], np.min(limits, axis=0)) - BOTH / omega
-    commands[:, 4] = np.clip(swing, QUICKEST / omega, SLOWEST / omega)
-    walker = WALK if going.max() <= STEADY * h * omega else WALK_FAST
-    return Walked(commands, tempo, walker)
+    return np.asarray(np.clip(swing, QUICKEST / omega, SLOWEST / omega))
 
 
 def _run(clip: Clip, planted: np.ndarray) -> str:

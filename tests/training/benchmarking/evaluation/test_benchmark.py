@@ -283,7 +283,7 @@ def test_bad_input_is_refused_and_nothing_is_written(
 def test_everyone_takes_part_by_default() -> None:
     """The reference first, the packaged policies last."""
     names, policies = default_controllers(), packaged_policies("humanoid")
-    walkers = {"residual-walk", "residual-walk-field"}
+    walkers = {"residual-walk", "residual-walk-fast", "residual-walk-field"}
     assert walkers <= set(policies) and not {"walk", *walkers} & set(names)
     policies = [name for name in policies if name not in walkers]
     assert names[0] == "momentum-qp" and len(set(names)) == len(names)

@@ -61,7 +61,8 @@ def test_an_unknown_controller_is_refused_with_the_choices(robot: Robot, name: s
     """The text names what was asked for and what there is."""
     with pytest.raises(
         ConfigError,
-        match="momentum-qp, .*residual-walk, residual-walk-field, residual-whole-g1, "
+        match="momentum-qp, .*residual-walk, residual-walk-fast, "
+        "residual-walk-field, residual-whole-g1, "
         "residual-whole-g1-field, guard-falcon-g1, guard-g1, zero",
     ) as error:
         load_agent(name, robot)
@@ -93,7 +94,7 @@ def test_a_packaged_policy_is_known_by_its_folder(
     assert load_policy("residual-pd").state == load_policy(finished_run() / "last").state
     names = ["ppo-position", "ppo-torque", "residual", "residual-lqr-lip", "residual-pd"]
     names += ["residual-step", "residual-torque", "residual-torque-field"]
-    others = ["residual-walk", "residual-walk-field"]
+    others = ["residual-walk", "residual-walk-fast", "residual-walk-field"]
     others += [f"residual-whole-g1{where}" for where in ("", "-field")]
     assert packaged("policies") == [*names, *others]
     assert default_controllers()[-8:] == tuple(names)
